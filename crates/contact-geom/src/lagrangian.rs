@@ -1,0 +1,168 @@
+//! Lagrangians L(t, q, v, z) and their derivatives.
+
+use crate::points::seed;
+use crate::{Dual, Module, Scalar, Structure, Triple, VelocityPoint};
+use nalgebra::{SMatrix, SVector};
+
+/// A Lagrangian of Herglotz' variational principle, `L : R x TQ x R -> R`, written once as a generic function.
+///
+/// The motion makes the end value of the action critical, where `zdot = L(t, q, qdot, z)`. In the field's signs a
+/// dissipative term is `gamma z` with `gamma < 0`. Every derivative is `value` on duals; a user who has a closed form
+/// overrides [`closed_gradient`](Self::closed_gradient) or [`closed_hessian`](Self::closed_hessian), and all the rest
+/// then uses it. [`check_closed_derivatives`] compares such a form with the derived one.
+///
+/// ```
+/// use contact_geom::{nalgebra::SVector, Lagrangian, Scalar, VelocityPoint};
+/// struct Damped;
+/// impl Lagrangian<1> for Damped {
+///     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+///         v[0] * v[0] * 0.5 - q[0] * q[0] * 0.5 - z * 0.1
+///     }
+/// }
+/// let x = VelocityPoint::new([1.0], [2.0], 0.0);
+/// assert_eq!(Damped.gradient(0.0, &x).y[0], 2.0); // L_v
+/// ```
+pub trait Lagrangian<const N: usize> {
+    /// The value `L(t, q, v, z)`.
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T;
+
+    /// The partial derivatives `(L_q, L_v, L_z)` in closed form, if the implementor has one that is worth it.
+    fn closed_gradient<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+        None
+    }
+
+    /// The second partial derivatives in closed form, if the implementor has one that is worth it.
+    fn closed_hessian<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
+        None
+    }
+
+    /// What is known of this Lagrangian's form; see [`Structure`]. The default claims nothing.
+    fn structure(&self) -> Structure {
+        Structure::default()
+    }
+
+    /// The value and the differential along given directions: the coordinates of `x` carry the directions as duals.
+    /// Not to be overridden: it uses [`closed_gradient`](Self::closed_gradient) where there is one.
+    #[inline]
+    fn along<T: Scalar, D: Module<T>>(&self, t: T, x: &VelocityPoint<N, Dual<T, D>>) -> Dual<T, D> {
+        let base = VelocityPoint { q: x.q.map(|a| a.re), v: x.v.map(|a| a.re), z: x.z.re };
+        match self.closed_gradient(t, &base) {
+            None => self.value(Dual::constant(t), &x.q, &x.v, x.z),
+            Some(g) => {
+                let mut d = x.z.d.each(|a| a * g.z);
+                for i in 0..N {
+                    d = d.join(x.q[i].d, |sum, a| sum + a * g.x[i]).join(x.v[i].d, |sum, a| sum + a * g.y[i]);
+                }
+                Dual { re: self.value(t, &base.q, &base.v, base.z), d }
+            }
+        }
+    }
+
+    /// The partial derivatives `(L_q, L_v, L_z)`. Not to be overridden.
+    #[inline]
+    fn gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Triple<N, T> {
+        self.closed_gradient(t, x).unwrap_or_else(|| derived_gradient(self, t, x))
+    }
+
+    /// The second partial derivatives in `(q, v, z)`. Not to be overridden.
+    #[inline]
+    fn hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Hessian<N, T> {
+        self.closed_hessian(t, x).unwrap_or_else(|| derived_hessian(self, t, x))
+    }
+}
+
+/// The second partial derivatives of a Lagrangian in `(q, v, z)`; `W = vv` in the paper's notation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hessian<const N: usize, T = f64> {
+    /// `d2L / dq_i dq_j`.
+    pub qq: SMatrix<T, N, N>,
+    /// `d2L / dq_i dv_j`.
+    pub qv: SMatrix<T, N, N>,
+    /// `W_ij = d2L / dv_i dv_j`.
+    pub vv: SMatrix<T, N, N>,
+    /// `d2L / dq_i dz`.
+    pub qz: SVector<T, N>,
+    /// `d2L / dv_i dz`.
+    pub vz: SVector<T, N>,
+    /// `d2L / dz2`.
+    pub zz: T,
+}
+
+/// The gradient by automatic differentiation, whatever the implementor overrides.
+#[inline]
+pub fn derived_gradient<T: Scalar, const N: usize>(
+    lagrangian: &(impl Lagrangian<N> + ?Sized),
+    t: T,
+    x: &VelocityPoint<N, T>,
+) -> Triple<N, T> {
+    let s = seed(&Triple::from(*x));
+    lagrangian.value(Dual::constant(t), &s.x, &s.y, s.z).d
+}
+
+/// The second derivatives by automatic differentiation of the gradient, itself derived or in closed form.
+#[inline]
+pub fn derived_hessian<T: Scalar, const N: usize>(
+    lagrangian: &(impl Lagrangian<N> + ?Sized),
+    t: T,
+    x: &VelocityPoint<N, T>,
+) -> Hessian<N, T> {
+    let g = lagrangian.gradient(Dual::constant(t), &seed(&Triple::from(*x)).into());
+    Hessian {
+        qq: SMatrix::from_fn(|i, j| g.x[i].d.x[j]),
+        qv: SMatrix::from_fn(|i, j| g.x[i].d.y[j]),
+        vv: SMatrix::from_fn(|i, j| g.y[i].d.y[j]),
+        qz: SVector::from_fn(|i, _| g.x[i].d.z),
+        vz: SVector::from_fn(|i, _| g.y[i].d.z),
+        zz: g.z.d.z,
+    }
+}
+
+/// How far the closed derivatives that an implementor gives are from the derived ones at a point: the largest difference
+/// of the gradient and of the Hessian, each relative to one plus the largest entry. `None` where nothing is overridden.
+///
+/// A correct closed form gives a few units of round-off; call it in a test of your own, at several points.
+pub fn check_closed_derivatives<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+) -> (Option<f64>, Option<f64>) {
+    let gradient = lagrangian.closed_gradient(t, x).map(|closed| {
+        let derived = derived_gradient(lagrangian, t, x);
+        closed.minus(derived).amax() / (1.0 + derived.amax())
+    });
+    let hessian = lagrangian.closed_hessian(t, x).map(|c| {
+        // Derived from `value` alone, so that a wrong closed gradient cannot hide a wrong Hessian.
+        let d = derived_hessian(&ValueOnly(lagrangian), t, x);
+        let size = 1.0 + d.qq.amax().max(d.qv.amax()).max(d.vv.amax()).max(d.qz.amax()).max(d.vz.amax()).max(d.zz.abs());
+        let blocks = (c.qq - d.qq).amax().max((c.qv - d.qv).amax()).max((c.vv - d.vv).amax());
+        blocks.max((c.qz - d.qz).amax()).max((c.vz - d.vz).amax()).max((c.zz - d.zz).abs()) / size
+    });
+    (gradient, hessian)
+}
+
+/// A Lagrangian without its closed derivatives.
+struct ValueOnly<'a, L>(&'a L);
+
+impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<'_, L> {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        self.0.value(t, q, v, z)
+    }
+}
+
+impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
+    #[inline]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        (**self).value(t, q, v, z)
+    }
+    #[inline]
+    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+        (**self).closed_gradient(t, x)
+    }
+    #[inline]
+    fn closed_hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
+        (**self).closed_hessian(t, x)
+    }
+    fn structure(&self) -> Structure {
+        (**self).structure()
+    }
+}

@@ -1,0 +1,68 @@
+//! Linear systems on the stack, over any scalar.
+
+use crate::{GeometryError, Scalar};
+use nalgebra::{SMatrix, SVector};
+use thiserror::Error;
+
+/// A matrix that has no inverse, or entries that are not finite.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error("singular matrix (pivot {pivot:e})")]
+pub struct SingularMatrix {
+    /// The size of the pivot at which elimination stopped.
+    pub pivot: f64,
+}
+
+impl SingularMatrix {
+    /// The error of the geometry that says which matrix this is in the field's terms, and what to do.
+    pub fn of(self, what: &'static str, remedy: &'static str) -> GeometryError {
+        GeometryError::Singular { what, pivot: self.pivot, remedy }
+    }
+}
+
+/// Solves `a x = b` by elimination with row pivoting, on the stack, over any [`Scalar`]; `a` and `b` are used up.
+///
+/// nalgebra's factorisations ask for a field, which duals are not; and for the sizes of few-body mechanics this is faster
+/// than any library call. Its cost is `N^3 / 3` products.
+///
+/// # Errors
+/// [`SingularMatrix`] where a pivot vanishes or is not finite.
+#[inline]
+pub fn solve<T: Scalar, const N: usize>(
+    a: &mut SMatrix<T, N, N>,
+    b: &mut SVector<T, N>,
+) -> Result<(), SingularMatrix> {
+    for k in 0..N {
+        let mut row = k;
+        for i in k + 1..N {
+            if a[(i, k)].modulus() > a[(row, k)].modulus() {
+                row = i;
+            }
+        }
+        let size = a[(row, k)].modulus();
+        if !(size > 0.0 && size.is_finite()) {
+            return Err(SingularMatrix { pivot: size });
+        }
+        if row != k {
+            a.swap_rows(k, row);
+            b.swap_rows(k, row);
+        }
+        let inverse = a[(k, k)].recip();
+        for i in k + 1..N {
+            let factor = a[(i, k)] * inverse;
+            for j in k + 1..N {
+                let above = a[(k, j)];
+                a[(i, j)] -= factor * above;
+            }
+            let above = b[k];
+            b[i] -= factor * above;
+        }
+    }
+    for k in (0..N).rev() {
+        let mut sum = b[k];
+        for j in k + 1..N {
+            sum -= a[(k, j)] * b[j];
+        }
+        b[k] = sum / a[(k, k)];
+    }
+    Ok(())
+}

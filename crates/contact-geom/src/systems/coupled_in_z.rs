@@ -1,0 +1,74 @@
+//! A Lagrangian in which position, velocity and action are all coupled.
+
+use super::{System, between, versine};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use nalgebra::SVector;
+
+/// A pendulum whose inertia depends on its position and its action, and grows with its speed:
+/// `L = (1 + a cos q cos z) v^2/2 + b v^4/4 - (1 - cos q) + gamma z`, with `|a| < 1` and `b >= 0`. Dimensionless: as
+/// [`Pendulum`](super::Pendulum).
+///
+/// With `m = 1 + a cos q cos z` Herglotz' equation is
+/// `(m + 3 b v^2) q'' = -m_q v^2/2 - m_z v L - sin q + (m v + b v^3) (gamma + m_z v^2/2)`. `W = m + 3 b v^2` depends on all
+/// of q, v and z, and is at least `1 - |a|` everywhere. It has no other structure than to be autonomous: what holds here
+/// holds for every regular L. No formula for H: that of p asks for the root of a cubic.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoupledInZ {
+    /// How much the inertia depends on position and action; below one in absolute value.
+    pub a: f64,
+    /// How much it grows with the speed; not negative.
+    pub b: f64,
+    /// The part of `L_z` that does not depend on the point, negative for dissipation.
+    pub gamma: f64,
+}
+
+impl Default for CoupledInZ {
+    fn default() -> Self {
+        CoupledInZ { a: 0.5, b: 0.1, gamma: -0.1 }
+    }
+}
+
+impl Lagrangian<1> for CoupledInZ {
+    #[inline]
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        let square = v[0] * v[0];
+        let inertia = q[0].cos() * z.cos() * self.a + 1.0;
+        square * (inertia * 0.5 + square * (self.b * 0.25)) - versine(q[0]) + z * self.gamma
+    }
+
+    fn structure(&self) -> Structure {
+        let decoupled = self.a == 0.0;
+        let constant = decoupled && self.b == 0.0;
+        Structure {
+            autonomous: true,
+            z_free: decoupled && self.gamma == 0.0,
+            z_affine: decoupled,
+            separable: constant,
+            quadratic: false,
+            constant_mass: constant,
+        }
+    }
+}
+
+impl System<1> for CoupledInZ {
+    fn name(&self) -> &'static str {
+        "coupled_in_z"
+    }
+
+    fn initial(&self) -> VelocityPoint<1> {
+        VelocityPoint::new([1.0], [1.0], 0.5)
+    }
+
+    fn sample(&self, u: &[f64]) -> (f64, VelocityPoint<1>) {
+        let x = VelocityPoint::new([between(-3.0, 3.0, u[0])], [between(-2.0, 2.0, u[1])], between(-3.0, 3.0, u[2]));
+        (between(0.0, 5.0, u[3]), x)
+    }
+
+    fn hamiltonian<T: Scalar>(&self, _t: T, x: &PhasePoint<1, T>) -> Option<T> {
+        // Without the quartic term the fibre derivative is linear in v.
+        (self.b == 0.0).then(|| {
+            let inertia = x.q[0].cos() * x.z.cos() * self.a + 1.0;
+            x.p[0] * x.p[0] / inertia * 0.5 + versine(x.q[0]) - x.z * self.gamma
+        })
+    }
+}

@@ -1,0 +1,81 @@
+//! The damped double pendulum.
+
+use super::{System, between, versine};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use nalgebra::SVector;
+
+/// The planar double pendulum with linear drag,
+/// `L = (m1 + m2) l1^2 v1^2/2 + m2 l2^2 v2^2/2 + m2 l1 l2 cos(q1 - q2) v1 v2 - V(q) + gamma z` with
+/// `V = (m1 + m2) l1 (1 - cos q1) + m2 l2 (1 - cos q2)`, both angles from the downward vertical. Dimensionless: `g = 1`.
+///
+/// Herglotz' equations are `(W q')' = L_q + gamma W q'`, so the drag acts on the momenta; nonlinear and chaotic at large
+/// energy. W depends on `q1 - q2`, with determinant `m2 l1^2 l2^2 (m1 + m2 sin^2(q1 - q2)) > 0`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DoublePendulum {
+    /// The masses: of the upper bob, and of the lower one.
+    pub masses: [f64; 2],
+    /// The lengths of the upper and of the lower rod.
+    pub lengths: [f64; 2],
+    /// The rate `L_z` of the conformal factor, negative for dissipation.
+    pub gamma: f64,
+}
+
+impl Default for DoublePendulum {
+    fn default() -> Self {
+        DoublePendulum { masses: [1.0, 1.0], lengths: [1.0, 1.0], gamma: -0.1 }
+    }
+}
+
+impl DoublePendulum {
+    /// The constants of W: its two diagonal entries, and the factor of `cos(q1 - q2)` off the diagonal.
+    #[inline]
+    fn inertia(&self) -> (f64, f64, f64) {
+        let ([m1, m2], [l1, l2]) = (self.masses, self.lengths);
+        ((m1 + m2) * l1 * l1, m2 * l2 * l2, m2 * l1 * l2)
+    }
+
+    /// The potential energy, zero with both rods hanging.
+    #[inline]
+    fn potential<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
+        let ([m1, m2], [l1, l2]) = (self.masses, self.lengths);
+        versine(q[0]) * ((m1 + m2) * l1) + versine(q[1]) * (m2 * l2)
+    }
+}
+
+impl Lagrangian<2> for DoublePendulum {
+    #[inline]
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        let (upper, lower, mixed) = self.inertia();
+        let turning = v[0] * v[0] * (upper * 0.5) + v[1] * v[1] * (lower * 0.5);
+        turning + (q[0] - q[1]).cos() * v[0] * v[1] * mixed - self.potential(q) + z * self.gamma
+    }
+
+    fn structure(&self) -> Structure {
+        Structure { autonomous: true, z_free: self.gamma == 0.0, z_affine: true, ..Structure::default() }
+    }
+}
+
+impl System<2> for DoublePendulum {
+    fn name(&self) -> &'static str {
+        "double_pendulum"
+    }
+
+    fn initial(&self) -> VelocityPoint<2> {
+        VelocityPoint::new([1.5, 2.0], [0.0, 0.0], 0.0)
+    }
+
+    fn sample(&self, u: &[f64]) -> (f64, VelocityPoint<2>) {
+        let q = [between(-3.0, 3.0, u[0]), between(-3.0, 3.0, u[1])];
+        let v = [between(-2.0, 2.0, u[2]), between(-2.0, 2.0, u[3])];
+        (between(0.0, 5.0, u[5]), VelocityPoint::new(q, v, between(-1.0, 1.0, u[4])))
+    }
+
+    fn hamiltonian<T: Scalar>(&self, _t: T, x: &PhasePoint<2, T>) -> Option<T> {
+        let ([m1, m2], (upper, lower, mixed)) = (self.masses, self.inertia());
+        let (sin, cos) = (x.q[0] - x.q[1]).sin_cos();
+        let determinant = (sin * sin * m2 + m1) * (self.lengths[0] * self.lengths[0] * lower);
+        let (p1, p2) = (x.p[0], x.p[1]);
+        let kinetic = (p1 * p1 * lower - cos * p1 * p2 * (2.0 * mixed) + p2 * p2 * upper) / determinant * 0.5;
+        Some(kinetic + self.potential(&x.q) - x.z * self.gamma)
+    }
+}

@@ -1,0 +1,82 @@
+//! Duffing's oscillator, free and forced.
+
+use super::{System, between};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use nalgebra::SVector;
+
+/// Duffing's oscillator, `L = v^2/2 - alpha q^2/2 - beta q^4/4 + force cos(omega t) q + gamma z`. Dimensionless: lengths
+/// and times in which mass and, by default, both spring constants have absolute value one.
+///
+/// Herglotz' equation is `q'' = -alpha q - beta q^3 + force cos(omega t) + gamma q'`; nonlinear, W = 1. For `alpha < 0 <
+/// beta` there are two wells, `q = +-sqrt(-alpha/beta)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Duffing {
+    /// The linear spring constant; negative for a double well.
+    pub alpha: f64,
+    /// The cubic spring constant.
+    pub beta: f64,
+    /// The amplitude of the forcing.
+    pub force: f64,
+    /// The angular frequency of the forcing.
+    pub omega: f64,
+    /// The rate `L_z` of the conformal factor, negative for dissipation.
+    pub gamma: f64,
+}
+
+impl Default for Duffing {
+    /// The unforced double well.
+    fn default() -> Self {
+        Duffing { alpha: -1.0, beta: 1.0, force: 0.0, omega: 0.0, gamma: -0.25 }
+    }
+}
+
+impl Duffing {
+    /// The double well with periodic forcing.
+    pub fn forced() -> Self {
+        Duffing { force: 0.3, omega: 1.2, ..Duffing::default() }
+    }
+
+    /// The potential with the forcing: `V(t, q)`.
+    #[inline]
+    fn potential<T: Scalar>(&self, t: T, q: T) -> T {
+        let square = q * q;
+        square * (square * (self.beta * 0.25) + self.alpha * 0.5) - (t * self.omega).cos() * q * self.force
+    }
+}
+
+impl Lagrangian<1> for Duffing {
+    #[inline]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 - self.potential(t, q[0]) + z * self.gamma
+    }
+
+    fn structure(&self) -> Structure {
+        Structure {
+            autonomous: self.force == 0.0 || self.omega == 0.0,
+            z_free: self.gamma == 0.0,
+            z_affine: true,
+            separable: true,
+            quadratic: self.beta == 0.0,
+            constant_mass: true,
+        }
+    }
+}
+
+impl System<1> for Duffing {
+    fn name(&self) -> &'static str {
+        if self.force == 0.0 { "duffing" } else { "duffing_forced" }
+    }
+
+    fn initial(&self) -> VelocityPoint<1> {
+        VelocityPoint::new([1.5], [0.0], 0.0)
+    }
+
+    fn sample(&self, u: &[f64]) -> (f64, VelocityPoint<1>) {
+        let x = VelocityPoint::new([between(-2.0, 2.0, u[0])], [between(-2.0, 2.0, u[1])], between(-1.0, 1.0, u[2]));
+        (between(0.0, 6.0, u[3]), x)
+    }
+
+    fn hamiltonian<T: Scalar>(&self, t: T, x: &PhasePoint<1, T>) -> Option<T> {
+        Some(x.p[0] * x.p[0] * 0.5 + self.potential(t, x.q[0]) - x.z * self.gamma)
+    }
+}

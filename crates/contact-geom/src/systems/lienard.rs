@@ -1,0 +1,76 @@
+//! Liénard systems as contact Hamiltonian systems without a Lagrangian.
+
+use crate::{PhasePoint, Scalar, SmoothFunction, Triple};
+
+/// A forced Liénard system `q'' + f(q) q' + F(q, t) = 0` as the contact Hamiltonian `H = p z + f(q) z + F(q, t)` on
+/// T\*R x R. Dimensionless.
+///
+/// Here `z` is not an action but the velocity: `q' = H_p = z` and `z' = p H_p - H = -f(q) z - F(q, t)`. H is affine in p, so
+/// its fibre derivative is not a diffeomorphism and no regular Lagrangian gives it. The momentum obeys a Riccati equation,
+/// `p' = -p^2 - f p - f' z - F_q`, and usually reaches infinity in finite time; q and z do not feel it. Zadra, Bravetti and
+/// Seri, "Geometric numerical integration of Liénard systems via a contact Hamiltonian approach", Mathematics 9 (2021).
+///
+/// `f` and `F` are polynomials in q, with the periodic forcing `-amplitude cos(omega t)` in F.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lienard {
+    /// The damping `f = f0 + f1 q + f2 q^2`, as `[f0, f1, f2]`.
+    pub damping: [f64; 3],
+    /// The restoring force `F0 + F1 q + F2 q^2 + F3 q^3`, as `[F0, F1, F2, F3]`.
+    pub restoring: [f64; 4],
+    /// The amplitude of the forcing.
+    pub amplitude: f64,
+    /// The angular frequency of the forcing.
+    pub omega: f64,
+}
+
+impl Default for Lienard {
+    /// A double well with damping that is negative at small amplitudes, unforced.
+    fn default() -> Self {
+        Lienard { damping: [-0.1, 0.0, 0.1], restoring: [0.0, -1.0, 0.0, 1.0], amplitude: 0.0, omega: 0.0 }
+    }
+}
+
+impl Lienard {
+    /// A natural start: `q = 1.5` at rest, on the momentum `p = 0`.
+    pub fn initial(&self) -> PhasePoint<1> {
+        PhasePoint::new([1.5], [0.0], 0.0)
+    }
+}
+
+impl SmoothFunction<1> for Lienard {
+    #[inline]
+    fn value<T: Scalar>(&self, t: T, x: &Triple<1, T>) -> T {
+        let (q, p, z) = (x.x[0], x.y[0], x.z);
+        let forcing = (t * self.omega).cos() * self.amplitude;
+        z * (p + horner(&self.damping, q)) + horner(&self.restoring, q) - forcing
+    }
+}
+
+/// The polynomial with these coefficients, lowest first.
+#[inline]
+fn horner<T: Scalar>(coefficients: &[f64], q: T) -> T {
+    coefficients.iter().rev().fold(T::zero(), |sum, c| sum * q + *c)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_contact_hamiltonian_equations_are_lienards() {
+        let system =
+            Lienard { damping: [0.3, -0.2, 0.7], restoring: [0.1, 1.0, -0.4, 0.6], amplitude: 0.5, omega: 1.2 };
+        for (t, q, p, z) in [(0.0, 1.0, 0.0, 0.5), (0.7, -1.3, 0.4, -0.9), (2.0, 0.2, -2.0, 1.5)] {
+            let x = Triple { x: [q].into(), y: [p].into(), z };
+            let (h, d) = (system.value(t, &x), system.differential(t, &x));
+            let f: f64 = 0.3 - 0.2 * q + 0.7 * q * q;
+            let force: f64 = 0.1 + q - 0.4 * q * q + 0.6 * q * q * q - 0.5 * (1.2 * t).cos();
+            // Some ten roundings of terms below 8.
+            let tolerance = 64.0 * f64::EPSILON;
+            assert_eq!(d.y[0], z);
+            assert!((p * d.y[0] - h + f * z + force).abs() <= tolerance);
+            let momentum_rate = -p * p - f * p - (1.4 * q - 0.2) * z - (1.0 - 0.8 * q + 1.8 * q * q);
+            assert!((-d.x[0] - p * d.z - momentum_rate).abs() <= tolerance);
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! The catalogue: mechanical systems with dissipation, one file each.
+//!
+//! Every theorem test of the workspace runs over all of them; a new system joins [`visit_catalogue`] and is tested at once.
+
+mod chain;
+mod charged_particle;
+mod closed_form;
+mod coupled_in_z;
+mod double_pendulum;
+mod duffing;
+mod free_particle;
+mod harmonic_oscillator;
+mod kepler;
+mod lane_emden;
+mod lienard;
+mod pendulum;
+mod perturbed_kepler;
+mod quadratic_in_z;
+mod relativistic;
+mod spherical_pendulum;
+mod van_der_pol;
+
+pub use chain::{Chain, Ends};
+pub use charged_particle::ChargedParticle;
+pub use coupled_in_z::CoupledInZ;
+pub use double_pendulum::DoublePendulum;
+pub use duffing::Duffing;
+pub use free_particle::FreeParticle;
+pub use harmonic_oscillator::HarmonicOscillator;
+pub use kepler::Kepler;
+pub use lane_emden::LaneEmden;
+pub use lienard::Lienard;
+pub use pendulum::Pendulum;
+pub use perturbed_kepler::PerturbedKepler;
+pub use quadratic_in_z::QuadraticInZ;
+pub use relativistic::Relativistic;
+pub use spherical_pendulum::SphericalPendulum;
+pub use van_der_pol::VanDerPol;
+
+use crate::{Lagrangian, PhasePoint, Scalar, Symmetry, VelocityPoint};
+
+/// A system of the catalogue: a regular Lagrangian with what is known of it.
+pub trait System<const N: usize>: Lagrangian<N> {
+    /// The name in tables, in lower case with underscores.
+    fn name(&self) -> &'static str;
+
+    /// Natural initial data at time [`initial_time`](Self::initial_time).
+    fn initial(&self) -> VelocityPoint<N>;
+
+    /// The time at which a motion naturally starts.
+    fn initial_time(&self) -> f64 {
+        0.0
+    }
+
+    /// A time and a point of the domain on which L is smooth and regular, away from its boundary: the image of `2N + 2`
+    /// numbers of `[0, 1]`. Covers the region that a user would visit, and is what random tests draw from.
+    fn sample(&self, u: &[f64]) -> (f64, VelocityPoint<N>);
+
+    /// The Hamiltonian `H` with `E_L = H o FL`, where it is known in closed form.
+    fn hamiltonian<T: Scalar>(&self, _t: T, _x: &PhasePoint<N, T>) -> Option<T> {
+        None
+    }
+
+    /// One-parameter groups that leave L invariant.
+    fn symmetries(&self) -> Vec<Symmetry<N>> {
+        Vec::new()
+    }
+}
+
+/// Something done to every system, whatever its dimension.
+pub trait SystemVisitor {
+    /// Does it to one system.
+    fn visit<const N: usize, S: System<N>>(&mut self, system: &S);
+}
+
+/// Visits every regular system of the catalogue with its natural parameters. [`Lienard`] and [`VanDerPol`] are not among
+/// them: they have a contact Hamiltonian, but no regular Lagrangian.
+pub fn visit_catalogue(visitor: &mut impl SystemVisitor) {
+    visitor.visit(&FreeParticle::default());
+    visitor.visit(&HarmonicOscillator::default());
+    visitor.visit(&Pendulum::default());
+    visitor.visit(&Duffing::default());
+    visitor.visit(&Duffing::forced());
+    visitor.visit(&SphericalPendulum::default());
+    visitor.visit(&DoublePendulum::default());
+    visitor.visit(&Kepler::<2>::default());
+    visitor.visit(&Kepler::<3>::default());
+    visitor.visit(&PerturbedKepler::default());
+    visitor.visit(&LaneEmden::default());
+    visitor.visit(&QuadraticInZ::default());
+    visitor.visit(&CoupledInZ::default());
+    visitor.visit(&ChargedParticle::default());
+    visitor.visit(&Relativistic::default());
+    visitor.visit(&Chain::<4>::default());
+    visitor.visit(&Chain::<3>::free());
+}
+
+/// The point of the interval `[low, high]` at the fraction `u` of its length.
+fn between(low: f64, high: f64, u: f64) -> f64 {
+    low + (high - low) * u
+}
+
+/// `1 - cos x`, without cancellation near 0.
+#[inline]
+fn versine<T: Scalar>(x: T) -> T {
+    let half = (x * 0.5).sin();
+    half * half * 2.0
+}
+
+#[cfg(test)]
+mod tests;

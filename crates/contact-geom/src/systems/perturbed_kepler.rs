@@ -1,0 +1,70 @@
+//! Kepler's problem with dissipation that is periodic in time.
+
+use super::System;
+use super::kepler::{attraction, pericentre, sample_annulus};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use nalgebra::SVector;
+
+/// Kepler's problem in the plane with a drag that changes sign periodically, `L = |v|^2/2 + mu/|q| + alpha sin(theta t) z`.
+/// Dimensionless: as [`Kepler`](super::Kepler).
+///
+/// Herglotz' equation is `q'' = -mu q/|q|^3 + alpha sin(theta t) q'`; nonlinear, singular at `q = 0`, W the identity. The
+/// conformal factor `exp(alpha (1 - cos(theta t)) / theta)` from `t = 0` depends on time alone and comes back to one, so
+/// nothing is lost on average. One of the family `q'' + grad V + f(t) q' = 0` of Bravetti, Seri, Vermeeren and Zadra,
+/// "Numerical integration in celestial mechanics: a case for contact geometry", Celest. Mech. Dyn. Astron. 132 (2020).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PerturbedKepler {
+    /// The attraction of the centre: the gravitational constant times its mass.
+    pub mu: f64,
+    /// The largest rate `L_z` of the conformal factor.
+    pub alpha: f64,
+    /// The angular frequency at which the rate changes.
+    pub theta: f64,
+}
+
+impl Default for PerturbedKepler {
+    fn default() -> Self {
+        PerturbedKepler { mu: 1.0, alpha: 0.01, theta: std::f64::consts::PI }
+    }
+}
+
+impl Lagrangian<2> for PerturbedKepler {
+    #[inline]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        v.dot(v) * 0.5 + attraction(self.mu, q) + (t * self.theta).sin() * z * self.alpha
+    }
+
+    fn structure(&self) -> Structure {
+        let without_drag = self.alpha == 0.0 || self.theta == 0.0;
+        Structure {
+            autonomous: without_drag,
+            z_free: without_drag,
+            z_affine: true,
+            separable: true,
+            constant_mass: true,
+            ..Structure::default()
+        }
+    }
+}
+
+impl System<2> for PerturbedKepler {
+    fn name(&self) -> &'static str {
+        "perturbed_kepler"
+    }
+
+    fn initial(&self) -> VelocityPoint<2> {
+        pericentre(self.mu)
+    }
+
+    fn sample(&self, u: &[f64]) -> (f64, VelocityPoint<2>) {
+        sample_annulus(u)
+    }
+
+    fn hamiltonian<T: Scalar>(&self, t: T, x: &PhasePoint<2, T>) -> Option<T> {
+        Some(x.p.dot(&x.p) * 0.5 - attraction(self.mu, &x.q) - (t * self.theta).sin() * x.z * self.alpha)
+    }
+
+    fn symmetries(&self) -> Vec<Symmetry<2>> {
+        vec![Symmetry::Rotation(0, 1)]
+    }
+}

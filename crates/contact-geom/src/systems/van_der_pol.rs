@@ -1,0 +1,60 @@
+//! Van der Pol's oscillator as a contact Hamiltonian system.
+
+use crate::{PhasePoint, Scalar, SmoothFunction, Triple};
+
+/// Van der Pol's oscillator `q'' + mu (q^2 - 1) q' + q = amplitude cos(omega t)` as the contact Hamiltonian
+/// `H = p z + mu (q^2 - 1) z + q - amplitude cos(omega t)` on T\*R x R. Dimensionless: time in units of the inverse
+/// frequency of small oscillations, q in units of the amplitude at which the damping changes sign.
+///
+/// A [`Lienard`](super::Lienard) system: z is the velocity, there is no regular Lagrangian, and `p` usually reaches infinity
+/// in finite time while q and z go on to the limit cycle of amplitude about 2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VanDerPol {
+    /// The strength of the nonlinear damping; the limit cycle relaxes in jumps where it is large.
+    pub mu: f64,
+    /// The amplitude of the forcing.
+    pub amplitude: f64,
+    /// The angular frequency of the forcing.
+    pub omega: f64,
+}
+
+impl Default for VanDerPol {
+    fn default() -> Self {
+        VanDerPol { mu: 1.0, amplitude: 0.0, omega: 0.0 }
+    }
+}
+
+impl VanDerPol {
+    /// A natural start: `q = 2` at rest, near the limit cycle, on the momentum `p = 0`.
+    pub fn initial(&self) -> PhasePoint<1> {
+        PhasePoint::new([2.0], [0.0], 0.0)
+    }
+}
+
+impl SmoothFunction<1> for VanDerPol {
+    #[inline]
+    fn value<T: Scalar>(&self, t: T, x: &Triple<1, T>) -> T {
+        let (q, p, z) = (x.x[0], x.y[0], x.z);
+        z * (p + (q * q - 1.0) * self.mu) + q - (t * self.omega).cos() * self.amplitude
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::systems::Lienard;
+
+    #[test]
+    fn it_is_a_lienard_system() {
+        let system = VanDerPol { mu: 1.5, amplitude: 0.4, omega: 1.1 };
+        let general =
+            Lienard { damping: [-1.5, 0.0, 1.5], restoring: [0.0, 1.0, 0.0, 0.0], amplitude: 0.4, omega: 1.1 };
+        for (t, q, p, z) in [(0.0, 2.0, 0.0, 0.5), (0.7, -1.3, 0.4, -0.9), (2.0, 0.2, -2.0, 1.5)] {
+            let x = Triple { x: [q].into(), y: [p].into(), z };
+            let difference = system.differential(t, &x).minus(general.differential(t, &x));
+            // A few roundings of terms below 8.
+            assert!(difference.amax() <= 32.0 * f64::EPSILON);
+            assert!((system.value(t, &x) - general.value(t, &x)).abs() <= 32.0 * f64::EPSILON);
+        }
+    }
+}

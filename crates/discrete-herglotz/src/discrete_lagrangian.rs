@@ -1,0 +1,201 @@
+//! Discrete Lagrangians on Q x Q x R.
+
+use crate::newton::{Linearised, newton};
+use crate::{Solver, StepError};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed};
+
+/// A discrete Lagrangian `L_d : Q x Q x R -> R` with the action's recursion `z1 = z0 + L_d(q0, q1, z0)`; paper, section 3.
+///
+/// Only the value is asked for, as a generic function; derivatives come by automatic differentiation and steps by Newton's
+/// method on them. The discretisations of this crate override both by cheaper routes to the same numbers. For a
+/// time-dependent Lagrangian, `t` is the time `t_k` at the start of the step.
+pub trait DiscreteLagrangian<const N: usize> {
+    /// The time step `h > 0`.
+    fn step_size(&self) -> f64;
+
+    /// The value `L_d(q0, q1, z0)`.
+    ///
+    /// # Errors
+    /// A [`StepError`] where it is not defined, or where an implicit definition cannot be solved.
+    fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError>;
+
+    /// Value and first derivatives `D1 L_d, D2 L_d, Dz L_d`.
+    ///
+    /// # Errors
+    /// Those of [`value`](Self::value).
+    fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
+        derived_jet(self, t, x)
+    }
+
+    /// Value, first and second derivatives.
+    ///
+    /// # Errors
+    /// Those of [`value`](Self::value).
+    fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
+        derived_second_jet(self, t, x)
+    }
+
+    /// The step `(q0, p0, z0) -> (q1, p1, z1)` of the discrete Hamiltonian flow `F+L_d o (F-L_d)^-1`.
+    ///
+    /// Solves `D1 L_d + sigma_d p0 = 0` for `q1`, starting from `q0 + h u` with the guess `u` of the mean velocity.
+    ///
+    /// # Errors
+    /// A [`StepError`]: no convergence, a singular matrix, `sigma_d <= 0`, a non-finite value.
+    fn forward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        let h = self.step_size();
+        let point = |u: &SVector<f64, N>| DiscretePoint { q0: from.q, q1: from.q + u * h, z0: from.z };
+        let root = newton(*guess, 0.0, solver, |u, _| {
+            let jet = self.second_jet(t, &point(u))?;
+            Ok(Linearised {
+                residual: jet.first.d1 + from.p * jet.first.sigma(),
+                jacobian: (jet.d12 + from.p * jet.d2z.transpose()) * h,
+                size: jet.first.d1.amax() + from.p.amax() * (1.0 + jet.first.dz.abs()),
+                z_change: 0.0,
+                z_slope: SVector::zeros(),
+            })
+        })?;
+        let x = point(&root.u);
+        let jet = self.jet(t, &x)?;
+        let end = PhasePoint { q: x.q1, p: jet.d2, z: from.z + jet.value };
+        Transition { end, velocity: root.u, sigma: jet.sigma(), iterations: root.iterations }.checked()
+    }
+
+    /// The step `(q1, p1, z1) -> (q0, p0, z0)` of the inverse flow; `t` is the time at `(q0, p0, z0)`.
+    ///
+    /// Solves `D2 L_d = p1`, `z0 + L_d = z1` for `(q0, z0)`, starting from `q1 - h u`.
+    ///
+    /// # Errors
+    /// Like those of [`forward`](Self::forward).
+    fn backward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        let h = self.step_size();
+        let point = |u: &SVector<f64, N>, z0: f64| DiscretePoint { q0: from.q - u * h, q1: from.q, z0 };
+        let root = newton(*guess, from.z, solver, |u, z0| {
+            let jet = self.second_jet(t, &point(u, z0))?;
+            let defect = z0 + jet.first.value - from.z;
+            // z0 moves by -(defect + D1 . dq0) / sigma, and dq0 = -h du.
+            let (z_change, z_slope) = (-defect / jet.first.sigma(), jet.first.d1 * (h / jet.first.sigma()));
+            Ok(Linearised {
+                residual: jet.first.d2 - from.p + jet.d2z * z_change,
+                jacobian: jet.d12.transpose() * -h + jet.d2z * z_slope.transpose(),
+                size: jet.first.d2.amax() + from.p.amax() + jet.d2z.amax() * (z0.abs() + jet.first.value.abs()),
+                z_change,
+                z_slope,
+            })
+        })?;
+        let x = point(&root.u, root.z);
+        let jet = self.jet(t, &x)?;
+        let sigma = jet.sigma();
+        let end = PhasePoint { q: x.q0, p: -jet.d1 / sigma, z: root.z };
+        Transition { end, velocity: root.u, sigma, iterations: root.iterations }.checked()
+    }
+}
+
+impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
+    fn step_size(&self) -> f64 {
+        (**self).step_size()
+    }
+    fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
+        (**self).value(t, x)
+    }
+    fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
+        (**self).jet(t, x)
+    }
+    fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
+        (**self).second_jet(t, x)
+    }
+    #[inline]
+    fn forward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        (**self).forward(t, from, guess, solver)
+    }
+    #[inline]
+    fn backward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        (**self).backward(t, from, guess, solver)
+    }
+}
+
+/// One step of a discrete Hamiltonian flow, forward or backward.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transition<const N: usize> {
+    /// The state that the step leads to.
+    pub end: PhasePoint<N>,
+    /// The mean velocity `(q1 - q0) / h`, kept apart because the difference of the positions loses its digits.
+    pub velocity: SVector<f64, N>,
+    /// `sigma_d = 1 + Dz L_d` at the step's point of Q x Q x R.
+    pub sigma: f64,
+    /// Newton iterations taken.
+    pub iterations: u32,
+}
+
+impl<const N: usize> Transition<N> {
+    /// Refuses a step that is not finite or not conformally contact.
+    #[inline]
+    pub(crate) fn checked(self) -> Result<Self, StepError> {
+        if !(Triple::from(self.end).is_finite() && self.sigma.is_finite()) {
+            return Err(StepError::NonFinite);
+        }
+        if self.sigma <= 0.0 {
+            return Err(StepError::SigmaVanished { sigma: self.sigma });
+        }
+        Ok(self)
+    }
+}
+
+/// The first jet by automatic differentiation of the value.
+///
+/// # Errors
+/// Those of the value.
+pub fn derived_jet<const N: usize>(
+    ld: &(impl DiscreteLagrangian<N> + ?Sized),
+    t: f64,
+    x: &DiscretePoint<N>,
+) -> Result<DiscreteJet<N>, StepError> {
+    let l = ld.value(t, &seed(&Triple::from(*x)).into())?;
+    Ok(DiscreteJet { value: l.re, d1: l.d.x, d2: l.d.y, dz: l.d.z })
+}
+
+/// The second jet by automatic differentiation of the value.
+///
+/// # Errors
+/// Those of the value.
+pub fn derived_second_jet<const N: usize>(
+    ld: &(impl DiscreteLagrangian<N> + ?Sized),
+    t: f64,
+    x: &DiscretePoint<N>,
+) -> Result<SecondDiscreteJet<N>, StepError> {
+    use contact_geom::nalgebra::SMatrix;
+    let l: Dual<Dual<f64, Triple<N>>, _> = ld.value(t, &seed(&seed(&Triple::from(*x))).into())?;
+    Ok(SecondDiscreteJet {
+        first: DiscreteJet { value: l.re.re, d1: l.re.d.x, d2: l.re.d.y, dz: l.re.d.z },
+        d11: SMatrix::from_fn(|i, j| l.d.x[i].d.x[j]),
+        d12: SMatrix::from_fn(|i, j| l.d.x[i].d.y[j]),
+        d22: SMatrix::from_fn(|i, j| l.d.y[i].d.y[j]),
+        d1z: SVector::from_fn(|i, _| l.d.x[i].d.z),
+        d2z: SVector::from_fn(|i, _| l.d.y[i].d.z),
+        dzz: l.d.z.d.z,
+    })
+}

@@ -1,0 +1,109 @@
+//! Bad input, and bad luck.
+
+use contact_geom::GeometryError;
+use thiserror::Error;
+
+/// Bad input, found before the first step.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum InputError {
+    /// The step is not a positive finite number.
+    #[error("the step h = {h} must be a positive finite number")]
+    Step {
+        /// The step that was passed.
+        h: f64,
+    },
+    /// The configuration space has dimension 0.
+    #[error("the configuration space has dimension 0; a Lagrangian needs at least one coordinate")]
+    Dimension,
+    /// A count of steps, rows or points is too small.
+    #[error("{what} = {found}; at least {least} is needed")]
+    Count {
+        /// What is counted.
+        what: &'static str,
+        /// The smallest count that is accepted.
+        least: usize,
+        /// The count that was passed.
+        found: usize,
+    },
+    /// A coordinate, a slice or a matrix of the geometry is bad.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// The conformal factor is not positive at the start.
+    #[error(
+        "sigma_d = {sigma} at the start, where it must be positive (h L_z > -1 for rules explicit in z); \
+         take a smaller step"
+    )]
+    Sigma {
+        /// The value of sigma_d.
+        sigma: f64,
+    },
+    /// The two points of the start coincide and the discrete Lagrangian is not regular there.
+    #[error("q0 = q1 at the start, and the discrete Lagrangian is not regular on the diagonal; pass two different points")]
+    EqualPoints,
+    /// The first step cannot be solved.
+    #[error("no first step from this start: {0}")]
+    FirstStep(StepError),
+}
+
+/// Why a step could not be taken: bad luck, not bad input.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum StepError {
+    /// Newton's method did not reach round-off.
+    #[error("Newton's method left a residual of {residual:e} after {iterations} iterations; take a smaller step")]
+    NotConverged {
+        /// The largest component of the last residual, a momentum.
+        residual: f64,
+        /// The iterations made.
+        iterations: u32,
+    },
+    /// The derivative of F-L_d (or F+L_d) is singular.
+    #[error("the discrete Lagrangian is not regular here (pivot {pivot:e}); take a smaller step")]
+    Singular {
+        /// The pivot that vanished.
+        pivot: f64,
+    },
+    /// sigma_d = 1 + Dz L_d is not positive.
+    #[error("sigma_d = {sigma} is not positive, so the step is not conformally contact; take a smaller step")]
+    SigmaVanished {
+        /// The value of sigma_d.
+        sigma: f64,
+    },
+    /// A coordinate or a derivative is infinite or not a number.
+    #[error("a value is not finite: the motion leaves the domain of the Lagrangian, or grows without bound")]
+    NonFinite,
+}
+
+impl From<StepError> for GeometryError {
+    fn from(_: StepError) -> Self {
+        GeometryError::Undefined { what: "the discrete Lagrangian" }
+    }
+}
+
+/// How a run ended. All that was recorded before is kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Status {
+    /// All steps were taken.
+    Completed,
+    /// The observer asked to stop after this step.
+    Stopped {
+        /// The number of steps taken.
+        step: usize,
+    },
+    /// A step could not be taken; the state is that before it.
+    Failed {
+        /// The number of the step that failed, counted from 0.
+        step: usize,
+        /// Why.
+        cause: StepError,
+    },
+}
+
+impl std::fmt::Display for Status {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Status::Completed => write!(f, "completed"),
+            Status::Stopped { step } => write!(f, "stopped by the observer after step {step}"),
+            Status::Failed { step, cause } => write!(f, "failed in step {step}: {cause}"),
+        }
+    }
+}

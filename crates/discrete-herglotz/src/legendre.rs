@@ -1,0 +1,98 @@
+//! The discrete Legendre transforms F+L_d and F-L_d, their inverses, and regularity.
+
+use crate::{DiscreteLagrangian, Solver, StepError};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{DiscretePoint, PhasePoint, Regularity};
+
+/// `sigma_d = 1 + Dz L_d`, the conformal factor of the step; paper, section 3.1.
+///
+/// # Errors
+/// Those of the discrete Lagrangian.
+pub fn sigma_d<const N: usize>(
+    ld: &impl DiscreteLagrangian<N>,
+    t: f64,
+    x: &DiscretePoint<N>,
+) -> Result<f64, StepError> {
+    Ok(ld.jet(t, x)?.sigma())
+}
+
+/// `F-L_d (q0, q1, z0) = (q0, -D1 L_d / (1 + Dz L_d), z0)`; paper, section 3.1.
+///
+/// # Errors
+/// [`StepError::SigmaVanished`] where `sigma_d` vanishes, and those of the discrete Lagrangian.
+pub fn legendre_minus<const N: usize>(
+    ld: &impl DiscreteLagrangian<N>,
+    t: f64,
+    x: &DiscretePoint<N>,
+) -> Result<PhasePoint<N>, StepError> {
+    let jet = ld.jet(t, x)?;
+    let sigma = jet.sigma();
+    if sigma == 0.0 {
+        return Err(StepError::SigmaVanished { sigma });
+    }
+    Ok(PhasePoint { q: x.q0, p: -jet.d1 / sigma, z: x.z0 })
+}
+
+/// `F+L_d (q0, q1, z0) = (q1, D2 L_d, z0 + L_d)`; paper, section 3.1.
+///
+/// # Errors
+/// Those of the discrete Lagrangian.
+pub fn legendre_plus<const N: usize>(
+    ld: &impl DiscreteLagrangian<N>,
+    t: f64,
+    x: &DiscretePoint<N>,
+) -> Result<PhasePoint<N>, StepError> {
+    let jet = ld.jet(t, x)?;
+    Ok(PhasePoint { q: x.q1, p: jet.d2, z: x.z0 + jet.value })
+}
+
+/// The inverse of F-L_d near a guess of the mean velocity `(q1 - q0)/h`; `t` is the time of the state.
+///
+/// # Errors
+/// Those of a step: where F-L_d is no local diffeomorphism, [`StepError::Singular`].
+pub fn legendre_minus_inverse<const N: usize>(
+    ld: &impl DiscreteLagrangian<N>,
+    t: f64,
+    state: &PhasePoint<N>,
+    guess: &SVector<f64, N>,
+) -> Result<DiscretePoint<N>, StepError> {
+    let step = ld.forward(t, state, guess, &mut Solver::default())?;
+    Ok(DiscretePoint { q0: state.q, q1: step.end.q, z0: state.z })
+}
+
+/// The inverse of F+L_d near a guess of the mean velocity; `t` is the time a step before that of the state.
+///
+/// # Errors
+/// Those of a backward step.
+pub fn legendre_plus_inverse<const N: usize>(
+    ld: &impl DiscreteLagrangian<N>,
+    t: f64,
+    state: &PhasePoint<N>,
+    guess: &SVector<f64, N>,
+) -> Result<DiscretePoint<N>, StepError> {
+    let step = ld.backward(t, state, guess, &mut Solver::default())?;
+    Ok(DiscretePoint { q0: step.end.q, q1: state.q, z0: step.end.z })
+}
+
+/// How regular a discrete Lagrangian is at a point: it is regular where `sigma_d` does not vanish and F-L_d is a local
+/// diffeomorphism; paper, section 3.1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DiscreteRegularity {
+    /// `sigma_d`.
+    pub sigma: f64,
+    /// The singular values of the derivative of F-L_d in `q1`.
+    pub fibre: Regularity,
+}
+
+/// Measures the regularity of a discrete Lagrangian at a point.
+///
+/// # Errors
+/// Those of the discrete Lagrangian.
+pub fn discrete_regularity<const N: usize>(
+    ld: &impl DiscreteLagrangian<N>,
+    t: f64,
+    x: &DiscretePoint<N>,
+) -> Result<DiscreteRegularity, StepError> {
+    let jet = ld.second_jet(t, x)?;
+    Ok(DiscreteRegularity { sigma: jet.first.sigma(), fibre: jet.regularity() })
+}

@@ -1,0 +1,52 @@
+//! Discrete contact mechanics: discrete Lagrangians on Q x Q x R, their flows, and what the theory says of them.
+//!
+//! A discrete Lagrangian `L_d(q0, q1, z0)` advances the action by `z1 = z0 + L_d`; the discrete Herglotz equations
+//! `D1 L_d(q1, q2, z1) + sigma_d D2 L_d(q0, q1, z0) = 0`, `sigma_d = 1 + Dz L_d`, advance the position. The flow on
+//! T\*Q x R is conformally contact by construction: it contracts the contact form, and every momentum of a symmetry, by
+//! exactly `sigma_d`. [`rules`] makes discrete Lagrangians from any Lagrangian, [`Flow`] runs them, [`statements`] checks
+//! the theory on them.
+//!
+//! ```
+//! use contact_geom::{PhasePoint, systems::DoublePendulum};
+//! use discrete_herglotz::{Every, Flow, Midpoint, Record};
+//!
+//! let ld = Midpoint::new(DoublePendulum::default(), 0.05)?;
+//! let mut flow = Flow::new(&ld, 0.0, PhasePoint::new([1.0, 0.5], [0.0, 0.0], 0.0))?;
+//! let mut every_tenth = Every::new(10, Record::default())?;
+//! let status = flow.run(1000, &mut every_tenth)?;
+//! println!("{status}: {} rows, last {:?}", every_tenth.into_inner().rows.len(), flow.state());
+//! # Ok::<(), discrete_herglotz::InputError>(())
+//! ```
+//!
+//! Symbols and their names in code are in the project's `NOTATION.md`.
+
+mod discrete_lagrangian;
+mod error;
+mod flow;
+mod legendre;
+mod momentum;
+mod newton;
+mod path;
+mod quadrature;
+pub mod rules;
+mod run;
+mod solver;
+pub mod statements;
+mod unknowns;
+
+pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};
+pub use error::{InputError, Status, StepError};
+pub use flow::{HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian};
+pub use legendre::{
+    DiscreteRegularity, discrete_regularity, legendre_minus, legendre_minus_inverse, legendre_plus,
+    legendre_plus_inverse, sigma_d,
+};
+pub use momentum::{MomentumDecay, MomentumRow, discrete_momentum, discrete_symmetry_defect};
+pub use newton::ITERATION_LIMIT;
+pub use path::{DiscretePath, discrete_action};
+pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
+pub use rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
+pub use run::{Every, FinalOnly, Flow, Observer, Record, Step};
+pub use solver::{CROSSOVER, Solver};
+
+pub use contact_geom;

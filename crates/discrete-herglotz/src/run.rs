@@ -1,0 +1,266 @@
+//! Runs: many steps of a discrete Hamiltonian flow, recording only what is asked for.
+
+use crate::legendre::{discrete_regularity, legendre_minus};
+use crate::{DiscreteLagrangian, InputError, Solver, Status, StepError};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{DiscretePoint, PhasePoint};
+use std::ops::ControlFlow;
+
+/// One step of a run, as an observer sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step<const N: usize> {
+    /// The number of steps taken, this one included: the state `to` is that of index `k`.
+    pub k: usize,
+    /// The time at the step's end, `t0 + k h`.
+    pub t: f64,
+    /// The state before.
+    pub from: PhasePoint<N>,
+    /// The state after.
+    pub to: PhasePoint<N>,
+    /// The mean velocity `(q_k - q_{k-1}) / h`, to full precision.
+    pub velocity: SVector<f64, N>,
+    /// `sigma_d` of the step: the factor by which it contracts the contact form, and every momentum of a symmetry.
+    pub sigma: f64,
+    /// Newton iterations taken.
+    pub iterations: u32,
+}
+
+/// What a run does with its states. Closures of [`Step`] observe too, and pairs of observers observe one after the other.
+pub trait Observer<const N: usize> {
+    /// Sees the initial state.
+    fn start(&mut self, _t: f64, _state: &PhasePoint<N>) {}
+    /// Sees a step; `Break` ends the run.
+    fn step(&mut self, step: &Step<N>) -> ControlFlow<()>;
+}
+
+impl<const N: usize, F: FnMut(&Step<N>) -> ControlFlow<()>> Observer<N> for F {
+    #[inline]
+    fn step(&mut self, step: &Step<N>) -> ControlFlow<()> {
+        self(step)
+    }
+}
+
+impl<const N: usize, A: Observer<N>, B: Observer<N>> Observer<N> for (A, B) {
+    fn start(&mut self, t: f64, state: &PhasePoint<N>) {
+        self.0.start(t, state);
+        self.1.start(t, state);
+    }
+    #[inline]
+    fn step(&mut self, step: &Step<N>) -> ControlFlow<()> {
+        self.0.step(step)?;
+        self.1.step(step)
+    }
+}
+
+/// Records nothing: for runs of which only the final state is wanted.
+#[derive(Clone, Copy, Debug)]
+pub struct FinalOnly;
+
+impl<const N: usize> Observer<N> for FinalOnly {
+    #[inline]
+    fn step(&mut self, _step: &Step<N>) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+/// Passes the initial state and every `stride`-th step on to another observer; for rows, and for a progress callback.
+#[derive(Clone, Copy, Debug)]
+pub struct Every<O> {
+    stride: usize,
+    observer: O,
+}
+
+impl<O> Every<O> {
+    /// Every `stride`-th step to this observer.
+    ///
+    /// # Errors
+    /// [`InputError::Count`] if the stride is 0.
+    pub fn new(stride: usize, observer: O) -> Result<Self, InputError> {
+        if stride == 0 {
+            return Err(InputError::Count { what: "the stride of the record", least: 1, found: 0 });
+        }
+        Ok(Every { stride, observer })
+    }
+
+    /// The observer.
+    pub fn into_inner(self) -> O {
+        self.observer
+    }
+}
+
+impl<const N: usize, O: Observer<N>> Observer<N> for Every<O> {
+    fn start(&mut self, t: f64, state: &PhasePoint<N>) {
+        self.observer.start(t, state);
+    }
+    #[inline]
+    fn step(&mut self, step: &Step<N>) -> ControlFlow<()> {
+        if step.k.is_multiple_of(self.stride) { self.observer.step(step) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// Records times and states, the initial one included.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Record<const N: usize> {
+    /// The rows so far: time and state.
+    pub rows: Vec<(f64, PhasePoint<N>)>,
+}
+
+impl<const N: usize> Observer<N> for Record<N> {
+    fn start(&mut self, t: f64, state: &PhasePoint<N>) {
+        self.rows.push((t, *state));
+    }
+    fn step(&mut self, step: &Step<N>) -> ControlFlow<()> {
+        self.rows.push((step.t, step.to));
+        ControlFlow::Continue(())
+    }
+}
+
+/// A discrete Hamiltonian flow with its current state: the working object of a simulation.
+///
+/// The state is `(q, p, z)`; there is a second door for those who start, as the paper does, from `(q0, q1, z0)`.
+///
+/// ```
+/// use contact_geom::{PhasePoint, systems::Pendulum};
+/// use discrete_herglotz::{Flow, Midpoint, FinalOnly, Status};
+/// let ld = Midpoint::new(Pendulum { gamma: -0.1 }, 0.1)?;
+/// let mut flow = Flow::new(&ld, 0.0, PhasePoint::new([1.0], [1.0], 0.0))?;
+/// assert_eq!(flow.run(100, &mut FinalOnly)?, Status::Completed);
+/// println!("q(10) = {}", flow.state().q[0]);
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+pub struct Flow<'a, D, const N: usize> {
+    ld: &'a D,
+    t0: f64,
+    k: usize,
+    state: PhasePoint<N>,
+    /// The mean velocities of the last steps, the latest first: the start of Newton's method is extrapolated from them.
+    velocities: [SVector<f64, N>; 2],
+    solver: Solver<N>,
+}
+
+impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
+    /// A flow from the state `(q, p, z)` at time `t0`.
+    ///
+    /// # Errors
+    /// [`InputError`] where the state is not finite, `sigma_d <= 0`, the discrete Lagrangian is not regular there, or the
+    /// first step cannot be solved.
+    pub fn new(ld: &'a D, t0: f64, state: PhasePoint<N>) -> Result<Self, InputError> {
+        Self::with_guess(ld, t0, state, SVector::zeros())
+    }
+
+    /// Like [`new`](Self::new), with a guess of the velocity from which the first step is solved; needed where several
+    /// velocities have the same momentum.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn with_guess(
+        ld: &'a D,
+        t0: f64,
+        state: PhasePoint<N>,
+        guess: SVector<f64, N>,
+    ) -> Result<Self, InputError> {
+        state.check()?;
+        let mut solver = Solver::default();
+        let first = ld.forward(t0, &state, &guess, &mut solver).map_err(|cause| match cause {
+            StepError::SigmaVanished { sigma } => InputError::Sigma { sigma },
+            cause => InputError::FirstStep(cause),
+        })?;
+        Ok(Flow { ld, t0, k: 0, state, velocities: [first.velocity; 2], solver })
+    }
+
+    /// A flow from the two positions `q0, q1` and the action `z0`: its state at `t0` is `F-L_d (q0, q1, z0)`.
+    ///
+    /// # Errors
+    /// [`InputError`] where a coordinate is not finite, `sigma_d <= 0`, or the discrete Lagrangian is not regular at the
+    /// point; [`InputError::EqualPoints`] where that is because `q0 = q1`.
+    pub fn from_points(ld: &'a D, t0: f64, x: DiscretePoint<N>) -> Result<Self, InputError> {
+        x.check()?;
+        let bad = |cause| if x.q0 == x.q1 { InputError::EqualPoints } else { InputError::FirstStep(cause) };
+        let regularity = discrete_regularity(ld, t0, &x).map_err(bad)?;
+        let sigma = regularity.sigma;
+        if sigma <= 0.0 {
+            return Err(InputError::Sigma { sigma });
+        }
+        // Not `condition() >= 1/eps`: that would let a NaN pass.
+        let regular = regularity.fibre.condition() < 1.0 / f64::EPSILON;
+        if !(sigma.is_finite() && regular) {
+            return Err(bad(StepError::Singular { pivot: regularity.fibre.smallest }));
+        }
+        let state = legendre_minus(ld, t0, &x).map_err(bad)?;
+        Self::with_guess(ld, t0, state, (x.q1 - x.q0) / ld.step_size())
+    }
+
+    /// The current state `(q, p, z)`.
+    pub fn state(&self) -> &PhasePoint<N> {
+        &self.state
+    }
+
+    /// The current time `t0 + k h`.
+    pub fn time(&self) -> f64 {
+        self.t0 + self.k as f64 * self.ld.step_size()
+    }
+
+    /// Takes one step.
+    ///
+    /// # Errors
+    /// A [`StepError`]; the state is then the one before.
+    #[inline]
+    pub fn step(&mut self) -> Result<Step<N>, StepError> {
+        let t = self.time();
+        let [latest, before] = self.velocities;
+        let next = self.ld.forward(t, &self.state, &(latest * 2.0 - before), &mut self.solver)?;
+        self.k += 1;
+        let step = Step {
+            k: self.k,
+            t: self.time(),
+            from: self.state,
+            to: next.end,
+            velocity: next.velocity,
+            sigma: next.sigma,
+            iterations: next.iterations,
+        };
+        self.velocities = [next.velocity, latest];
+        self.state = next.end;
+        Ok(step)
+    }
+
+    /// Takes up to `steps` steps, showing each to the observer. The flow stays at the last state reached, and can go on.
+    ///
+    /// # Errors
+    /// [`InputError::Count`] if `steps` is 0. Bad luck in mid-run is a [`Status`], not an error: what was recorded is kept.
+    pub fn run(&mut self, steps: usize, observer: &mut impl Observer<N>) -> Result<Status, InputError> {
+        if steps == 0 {
+            return Err(InputError::Count { what: "the number of steps", least: 1, found: 0 });
+        }
+        if self.k == 0 {
+            observer.start(self.t0, &self.state);
+        }
+        for _ in 0..steps {
+            match self.step() {
+                Ok(step) => {
+                    if observer.step(&step).is_break() {
+                        return Ok(Status::Stopped { step: step.k });
+                    }
+                }
+                Err(cause) => return Ok(Status::Failed { step: self.k, cause }),
+            }
+        }
+        Ok(Status::Completed)
+    }
+
+    /// Takes one step back by the inverse flow `F-L_d o (F+L_d)^-1`.
+    ///
+    /// # Errors
+    /// A [`StepError`]; the state is then unchanged.
+    pub fn step_back(&mut self) -> Result<(), StepError> {
+        let t = self.time() - self.ld.step_size();
+        let back = self.ld.backward(t, &self.state, &self.velocities[0], &mut self.solver)?;
+        self.state = back.end;
+        self.velocities = [back.velocity; 2];
+        match self.k.checked_sub(1) {
+            Some(k) => self.k = k,
+            None => self.t0 = t,
+        }
+        Ok(())
+    }
+}
