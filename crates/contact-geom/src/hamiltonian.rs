@@ -37,12 +37,7 @@ impl<const N: usize, H: SmoothFunction<N>> Smooth<N> for DarbouxField<'_, H> {
 }
 
 /// The derivative `X(f)` of a function along a vector.
-pub fn derivative_along<const N: usize>(
-    f: &impl SmoothFunction<N>,
-    t: f64,
-    x: &Triple<N>,
-    vector: &Triple<N>,
-) -> f64 {
+pub fn derivative_along<const N: usize>(f: &impl SmoothFunction<N>, t: f64, x: &Triple<N>, vector: &Triple<N>) -> f64 {
     f.differential(t, x).dot(vector)
 }
 

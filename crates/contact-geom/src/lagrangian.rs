@@ -133,7 +133,8 @@ pub fn check_closed_derivatives<const N: usize>(
     let hessian = lagrangian.closed_hessian(t, x).map(|c| {
         // Derived from `value` alone, so that a wrong closed gradient cannot hide a wrong Hessian.
         let d = derived_hessian(&ValueOnly(lagrangian), t, x);
-        let size = 1.0 + d.qq.amax().max(d.qv.amax()).max(d.vv.amax()).max(d.qz.amax()).max(d.vz.amax()).max(d.zz.abs());
+        let size =
+            1.0 + d.qq.amax().max(d.qv.amax()).max(d.vv.amax()).max(d.qz.amax()).max(d.vz.amax()).max(d.zz.abs());
         let blocks = (c.qq - d.qq).amax().max((c.qv - d.qv).amax()).max((c.vv - d.vv).amax());
         blocks.max((c.qz - d.qz).amax()).max((c.vz - d.vz).amax()).max((c.zz - d.zz).abs()) / size
     });

@@ -27,10 +27,7 @@ impl SingularMatrix {
 /// # Errors
 /// [`SingularMatrix`] where a pivot vanishes or is not finite.
 #[inline]
-pub fn solve<T: Scalar, const N: usize>(
-    a: &mut SMatrix<T, N, N>,
-    b: &mut SVector<T, N>,
-) -> Result<(), SingularMatrix> {
+pub fn solve<T: Scalar, const N: usize>(a: &mut SMatrix<T, N, N>, b: &mut SVector<T, N>) -> Result<(), SingularMatrix> {
     for k in 0..N {
         let mut row = k;
         for i in k + 1..N {

@@ -103,11 +103,8 @@ impl<const N: usize> Triple<N> {
 /// with its derivative.
 #[inline]
 pub fn seed<T: Scalar, const N: usize>(point: &Triple<N, T>) -> Triple<N, Dual<T, Triple<N, T>>> {
-    let mut seeded: Triple<N, Dual<T, Triple<N, T>>> = Triple {
-        x: point.x.map(Dual::constant),
-        y: point.y.map(Dual::constant),
-        z: Dual::constant(point.z),
-    };
+    let mut seeded: Triple<N, Dual<T, Triple<N, T>>> =
+        Triple { x: point.x.map(Dual::constant), y: point.y.map(Dual::constant), z: Dual::constant(point.z) };
     for i in 0..N {
         seeded.x[i].d.x[i] = T::one();
         seeded.y[i].d.y[i] = T::one();

@@ -97,7 +97,8 @@ fn form_residual<const N: usize>(form: &impl ContactForm<N>, x: &Triple<N>) -> R
         let e = Triple::from_fn(|i| f64::from(u8::from(i == j)));
         let flat = form.flat(x, &e)?;
         worst = worst.max(relative(flat, generic::flat(form, x, &e)?, 0.0));
-        worst = worst.max(relative(form.sharp(x, &flat)?, e, 0.0)).max(relative(generic::sharp(form, x, &flat)?, e, 0.0));
+        worst =
+            worst.max(relative(form.sharp(x, &flat)?, e, 0.0)).max(relative(generic::sharp(form, x, &flat)?, e, 0.0));
     }
     Ok(worst)
 }
@@ -152,7 +153,11 @@ fn hamiltonian_field_residual<const N: usize>(
 
 /// Statement 3: the contact Hamiltonian vector field, of E_L on TQ x R, of any f on both; closed form in Darboux
 /// coordinates.
-fn hamiltonian_field<const N: usize>(system: &impl System<N>, t: f64, x: &VelocityPoint<N>) -> Result<f64, GeometryError> {
+fn hamiltonian_field<const N: usize>(
+    system: &impl System<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+) -> Result<f64, GeometryError> {
     let (phase, eta_l, velocity) = forms(system, t, x);
     let any = AnyFunction(0.37);
     let closed = DarbouxField { hamiltonian: &any, t }.at(&phase)?;
@@ -199,7 +204,8 @@ fn infinitesimal_conformal<const N: usize>(
     let strict_field = DarbouxField { hamiltonian: &strict, t };
     let change = lie_derivative(&Darboux, &strict_field, &phase)?;
     worst = worst.max(change.amax() / (1.0 + strict_field.at(&phase)?.amax()));
-    worst = worst.max(conformal_residual(&eta_l, &HerglotzField { lagrangian: system, t }, &Energy(system), t, &velocity)?);
+    worst =
+        worst.max(conformal_residual(&eta_l, &HerglotzField { lagrangian: system, t }, &Energy(system), t, &velocity)?);
     let bracket = DarbouxBracket { f: &f, g: &g };
     let commutator = lie_bracket(&field(&f), &field(&g), &phase)?;
     worst = worst.max(relative(DarbouxField { hamiltonian: &bracket, t }.at(&phase)?, commutator, 1.0));

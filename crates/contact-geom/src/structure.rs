@@ -49,8 +49,7 @@ impl Structure {
             v: SVector::from_fn(|i, _| Dual { re: x.v[i], d: towards(N + i) }),
             z: Dual { re: x.z, d: towards(2 * N) },
         };
-        let still =
-            VelocityPoint { q: x.q.map(Dual::constant), v: x.v.map(Dual::constant), z: Dual::constant(x.z) };
+        let still = VelocityPoint { q: x.q.map(Dual::constant), v: x.v.map(Dual::constant), z: Dual::constant(x.z) };
         let clock = Dual { re: t, d: Line::new(1.0) };
 
         let largest = |entries: &mut dyn Iterator<Item = f64>| entries.fold(0.0, |m: f64, e| m.max(e.abs()));

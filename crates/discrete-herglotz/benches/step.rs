@@ -1,7 +1,7 @@
 //! One step by automatic differentiation against a hand-written Newton loop of the same arithmetic and stopping rule.
 
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::systems::{Pendulum};
+use contact_geom::systems::Pendulum;
 use contact_geom::{Lagrangian, PhasePoint, Scalar};
 use criterion::{Criterion, criterion_group, criterion_main};
 use discrete_herglotz::{DiscreteLagrangian, LeftMidpoint, Solver};
@@ -10,7 +10,13 @@ use std::hint::black_box;
 const H: f64 = 0.1;
 const STEPS: usize = 1000;
 
-struct DoublePendulum { m1: f64, m2: f64, l1: f64, l2: f64, gamma: f64 }
+struct DoublePendulum {
+    m1: f64,
+    m2: f64,
+    l1: f64,
+    l2: f64,
+    gamma: f64,
+}
 impl Lagrangian<2> for DoublePendulum {
     #[inline]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
@@ -59,7 +65,9 @@ fn pendulum_by_hand(gamma: f64, mut q: f64, mut p: f64, mut z: f64) -> (f64, f64
             w += change;
             let size = change.abs();
             let next = size * (size / last_size) * (size / last_size);
-            if (last_size.is_finite() && next <= f64::EPSILON * w.abs()) || residual.abs() <= 8.0 * f64::EPSILON * (p.abs() + w.abs()) {
+            if (last_size.is_finite() && next <= f64::EPSILON * w.abs())
+                || residual.abs() <= 8.0 * f64::EPSILON * (p.abs() + w.abs())
+            {
                 break;
             }
             last_size = size;
@@ -73,7 +81,12 @@ fn pendulum_by_hand(gamma: f64, mut q: f64, mut p: f64, mut z: f64) -> (f64, f64
     (q, p, z, its)
 }
 
-fn double_by_hand(l: &DoublePendulum, mut q: SVector<f64, 2>, mut p: SVector<f64, 2>, mut z: f64) -> (SVector<f64, 2>, SVector<f64, 2>, f64, u32) {
+fn double_by_hand(
+    l: &DoublePendulum,
+    mut q: SVector<f64, 2>,
+    mut p: SVector<f64, 2>,
+    mut z: f64,
+) -> (SVector<f64, 2>, SVector<f64, 2>, f64, u32) {
     let (a, b, c) = ((l.m1 + l.m2) * l.l1 * l.l1, l.m2 * l.l2 * l.l2, l.m2 * l.l1 * l.l2);
     let (g1, g2) = ((l.m1 + l.m2) * l.l1, l.m2 * l.l2);
     let sigma = 1.0 + H * l.gamma;
@@ -112,7 +125,9 @@ fn double_by_hand(l: &DoublePendulum, mut q: SVector<f64, 2>, mut p: SVector<f64
             w += change;
             let size = change.amax();
             let next = size * (size / last_size) * (size / last_size);
-            if (last_size.is_finite() && next <= f64::EPSILON * w.amax()) || residual.amax() <= 8.0 * f64::EPSILON * (p.amax() + jac.amax() * w.amax()) {
+            if (last_size.is_finite() && next <= f64::EPSILON * w.amax())
+                || residual.amax() <= 8.0 * f64::EPSILON * (p.amax() + jac.amax() * w.amax())
+            {
                 break;
             }
             last_size = size;

@@ -1,6 +1,6 @@
 //! Discrete Lagrangians on Q x Q x R.
 
-use crate::newton::{Linearised, newton};
+use crate::newton::{Linearised, Start, newton};
 use crate::{Solver, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed};
@@ -51,7 +51,8 @@ pub trait DiscreteLagrangian<const N: usize> {
     ) -> Result<Transition<N>, StepError> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>| DiscretePoint { q0: from.q, q1: from.q + u * h, z0: from.z };
-        let root = newton(*guess, 0.0, solver, |u, _| {
+        let start = Start { u: *guess, z: 0.0, resolution: from.q.amax() / h };
+        let root = newton(start, solver, |u, _| {
             let jet = self.second_jet(t, &point(u))?;
             Ok(Linearised {
                 residual: jet.first.d1 + from.p * jet.first.sigma(),
@@ -82,7 +83,8 @@ pub trait DiscreteLagrangian<const N: usize> {
     ) -> Result<Transition<N>, StepError> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>, z0: f64| DiscretePoint { q0: from.q - u * h, q1: from.q, z0 };
-        let root = newton(*guess, from.z, solver, |u, z0| {
+        let start = Start { u: *guess, z: from.z, resolution: from.q.amax() / h };
+        let root = newton(start, solver, |u, z0| {
             let jet = self.second_jet(t, &point(u, z0))?;
             let defect = z0 + jet.first.value - from.z;
             // z0 moves by -(defect + D1 . dq0) / sigma, and dq0 = -h du.

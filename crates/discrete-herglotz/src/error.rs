@@ -38,7 +38,9 @@ pub enum InputError {
         sigma: f64,
     },
     /// The two points of the start coincide and the discrete Lagrangian is not regular there.
-    #[error("q0 = q1 at the start, and the discrete Lagrangian is not regular on the diagonal; pass two different points")]
+    #[error(
+        "q0 = q1 at the start, and the discrete Lagrangian is not regular on the diagonal; pass two different points"
+    )]
     EqualPoints,
     /// The first step cannot be solved.
     #[error("no first step from this start: {0}")]

@@ -20,6 +20,17 @@ pub(crate) struct Linearised<const N: usize> {
     pub z_slope: SVector<f64, N>,
 }
 
+/// Where Newton's method starts, and the sizes that tell round-off.
+pub(crate) struct Start<const N: usize> {
+    /// The guess of the mean velocity.
+    pub u: SVector<f64, N>,
+    /// The guess of the unknown action.
+    pub z: f64,
+    /// The size of the known position divided by the step: `eps` times this is the velocity below which a correction does
+    /// not move the position.
+    pub resolution: f64,
+}
+
 /// The solution of the step equations.
 pub(crate) struct Root<const N: usize> {
     pub u: SVector<f64, N>,
@@ -27,25 +38,34 @@ pub(crate) struct Root<const N: usize> {
     pub iterations: u32,
 }
 
+/// Whether the correction after this one is below round-off: convergence is quadratic, so from two corrections
+/// `before > now` the next is about `now^3 / before^2`.
+#[inline]
+fn last_correction(now: f64, before: f64, scale: f64) -> bool {
+    now == 0.0 || now * (now / before) * (now / before) <= f64::EPSILON * scale
+}
+
 /// Solves the step equations for `(u, z)` from a guess.
 ///
-/// Stopping rule: convergence is quadratic, so from two corrections `d1 > d2` the next is about `d2^3 / d1^2`; the method
-/// stops when that is below round-off of `u`, or when the residual is below the round-off of its own terms. An iterate
-/// outside the domain (a value that is not finite) is drawn back half-way, which counts as an iteration; after
-/// [`ITERATION_LIMIT`] the step fails.
+/// Stopping rule, the first that holds: the next corrections of `u` and `z`, predicted from the last two, are below their
+/// round-off; the residual and the defect of `z` are below the round-off of their own terms; the corrections stagnate below
+/// what moves the position. An iterate outside the domain (a value that is not finite) is drawn back half-way, which counts
+/// as an iteration; after [`ITERATION_LIMIT`] the step fails.
 #[inline]
 pub(crate) fn newton<const N: usize>(
-    mut u: SVector<f64, N>,
-    mut z: f64,
+    start: Start<N>,
     solver: &mut Solver<N>,
     mut linearise: impl FnMut(&SVector<f64, N>, f64) -> Result<Linearised<N>, StepError>,
 ) -> Result<Root<N>, StepError> {
-    let (mut last, mut last_z, mut last_size) = (SVector::<f64, N>::zeros(), 0.0, f64::INFINITY);
+    let Start { mut u, mut z, resolution } = start;
+    let (mut last, mut last_z) = (SVector::<f64, N>::zeros(), 0.0f64);
+    // The size of the last correction; infinite before the first.
+    let (mut last_size, mut last_z_size) = (f64::INFINITY, f64::INFINITY);
     let mut residual_size = f64::INFINITY;
     for iterations in 1..=ITERATION_LIMIT {
         let mut at = linearise(&u, z)?;
         residual_size = at.residual.amax();
-        // `max` ignores a NaN; the sum does not.
+        // `amax` ignores a NaN; the sum does not.
         if !(at.residual.sum() + at.jacobian.sum() + at.z_change).is_finite() {
             if last_size == f64::INFINITY {
                 return Err(StepError::NonFinite);
@@ -61,13 +81,17 @@ pub(crate) fn newton<const N: usize>(
         let z_change = at.z_change + at.z_slope.dot(&change);
         u += change;
         z += z_change;
-        let size = change.amax();
-        let round_off = f64::EPSILON * u.amax();
-        let next = size * (size / last_size) * (size / last_size);
-        if (last_size.is_finite() && next <= round_off) || residual_size <= 8.0 * f64::EPSILON * at.size {
+        let (size, z_size) = (change.amax(), z_change.abs());
+        let predicted = last_size.is_finite()
+            && last_correction(size, last_size, u.amax())
+            && last_correction(z_size, last_z_size, z.abs());
+        let round_off = 8.0 * f64::EPSILON;
+        let exact = residual_size <= round_off * at.size && at.z_change.abs() <= round_off * z.abs();
+        let stagnant = size >= 0.5 * last_size && size <= round_off * (resolution + u.amax());
+        if predicted || exact || stagnant {
             return Ok(Root { u, z, iterations });
         }
-        (last, last_z, last_size) = (change, z_change, size);
+        (last, last_z, last_size, last_z_size) = (change, z_change, size, z_size);
     }
     Err(StepError::NotConverged { residual: residual_size, iterations: ITERATION_LIMIT })
 }

@@ -39,12 +39,7 @@ impl<const N: usize> DiscretePath<N> {
     }
 
     /// The jets of `L_d` along the path, with the actions `z_k` that they belong to.
-    fn jets(
-        &self,
-        ld: &impl DiscreteLagrangian<N>,
-        t0: f64,
-        z0: f64,
-    ) -> Result<Vec<(f64, DiscreteJet<N>)>, StepError> {
+    fn jets(&self, ld: &impl DiscreteLagrangian<N>, t0: f64, z0: f64) -> Result<Vec<(f64, DiscreteJet<N>)>, StepError> {
         let mut z = z0;
         let mut jets = Vec::with_capacity(self.steps());
         for (k, pair) in self.points.windows(2).enumerate() {

@@ -1,12 +1,12 @@
 //! Discrete Lagrangians by quadrature of the action: what the rules of [`crate::rules`] share.
 
-use crate::newton::{Linearised, newton};
+use crate::newton::{Linearised, Start, newton};
 use crate::unknowns::Unknowns;
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    Border, DiscreteJet, DiscretePoint, Dual, Hessian, Lagrangian, Module, PhasePoint, Scalar, SecondDiscreteJet, Triple,
-    VelocityPoint,
+    Border, DiscreteJet, DiscretePoint, Dual, Hessian, Lagrangian, Module, PhasePoint, Scalar, SecondDiscreteJet,
+    Triple, VelocityPoint,
 };
 use std::marker::PhantomData;
 
@@ -184,7 +184,13 @@ impl<L, R: Rule> Quadrature<L, R> {
         L: Lagrangian<N>,
     {
         let implicit = Self::implicit(ADJOINT);
-        let mut sums = Sums { value: 0.0, residual: from.p, right: SMatrix::zeros(), right_z: SVector::zeros(), slope: Border::null() };
+        let mut sums = Sums {
+            value: 0.0,
+            residual: from.p,
+            right: SMatrix::zeros(),
+            right_z: SVector::zeros(),
+            slope: Border::null(),
+        };
         for node in R::NODES {
             let node = directed::<ADJOINT>(node);
             let at = VelocityPoint {
@@ -203,7 +209,13 @@ impl<L, R: Rule> Quadrature<L, R> {
         }
         let size = from.p.amax() + sums.right.amax() * u.amax();
         if !implicit {
-            return Linearised { residual: sums.residual, jacobian: sums.right, size, z_change: 0.0, z_slope: SVector::zeros() };
+            return Linearised {
+                residual: sums.residual,
+                jacobian: sums.right,
+                size,
+                z_change: 0.0,
+                z_slope: SVector::zeros(),
+            };
         }
         let pivot = 1.0 - h * sums.slope.z;
         let (z_change, z_slope) = ((from.z - z1 + h * sums.value) / pivot, sums.slope.x * (h / pivot));
@@ -229,7 +241,8 @@ impl<L, R: Rule> Quadrature<L, R> {
     where
         L: Lagrangian<N>,
     {
-        let root = newton(*guess, from.z, solver, |u, z1| Ok(self.linearise::<N, ADJOINT>(t, h, from, u, z1)))?;
+        let start = Start { u: *guess, z: from.z, resolution: (from.q.amax() / h).abs() };
+        let root = newton(start, solver, |u, z1| Ok(self.linearise::<N, ADJOINT>(t, h, from, u, z1)))?;
         let (u, mut p) = (root.u, SVector::<f64, N>::zeros());
         let (mut value, mut slope_0, mut slope_1) = (0.0, 0.0, 0.0);
         for node in R::NODES {
@@ -501,7 +514,9 @@ struct Total<const N: usize> {
 impl<const N: usize> Total<N> {
     /// `d2L` on two sets of total directions.
     fn form(&self, l: &Hessian<N>, other: &Self) -> SMatrix<f64, N, N> {
-        l.qq * (self.q * other.q) + l.qv * (self.q * other.v) + l.qv.transpose() * (self.v * other.q)
+        l.qq * (self.q * other.q)
+            + l.qv * (self.q * other.v)
+            + l.qv.transpose() * (self.v * other.q)
             + l.vv * (self.v * other.v)
             + (l.qz * self.q + l.vz * self.v) * other.z.transpose()
             + self.z * (l.qz * other.q + l.vz * other.v).transpose()

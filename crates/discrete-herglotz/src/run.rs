@@ -153,12 +153,7 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
-    pub fn with_guess(
-        ld: &'a D,
-        t0: f64,
-        state: PhasePoint<N>,
-        guess: SVector<f64, N>,
-    ) -> Result<Self, InputError> {
+    pub fn with_guess(ld: &'a D, t0: f64, state: PhasePoint<N>, guess: SVector<f64, N>) -> Result<Self, InputError> {
         state.check()?;
         let mut solver = Solver::default();
         let first = ld.forward(t0, &state, &guess, &mut solver).map_err(|cause| match cause {

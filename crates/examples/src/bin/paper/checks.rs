@@ -1,0 +1,132 @@
+//! The table of checked statements: the worst residual for each statement, system, method and time step.
+
+use crate::statements;
+use contact_examples::Failure;
+use std::collections::BTreeMap;
+use std::error::Error;
+
+/// The largest residual that a true statement may have.
+///
+/// Residuals are relative to the size of their terms, so they are a few units of round-off (2e-16) times the conditions of
+/// the matrices that are inverted: W, the derivative of F-L_d, the Jacobian of a step. Those of the catalogue stay below
+/// 1e4; 1e-11 leaves a factor of ten. A false statement (a wrong sign, `1 + h gamma` for `e^(h gamma)`) has a residual of
+/// the size of `h gamma`, 1e-3 and more.
+pub const TOLERANCE: f64 = 1e-11;
+
+/// What a residual belongs to. The order is that of the table: by statement, then by name, then by step.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Subject {
+    /// The number of the statement.
+    pub statement: u32,
+    /// The system that it was checked on.
+    pub system: &'static str,
+    /// The discretisation, or a dash for the statements that need none.
+    pub method: String,
+    /// The bits of the time step, which order positive numbers; 0 for none.
+    step: u64,
+}
+
+impl Subject {
+    /// A statement without discretisation.
+    pub fn continuous(statement: u32, system: &'static str) -> Self {
+        Subject { statement, system, method: "-".into(), step: 0 }
+    }
+
+    /// A statement for a discrete Lagrangian.
+    pub fn discrete(statement: u32, system: &'static str, method: &str, h: f64) -> Self {
+        Subject { statement, system, method: method.into(), step: h.to_bits() }
+    }
+
+    /// The time step as text, a dash for none.
+    pub fn step(&self) -> String {
+        if self.step == 0 { "-".into() } else { f64::from_bits(self.step).to_string() }
+    }
+}
+
+/// All residuals so far.
+#[derive(Clone, Debug, Default)]
+pub struct Checks {
+    worst: BTreeMap<Subject, f64>,
+    /// What went wrong where a statement could not be evaluated at all.
+    errors: BTreeMap<Subject, String>,
+}
+
+impl Checks {
+    /// Takes a residual into account. What cannot be evaluated counts as infinite; `None` says that the statement's
+    /// hypotheses do not hold here.
+    pub fn record<E: Error>(&mut self, subject: &Subject, residual: Result<Option<f64>, E>) {
+        let residual = match residual {
+            Ok(None) => return,
+            Ok(Some(residual)) if !residual.is_nan() => residual,
+            Ok(Some(_)) => {
+                self.errors.insert(subject.clone(), "the residual is not a number".into());
+                f64::INFINITY
+            }
+            Err(error) => {
+                self.errors.insert(subject.clone(), error.to_string());
+                f64::INFINITY
+            }
+        };
+        match self.worst.get_mut(subject) {
+            Some(worst) => *worst = worst.max(residual),
+            None => {
+                self.worst.insert(subject.clone(), residual);
+            }
+        }
+    }
+
+    /// The subjects with their residuals, in the table's order.
+    pub fn iter(&self) -> impl Iterator<Item = (&Subject, f64)> {
+        self.worst.iter().map(|(subject, residual)| (subject, *residual))
+    }
+
+    /// The worst residual of a statement and where it was met.
+    pub fn worst_of(&self, statement: u32) -> Option<(&Subject, f64)> {
+        let of = self.iter().filter(|(subject, _)| subject.statement == statement);
+        of.reduce(|worst, other| if other.1 > worst.1 { other } else { worst })
+    }
+
+    /// The number of subjects that a statement was checked on.
+    pub fn count(&self, statement: u32) -> usize {
+        self.iter().filter(|(subject, _)| subject.statement == statement).count()
+    }
+
+    /// The rows of `statements.csv`.
+    pub fn rows(&self) -> impl Iterator<Item = Vec<String>> {
+        self.iter().map(|(subject, residual)| {
+            let numbers = [format!("{residual:.3e}"), format!("{TOLERANCE:e}")];
+            let [residual, tolerance] = numbers;
+            let statement = subject.statement.to_string();
+            vec![statement, subject.system.into(), subject.method.clone(), subject.step(), residual, tolerance]
+        })
+    }
+
+    /// Fails unless every residual is within the tolerance.
+    pub fn verdict(&self) -> Result<(), Failure> {
+        let failing: Vec<String> = self
+            .iter()
+            .filter(|(_, residual)| *residual > TOLERANCE)
+            .map(|(subject, residual)| {
+                let Subject { statement, system, method, .. } = subject;
+                let title = statements::title(*statement);
+                let cause = self.errors.get(subject).map_or(String::new(), |error| format!(" ({error})"));
+                let step = subject.step();
+                format!(
+                    "  {statement} ({title}): {system}, {method}, h = {step}: {residual:.1e} > {TOLERANCE:e}{cause}"
+                )
+            })
+            .collect();
+        if failing.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::Statements { count: failing.len(), total: self.worst.len(), list: failing.join("\n") })
+    }
+}
+
+/// `2N + 2` numbers of `[0, 1)` for the sample of index `i`: a Kronecker sequence, which fills the cube evenly and is the
+/// same in every run.
+pub fn fractions(i: usize, count: usize) -> Vec<f64> {
+    const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
+    let position = (i + 1) as f64;
+    PRIMES.iter().cycle().take(count).map(|prime| (position * prime.sqrt()).fract()).collect()
+}

@@ -1,0 +1,93 @@
+//! Recomputes the paper's figures, names its slips with numbers, and checks the statements of its sections 2 and 3.
+//!
+//! ```text
+//! cargo run --release --bin paper [-- --out DIR]
+//! ```
+//!
+//! Writes the discrete solutions beside the true motions (`free_particle.csv`, `harmonic_oscillator.csv`), the curves that
+//! the paper calls exact by the formulas that produce them (`*_as_published.csv`), the figures as SVG, and
+//! `statements.csv`. Ends with 1 if a statement fails its check, with 2 if the output cannot be written.
+
+mod checks;
+mod closed_exact;
+mod decay;
+mod figures;
+mod published;
+mod section2;
+mod section3;
+mod section5;
+mod series;
+mod statements;
+mod tables;
+
+use clap::Parser;
+use contact_examples::{Directory, Failure, finish, number, print};
+use contact_geom::systems::{FreeParticle, HarmonicOscillator};
+use discrete_herglotz::{LeftMidpoint, Rectangle};
+use published::PublishedRow;
+use series::{GAMMA, Row, STEP};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Recomputes the figures of the paper and checks its statements.
+#[derive(Parser)]
+struct Arguments {
+    /// The directory for tables and figures; created where it does not exist.
+    #[arg(long, value_name = "DIR", default_value = "out/paper")]
+    out: PathBuf,
+}
+
+fn main() -> ExitCode {
+    finish(run(&Arguments::parse()))
+}
+
+fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let out = Directory::create(&arguments.out)?;
+
+    let particle = FreeParticle { gamma: GAMMA };
+    let free = series::rows(&particle, &Rectangle::new::<1>(particle, STEP)?, 100)?;
+    let free_published = published::free_particle(free.len())?;
+    let spring = HarmonicOscillator { gamma: GAMMA };
+    let oscillator = series::rows(&spring, &LeftMidpoint::new::<1>(spring, STEP)?, 50)?;
+    let oscillator_published = published::harmonic_oscillator(&oscillator)?;
+    out.table("free_particle.csv", &series::COLUMNS, free.iter().map(row))?;
+    out.table("harmonic_oscillator.csv", &series::COLUMNS, oscillator.iter().map(row))?;
+    out.table("free_particle_as_published.csv", &published::COLUMNS, free_published.iter().map(published_row))?;
+    out.table(
+        "harmonic_oscillator_as_published.csv",
+        &published::COLUMNS,
+        oscillator_published.iter().map(published_row),
+    )?;
+    print(&tables::deviations((&free, &free_published), (&oscillator, &oscillator_published)))?;
+
+    figures::free_particle(&out, &free, &free_published)?;
+    figures::harmonic_oscillator(&out, &oscillator, &oscillator_published)?;
+    decay::conformal_factor(&out)?;
+    decay::angular_momentum(&out)?;
+
+    let checks = statements::check_all();
+    let columns = ["statement", "system", "method", "h", "residual", "tolerance"];
+    out.table("statements.csv", &columns, checks.rows())?;
+    print(&tables::theorems(&checks))?;
+    print(&format!("\nTables and figures are in {}.\n", out.path().display()))?;
+    checks.verdict()
+}
+
+fn row(row: &Row) -> Vec<String> {
+    let entries = [
+        row.t,
+        row.q,
+        row.z,
+        row.log_energy_midpoint,
+        row.log_hamiltonian,
+        row.q_exact,
+        row.z_exact,
+        row.log_hamiltonian_exact,
+    ];
+    std::iter::once(row.k.to_string()).chain(entries.map(number)).collect()
+}
+
+fn published_row(row: &PublishedRow) -> Vec<String> {
+    let entries = [row.t, row.q, row.z, row.log_hamiltonian];
+    std::iter::once(row.k.to_string()).chain(entries.map(number)).collect()
+}

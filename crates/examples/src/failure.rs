@@ -1,0 +1,75 @@
+//! How a binary fails, and with which exit code.
+
+use contact_geom::GeometryError;
+use discrete_herglotz::{InputError, Status, StepError};
+use std::io;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use thiserror::Error;
+
+/// Why a binary cannot deliver its results.
+#[derive(Debug, Error)]
+pub enum Failure {
+    /// The output cannot be written. Bad input: exit code 2.
+    #[error(
+        "cannot write to {}: {cause}; --out takes a directory that exists or can be created, and in which files can \
+         be written", .path.display()
+    )]
+    Output {
+        /// The file or directory.
+        path: PathBuf,
+        /// What the system says.
+        cause: io::Error,
+    },
+    /// The text for the terminal cannot be written: exit code 2.
+    #[error("cannot write to the standard output: {0}")]
+    Terminal(io::Error),
+    /// A time step, a start or a count is not acceptable. Bad input: exit code 2.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// A point or a matrix is not acceptable. Bad input: exit code 2.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// A run ended early; what it recorded before is written. Exit code 1.
+    #[error("the run of {what} {status}")]
+    Run {
+        /// The system.
+        what: &'static str,
+        /// How the run ended.
+        status: Status,
+    },
+    /// A single step could not be taken: exit code 1.
+    #[error("no step: {0}")]
+    Step(#[from] StepError),
+    /// Statements that are theorems were found violated: exit code 1.
+    #[error("{count} of {total} checks of the paper's statements fail:\n{list}")]
+    Statements {
+        /// How many fail.
+        count: usize,
+        /// How many there are.
+        total: usize,
+        /// One line for each that fails.
+        list: String,
+    },
+}
+
+impl Failure {
+    /// 2 for bad input, 1 for a run or a check that went wrong.
+    fn code(&self) -> u8 {
+        match self {
+            Failure::Output { .. } | Failure::Terminal(_) | Failure::Input(_) | Failure::Geometry(_) => 2,
+            Failure::Run { .. } | Failure::Step(_) | Failure::Statements { .. } => 1,
+        }
+    }
+}
+
+/// Ends a binary: prints a failure on stderr and makes it an exit code.
+pub fn finish(result: Result<(), Failure>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            ExitCode::from(failure.code())
+        }
+    }
+}

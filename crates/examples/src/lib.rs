@@ -1,0 +1,11 @@
+//! What the binaries share: where results go, how figures look, how a failure ends a program.
+//!
+//! No mechanics is computed here; that is what the library crates are for.
+
+mod failure;
+mod figure;
+mod output;
+
+pub use failure::{Failure, finish};
+pub use figure::{Axis, Curve, Legend, Line, Panel, draw, draw_stack};
+pub use output::{Directory, number, print};

@@ -1,0 +1,128 @@
+//! Bad input is a typed error before the first step; bad luck is a status that keeps what was computed.
+
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::{FreeParticle, Kepler, Pendulum};
+use contact_geom::{DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, Symmetry, VelocityPoint};
+use discrete_herglotz::{
+    DiscreteLagrangian, DiscretePath, Every, FinalOnly, Flow, InputError, LeftMidpoint, Midpoint, Record, Rectangle,
+    Status, StepError,
+};
+
+/// A step that is not a positive finite number.
+#[test]
+fn steps() {
+    for h in [0.0, -0.1, f64::INFINITY] {
+        assert_eq!(Midpoint::new(Pendulum::default(), h).err(), Some(InputError::Step { h }));
+    }
+    assert!(matches!(Midpoint::new(Pendulum::default(), f64::NAN).err(), Some(InputError::Step { .. })));
+}
+
+/// Counts of zero: steps, stride, points, and coordinates.
+#[test]
+fn counts() {
+    let Ok(ld) = Midpoint::new(Pendulum::default(), 0.1) else { return };
+    let none = Flow::new(&ld, 0.0, PhasePoint::new([0.1], [0.2], 0.0)).and_then(|mut f| f.run(0, &mut FinalOnly));
+    assert_eq!(none, Err(InputError::Count { what: "the number of steps", least: 1, found: 0 }));
+    assert!(matches!(Every::new(0, FinalOnly), Err(InputError::Count { found: 0, .. })));
+    let one = DiscretePath::new(vec![SVector::from([0.0])]);
+    assert!(matches!(one, Err(InputError::Count { least: 2, found: 1, .. })));
+    struct Nothing;
+    impl Lagrangian<0> for Nothing {
+        fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 0>, _v: &SVector<T, 0>, z: T) -> T {
+            z
+        }
+    }
+    assert_eq!(Midpoint::new(Nothing, 0.1).err(), Some(InputError::Dimension));
+}
+
+/// Wrong sizes and non-finite numbers name the coordinate and what would be accepted.
+#[test]
+fn coordinates() {
+    let short = PhasePoint::<2>::from_slices(&[1.0], &[1.0, 2.0], 0.0);
+    assert_eq!(short, Err(GeometryError::WrongSize { what: "q", expected: 2, found: 1 }));
+    let Ok(ld) = Midpoint::new(Kepler::<2>::default(), 0.1) else { return };
+    let start = PhasePoint::new([1.0, 0.0], [f64::INFINITY, 1.0], 0.0);
+    let refused = Flow::new(&ld, 0.0, start).err();
+    let expected = GeometryError::NonFinite { what: "p", index: 0, value: f64::INFINITY };
+    assert_eq!(refused, Some(InputError::Geometry(expected)));
+    assert!(expected.to_string().contains("p[0] = inf"));
+    let path = DiscretePath::new(vec![SVector::from([0.0]), SVector::from([f64::NAN])]);
+    assert!(matches!(path, Err(InputError::Geometry(GeometryError::NonFinite { index: 1, .. }))));
+    assert!(Symmetry::<2>::rotation(0, 0).is_err() && Symmetry::<2>::rotation(0, 2).is_err());
+    assert!(Symmetry::<2>::axis([0.0, 0.0, 1.0]).is_err() && Symmetry::<3>::axis([0.0; 3]).is_err());
+}
+
+/// Equal points where the discrete Lagrangian is singular on the diagonal, and only there.
+#[test]
+fn equal_points() {
+    struct Length;
+    impl DiscreteLagrangian<1> for Length {
+        fn step_size(&self) -> f64 {
+            0.1
+        }
+        fn value<T: Scalar>(&self, _t: f64, x: &DiscretePoint<1, T>) -> Result<T, StepError> {
+            let d = x.q1[0] - x.q0[0];
+            Ok(d * d.sqrt() - x.z0 * 0.01)
+        }
+    }
+    let refused = Flow::from_points(&Length, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).err();
+    assert_eq!(refused, Some(InputError::EqualPoints));
+    let Ok(ld) = Rectangle::new(FreeParticle::default(), 0.1) else { return };
+    assert!(Flow::from_points(&ld, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).is_ok());
+}
+
+/// A start inside a singularity is refused, not handed on as a NaN.
+#[test]
+fn a_singular_start() {
+    let Ok(ld) = Rectangle::new(Kepler::<2>::default(), 0.1) else { return };
+    let refused = Flow::new(&ld, 0.0, PhasePoint::new([0.0, 0.0], [0.0, 1.0], 0.0)).err();
+    assert_eq!(refused, Some(InputError::FirstStep(StepError::NonFinite)));
+}
+
+/// sigma_d crosses zero in mid-run: a status with the step, and every row before it.
+#[test]
+fn sigma_crosses_zero() {
+    struct GrowingDrag;
+    impl Lagrangian<1> for GrowingDrag {
+        fn value<T: Scalar>(&self, t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+            v[0] * v[0] * 0.5 - t * z
+        }
+    }
+    // sigma = 1 - h t_mid with t_mid = (k + 1/2) h: not positive from k = 100 on, for h = 0.1.
+    let Ok(ld) = LeftMidpoint::new(GrowingDrag, 0.1) else { return };
+    let mut record = Record::default();
+    let status = Flow::new(&ld, 0.0, PhasePoint::new([0.0], [1.0], 0.0)).and_then(|mut f| f.run(200, &mut record));
+    let failed = matches!(status, Ok(Status::Failed { step: 100, cause: StepError::SigmaVanished { .. } }));
+    assert!(failed, "{status:?}");
+    assert_eq!(record.rows.len(), 101);
+    assert!(record.rows.iter().all(|(t, x)| t.is_finite() && x.check().is_ok()));
+}
+
+/// Motion that blows up ends with a status, not with a NaN: `z' = z^2` leaves the real line at t = 1.
+#[test]
+fn blow_up() {
+    struct Explosive;
+    impl Lagrangian<1> for Explosive {
+        fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+            v[0] * v[0] * 0.5 + z * z
+        }
+    }
+    let Ok(explicit) = LeftMidpoint::new(Explosive, 0.01) else { return };
+    let Ok(implicit) = Midpoint::new(Explosive, 0.01) else { return };
+    let start = PhasePoint::new([0.0], [0.1], 1.0);
+    let mut rows = (Record::default(), Record::default());
+    let explicit = Flow::new(&explicit, 0.0, start).and_then(|mut f| f.run(400, &mut rows.0));
+    let implicit = Flow::new(&implicit, 0.0, start).and_then(|mut f| f.run(400, &mut rows.1));
+    for (status, rows) in [(explicit, rows.0.rows), (implicit, rows.1.rows)] {
+        let Ok(Status::Failed { step, .. }) = status else { panic!("{status:?}") };
+        assert_eq!(rows.len(), step + 1);
+        assert!(rows.iter().all(|(_, x)| x.check().is_ok()));
+    }
+}
+
+/// The helpers that read slices accept what they should.
+#[test]
+fn good_slices() {
+    let x = VelocityPoint::<2>::from_slices(&[1.0, 2.0], &[3.0, 4.0], 5.0);
+    assert_eq!(x, Ok(VelocityPoint::new([1.0, 2.0], [3.0, 4.0], 5.0)));
+}

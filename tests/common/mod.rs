@@ -1,0 +1,123 @@
+//! What every theorem test shares: random points of every system, with every discretisation.
+
+pub mod oracle;
+
+use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use contact_geom::{DiscretePoint, VelocityPoint, statements as continuous};
+use discrete_herglotz::rules::{Discretisation, DiscretisationVisitor, visit_discretisations};
+use discrete_herglotz::statements as discrete;
+use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
+
+/// The bound on theorem residuals, relative to the terms' size: 5e4 eps, for the conditions of W and of F-L_d that the
+/// samples allow (1e3) times the operations in a formula.
+pub const TOLERANCE: f64 = 1e-11;
+
+/// The random cases for each system and method.
+pub const CASES: u32 = 256;
+
+/// A runner whose cases are the same in every run.
+pub fn runner(cases: u32) -> TestRunner {
+    let config = Config { cases, failure_persistence: None, ..Config::default() };
+    TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha))
+}
+
+/// Runs a check on random vectors of `[0, 1]^dimension`; panics with the smallest failing case.
+pub fn on_random(name: &str, dimension: usize, mut check: impl FnMut(&[f64]) -> Result<(), String>) {
+    let strategy = proptest::collection::vec(0.0..=1.0f64, dimension);
+    let cell = std::cell::RefCell::new(&mut check);
+    let outcome = runner(CASES).run(&strategy, |u| (cell.borrow_mut())(&u).map_err(TestCaseError::fail));
+    assert!(outcome.is_ok(), "{name}: {outcome:?}");
+}
+
+/// A residual as a check: an error of the library is a failure too.
+fn check(residual: Result<Option<f64>, impl std::fmt::Display>, applies: &mut bool) -> Result<(), String> {
+    match residual {
+        Err(e) => Err(e.to_string()),
+        // A NaN is not below the tolerance.
+        Ok(Some(r)) if r <= TOLERANCE => {
+            *applies = true;
+            Ok(())
+        }
+        Ok(Some(r)) => Err(format!("residual {r:e}")),
+        Ok(None) => Ok(()),
+    }
+}
+
+/// The two positions of a step of length `h` around a point of TQ x R.
+pub fn around<const N: usize>(x: &VelocityPoint<N>, h: f64) -> DiscretePoint<N> {
+    DiscretePoint { q0: x.q - x.v * (0.5 * h), q1: x.q + x.v * (0.5 * h), z0: x.z }
+}
+
+/// A step between 0.005 and 0.05 on a logarithmic scale: small enough for every system's fastest sample, so that F-L_d has
+/// one inverse near the motion.
+pub fn step_from(u: f64) -> f64 {
+    0.005 * 10f64.powf(u)
+}
+
+/// Checks a statement of section 2 at random points of every system; returns on how many systems it applies.
+pub fn over_catalogue(statement: u32) -> usize {
+    struct Visitor(u32, usize);
+    impl SystemVisitor for Visitor {
+        fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+            let mut applies = false;
+            on_random(system.name(), 2 * N + 2, |u| {
+                let (t, x) = system.sample(u);
+                check(continuous::residual(self.0, system, t, &x), &mut applies)
+            });
+            self.1 += usize::from(applies);
+        }
+    }
+    let mut visitor = Visitor(statement, 0);
+    visit_catalogue(&mut visitor);
+    visitor.1
+}
+
+/// Checks a statement of section 3 at random points of every system with every discretisation; returns with how many pairs
+/// it applies.
+pub fn over_discretisations(statement: u32) -> usize {
+    struct Visitor(u32, usize);
+    impl SystemVisitor for Visitor {
+        fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+            struct Methods<'a, S, const N: usize>(u32, &'a S, usize);
+            impl<const N: usize, S: System<N>> DiscretisationVisitor for Methods<'_, S, N> {
+                fn visit(&mut self, method: &impl Discretisation) {
+                    let (system, symmetries) = (self.1, self.1.symmetries());
+                    let mut applies = false;
+                    let name = format!("{} with {}", system.name(), method.name());
+                    on_random(&name, 2 * N + 3, |u| {
+                        let (t, x) = system.sample(&u[1..]);
+                        let h = step_from(u[0]);
+                        let ld = method.discretise(system, h).map_err(|e| e.to_string())?;
+                        check(discrete::residual(self.0, &ld, &symmetries, t, &around(&x, h)), &mut applies)
+                    });
+                    self.2 += usize::from(applies);
+                }
+            }
+            let mut methods = Methods(self.0, system, 0);
+            visit_discretisations(&mut methods);
+            self.1 += methods.2;
+        }
+    }
+    let mut visitor = Visitor(statement, 0);
+    visit_catalogue(&mut visitor);
+    visitor.1
+}
+
+/// The number of systems of the catalogue.
+pub fn systems() -> usize {
+    struct Count(usize);
+    impl SystemVisitor for Count {
+        fn visit<const N: usize, S: System<N>>(&mut self, _system: &S) {
+            self.0 += 1;
+        }
+    }
+    let mut count = Count(0);
+    visit_catalogue(&mut count);
+    count.0
+}
+
+/// The systems that declare a symmetry.
+pub const SYMMETRIC: usize = 7;
+
+/// The number of discretisations.
+pub const METHODS: usize = 4;

@@ -1,0 +1,81 @@
+//! An independent integrator: dop853 of another library, on Herglotz' equations and their variational equation.
+
+use contact_geom::nalgebra::DMatrix;
+use contact_geom::{HerglotzField, Lagrangian, Smooth, Triple, VelocityPoint};
+use differential_equations::prelude::{ExplicitRungeKutta, IVP, ODE};
+
+/// The Herglotz field, its variational equation and the exponent `int L_z`, as one first-order system.
+struct Variational<'a, L, const N: usize> {
+    lagrangian: &'a L,
+    /// Whether the derivative of the flow and the exponent are wanted.
+    derivative: bool,
+}
+
+impl<L: Lagrangian<N>, const N: usize> ODE<f64, Vec<f64>> for Variational<'_, L, N> {
+    fn diff(&self, t: f64, y: &Vec<f64>, d: &mut Vec<f64>) {
+        let m = 2 * N + 1;
+        let x = Triple::<N>::from_fn(|i| y[i]);
+        let field = HerglotzField { lagrangian: self.lagrangian, t };
+        if !self.derivative {
+            match field.at(&x) {
+                Ok(f) => (0..m).for_each(|i| d[i] = f.component(i)),
+                Err(_) => d.fill(f64::NAN),
+            }
+            return;
+        }
+        let Ok((f, jacobian)) = field.with_jacobian(&x) else {
+            d.fill(f64::NAN);
+            return;
+        };
+        (0..m).for_each(|i| d[i] = f.component(i));
+        let change = jacobian * DMatrix::from_column_slice(m, m, &y[m..m + m * m]);
+        d[m..m + m * m].copy_from_slice(change.as_slice());
+        d[m + m * m] = self.lagrangian.gradient(t, &x.into()).z;
+    }
+}
+
+/// The state of the motion after a time, with the derivative of the flow and the exponent `int L_z` if asked for.
+fn integrate<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t0: f64,
+    start: &VelocityPoint<N>,
+    duration: f64,
+    derivative: bool,
+) -> Vec<f64> {
+    let m = 2 * N + 1;
+    let mut y = Triple::from(*start).to_vector().as_slice().to_vec();
+    if derivative {
+        y.extend_from_slice(DMatrix::<f64>::identity(m, m).as_slice());
+        y.push(0.0);
+    }
+    let ode = Variational::<_, N> { lagrangian, derivative };
+    let method = ExplicitRungeKutta::dop853().rtol(3e-14).atol(1e-15).max_steps(1_000_000);
+    let solution = IVP::ode(&ode, t0, t0 + duration, y).method(method).solve();
+    let end = solution.ok().and_then(|s| s.y.last().cloned());
+    assert!(end.is_some(), "the oracle did not reach the end");
+    end.unwrap_or_default()
+}
+
+/// The state of the motion after a time.
+pub fn motion<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t0: f64,
+    start: &VelocityPoint<N>,
+    duration: f64,
+) -> VelocityPoint<N> {
+    let y = integrate(lagrangian, t0, start, duration, false);
+    Triple::from_fn(|i| y[i]).into()
+}
+
+/// The state of the motion after a time, the derivative of the flow, and `exp int L_z`.
+pub fn motion_with_derivative<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t0: f64,
+    start: &VelocityPoint<N>,
+    duration: f64,
+) -> (VelocityPoint<N>, DMatrix<f64>, f64) {
+    let m = 2 * N + 1;
+    let y = integrate(lagrangian, t0, start, duration, true);
+    let derivative = DMatrix::from_column_slice(m, m, &y[m..m + m * m]);
+    (Triple::from_fn(|i| y[i]).into(), derivative, y[m + m * m].exp())
+}

@@ -1,0 +1,67 @@
+//! A step of a small system allocates nothing, with any rule, however the derivatives are found.
+
+use contact_geom::systems::{DoublePendulum, Kepler, Pendulum, System};
+use contact_geom::{PhasePoint, legendre};
+use discrete_herglotz::rules::{Discretisation, DiscretisationVisitor, visit_discretisations};
+use discrete_herglotz::{FinalOnly, Flow, Status};
+use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
+use std::cell::Cell;
+
+thread_local! {
+    /// The allocations of this thread: the test runner's own threads do not count.
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+#[allow(unsafe_code)] // An allocator cannot be written without.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let _ = COUNT.try_with(|c| c.set(c.get() + 1));
+        unsafe { SystemAllocator.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { SystemAllocator.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(action: impl FnOnce()) -> usize {
+    let before = COUNT.with(Cell::get);
+    action();
+    COUNT.with(Cell::get) - before
+}
+
+/// The counter counts.
+#[test]
+fn an_allocation_is_seen() {
+    assert!(allocations(|| drop(std::hint::black_box(vec![1.0; 8]))) >= 1);
+}
+
+/// A thousand steps, without one.
+#[test]
+fn steps() {
+    struct Visitor;
+    impl DiscretisationVisitor for Visitor {
+        fn visit(&mut self, method: &impl Discretisation) {
+            run(method, &Pendulum::default());
+            run(method, &DoublePendulum::default());
+            run(method, &Kepler::<3>::default());
+        }
+    }
+    fn run<const N: usize, S: System<N>>(method: &impl Discretisation, system: &S) {
+        let start: PhasePoint<N> = legendre(system, 0.0, &system.initial());
+        let ld = method.discretise(system, 0.01);
+        assert!(ld.is_ok());
+        let Ok(ld) = ld else { return };
+        let flow = Flow::new(&ld, 0.0, start);
+        assert!(flow.is_ok(), "{}", system.name());
+        let Ok(mut flow) = flow else { return };
+        let mut status = Ok(Status::Completed);
+        let count = allocations(|| status = flow.run(1000, &mut FinalOnly));
+        assert_eq!((status, count), (Ok(Status::Completed), 0), "{} with {}", system.name(), method.name());
+    }
+    visit_discretisations(&mut Visitor);
+}

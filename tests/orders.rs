@@ -1,0 +1,74 @@
+//! Orders of the discretisations (1, 1, 2, 2) in q, p and z, by slope on problems nonlinear in q and z.
+//!
+//! The errors against an independent integrator are fitted over steps well above its error and small enough for the
+//! asymptotic regime; the band of 0.15 is the field's.
+
+use crate::common::oracle::motion;
+use contact_geom::systems::{CoupledInZ, DoublePendulum, QuadraticInZ, Relativistic, System};
+use contact_geom::{PhasePoint, legendre};
+use discrete_herglotz::rules::{Discretisation, DiscretisationVisitor, visit_discretisations};
+use discrete_herglotz::{FinalOnly, Flow, Status};
+
+/// The time over which the error is taken.
+const SPAN: f64 = 1.0;
+
+/// The errors in q, p and z at the end for a number of steps.
+fn errors<const N: usize, S: System<N>>(
+    method: &impl Discretisation,
+    system: &S,
+    steps: usize,
+    truth: &PhasePoint<N>,
+) -> [f64; 3] {
+    let t0 = system.initial_time();
+    let ld = method.discretise(system, SPAN / steps as f64);
+    let start = legendre(system, t0, &system.initial());
+    let end = ld.and_then(|ld| {
+        let mut flow = Flow::new(&ld, t0, start)?;
+        assert_eq!(flow.run(steps, &mut FinalOnly)?, Status::Completed);
+        Ok(*flow.state())
+    });
+    assert!(end.is_ok(), "{}: {end:?}", system.name());
+    end.map_or([f64::NAN; 3], |e| [(e.q - truth.q).amax(), (e.p - truth.p).amax(), (e.z - truth.z).abs()])
+}
+
+/// The least-squares slope of log error against log step.
+fn slope(points: &[(f64, f64)]) -> f64 {
+    let logs: Vec<_> = points.iter().map(|(h, e)| (h.ln(), e.ln())).collect();
+    let n = logs.len() as f64;
+    let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
+    let covariance: f64 = logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
+    covariance / logs.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>()
+}
+
+struct Methods<'a, S, const N: usize>(&'a S);
+
+impl<const N: usize, S: System<N>> DiscretisationVisitor for Methods<'_, S, N> {
+    fn visit(&mut self, method: &impl Discretisation) {
+        let system = self.0;
+        let t0 = system.initial_time();
+        let truth = legendre(system, t0 + SPAN, &motion(system, t0, &system.initial(), SPAN));
+        let runs: Vec<_> = [64, 128, 256, 512]
+            .into_iter()
+            .map(|steps| (SPAN / f64::from(steps), errors(method, system, steps as usize, &truth)))
+            .collect();
+        for (component, name) in ["q", "p", "z"].iter().enumerate() {
+            let points: Vec<_> = runs.iter().map(|(h, e)| (*h, e[component])).collect();
+            let (observed, order) = (slope(&points), f64::from(method.order()));
+            assert!(
+                (observed - order).abs() < 0.15,
+                "{} with {}: order {observed:.3} in {name}, documented {order}; {points:?}",
+                system.name(),
+                method.name()
+            );
+        }
+    }
+}
+
+/// Nonlinear in q and z, one with W depending on q, v and z; strong drag shows the first order of the rules explicit in z.
+#[test]
+fn orders_by_slope() {
+    visit_discretisations(&mut Methods::<_, 1>(&QuadraticInZ { c: 1.0 }));
+    visit_discretisations(&mut Methods::<_, 1>(&CoupledInZ { gamma: -1.0, ..CoupledInZ::default() }));
+    visit_discretisations(&mut Methods::<_, 1>(&Relativistic { gamma: -1.0 }));
+    visit_discretisations(&mut Methods::<_, 2>(&DoublePendulum { gamma: -1.0, ..DoublePendulum::default() }));
+}

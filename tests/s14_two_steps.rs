@@ -1,0 +1,9 @@
+//! Statement 14 (section 3, remark): the differential of the discrete action of two steps.
+
+use crate::common::{METHODS, over_discretisations, systems};
+
+/// With every discretisation of every system.
+#[test]
+fn with_every_discretisation() {
+    assert_eq!(over_discretisations(14), systems() * METHODS);
+}

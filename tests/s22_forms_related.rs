@@ -1,0 +1,9 @@
+//! Statement 22 (section 3.1, lemma): `eta+ = sigma_d eta-` and `Phi_d* eta- = eta+`.
+
+use crate::common::{METHODS, over_discretisations, systems};
+
+/// With every discretisation of every system.
+#[test]
+fn with_every_discretisation() {
+    assert_eq!(over_discretisations(22), systems() * METHODS);
+}

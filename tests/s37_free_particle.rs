@@ -1,0 +1,81 @@
+//! Statement 37 (section 5, corrected): the free particle's discrete equations, its explicit q2, and its exact discrete
+//! Lagrangian.
+
+use crate::common::{TOLERANCE, on_random};
+use contact_geom::systems::FreeParticle;
+use contact_geom::{DiscretePoint, Scalar, VelocityPoint};
+use discrete_herglotz::{
+    DiscreteLagrangian, LeftMidpoint, Rectangle, StepError, derived_jet, discrete_flow, legendre_minus,
+};
+
+/// The exact discrete Lagrangian `gamma dq^2 e^(gamma h) / (2 (e^(gamma h) - 1)) + s z0 (e^(gamma h) - 1)`: corrected with
+/// s = 1, as printed with s = -1.
+struct ExactFreeParticle {
+    gamma: f64,
+    h: f64,
+    sign: f64,
+}
+
+impl DiscreteLagrangian<1> for ExactFreeParticle {
+    fn step_size(&self) -> f64 {
+        self.h
+    }
+    fn value<T: Scalar>(&self, _t: f64, x: &DiscretePoint<1, T>) -> Result<T, StepError> {
+        let (d, growth) = (x.q1[0] - x.q0[0], (self.gamma * self.h).exp_m1());
+        Ok(d * d * (self.gamma * (growth + 1.0) / (2.0 * growth)) + x.z0 * (self.sign * growth))
+    }
+}
+
+fn random(name: &str, check: impl Fn(f64, f64, &DiscretePoint<1>) -> f64) {
+    on_random(name, 5, |u| {
+        let x = DiscretePoint::new([4.0 * u[0] - 2.0], [4.0 * u[1] - 2.0], u[2] - 0.5);
+        let (gamma, h) = (-1.0 + 1.5 * u[3], 0.05 + 0.5 * u[4]);
+        let residual = check(if gamma == 0.0 { -0.1 } else { gamma }, h, &x);
+        if residual <= TOLERANCE { Ok(()) } else { Err(format!("residual {residual:e}")) }
+    });
+}
+
+/// `q2 = (h gamma + 2) q1 - (h gamma + 1) q0`, `z1 = (q1 - q0)^2/(2h) + (h gamma + 1) z0`; the rectangle and the midpoint rule
+/// are the same for this L.
+#[test]
+fn explicit_step() {
+    random("free particle", |gamma, h, x| {
+        let system = FreeParticle { gamma };
+        let (q0, q1) = (x.q0[0], x.q1[0]);
+        let q2 = (h * gamma + 2.0) * q1 - (h * gamma + 1.0) * q0;
+        let z1 = (q1 - q0).powi(2) / (2.0 * h) + (h * gamma + 1.0) * x.z0;
+        let of = |next: Result<DiscretePoint<1>, StepError>| {
+            next.map_or(f64::NAN, |n| (n.q1[0] - q2).abs().max((n.z0 - z1).abs()) / (1.0 + q2.abs() + z1.abs()))
+        };
+        let rectangle = Rectangle::new(system, h).map_or(f64::NAN, |ld| of(discrete_flow(&ld, 0.0, x)));
+        let midpoint = LeftMidpoint::new(system, h).map_or(f64::NAN, |ld| of(discrete_flow(&ld, 0.0, x)));
+        if rectangle.is_nan() || midpoint.is_nan() { f64::NAN } else { rectangle.max(midpoint) }
+    });
+}
+
+/// The corrected exact discrete Lagrangian steps along the true motion, and `D_z L^e = e^(gamma h) - 1`.
+#[test]
+fn exact_discrete_lagrangian() {
+    random("exact free particle", |gamma, h, x| {
+        let (system, ld) = (FreeParticle { gamma }, ExactFreeParticle { gamma, h, sign: 1.0 });
+        let Some(v0) = system.velocity_through(x.q0[0], x.q1[0], h) else { return f64::NAN };
+        let at = |t| system.solution(t, &VelocityPoint::new(x.q0, [v0], x.z0));
+        let (Ok(next), Ok(jet)) = (discrete_flow(&ld, 0.0, x), derived_jet(&ld, 0.0, x)) else { return f64::NAN };
+        let size = 1.0 + at(2.0 * h).q[0].abs() + at(h).z.abs();
+        let flow = (next.q1[0] - at(2.0 * h).q[0]).abs().max((next.z0 - at(h).z).abs()) / size;
+        flow.max((jet.dz - (gamma * h).exp_m1()).abs())
+    });
+}
+
+/// The printed one, with the wrong sign of z0, misses the theorem F-L^e = FL o R^- by the factor that its sigma_d is wrong by.
+#[test]
+fn the_printed_one_is_wrong() {
+    let (gamma, h) = (-0.05f64, 0.5);
+    let ld = ExactFreeParticle { gamma, h, sign: -1.0 };
+    let system = FreeParticle { gamma };
+    let p0 = legendre_minus(&ld, 0.0, &DiscretePoint::new([0.0], [1.0], 0.0)).map(|s| s.p[0]);
+    let v0 = system.velocity_through(0.0, 1.0, h);
+    let factor = (gamma * h).exp() / (2.0 - (gamma * h).exp());
+    let ok = matches!((p0, v0), (Ok(p0), Some(v0)) if (p0 - factor * v0).abs() < 1e-14);
+    assert!(ok, "{p0:?} {v0:?} {factor}");
+}
