@@ -3,8 +3,9 @@
 
 use crate::common::{METHODS, TOLERANCE, on_random, over_discretisations, step_from, systems};
 use contact_geom::systems::{Duffing, HarmonicOscillator, Pendulum, System};
-use contact_geom::{DiscretePoint, PhasePoint};
-use discrete_herglotz::{Flow, InputError, LeftMidpoint, discrete_flow};
+use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint};
+use discrete_herglotz::{DiscreteLagrangian, Flow, InputError, LeftMidpoint, discrete_flow};
+use exact_lagrangian::LinearExact;
 
 /// `q2 = -((h^3 g + 4 h g + h^2 + 4) q0 + (h^3 g - 4 h g + 2 h^2 - 8) q1) / (h^2 + 4)`, and z1.
 #[test]
@@ -21,6 +22,31 @@ fn oscillator() {
         let residual = (next.q1[0] - q2).abs().max((next.z0 - z1).abs()) / (1.0 + q2.abs() + z1.abs());
         if residual <= TOLERANCE { Ok(()) } else { Err(format!("residual {residual:e}")) }
     });
+}
+
+/// The exact discrete Lagrangian of the oscillator steps along the true motion, under-, critically and overdamped, and its
+/// `sigma_d` is `e^(gamma h)`; at a conjugate point there is none.
+#[test]
+fn exact_dynamics() {
+    on_random("exact oscillator", 4, |u| {
+        let x = DiscretePoint::new([4.0 * u[0] - 2.0], [4.0 * u[1] - 2.0], u[2] - 0.5);
+        for gamma in [-0.05, -2.0, -2.5, 0.3] {
+            let (system, h) = (HarmonicOscillator { gamma }, 0.1 + u[3]);
+            let ld = LinearExact::oscillator(gamma, h).map_err(|e| e.to_string())?;
+            let v0 = system.velocity_through(x.q0[0], x.q1[0], h).ok_or("conjugate")?;
+            let at = |t| system.solution(t, &VelocityPoint::new(x.q0, [v0], x.z0));
+            let next = discrete_flow(&ld, 0.0, &x).map_err(|e| e.to_string())?;
+            let sigma = ld.jet(0.0, &x).map_err(|e| e.to_string())?.sigma();
+            let size = 1.0 + v0.abs() + at(2.0 * h).q[0].abs() + at(h).z.abs();
+            let flow = (next.q1[0] - at(2.0 * h).q[0]).abs().max((next.z0 - at(h).z).abs()) / size;
+            let residual = flow.max((sigma - (gamma * h).exp()).abs());
+            if !(residual <= TOLERANCE) {
+                return Err(format!("gamma {gamma}: residual {residual:e}"));
+            }
+        }
+        Ok(())
+    });
+    assert!(LinearExact::oscillator(0.0, std::f64::consts::PI).is_err());
 }
 
 /// `(q1 - q0)/h - h/2 V'((q0 + q1)/2) = ((q2 - q1)/h + h/2 V'((q1 + q2)/2)) / (1 + h gamma)` for a potential given by V'.

@@ -1,5 +1,8 @@
 //! Dual numbers: a value with its differential along given directions.
 
+// The product and quotient rules mix operations: clippy takes that for a slip.
+#![allow(clippy::suspicious_arithmetic_impl)]
+
 use crate::Scalar;
 use nalgebra::SVector;
 use num_traits::{One, Zero};
@@ -264,6 +267,11 @@ impl<T: Scalar, D: Module<T>> Scalar for Dual<T, D> {
     fn sin_cos(self) -> (Self, Self) {
         let (s, c) = self.re.sin_cos();
         (self.chain(s, c), self.chain(c, -s))
+    }
+    #[inline]
+    fn sin_versine(self) -> (Self, Self) {
+        let (s, v) = self.re.sin_versine();
+        (self.chain(s, -v + 1.0), self.chain(v, s))
     }
     #[inline]
     fn sinh(self) -> Self {

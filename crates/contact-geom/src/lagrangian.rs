@@ -8,8 +8,9 @@ use nalgebra::{SMatrix, SVector};
 ///
 /// The motion makes the end value of the action critical, where `zdot = L(t, q, qdot, z)`. In the field's signs a
 /// dissipative term is `gamma z` with `gamma < 0`. Every derivative is `value` on duals; a user who has a closed form
-/// overrides [`closed_gradient`](Self::closed_gradient) or [`closed_hessian`](Self::closed_hessian), and all the rest
-/// then uses it. [`check_closed_derivatives`] compares such a form with the derived one.
+/// overrides [`closed_gradient`](Self::closed_gradient), which vector fields, forms and steps then differentiate once less,
+/// or [`closed_hessian`](Self::closed_hessian), which W, forms and second jets then use. [`check_closed_derivatives`]
+/// compares such a form with the derived one.
 ///
 /// ```
 /// use contact_geom::{nalgebra::SVector, Lagrangian, Scalar, VelocityPoint};
@@ -43,7 +44,7 @@ pub trait Lagrangian<const N: usize> {
 
     /// The value and the differential along given directions: the coordinates of `x` carry the directions as duals.
     /// Not to be overridden: it uses [`closed_gradient`](Self::closed_gradient) where there is one.
-    #[inline]
+    #[inline(always)]
     fn along<T: Scalar, D: Module<T>>(&self, t: T, x: &VelocityPoint<N, Dual<T, D>>) -> Dual<T, D> {
         let base = VelocityPoint { q: x.q.map(|a| a.re), v: x.v.map(|a| a.re), z: x.z.re };
         match self.closed_gradient(t, &base) {
@@ -151,15 +152,15 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<'_, L> {
 }
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         (**self).value(t, q, v, z)
     }
-    #[inline]
+    #[inline(always)]
     fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
         (**self).closed_gradient(t, x)
     }
-    #[inline]
+    #[inline(always)]
     fn closed_hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
         (**self).closed_hessian(t, x)
     }

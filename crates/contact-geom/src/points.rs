@@ -95,7 +95,8 @@ impl<const N: usize> Triple<N> {
     /// Whether every component is finite.
     #[inline]
     pub fn is_finite(&self) -> bool {
-        self.x.iter().chain(self.y.iter()).all(|c| c.is_finite()) && self.z.is_finite()
+        let [x, y] = [self.x.data.0[0], self.y.data.0[0]];
+        x.iter().all(|c| c.is_finite()) && y.iter().all(|c| c.is_finite()) && self.z.is_finite()
     }
 }
 

@@ -61,6 +61,17 @@ pub trait Scalar:
     fn cos(self) -> Self {
         self.sin_cos().1
     }
+    /// Sine and versine `1 - cos x` together, the latter without cancellation near 0: both through the half angle.
+    #[inline]
+    fn sin_versine(self) -> (Self, Self) {
+        let (s, c) = (self * 0.5).sin_cos();
+        let twice = s * 2.0;
+        (twice * c, twice * s)
+    }
+    /// The versine `1 - cos x`, the height of a pendulum above its lowest point.
+    fn versine(self) -> Self {
+        self.sin_versine().1
+    }
     /// The tangent.
     fn tan(self) -> Self {
         let (s, c) = self.sin_cos();

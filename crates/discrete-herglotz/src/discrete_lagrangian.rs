@@ -118,7 +118,7 @@ impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
     fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
         (**self).second_jet(t, x)
     }
-    #[inline]
+    #[inline(always)]
     fn forward(
         &self,
         t: f64,
@@ -155,7 +155,7 @@ pub struct Transition<const N: usize> {
 
 impl<const N: usize> Transition<N> {
     /// Refuses a step that is not finite or not conformally contact.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn checked(self) -> Result<Self, StepError> {
         if !(Triple::from(self.end).is_finite() && self.sigma.is_finite()) {
             return Err(StepError::NonFinite);

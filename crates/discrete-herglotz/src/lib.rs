@@ -32,6 +32,7 @@ pub mod rules;
 mod run;
 mod solver;
 pub mod statements;
+mod step_equations;
 mod unknowns;
 
 pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};

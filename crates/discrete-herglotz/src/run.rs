@@ -199,7 +199,7 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
     ///
     /// # Errors
     /// A [`StepError`]; the state is then the one before.
-    #[inline]
+    #[inline(always)]
     pub fn step(&mut self) -> Result<Step<N>, StepError> {
         let t = self.time();
         let [latest, before] = self.velocities;

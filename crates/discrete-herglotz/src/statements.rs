@@ -166,23 +166,17 @@ fn differentiated<const N: usize>(
     path: &DiscretePath<N>,
     z0: f64,
 ) -> Result<Vec<SVector<f64, N>>, StepError> {
-    let mut differential = vec![SVector::zeros(); path.points().len()];
-    for k in 0..path.points().len() {
-        let points: Vec<_> = path
-            .points()
-            .iter()
-            .enumerate()
-            .map(|(j, q)| {
-                SVector::<Dual<f64, SVector<f64, N>>, N>::from_fn(|i, _| {
-                    let mut c: Dual<f64, SVector<f64, N>> = Dual::constant(q[i]);
-                    c.d[i] = f64::from(u8::from(j == k));
-                    c
-                })
+    let moving = |k: usize| -> Vec<SVector<Dual<f64, SVector<f64, N>>, N>> {
+        let seeded = |j: usize, q: &SVector<f64, N>| {
+            SVector::from_fn(|i, _| {
+                let mut c: Dual<f64, SVector<f64, N>> = Dual::constant(q[i]);
+                c.d[i] = f64::from(u8::from(j == k));
+                c
             })
-            .collect();
-        differential[k] = discrete_action(ld, t, &points, Dual::constant(z0))?.d;
-    }
-    Ok(differential)
+        };
+        path.points().iter().enumerate().map(|(j, q)| seeded(j, q)).collect()
+    };
+    (0..path.points().len()).map(|k| Ok(discrete_action(ld, t, &moving(k), Dual::constant(z0))?.d)).collect()
 }
 
 /// Statement 13: the paper's formula for dA_d against the derivative of A_d, for paths of 1 to `most` steps; and

@@ -1,6 +1,6 @@
 //! A Lagrangian in which position, velocity and action are all coupled.
 
-use super::{System, between, versine};
+use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
@@ -33,7 +33,7 @@ impl Lagrangian<1> for CoupledInZ {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         let square = v[0] * v[0];
         let inertia = q[0].cos() * z.cos() * self.a + 1.0;
-        square * (inertia * 0.5 + square * (self.b * 0.25)) - versine(q[0]) + z * self.gamma
+        square * (inertia * 0.5 + square * (self.b * 0.25)) - q[0].versine() + z * self.gamma
     }
 
     fn structure(&self) -> Structure {
@@ -68,7 +68,7 @@ impl System<1> for CoupledInZ {
         // Without the quartic term the fibre derivative is linear in v.
         (self.b == 0.0).then(|| {
             let inertia = x.q[0].cos() * x.z.cos() * self.a + 1.0;
-            x.p[0] * x.p[0] / inertia * 0.5 + versine(x.q[0]) - x.z * self.gamma
+            x.p[0] * x.p[0] / inertia * 0.5 + x.q[0].versine() - x.z * self.gamma
         })
     }
 }

@@ -1,6 +1,6 @@
 //! The damped double pendulum.
 
-use super::{System, between, versine};
+use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
@@ -38,7 +38,7 @@ impl DoublePendulum {
     #[inline]
     fn potential<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
         let ([m1, m2], [l1, l2]) = (self.masses, self.lengths);
-        versine(q[0]) * ((m1 + m2) * l1) + versine(q[1]) * (m2 * l2)
+        q[0].versine() * ((m1 + m2) * l1) + q[1].versine() * (m2 * l2)
     }
 }
 

@@ -100,12 +100,5 @@ fn between(low: f64, high: f64, u: f64) -> f64 {
     low + (high - low) * u
 }
 
-/// `1 - cos x`, without cancellation near 0.
-#[inline]
-fn versine<T: Scalar>(x: T) -> T {
-    let half = (x * 0.5).sin();
-    half * half * 2.0
-}
-
 #[cfg(test)]
 mod tests;

@@ -23,7 +23,7 @@ impl Default for Pendulum {
 impl Lagrangian<1> for Pendulum {
     #[inline]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        v[0] * v[0] * 0.5 + q[0].cos() - 1.0 + z * self.gamma
+        v[0] * v[0] * 0.5 - q[0].versine() + z * self.gamma
     }
 
     fn structure(&self) -> Structure {
@@ -53,6 +53,6 @@ impl System<1> for Pendulum {
     }
 
     fn hamiltonian<T: Scalar>(&self, _t: T, x: &PhasePoint<1, T>) -> Option<T> {
-        Some(x.p[0] * x.p[0] * 0.5 + 1.0 - x.q[0].cos() - x.z * self.gamma)
+        Some(x.p[0] * x.p[0] * 0.5 + x.q[0].versine() - x.z * self.gamma)
     }
 }

@@ -1,6 +1,6 @@
 //! The damped spherical pendulum.
 
-use super::{System, between, versine};
+use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
@@ -26,7 +26,7 @@ impl Lagrangian<2> for SphericalPendulum {
     #[inline]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
         let around = q[0].sin() * v[1];
-        (v[0] * v[0] + around * around) * 0.5 - versine(q[0]) + z * self.gamma
+        (v[0] * v[0] + around * around) * 0.5 - q[0].versine() + z * self.gamma
     }
 
     fn structure(&self) -> Structure {
@@ -51,7 +51,7 @@ impl System<2> for SphericalPendulum {
 
     fn hamiltonian<T: Scalar>(&self, _t: T, x: &PhasePoint<2, T>) -> Option<T> {
         let around = x.p[1] / x.q[0].sin();
-        Some((x.p[0] * x.p[0] + around * around) * 0.5 + versine(x.q[0]) - x.z * self.gamma)
+        Some((x.p[0] * x.p[0] + around * around) * 0.5 + x.q[0].versine() - x.z * self.gamma)
     }
 
     fn symmetries(&self) -> Vec<Symmetry<2>> {

@@ -94,9 +94,9 @@ pub fn conformal_factor(out: &Directory) -> Result<(), Failure> {
     out.table("conformal_factor.csv", &columns, entries)
 }
 
-/// Kepler's problem with a strong drag, its step and its number of steps.
-const KEPLER: Kepler<2> = Kepler { mu: 1.0, gamma: -0.05 };
-const KEPLER_RUN: (f64, usize) = (0.05, 600);
+/// Kepler's problem with drag, its step and its number of steps.
+const KEPLER: Kepler<2> = Kepler { mu: 1.0, gamma: -0.02 };
+const KEPLER_RUN: (f64, usize) = (0.025, 1200);
 
 /// The angular momentum of a run.
 fn momenta(ld: &impl DiscreteLagrangian<2>) -> Result<MomentumDecay<Symmetry<2>>, Failure> {

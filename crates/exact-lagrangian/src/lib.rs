@@ -1,0 +1,21 @@
+//! Exact discrete Lagrangians: `L_h^e(q0, q1, z0) = z(h) - z0`, the action along the motion from `q0` to `q1` in time `h`.
+//!
+//! Their discrete flow is the motion itself, sampled; every theorem on discrete Lagrangians holds for them, with
+//! `sigma_d = e^(int L_z)`. So far the crate holds those that are known in closed form through a linear motion.
+//!
+//! ```
+//! use contact_geom::DiscretePoint;
+//! use discrete_herglotz::{DiscreteLagrangian, discrete_flow};
+//! use exact_lagrangian::LinearExact;
+//!
+//! let ld = LinearExact::oscillator(-0.05, 0.5)?;
+//! let x = DiscretePoint::new([0.0], [1.0], 0.0);
+//! let next = discrete_flow(&ld, 0.0, &x)?; // (q(h), q(2h), z(h)), exactly
+//! assert!((ld.jet(0.0, &x)?.sigma() - (-0.05f64 * 0.5).exp()).abs() < 1e-15);
+//! # let _ = next;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod linear_exact;
+
+pub use linear_exact::LinearExact;
