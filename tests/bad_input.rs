@@ -46,6 +46,8 @@ fn coordinates() {
     let expected = GeometryError::NonFinite { what: "p", index: 0, value: f64::INFINITY };
     assert_eq!(refused, Some(InputError::Geometry(expected)));
     assert!(expected.to_string().contains("p[0] = inf"));
+    let late = Flow::new(&ld, f64::NEG_INFINITY, PhasePoint::new([1.0, 0.0], [0.0, 1.0], 0.0)).err();
+    assert!(matches!(late, Some(InputError::Geometry(GeometryError::NonFinite { what: "t0", .. }))));
     let path = DiscretePath::new(vec![SVector::from([0.0]), SVector::from([f64::NAN])]);
     assert!(matches!(path, Err(InputError::Geometry(GeometryError::NonFinite { index: 1, .. }))));
     assert!(Symmetry::<2>::rotation(0, 0).is_err() && Symmetry::<2>::rotation(0, 2).is_err());

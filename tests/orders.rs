@@ -4,7 +4,7 @@
 //! asymptotic regime; the band of 0.15 is the field's.
 
 use crate::common::oracle::motion;
-use contact_geom::systems::{CoupledInZ, DoublePendulum, QuadraticInZ, Relativistic, System};
+use contact_geom::systems::{CoupledInZ, CoupledPlane, DoublePendulum, QuadraticInZ, Relativistic, System};
 use contact_geom::{PhasePoint, legendre};
 use discrete_herglotz::rules::{Discretisation, DiscretisationVisitor, visit_discretisations};
 use discrete_herglotz::{FinalOnly, Flow, Status};
@@ -69,6 +69,7 @@ impl<const N: usize, S: System<N>> DiscretisationVisitor for Methods<'_, S, N> {
 fn orders_by_slope() {
     visit_discretisations(&mut Methods::<_, 1>(&QuadraticInZ { c: 1.0 }));
     visit_discretisations(&mut Methods::<_, 1>(&CoupledInZ { gamma: -1.0, ..CoupledInZ::default() }));
+    visit_discretisations(&mut Methods::<_, 2>(&CoupledPlane { c: 1.5, ..CoupledPlane::default() }));
     visit_discretisations(&mut Methods::<_, 1>(&Relativistic { gamma: -1.0 }));
     visit_discretisations(&mut Methods::<_, 2>(&DoublePendulum { gamma: -1.0, ..DoublePendulum::default() }));
 }

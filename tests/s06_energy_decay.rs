@@ -1,9 +1,33 @@
 //! Statement 6 (section 2.1): `X_H(H) = -R(H) H`.
 
-use crate::common::{over_catalogue, systems};
+use crate::common::{TOLERANCE, on_random, over_catalogue, systems};
+use contact_geom::systems::{Lienard, VanDerPol};
+use contact_geom::{
+    Darboux, DarbouxField, Smooth, SmoothFunction, Triple, dissipation_defect, hamiltonian_vector_field,
+};
 
 /// On every system of the catalogue.
 #[test]
 fn on_the_catalogue() {
     assert_eq!(over_catalogue(6), systems());
+}
+
+/// For contact Hamiltonians that belong to no regular Lagrangian; their fields are `q' = z`, and agree by both routes.
+fn without_lagrangian(name: &str, h: &impl SmoothFunction<1>) {
+    on_random(name, 4, |u| {
+        let (t, x) = (5.0 * u[3], Triple::<1>::from_fn(|i| 4.0 * u[i] - 2.0));
+        let defect = dissipation_defect(&Darboux, h, h, t, &x).map_err(|e| e.to_string())?;
+        let generic = hamiltonian_vector_field(&Darboux, h, t, &x).map_err(|e| e.to_string())?;
+        let closed = DarbouxField { hamiltonian: h, t }.at(&x).map_err(|e| e.to_string())?;
+        let routes = generic.minus(closed).amax() / (1.0 + closed.amax());
+        let worst = defect.max(routes).max((closed.x[0] - x.z).abs());
+        if worst <= TOLERANCE { Ok(()) } else { Err(format!("residual {worst:e}")) }
+    });
+}
+
+/// Van der Pol's and Lienard's.
+#[test]
+fn van_der_pol_and_lienard() {
+    without_lagrangian("van der Pol", &VanDerPol::default());
+    without_lagrangian("Lienard", &Lienard::default());
 }

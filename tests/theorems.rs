@@ -4,6 +4,7 @@ mod common;
 
 mod bad_input;
 mod derivatives;
+mod exact_series;
 mod orders;
 mod s01_contact_condition;
 mod s02_reeb_field;

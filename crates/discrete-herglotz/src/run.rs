@@ -3,7 +3,7 @@
 use crate::legendre::{discrete_regularity, legendre_minus};
 use crate::{DiscreteLagrangian, InputError, Solver, Status, StepError};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{DiscretePoint, PhasePoint};
+use contact_geom::{DiscretePoint, GeometryError, PhasePoint};
 use std::ops::ControlFlow;
 
 /// One step of a run, as an observer sees it.
@@ -154,6 +154,7 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
     /// # Errors
     /// Those of [`new`](Self::new).
     pub fn with_guess(ld: &'a D, t0: f64, state: PhasePoint<N>, guess: SVector<f64, N>) -> Result<Self, InputError> {
+        check_time(t0)?;
         state.check()?;
         let mut solver = Solver::default();
         let first = ld.forward(t0, &state, &guess, &mut solver).map_err(|cause| match cause {
@@ -169,6 +170,7 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
     /// [`InputError`] where a coordinate is not finite, `sigma_d <= 0`, or the discrete Lagrangian is not regular at the
     /// point; [`InputError::EqualPoints`] where that is because `q0 = q1`.
     pub fn from_points(ld: &'a D, t0: f64, x: DiscretePoint<N>) -> Result<Self, InputError> {
+        check_time(t0)?;
         x.check()?;
         let bad = |cause| if x.q0 == x.q1 { InputError::EqualPoints } else { InputError::FirstStep(cause) };
         let regularity = discrete_regularity(ld, t0, &x).map_err(bad)?;
@@ -258,4 +260,9 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
         }
         Ok(())
     }
+}
+
+/// Refuses a time that is not finite.
+fn check_time(t0: f64) -> Result<(), GeometryError> {
+    if t0.is_finite() { Ok(()) } else { Err(GeometryError::NonFinite { what: "t0", index: 0, value: t0 }) }
 }

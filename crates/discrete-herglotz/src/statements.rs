@@ -329,8 +329,8 @@ fn three_expressions<const N: usize>(
         .max(distance(step.end)))
 }
 
-/// Statement 21: eta+ and eta- in closed form are the pullbacks of Darboux' form; and the jets they are made of are those
-/// of the value.
+/// Statement 21: eta+ and eta- in closed form are the pullbacks of Darboux' form; the jets that they are made of, and the
+/// linearised transforms, are those of the value.
 fn contact_forms<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     t: f64,
@@ -347,7 +347,13 @@ fn contact_forms<const N: usize>(
     let blocks = blocks.max((second.d22 - derived_second.d22).amax()).max((second.d1z - derived_second.d1z).amax());
     let blocks = blocks.max((second.d2z - derived_second.d2z).amax()).max((second.dzz - derived_second.dzz).abs());
     let size = derived_second.d11.amax().max(derived_second.d12.amax()).max(derived_second.d22.amax());
-    Ok(minus.max(plus).max(relative(of(first), of(derived))).max(blocks / size))
+    let jacobian = |plus| -> Result<f64, GeometryError> {
+        let closed = if plus { second.legendre_plus_jacobian() } else { second.legendre_minus_jacobian() };
+        let (_, derived) = Transform { ld, t, plus }.with_jacobian(&point)?;
+        Ok((&closed - &derived).amax() / derived.amax())
+    };
+    let transforms = jacobian(false)?.max(jacobian(true)?);
+    Ok(minus.max(plus).max(transforms).max(relative(of(first), of(derived))).max(blocks / size))
 }
 
 /// Statement 22: `eta+ = sigma_d eta-` and `Phi_d* eta- = eta+`.
