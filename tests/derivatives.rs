@@ -1,9 +1,9 @@
 //! The duals against another library's, and the helper that checks closed derivatives.
 
-use crate::common::{TOLERANCE, on_random};
+use crate::common::{on_random, within};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{Hessian, Lagrangian, Scalar, Triple, VelocityPoint, check_closed_derivatives};
+use contact_geom::{Dual, Hessian, Lagrangian, Scalar, Triple, VelocityPoint, check_closed_derivatives};
 use num_dual::HyperDual64;
 
 /// Every second derivative of every Lagrangian, and so every first, against hyper-dual numbers of another library.
@@ -37,9 +37,7 @@ fn against_num_dual() {
                             _ => h.zz,
                         };
                         let defect = (l.eps1 - g.component(i)).abs().max((l.eps1eps2 - second).abs()) / size;
-                        if !(defect <= TOLERANCE) {
-                            return Err(format!("{i}, {j}: {defect:e}"));
-                        }
+                        within(defect).map_err(|e| format!("{i}, {j}: {e}"))?;
                     }
                 }
                 Ok(())
@@ -49,10 +47,12 @@ fn against_num_dual() {
     visit_catalogue(&mut Visitor);
 }
 
+/// A number with its first and second derivative.
+type Second = Dual<Dual<f64, SVector<f64, 1>>, SVector<Dual<f64, SVector<f64, 1>>, 1>>;
+
 /// The functions that no system of the catalogue uses, by the identities between them.
 #[test]
 fn elementary_functions() {
-    use contact_geom::Dual;
     on_random("elementary functions", 1, |u| {
         let x = Dual {
             re: Dual { re: 0.1 + u[0], d: SVector::<f64, 1>::new(1.0) },
@@ -72,9 +72,7 @@ fn elementary_functions() {
             (x.powi(0), one),
         ];
         for (k, (a, b)) in pairs.iter().enumerate() {
-            let size = |x: &Dual<Dual<f64, SVector<f64, 1>>, SVector<Dual<f64, SVector<f64, 1>>, 1>>| {
-                x.re.re.abs().max(x.re.d[0].abs()).max(x.d[0].d[0].abs())
-            };
+            let size = |x: &Second| x.re.re.abs().max(x.re.d[0].abs()).max(x.d[0].d[0].abs());
             let defect = size(&(*a - *b)) / (1.0 + size(b));
             if defect > 64.0 * f64::EPSILON {
                 return Err(format!("{k}: {defect:e}"));

@@ -1,6 +1,6 @@
 //! Statement 6 (section 2.1): `X_H(H) = -R(H) H`.
 
-use crate::common::{TOLERANCE, on_random, over_catalogue, systems};
+use crate::common::{on_random, over_catalogue, systems, within};
 use contact_geom::systems::{Lienard, VanDerPol};
 use contact_geom::{
     Darboux, DarbouxField, Smooth, SmoothFunction, Triple, dissipation_defect, hamiltonian_vector_field,
@@ -21,7 +21,7 @@ fn without_lagrangian(name: &str, h: &impl SmoothFunction<1>) {
         let closed = DarbouxField { hamiltonian: h, t }.at(&x).map_err(|e| e.to_string())?;
         let routes = generic.minus(closed).amax() / (1.0 + closed.amax());
         let worst = defect.max(routes).max((closed.x[0] - x.z).abs());
-        if worst <= TOLERANCE { Ok(()) } else { Err(format!("residual {worst:e}")) }
+        within(worst)
     });
 }
 

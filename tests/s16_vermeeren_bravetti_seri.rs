@@ -1,7 +1,7 @@
 //! Statements 16 (section 3, remark) and 41 (section 6): the condition of Vermeeren, Bravetti and Seri on `Q x Q x R^2` is
 //! the discrete Herglotz equation, and its rules come back to Q x Q x R with the same momenta.
 
-use crate::common::{TOLERANCE, around, on_random, step_from};
+use crate::common::{around, on_random, step_from, within};
 use contact_geom::DiscretePoint;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
@@ -39,7 +39,7 @@ fn with_rule<R: Rule, const N: usize, S: System<N>>(system: &S) {
             let factor = 1.0 - ld.extended_jet(t + (k + 1) as f64 * h, &at, z[k + 2]).z1;
             worst = worst.max((extended[k] / factor - herglotz[k]).amax() / size.max(herglotz[k].amax()));
         }
-        if worst <= TOLERANCE { Ok(()) } else { Err(format!("residual {worst:e}")) }
+        within(worst)
     });
 }
 

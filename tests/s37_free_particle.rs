@@ -1,7 +1,7 @@
 //! Statement 37 (section 5, corrected): the free particle's discrete equations, its explicit q2, and its exact discrete
 //! Lagrangian.
 
-use crate::common::{TOLERANCE, on_random};
+use crate::common::{on_random, within};
 use contact_geom::systems::FreeParticle;
 use contact_geom::{DiscretePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, LeftMidpoint, Rectangle, StepError, discrete_flow, legendre_minus};
@@ -28,7 +28,7 @@ fn random(name: &str, check: impl Fn(f64, f64, &DiscretePoint<1>) -> f64) {
         let x = DiscretePoint::new([4.0 * u[0] - 2.0], [4.0 * u[1] - 2.0], u[2] - 0.5);
         let (gamma, h) = (-1.0 + 1.5 * u[3], 0.05 + 0.5 * u[4]);
         let residual = check(if gamma == 0.0 { -0.1 } else { gamma }, h, &x);
-        if residual <= TOLERANCE { Ok(()) } else { Err(format!("residual {residual:e}")) }
+        within(residual)
     });
 }
 

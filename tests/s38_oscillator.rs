@@ -1,7 +1,7 @@
 //! Statements 38 and 39 (section 5): the midpoint rule's equations for any potential, and the oscillator's explicit q2; h
 //! small enough that sigma_d does not vanish.
 
-use crate::common::{METHODS, TOLERANCE, on_random, over_discretisations, step_from, systems};
+use crate::common::{METHODS, on_random, over_discretisations, step_from, systems, within};
 use contact_geom::systems::{Duffing, HarmonicOscillator, Pendulum, System};
 use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, Flow, InputError, LeftMidpoint, discrete_flow};
@@ -20,7 +20,7 @@ fn oscillator() {
             / (h * h + 4.0);
         let z1 = (q1 - q0).powi(2) / (2.0 * h) - h / 8.0 * (q1 + q0).powi(2) + (h * g + 1.0) * z0;
         let residual = (next.q1[0] - q2).abs().max((next.z0 - z1).abs()) / (1.0 + q2.abs() + z1.abs());
-        if residual <= TOLERANCE { Ok(()) } else { Err(format!("residual {residual:e}")) }
+        within(residual)
     });
 }
 
@@ -40,9 +40,7 @@ fn exact_dynamics() {
             let size = 1.0 + v0.abs() + at(2.0 * h).q[0].abs() + at(h).z.abs();
             let flow = (next.q1[0] - at(2.0 * h).q[0]).abs().max((next.z0 - at(h).z).abs()) / size;
             let residual = flow.max((sigma - (gamma * h).exp()).abs());
-            if !(residual <= TOLERANCE) {
-                return Err(format!("gamma {gamma}: residual {residual:e}"));
-            }
+            within(residual).map_err(|e| format!("gamma {gamma}: {e}"))?;
         }
         Ok(())
     });
@@ -63,7 +61,7 @@ fn any_potential<S: System<1>>(system: &S, gamma: f64, slope: impl Fn(f64) -> f6
         // A rounded position changes either side by its rounding over h.
         let size = left.abs().max(q2.abs() / h);
         let residual = (left - right).abs() / size;
-        if residual <= TOLERANCE { Ok(()) } else { Err(format!("residual {residual:e}")) }
+        within(residual)
     });
 }
 
