@@ -11,8 +11,8 @@ use crate::{
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    ContactForm, Darboux, DiscretePoint, Dual, EtaMinus, EtaPlus, Form, GeometryError, OneParameterGroup, PhasePoint,
-    Scalar, SecondDiscreteJet, Smooth, Symmetry, Triple, conformality, conformality_with_jacobian, generic, seed,
+    ContactForm, Darboux, DiscretePoint, Dual, EtaMinus, EtaPlus, GeometryError, OneParameterGroup, PhasePoint, Scalar,
+    SecondDiscreteJet, Smooth, Symmetry, Triple, conformality, conformality_with_jacobian, generic, seed,
 };
 
 /// The statements of section 3 that [`residual`] evaluates.
@@ -100,29 +100,24 @@ impl<const N: usize, D: DiscreteLagrangian<N>> Smooth<N> for Transform<'_, D> {
     }
 }
 
-/// The pullback of Darboux' form along a transform, by its definition.
-struct PulledBack<'a, D>(Transform<'a, D>);
-
-impl<const N: usize, D: DiscreteLagrangian<N>> Smooth<N> for PulledBack<'_, D> {
-    fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
-        let image = self.0.at(&seed(x))?;
-        // dz - p dq with the differentials of the image.
-        let mut eta = image.z.d;
-        for i in 0..N {
-            eta = eta.minus(image.x[i].d.scale(image.y[i].re));
-        }
-        Ok(eta)
-    }
+/// Darboux' form and its differential pulled back along a transform by their definition, `J^T eta` and `J^T d eta J`.
+fn pulled_back<const N: usize>(
+    ld: &impl DiscreteLagrangian<N>,
+    t: f64,
+    x: &DiscretePoint<N>,
+    plus: bool,
+) -> Result<(Triple<N>, DMatrix<f64>), GeometryError> {
+    let (image, jacobian) = Transform { ld, t, plus }.with_jacobian(&(*x).into())?;
+    let d_eta = jacobian.transpose() * Darboux.d_eta(&image)? * &jacobian;
+    Ok((pull(&jacobian, &Darboux.eta(&image)?), d_eta))
 }
 
 fn form_residual<const N: usize>(
     closed: &impl ContactForm<N>,
-    pulled_back: &impl ContactForm<N>,
+    (eta, d_eta): (Triple<N>, DMatrix<f64>),
     x: &Triple<N>,
 ) -> Result<f64, GeometryError> {
-    let (eta, derived) = (closed.eta(x)?, pulled_back.eta(x)?);
-    let (d_eta, d_derived) = (closed.d_eta(x)?, pulled_back.d_eta(x)?);
-    Ok(relative(eta, derived).max((&d_eta - &d_derived).amax() / d_derived.amax()))
+    Ok(relative(closed.eta(x)?, eta).max((closed.d_eta(x)? - &d_eta).amax() / d_eta.amax()))
 }
 
 /// Statement 1 on Q x Q x R: the contact condition for eta+ and eta-, in closed form and by the volume.
@@ -337,9 +332,8 @@ fn contact_forms<const N: usize>(
     x: &DiscretePoint<N>,
 ) -> Result<f64, GeometryError> {
     let point = (*x).into();
-    let pulled_back = |plus| Form(PulledBack(Transform { ld, t, plus }));
-    let minus = form_residual(&EtaMinus(jets(ld, t)), &pulled_back(false), &point)?;
-    let plus = form_residual(&EtaPlus(jets(ld, t)), &pulled_back(true), &point)?;
+    let minus = form_residual(&EtaMinus(jets(ld, t)), pulled_back(ld, t, x, false)?, &point)?;
+    let plus = form_residual(&EtaPlus(jets(ld, t)), pulled_back(ld, t, x, true)?, &point)?;
     let (first, derived) = (ld.jet(t, x)?, derived_jet(ld, t, x)?);
     let of = |jet: contact_geom::DiscreteJet<N>| Triple { x: jet.d1, y: jet.d2, z: jet.dz };
     let (second, derived_second) = (ld.second_jet(t, x)?, derived_second_jet(ld, t, x)?);
@@ -367,8 +361,8 @@ fn forms_are_related<const N: usize>(
     let (minus, plus) = (EtaMinus(jets(ld, t)), EtaPlus(jets(ld, t)));
     let sigma = ld.jet(t, x)?.sigma();
     // Both forms by their definition, so that the identity is not one of formulas.
-    let by_definition = |plus| PulledBack(Transform { ld, t, plus }).at(&point);
-    let proportional = relative(by_definition(true)?, by_definition(false)?.scale(sigma));
+    let (by_plus, by_minus) = (pulled_back(ld, t, x, true)?.0, pulled_back(ld, t, x, false)?.0);
+    let proportional = relative(by_plus, by_minus.scale(sigma));
     let image = discrete_flow(ld, t, x)?;
     let jacobian = discrete_flow_jacobian(ld, t, x, &image)?;
     let next = EtaMinus(jets(ld, t + h));

@@ -13,9 +13,9 @@ use std::sync::Arc;
 pub enum Line {
     /// Solid, blue: what a discrete Lagrangian gives.
     Solid,
-    /// Dashed, dark red: what is true.
+    /// Dashed, red: what is true, or predicted.
     Dashed,
-    /// Dotted, grey: what has been printed, and is wrong.
+    /// Dotted, grey: a reference.
     Dotted,
     /// Dash-dot, green: a second method.
     DashDot,
@@ -23,20 +23,20 @@ pub enum Line {
 
 impl Line {
     fn plot(self, points: Vec<(f64, f64)>) -> LinePlot {
-        let (colour, width, style) = match self {
-            Line::Solid => ("#1f5fa8", 2.0, LineStyle::Solid),
-            Line::Dashed => ("#c1272d", 2.2, LineStyle::Custom("9 5".into())),
-            Line::Dotted => ("#6b6b6b", 2.4, LineStyle::Custom("2 4".into())),
-            Line::DashDot => ("#2a7f4f", 2.0, LineStyle::Custom("10 4 2 4".into())),
+        let (colour, width, pattern) = match self {
+            Line::Solid => (SOLID, 2.0, LineStyle::Solid),
+            Line::Dashed => ("#c1272d", 2.2, LineStyle::Custom("8 5".into())),
+            Line::Dotted => ("#555555", 2.2, LineStyle::Custom("2 3".into())),
+            Line::DashDot => ("#2a7f4f", 2.2, LineStyle::Custom("9 3 2 3".into())),
         };
-        LinePlot::new().with_data(points).with_color(colour).with_stroke_width(width).with_line_style(style)
+        LinePlot::new().with_data(points).with_color(colour).with_stroke_width(width).with_line_style(pattern)
     }
 }
 
 /// A curve with its name in the legend.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// The name; none where another panel has it.
+    /// The name; a curve without one is not in the legend.
     pub name: Option<String>,
     /// How it is drawn.
     pub line: Line,
@@ -46,8 +46,13 @@ pub struct Curve {
 
 impl Curve {
     /// A named curve.
-    pub fn new(name: &str, line: Line, points: Vec<(f64, f64)>) -> Self {
-        Curve { name: Some(name.into()), line, points }
+    pub fn new(name: &str, line: Line, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Curve { name: Some(name.into()), line, points: points.into_iter().collect() }
+    }
+
+    /// A curve of the style of another one that the legend names.
+    pub fn unnamed(line: Line, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Curve { name: None, line, points: points.into_iter().collect() }
     }
 }
 
@@ -56,21 +61,35 @@ impl Curve {
 pub enum Axis {
     /// A linear axis: from, to, distance of ticks.
     Linear(f64, f64, f64),
-    /// A logarithmic axis: the powers of ten between which it extends.
-    Logarithmic(i32, i32),
+    /// A logarithmic axis: the powers of ten between which it extends, and the number of them between ticks.
+    Logarithmic(i32, i32, u32),
 }
 
-/// The corner in which a panel has room for its legend.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Legend {
-    /// Top right.
-    TopRight,
-    /// Top left.
-    TopLeft,
-    /// Bottom right.
-    BottomRight,
-    /// Bottom left.
-    BottomLeft,
+impl Axis {
+    /// The coordinate on the axis; none for what a logarithmic axis cannot show. Logarithms are taken here, as kuva's own
+    /// logarithmic axis ends at 1e-10.
+    fn place(self, value: f64) -> Option<f64> {
+        let coordinate = match self {
+            Axis::Linear(..) => value,
+            Axis::Logarithmic(..) => value.log10(),
+        };
+        Some(coordinate).filter(|c| c.is_finite())
+    }
+
+    /// The ends and the distance of the ticks, in coordinates on the axis.
+    fn range(self) -> (f64, f64, f64) {
+        match self {
+            Axis::Linear(from, to, step) => (from, to, step),
+            Axis::Logarithmic(from, to, step) => (f64::from(from), f64::from(to), f64::from(step)),
+        }
+    }
+
+    fn format(self) -> TickFormat {
+        match self {
+            Axis::Linear(..) => TickFormat::Auto,
+            Axis::Logarithmic(..) => TickFormat::Custom(Arc::new(power_of_ten)),
+        }
+    }
 }
 
 /// One pair of axes with its curves.
@@ -84,97 +103,87 @@ pub struct Panel {
     pub x: Axis,
     /// The vertical axis.
     pub y: Axis,
-    /// Where the legend goes.
-    pub legend: Legend,
+    /// The upper left corner of the legend, as fractions of the width and of the height from the lower left.
+    pub legend: (f64, f64),
     /// The curves, the first one drawn first.
     pub curves: Vec<Curve>,
-    /// Marked points, such as a centre or a start.
+    /// Marked points of a solid curve: the states that it connects.
     pub marks: Vec<(f64, f64)>,
 }
 
-/// The width of a panel in pixels, and its height.
-const SIZE: (f64, f64) = (600.0, 400.0);
+/// The colour of solid curves and of their points.
+const SOLID: &str = "#1f5fa8";
 
-/// The factor by which the legend's swatches are longer than kuva draws them: a swatch must show the pattern of its line.
-const CHROME: f64 = 2.5;
+/// The width and the height of a panel, in pixels.
+const SIZE: (f64, f64) = (560.0, 400.0);
+
+/// The factor by which all but the curves is enlarged. It makes the swatches of the legend long enough to show a pattern;
+/// the sizes of the fonts below are in units of it.
+const SCALE: f64 = 1.6;
 
 impl Panel {
     fn plots(&self) -> Vec<Plot> {
+        let place = |points: &[(f64, f64)]| -> Vec<(f64, f64)> {
+            points.iter().filter_map(|(x, y)| Some((self.x.place(*x)?, self.y.place(*y)?))).collect()
+        };
         let mut plots: Vec<Plot> = Vec::new();
         for curve in &self.curves {
-            let plot = curve.line.plot(curve.points.clone());
+            let plot = curve.line.plot(place(&curve.points));
             plots.push(match &curve.name {
                 Some(name) => plot.with_legend(name).into(),
                 None => plot.into(),
             });
         }
         if !self.marks.is_empty() {
-            plots.push(ScatterPlot::new().with_data(self.marks.clone()).with_color("black").with_size(4.0).into());
+            plots.push(ScatterPlot::new().with_data(place(&self.marks)).with_color(SOLID).with_size(2.6).into());
         }
         plots
     }
 
     fn layout(&self, plots: &[Plot]) -> Layout {
-        let position = match self.legend {
-            Legend::TopRight => LegendPosition::InsideTopRight,
-            Legend::TopLeft => LegendPosition::InsideTopLeft,
-            Legend::BottomRight => LegendPosition::InsideBottomRight,
-            Legend::BottomLeft => LegendPosition::InsideBottomLeft,
-        };
-        let mut layout = Layout::auto_from_plots(plots)
-            .with_scale(CHROME)
-            .with_label_size(7)
-            .with_tick_size(6)
-            .with_body_size(6)
-            .with_axis_line_width(0.45)
-            .with_tick_width(0.4)
-            .with_tick_length(2.6)
+        let ((left, right, x_step), (bottom, top, y_step)) = (self.x.range(), self.y.range());
+        let corner = (left + self.legend.0 * (right - left), bottom + self.legend.1 * (top - bottom));
+        Layout::auto_from_plots(plots)
+            .with_scale(SCALE)
+            .with_label_size(11)
+            .with_tick_size(10)
+            .with_body_size(10)
+            .with_axis_line_width(0.7)
+            .with_tick_width(0.6)
+            .with_tick_length(4.0)
             .with_x_label(&self.x_label)
             .with_y_label(&self.y_label)
+            .with_x_label_offset(0.0, -14.0)
             .with_show_grid(false)
             .with_tick_align(TickAlign::Inside)
             .with_tick_pos(TickPos::Both)
-            .with_legend_position(position)
-            .with_legend_box(false);
-        layout = match self.x {
-            Axis::Linear(from, to, step) => layout.with_x_axis_min(from).with_x_axis_max(to).with_x_tick_step(step),
-            Axis::Logarithmic(from, to) => layout
-                .with_log_x()
-                .with_x_axis_min(power(from))
-                .with_x_axis_max(power(to))
-                .with_x_tick_format(TickFormat::Custom(Arc::new(power_of_ten))),
-        };
-        match self.y {
-            Axis::Linear(from, to, step) => layout.with_y_axis_min(from).with_y_axis_max(to).with_y_tick_step(step),
-            Axis::Logarithmic(from, to) => layout
-                .with_log_y()
-                .with_y_axis_min(power(from))
-                .with_y_axis_max(power(to))
-                .with_y_tick_format(TickFormat::Custom(Arc::new(power_of_ten))),
-        }
+            .with_legend_position(LegendPosition::DataCoords(corner.0, corner.1))
+            .with_legend_box(false)
+            .with_x_axis_min(left)
+            .with_x_axis_max(right)
+            .with_x_tick_step(x_step)
+            .with_x_tick_format(self.x.format())
+            .with_y_axis_min(bottom)
+            .with_y_axis_max(top)
+            .with_y_tick_step(y_step)
+            .with_y_tick_format(self.y.format())
     }
 }
 
-fn power(exponent: i32) -> f64 {
-    10f64.powi(exponent)
-}
-
-/// The label of a decade's tick.
-fn power_of_ten(x: f64) -> String {
-    let exponent = x.log10().round();
-    let digits = format!("{exponent:.0}");
-    let raised: String = digits
-        .chars()
-        .map(|c| match c {
-            '-' => '\u{207b}',
-            '1' => '\u{b9}',
-            '2' => '\u{b2}',
-            '3' => '\u{b3}',
-            '0' | '4'..='9' => char::from_u32(0x2070 + u32::from(c) - u32::from('0')).unwrap_or(c),
-            c => c,
-        })
-        .collect();
-    format!("10{raised}")
+/// The label of a tick at a power of ten.
+fn power_of_ten(exponent: f64) -> String {
+    let raised = |digit: char| match digit {
+        '-' => '\u{207b}',
+        '1' => '\u{b9}',
+        '2' => '\u{b2}',
+        '3' => '\u{b3}',
+        digit => digit.to_digit(10).and_then(|d| char::from_u32(0x2070 + d)).unwrap_or(digit),
+    };
+    if exponent == 0.0 {
+        "1".into()
+    } else {
+        format!("10{}", format!("{exponent:.0}").chars().map(raised).collect::<String>())
+    }
 }
 
 /// A figure of one panel, as SVG.
@@ -184,12 +193,11 @@ pub fn draw(panel: &Panel) -> String {
     kuva::render_to_svg(plots, layout)
 }
 
-/// A figure of panels side by side, or one above the other, marked (a), (b), as SVG.
-pub fn draw_stack(panels: &[Panel], columns: usize) -> String {
-    let rows = panels.len().div_ceil(columns.max(1));
+/// A figure of panels side by side, marked a, b and so on, as SVG.
+pub fn draw_row(panels: &[Panel]) -> String {
     let plots: Vec<Vec<Plot>> = panels.iter().map(Panel::plots).collect();
     let layouts = panels.iter().zip(&plots).map(|(panel, plots)| panel.layout(plots)).collect();
-    let scene = Figure::new(rows, columns.max(1))
+    let scene = Figure::new(1, panels.len().max(1))
         .with_plots(plots)
         .with_layouts(layouts)
         .with_cell_size(SIZE.0, SIZE.1)

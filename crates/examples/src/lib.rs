@@ -7,5 +7,5 @@ mod figure;
 mod output;
 
 pub use failure::{Failure, finish};
-pub use figure::{Axis, Curve, Legend, Line, Panel, draw, draw_stack};
+pub use figure::{Axis, Curve, Line, Panel, draw, draw_row};
 pub use output::{Directory, number, print};

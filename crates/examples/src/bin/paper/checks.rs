@@ -130,3 +130,37 @@ pub fn fractions(i: usize, count: usize) -> Vec<f64> {
     let position = (i + 1) as f64;
     PRIMES.iter().cycle().take(count).map(|prime| (position * prime.sqrt()).fract()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contact_geom::GeometryError;
+
+    fn verdict(residual: Result<Option<f64>, GeometryError>) -> Result<(), Failure> {
+        let mut checks = Checks::default();
+        let subject = Subject::discrete(15, "pendulum", "midpoint", 0.1);
+        checks.record(&subject, Ok::<_, GeometryError>(Some(1e-15)));
+        checks.record(&subject, residual);
+        checks.record(&subject, Ok::<_, GeometryError>(Some(2e-15)));
+        checks.verdict()
+    }
+
+    #[test]
+    fn one_bad_residual_fails_and_no_number_hides_it() {
+        assert!(verdict(Ok(Some(9e-12))).is_ok());
+        assert!(verdict(Ok(None)).is_ok());
+        assert!(verdict(Ok(Some(1.1e-11))).is_err());
+        assert!(verdict(Ok(Some(f64::NAN))).is_err());
+        assert!(verdict(Err(GeometryError::Undefined { what: "the flow" })).is_err());
+    }
+
+    #[test]
+    fn samples_fill_the_cube() {
+        for column in 0..10 {
+            let mut values: Vec<f64> = (0..16).map(|i| fractions(i, 10)[column]).collect();
+            values.sort_by(f64::total_cmp);
+            assert!(values.windows(2).all(|pair| pair[1] - pair[0] < 0.25), "column {column}: {values:?}");
+            assert!(values[0] >= 0.0 && values[0] < 0.25 && values[15] > 0.75 && values[15] < 1.0);
+        }
+    }
+}

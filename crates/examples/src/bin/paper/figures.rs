@@ -1,69 +1,81 @@
 //! The paper's six figures.
 
-use crate::published::PublishedRow;
-use crate::series::Row;
-use contact_examples::{Axis, Curve, Directory, Failure, Legend, Line, Panel, draw};
+use crate::published::{PublishedRow, faulty_action};
+use crate::series::{GAMMA, Row, STEP, true_start};
+use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw};
+use contact_geom::VelocityPoint;
+use contact_geom::systems::HarmonicOscillator;
 
 const TIME: &str = "time t (dimensionless)";
 const POSITION: &str = "position q (dimensionless)";
 const ACTION: &str = "action z (dimensionless)";
 const ENERGY: &str = "ln H (H dimensionless)";
 
-/// The curves of one figure.
-struct Curves<'a> {
-    rows: &'a [Row],
-    published: &'a [PublishedRow],
+/// The discrete curve of an entry.
+fn discrete(rows: &[Row], entry: fn(&Row) -> f64) -> Curve {
+    Curve::new("discrete", Line::Solid, rows.iter().map(|r| (r.t, entry(r))))
 }
 
-impl Curves<'_> {
-    fn discrete(&self, entry: fn(&Row) -> f64) -> Curve {
-        Curve::new("discrete", Line::Solid, self.rows.iter().map(|r| (r.t, entry(r))).collect())
-    }
-
-    fn exact(&self, entry: fn(&Row) -> f64) -> Curve {
-        Curve::new("exact", Line::Dashed, self.rows.iter().map(|r| (r.t, entry(r))).collect())
-    }
-
-    fn as_published(&self, entry: fn(&PublishedRow) -> f64) -> Curve {
-        let points = self.published.iter().map(|r| (r.t, entry(r))).collect();
-        Curve::new("exact as published", Line::Dotted, points)
-    }
+/// The true curve.
+fn exact(points: impl IntoIterator<Item = (f64, f64)>) -> Curve {
+    Curve::new("exact", Line::Dashed, points)
 }
 
-fn panel(label: &str, x: Axis, y: Axis, legend: Legend, curves: Vec<Curve>) -> Panel {
+/// What the paper plots in its place.
+fn as_published(points: impl IntoIterator<Item = (f64, f64)>) -> Curve {
+    Curve::new("exact as published", Line::Dotted, points)
+}
+
+fn panel(label: &str, x: Axis, y: Axis, legend: (f64, f64), curves: Vec<Curve>) -> Panel {
     Panel { x_label: TIME.into(), y_label: label.into(), x, y, legend, curves, marks: Vec::new() }
 }
 
+/// The entries that a figure's discrete, exact and published curves show.
+type Entries = (fn(&Row) -> f64, fn(&Row) -> f64, fn(&PublishedRow) -> f64);
+
 /// Position, action and energy of the free particle.
 pub fn free_particle(out: &Directory, rows: &[Row], published: &[PublishedRow]) -> Result<(), Failure> {
-    let c = Curves { rows, published };
-    let time = Axis::Linear(0.0, 50.0, 10.0);
-    let q = vec![c.as_published(|r| r.q), c.discrete(|r| r.q), c.exact(|r| r.q_exact)];
-    let z = vec![c.as_published(|r| r.z), c.discrete(|r| r.z), c.exact(|r| r.z_exact)];
-    let h = vec![
-        c.as_published(|r| r.log_hamiltonian),
-        c.discrete(|r| r.log_energy_midpoint),
-        c.exact(|r| r.log_hamiltonian_exact),
-    ];
-    let position = panel(POSITION, time, Axis::Linear(0.0, 40.0, 10.0), Legend::BottomRight, q);
-    let action = panel(ACTION, time, Axis::Linear(0.0, 12.0, 2.0), Legend::TopRight, z);
-    let energy = panel(ENERGY, time, Axis::Linear(-2.0, 1.0, 0.5), Legend::TopRight, h);
-    out.text("free_particle_q.svg", &draw(&position))?;
-    out.text("free_particle_z.svg", &draw(&action))?;
-    out.text("free_particle_log_hamiltonian.svg", &draw(&energy))
+    let figure = |name: &str, label, y, legend, (solid, dashed, dotted): Entries| {
+        let curves = vec![
+            discrete(rows, solid),
+            exact(rows.iter().map(|r| (r.t, dashed(r)))),
+            as_published(published.iter().map(|r| (r.t, dotted(r)))),
+        ];
+        out.text(name, &draw(&panel(label, Axis::Linear(0.0, 50.0, 10.0), y, legend, curves)))
+    };
+    let (below, above) = ((0.5, 0.35), (0.5, 0.95));
+    let q = Axis::Linear(0.0, 40.0, 10.0);
+    figure("free_particle_q.svg", POSITION, q, below, (|r| r.q, |r| r.q_exact, |r| r.q))?;
+    let z = Axis::Linear(0.0, 12.0, 2.0);
+    figure("free_particle_z.svg", ACTION, z, above, (|r| r.z, |r| r.z_exact, |r| r.z))?;
+    let h = Axis::Linear(-2.0, 1.0, 0.5);
+    let entries: Entries = (|r| r.log_energy_midpoint, |r| r.log_hamiltonian_exact, |r| r.log_hamiltonian);
+    figure("free_particle_log_hamiltonian.svg", ENERGY, h, above, entries)
 }
 
-/// Position, action and energy of the harmonic oscillator. Only the published action is wrong.
-pub fn harmonic_oscillator(out: &Directory, rows: &[Row], published: &[PublishedRow]) -> Result<(), Failure> {
-    let c = Curves { rows, published };
-    let time = Axis::Linear(0.0, 25.0, 5.0);
-    let q = vec![c.discrete(|r| r.q), c.exact(|r| r.q_exact)];
-    let z = vec![c.as_published(|r| r.z), c.discrete(|r| r.z), c.exact(|r| r.z_exact)];
-    let h = vec![c.discrete(|r| r.log_energy_midpoint), c.exact(|r| r.log_hamiltonian_exact)];
-    let position = panel(POSITION, time, Axis::Linear(-2.0, 3.0, 1.0), Legend::TopRight, q);
-    let action = panel(ACTION, time, Axis::Linear(-1.0, 2.0, 0.5), Legend::TopRight, z);
-    let energy = panel(ENERGY, time, Axis::Linear(-0.5, 1.0, 0.5), Legend::TopRight, h);
-    out.text("harmonic_oscillator_q.svg", &draw(&position))?;
-    out.text("harmonic_oscillator_z.svg", &draw(&action))?;
-    out.text("harmonic_oscillator_log_hamiltonian.svg", &draw(&energy))
+/// Position, action and energy of the harmonic oscillator. Only the published action is wrong. The curves that are known
+/// at all times are drawn smooth, the discrete ones with their points.
+pub fn harmonic_oscillator(out: &Directory, rows: &[Row]) -> Result<(), Failure> {
+    let system = HarmonicOscillator { gamma: GAMMA };
+    let start = true_start(&system)?;
+    // Ten points a step.
+    let times = |end: usize| (0..=10 * end).map(|k| 0.1 * STEP * k as f64);
+    let fine = || times(rows.len().saturating_sub(1));
+    let motion =
+        |entry: fn(&VelocityPoint<1>) -> f64| exact(fine().map(move |t| (t, entry(&system.solution(t, &start)))));
+    let figure = |name: &str, label, y, legend, entry: fn(&Row) -> f64, others: Vec<Curve>| {
+        let curves = std::iter::once(discrete(rows, entry)).chain(others).collect();
+        let mut panel = panel(label, Axis::Linear(0.0, 25.0, 5.0), y, legend, curves);
+        panel.marks = rows.iter().map(|r| (r.t, entry(r))).collect();
+        out.text(name, &draw(&panel))
+    };
+    let (few, three) = ((0.65, 0.95), (0.5, 0.95));
+    let q = Axis::Linear(-2.0, 3.0, 1.0);
+    figure("harmonic_oscillator_q.svg", POSITION, q, few, |r| r.q, vec![motion(|x| x.q[0])])?;
+    let z = Axis::Linear(-1.5, 2.0, 0.5);
+    let faulty = as_published(fine().map(|t| (t, faulty_action(start.v[0], t))));
+    figure("harmonic_oscillator_z.svg", ACTION, z, three, |r| r.z, vec![motion(|x| x.z), faulty])?;
+    let h = Axis::Linear(-0.5, 1.0, 0.5);
+    let truth = exact(rows.iter().map(|r| (r.t, r.log_hamiltonian_exact)));
+    figure("harmonic_oscillator_log_hamiltonian.svg", ENERGY, h, few, |r| r.log_energy_midpoint, vec![truth])
 }

@@ -8,9 +8,11 @@
 //! the paper calls exact by the formulas that produce them (`*_as_published.csv`), the figures as SVG, and
 //! `statements.csv`. Ends with 1 if a statement fails its check, with 2 if the output cannot be written.
 
+mod any_rule;
 mod checks;
 mod closed_exact;
 mod decay;
+mod explicit;
 mod figures;
 mod published;
 mod section2;
@@ -45,7 +47,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = Directory::create(&arguments.out)?;
 
     let particle = FreeParticle { gamma: GAMMA };
-    let free = series::rows(&particle, &Rectangle::new::<1>(particle, STEP)?, 100)?;
+    let rectangle = Rectangle::new::<1>(particle, STEP)?;
+    let free = series::rows(&particle, &rectangle, 100)?;
     let free_published = published::free_particle(free.len())?;
     let spring = HarmonicOscillator { gamma: GAMMA };
     let oscillator = series::rows(&spring, &LeftMidpoint::new::<1>(spring, STEP)?, 50)?;
@@ -59,9 +62,10 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         oscillator_published.iter().map(published_row),
     )?;
     print(&tables::deviations((&free, &free_published), (&oscillator, &oscillator_published)))?;
+    print(&tables::rounding(&series::positions_by_flow(&rectangle, free.len())?))?;
 
     figures::free_particle(&out, &free, &free_published)?;
-    figures::harmonic_oscillator(&out, &oscillator, &oscillator_published)?;
+    figures::harmonic_oscillator(&out, &oscillator)?;
     decay::conformal_factor(&out)?;
     decay::angular_momentum(&out)?;
 

@@ -58,7 +58,7 @@ pub fn harmonic_oscillator(truth: &[Row]) -> Result<Vec<PublishedRow>, Failure> 
 ///
 /// With `q = B e^(a t) sin w t`, `a = gamma/2`, `w^2 = 1 - a^2`, the first two terms are
 /// `B^2 e^(gamma t)/2 (w^2 cos 2wt + a w sin 2wt)`; so `e^(gamma t) z` is the integral of that times `e^(gamma t)`.
-fn faulty_action(velocity: f64, t: f64) -> f64 {
+pub fn faulty_action(velocity: f64, t: f64) -> f64 {
     let a = GAMMA * 0.5;
     let w = (1.0 - a * a).sqrt();
     let amplitude = velocity / w;
@@ -69,6 +69,12 @@ fn faulty_action(velocity: f64, t: f64) -> f64 {
     let cosine = growth * (c * cos + b * sin) - c;
     let sine = growth * (c * sin - b * cos) + b;
     (-GAMMA * t).exp() * 0.5 * amplitude * amplitude * (w * w * cosine + a * w * sine) / (c * c + b * b)
+}
+
+/// The solution of the free particle's discrete equations, `q_k = (q_1 - q_0) ((1 + h gamma)^k - 1)/(h gamma)`.
+pub fn solved_recurrence(count: usize) -> Vec<f64> {
+    let (x, drag) = (start(), STEP * GAMMA);
+    (0..count).map(|k| (x.q1[0] - x.q0[0]) * (drag.ln_1p() * k as f64).exp_m1() / drag).collect()
 }
 
 /// The published data of one figure: its solid and its dashed curve.
