@@ -16,13 +16,28 @@ pub struct DiscreteJet<const N: usize> {
     pub d2: SVector<f64, N>,
     /// `Dz L_d`, the derivative in `z0`.
     pub dz: f64,
+    /// `sigma_d = 1 + Dz L_d`, the conformal factor of the step. Kept apart: where the drag is strong, `1 + dz` has lost
+    /// its digits.
+    sigma: f64,
 }
 
 impl<const N: usize> DiscreteJet<N> {
+    /// The jet with these derivatives, and `sigma_d = 1 + dz`.
+    #[inline(always)]
+    pub fn new(value: f64, d1: SVector<f64, N>, d2: SVector<f64, N>, dz: f64) -> Self {
+        DiscreteJet { value, d1, d2, dz, sigma: 1.0 + dz }
+    }
+
+    /// The jet with a `sigma_d` that is known to more digits than `1 + dz`.
+    #[inline(always)]
+    pub fn with_sigma(self, sigma: f64) -> Self {
+        DiscreteJet { sigma, ..self }
+    }
+
     /// `sigma_d = 1 + Dz L_d`, the conformal factor of the step.
-    #[inline]
+    #[inline(always)]
     pub fn sigma(&self) -> f64 {
-        1.0 + self.dz
+        self.sigma
     }
 }
 

@@ -219,8 +219,17 @@ assign! {
 
 impl<T: Scalar, D: Module<T>> Scalar for Dual<T, D> {
     #[inline]
-    fn modulus(self) -> f64 {
-        self.re.modulus()
+    fn re(self) -> f64 {
+        self.re.re()
+    }
+    #[inline]
+    fn extent(self) -> f64 {
+        let mut largest = self.re.extent();
+        self.d.each(|a| {
+            largest = largest.max(a.extent());
+            a
+        });
+        largest
     }
     #[inline]
     fn recip(self) -> Self {

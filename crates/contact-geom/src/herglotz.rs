@@ -15,8 +15,11 @@ pub struct Regularity {
 }
 
 impl Regularity {
-    /// The singular values of a matrix that decides regularity.
+    /// The singular values of a matrix that decides regularity. A matrix that is not finite counts as singular.
     pub fn of(matrix: DMatrix<f64>) -> Self {
+        if !matrix.iter().all(|e| e.is_finite()) {
+            return Regularity { smallest: 0.0, largest: f64::INFINITY };
+        }
         let values = matrix.singular_values();
         Regularity { smallest: values.min(), largest: values.max() }
     }
@@ -100,6 +103,20 @@ pub fn herglotz_field<T: Scalar, const N: usize>(
     t: T,
     x: &VelocityPoint<N, T>,
 ) -> Result<Triple<N, T>, GeometryError> {
+    Ok(herglotz_rates(lagrangian, t, x)?.0)
+}
+
+/// The Herglotz vector field with the rate `L_z` of the conformal factor, which its evaluation gives as well: along a
+/// motion `sigma = exp int L_z`.
+///
+/// # Errors
+/// Those of [`herglotz_field`].
+#[inline]
+pub fn herglotz_rates<T: Scalar, const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: T,
+    x: &VelocityPoint<N, T>,
+) -> Result<(Triple<N, T>, T), GeometryError> {
     let zdot = lagrangian.value(t, &x.q, &x.v, x.z);
     let g = {
         let moving = |re: T, drift: T| Dual { re, d: Border::<N, T> { x: Module::null(), z: drift } };
@@ -117,7 +134,7 @@ pub fn herglotz_field<T: Scalar, const N: usize>(
     let mut w = SMatrix::<T, N, N>::from_fn(|i, j| g.y[i].d.x[j]);
     solve(&mut w, &mut a)
         .map_err(|e| e.of("W = L_vv", "Herglotz' equations have no unique acceleration here; L is not regular"))?;
-    Ok(Triple { x: x.v, y: a, z: zdot })
+    Ok((Triple { x: x.v, y: a, z: zdot }, g.z.re))
 }
 
 /// The Herglotz vector field at a fixed time, as a field that can be differentiated.

@@ -57,8 +57,8 @@ pub use hamiltonian::{
     lie_derivative,
 };
 pub use herglotz::{
-    Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, Regularity, herglotz_field, legendre,
-    legendre_jacobian, regularity,
+    Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, Regularity, herglotz_field, herglotz_rates,
+    legendre, legendre_jacobian, regularity,
 };
 pub use lagrangian::{Hessian, Lagrangian, check_closed_derivatives, derived_gradient, derived_hessian};
 pub use lagrangian_form::LagrangianForm;

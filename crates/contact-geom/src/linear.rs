@@ -1,7 +1,7 @@
 //! Linear systems on the stack, over any scalar.
 
 use crate::{GeometryError, Scalar};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Dim, Matrix, StorageMut, U1};
 use thiserror::Error;
 
 /// A matrix that has no inverse, or entries that are not finite.
@@ -19,7 +19,7 @@ impl SingularMatrix {
     }
 }
 
-/// Solves `a x = b` by elimination with row pivoting, on the stack, over any [`Scalar`]; `a` and `b` are used up.
+/// Solves `a x = b` by elimination with row pivoting, in place, over any [`Scalar`]; `a` and `b` are used up.
 ///
 /// nalgebra's factorisations ask for a field, which duals are not; and for the sizes of few-body mechanics this is faster
 /// than any library call. Its cost is `N^3 / 3` products.
@@ -27,10 +27,14 @@ impl SingularMatrix {
 /// # Errors
 /// [`SingularMatrix`] where a pivot vanishes or is not finite.
 #[inline]
-pub fn solve<T: Scalar, const N: usize>(a: &mut SMatrix<T, N, N>, b: &mut SVector<T, N>) -> Result<(), SingularMatrix> {
-    for k in 0..N {
+pub fn solve<T: Scalar, D: Dim>(
+    a: &mut Matrix<T, D, D, impl StorageMut<T, D, D>>,
+    b: &mut Matrix<T, D, U1, impl StorageMut<T, D>>,
+) -> Result<(), SingularMatrix> {
+    let n = a.nrows();
+    for k in 0..n {
         let mut row = k;
-        for i in k + 1..N {
+        for i in k + 1..n {
             if a[(i, k)].modulus() > a[(row, k)].modulus() {
                 row = i;
             }
@@ -44,9 +48,9 @@ pub fn solve<T: Scalar, const N: usize>(a: &mut SMatrix<T, N, N>, b: &mut SVecto
             b.swap_rows(k, row);
         }
         let inverse = a[(k, k)].recip();
-        for i in k + 1..N {
+        for i in k + 1..n {
             let factor = a[(i, k)] * inverse;
-            for j in k + 1..N {
+            for j in k + 1..n {
                 let above = a[(k, j)];
                 a[(i, j)] -= factor * above;
             }
@@ -54,9 +58,9 @@ pub fn solve<T: Scalar, const N: usize>(a: &mut SMatrix<T, N, N>, b: &mut SVecto
             b[i] -= factor * above;
         }
     }
-    for k in (0..N).rev() {
+    for k in (0..n).rev() {
         let mut sum = b[k];
-        for j in k + 1..N {
+        for j in k + 1..n {
             sum -= a[(k, j)] * b[j];
         }
         b[k] = sum / a[(k, k)];

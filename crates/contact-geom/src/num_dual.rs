@@ -6,8 +6,12 @@ use num_dual::{Dual2_64, Dual64, DualNum, HyperDual64};
 macro_rules! scalar {
     ($($number:ty),*) => {$(
         impl Scalar for $number {
-            fn modulus(self) -> f64 {
-                self.re.abs()
+            fn re(self) -> f64 {
+                <Self as DualNum>::re(&self)
+            }
+            /// Of the value alone: num-dual has no common access to the differentials.
+            fn extent(self) -> f64 {
+                Scalar::extent(<Self as DualNum>::re(&self))
             }
             fn recip(self) -> Self {
                 <Self as DualNum>::recip(&self)

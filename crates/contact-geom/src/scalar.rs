@@ -32,9 +32,17 @@ pub trait Scalar:
     + Mul<f64, Output = Self>
     + Div<f64, Output = Self>
 {
+    /// The value without its differentials. For lanes: of the first; only a guess that is improved upon may depend on it.
+    fn re(self) -> f64;
     /// The size of the value without its differentials, used only to choose pivots and to see that a number is finite.
     /// For lanes: of the lane that matters most to a pivot, the smallest.
-    fn modulus(self) -> f64;
+    #[inline]
+    fn modulus(self) -> f64 {
+        self.re().abs()
+    }
+    /// The largest absolute value among the value and all its differentials: what an iteration or an error control over
+    /// this scalar has to make small. A NaN anywhere makes it infinite.
+    fn extent(self) -> f64;
     /// `1 / x`.
     fn recip(self) -> Self;
     /// The square root.
@@ -89,8 +97,12 @@ pub trait Scalar:
 
 impl Scalar for f64 {
     #[inline]
-    fn modulus(self) -> f64 {
-        self.abs()
+    fn re(self) -> f64 {
+        self
+    }
+    #[inline]
+    fn extent(self) -> f64 {
+        if self.is_nan() { f64::INFINITY } else { self.abs() }
     }
     #[inline]
     fn recip(self) -> Self {

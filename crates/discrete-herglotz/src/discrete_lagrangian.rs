@@ -155,8 +155,11 @@ pub struct Transition<const N: usize> {
 
 impl<const N: usize> Transition<N> {
     /// Refuses a step that is not finite or not conformally contact.
+    ///
+    /// # Errors
+    /// [`StepError::NonFinite`], [`StepError::SigmaVanished`].
     #[inline(always)]
-    pub(crate) fn checked(self) -> Result<Self, StepError> {
+    pub fn checked(self) -> Result<Self, StepError> {
         if !(Triple::from(self.end).is_finite() && self.sigma.is_finite()) {
             return Err(StepError::NonFinite);
         }
@@ -177,7 +180,7 @@ pub fn derived_jet<const N: usize>(
     x: &DiscretePoint<N>,
 ) -> Result<DiscreteJet<N>, StepError> {
     let l = ld.value(t, &seed(&Triple::from(*x)).into())?;
-    Ok(DiscreteJet { value: l.re, d1: l.d.x, d2: l.d.y, dz: l.d.z })
+    Ok(DiscreteJet::new(l.re, l.d.x, l.d.y, l.d.z))
 }
 
 /// The second jet by automatic differentiation of the value.
@@ -192,7 +195,7 @@ pub fn derived_second_jet<const N: usize>(
     use contact_geom::nalgebra::SMatrix;
     let l: Dual<Dual<f64, Triple<N>>, _> = ld.value(t, &seed(&seed(&Triple::from(*x))).into())?;
     Ok(SecondDiscreteJet {
-        first: DiscreteJet { value: l.re.re, d1: l.re.d.x, d2: l.re.d.y, dz: l.re.d.z },
+        first: DiscreteJet::new(l.re.re, l.re.d.x, l.re.d.y, l.re.d.z),
         d11: SMatrix::from_fn(|i, j| l.d.x[i].d.x[j]),
         d12: SMatrix::from_fn(|i, j| l.d.x[i].d.y[j]),
         d22: SMatrix::from_fn(|i, j| l.d.y[i].d.y[j]),

@@ -70,6 +70,18 @@ pub enum StepError {
         /// The value of sigma_d.
         sigma: f64,
     },
+    /// The exact motion of a step is not defined up to the step's end.
+    #[error("the motion is defined only until t = {t}; take a smaller step")]
+    OutsideDomain {
+        /// The time until which it is defined.
+        t: f64,
+    },
+    /// The two points of a step are conjugate along the exact motion, and do not determine it.
+    #[error("the points of the step are conjugate (singular value {smallest:e}); take another step")]
+    ConjugatePoint {
+        /// The smallest singular value of the derivative of the end position in the initial velocity, a time.
+        smallest: f64,
+    },
     /// A coordinate or a derivative is infinite or not a number.
     #[error("a value is not finite: the motion leaves the domain of the Lagrangian, or grows without bound")]
     NonFinite,

@@ -317,7 +317,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         let z1 = self.end_action(t, x)?;
         let s = self.extended_jet(t, x, z1);
         let pivot = 1.0 - s.z1;
-        Ok(DiscreteJet { value: s.value, d1: s.s1 / pivot, d2: s.s2 / pivot, dz: (s.z0 + s.z1) / pivot })
+        Ok(DiscreteJet::new(s.value, s.s1 / pivot, s.s2 / pivot, (s.z0 + s.z1) / pivot))
     }
 
     /// By the chain rule from the Hessian of L at the nodes, along the total directions of `(q0, q1, z0)`:

@@ -16,6 +16,20 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod conjugate;
+mod error;
+mod exact_lagrangian;
+mod exponential;
+mod flow;
+mod gauss;
 mod linear_exact;
+mod panel;
+mod retraction;
 
+pub use conjugate::ConjugatePoint;
+pub use error::ExactError;
+pub use exact_lagrangian::ExactLagrangian;
+pub use exponential::{ContactExponential, ExponentialDifferential, HerglotzFlow};
+pub use flow::{Motion, PANELS, herglotz_flow};
 pub use linear_exact::LinearExact;
+pub use retraction::{Retraction, Route};

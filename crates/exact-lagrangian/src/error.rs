@@ -1,0 +1,99 @@
+//! Bad input and bad luck on the exact side.
+
+use contact_geom::{GeometryError, VelocityPoint};
+use discrete_herglotz::{InputError, StepError};
+use thiserror::Error;
+
+/// Why a motion, or the motion between two points, could not be computed. Bad luck carries what was reached, so that one can
+/// go on from there.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum ExactError<const N: usize> {
+    /// The input is not acceptable; nothing was computed.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The motion is not defined up to the end: it blows up, meets a singular W, or leaves the domain of L. The start is
+    /// outside `U_h`, the domain of the exponential map; paper, section 4.1.
+    #[error(
+        "the motion is defined only until t = {t}: it blows up there, or leaves the domain on which L is regular; \
+         take a smaller h or another start"
+    )]
+    OutsideDomain {
+        /// The time that was reached.
+        t: f64,
+        /// The state at that time.
+        reached: VelocityPoint<N>,
+        /// What the geometry says beyond, if it says something.
+        cause: Option<GeometryError>,
+    },
+    /// The motion needs more panels than [`PANELS`](crate::PANELS): the drag is very strong, or the time very long.
+    #[error("t = {t} was reached with the largest number of panels; go on from there, or take a smaller h")]
+    Unfinished {
+        /// The time that was reached.
+        t: f64,
+        /// The state at that time.
+        reached: VelocityPoint<N>,
+    },
+    /// No motion through the two points was found.
+    #[error(
+        "no motion through the two points found: from velocity {:?} it misses the second by {residual:e}; \
+         pass a guess of the initial velocity, or take a smaller h", last.v.as_slice()
+    )]
+    NotConverged {
+        /// The start of the last motion tried.
+        last: VelocityPoint<N>,
+        /// The distance by which it misses the second point, its largest component.
+        residual: f64,
+        /// The smallest singular value of `dq1/dv0` there, a time.
+        smallest: f64,
+    },
+    /// The points are conjugate along the motion: `dq1/dv0` is singular to round-off, and the exponential map is no local
+    /// diffeomorphism there.
+    #[error(
+        "the two points are conjugate along the motion (smallest singular value of dq1/dv0 {smallest:e}): \
+         they do not determine it; take another h"
+    )]
+    ConjugatePoint {
+        /// The start of the last motion tried.
+        last: VelocityPoint<N>,
+        /// The distance by which it misses the second point, its largest component.
+        residual: f64,
+        /// The smallest singular value of `dq1/dv0` there, a time.
+        smallest: f64,
+    },
+}
+
+impl<const N: usize> From<GeometryError> for ExactError<N> {
+    fn from(error: GeometryError) -> Self {
+        ExactError::Input(InputError::Geometry(error))
+    }
+}
+
+/// What remains of an error in a step of a discrete Lagrangian, which knows no dimension.
+impl<const N: usize> From<ExactError<N>> for StepError {
+    fn from(error: ExactError<N>) -> Self {
+        match error {
+            ExactError::Input(InputError::FirstStep(cause)) => cause,
+            ExactError::Input(InputError::Geometry(GeometryError::Singular { pivot, .. })) => {
+                StepError::Singular { pivot }
+            }
+            ExactError::Input(_) => StepError::NonFinite,
+            ExactError::OutsideDomain { t, .. } | ExactError::Unfinished { t, .. } => StepError::OutsideDomain { t },
+            ExactError::NotConverged { residual, .. } => {
+                StepError::NotConverged { residual, iterations: crate::retraction::ITERATIONS }
+            }
+            ExactError::ConjugatePoint { smallest, .. } => StepError::ConjugatePoint { smallest },
+        }
+    }
+}
+
+/// What remains of an error in a formula of the geometry.
+impl<const N: usize> From<ExactError<N>> for GeometryError {
+    fn from(error: ExactError<N>) -> Self {
+        match error {
+            ExactError::Input(InputError::Geometry(cause)) | ExactError::OutsideDomain { cause: Some(cause), .. } => {
+                cause
+            }
+            _ => GeometryError::Undefined { what: "the exact motion" },
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Coefficients of Gauss collocation.
+
+use std::array::from_fn;
+use std::sync::LazyLock;
+
+/// The largest number of nodes of a panel.
+pub(crate) const MOST: usize = 24;
+
+/// The numbers of nodes that a panel may have: few for a short one, many for a long one.
+const SIZES: [usize; 4] = [4, 8, 14, MOST];
+
+/// Gauss collocation with `s` nodes on `[0, 1]`, for systems `q' = v, v' = a`.
+pub(crate) struct Gauss {
+    /// The number of nodes.
+    pub s: usize,
+    /// The nodes.
+    pub c: [f64; MOST],
+    /// The weights.
+    pub b: [f64; MOST],
+    /// The integrals of the Lagrange polynomials from 0 to each node: `v_i = v0 + h sum_j a_ij a_j`.
+    pub a: [[f64; MOST]; MOST],
+    /// The square of that matrix: `q_i = q0 + h c_i v0 + h^2 sum_j aa_ij a_j`.
+    pub aa: [[f64; MOST]; MOST],
+    /// `b_j (1 - c_j)`: the position at the end is `q0 + h v0 + h^2 sum_j end_j a_j`.
+    pub end: [f64; MOST],
+    /// The functionals that give the last two Legendre coefficients of a function from its values at the nodes.
+    pub tail: [[f64; MOST]; 2],
+    /// The values at the nodes of the next larger collocation of the polynomial with given values at these nodes.
+    pub refine: [[f64; MOST]; MOST],
+}
+
+/// The Legendre polynomials `P_0(x) .. P_s(x)` on `[-1, 1]`.
+fn legendre(s: usize, x: f64) -> [f64; MOST + 1] {
+    let mut p = [1.0; MOST + 1];
+    p[1] = x;
+    for k in 1..s {
+        let n = k as f64;
+        p[k + 1] = ((2.0 * n + 1.0) * x * p[k] - n * p[k - 1]) / (n + 1.0);
+    }
+    p
+}
+
+impl Gauss {
+    /// The nodes on `[-1, 1]`, 0 beyond the last.
+    fn nodes(s: usize) -> [f64; MOST] {
+        let n = s as f64;
+        from_fn(|i| {
+            if i >= s {
+                return 0.0;
+            }
+            // Tricomi's guess, then Newton: quadratic, so that five steps are more than enough.
+            let mut x = -(std::f64::consts::PI * (i as f64 + 0.75) / (n + 0.5)).cos();
+            for _ in 0..5 {
+                let p = legendre(s, x);
+                x -= p[s] * (x * x - 1.0) / (n * (x * p[s] - p[s - 1]));
+            }
+            x
+        })
+    }
+
+    fn new(s: usize, next: usize) -> Self {
+        let (n, nodes, beyond) = (s as f64, Self::nodes(s), Self::nodes(next));
+        let c = nodes.map(|x| (1.0 + x) * 0.5);
+        let rough: [f64; MOST] = from_fn(|j| {
+            let below = n * legendre(s, nodes[j])[s - 1];
+            if j < s { (1.0 - nodes[j] * nodes[j]) / (below * below) } else { 0.0 }
+        });
+        // The closed formula amplifies the nodes' rounding. One correction by the Legendre polynomials, whose integrals the
+        // weights must give, brings all of them to the last digit.
+        let defects: [f64; MOST] = from_fn(|k| {
+            let sum: f64 = (0..s).map(|j| rough[j] * legendre(s, nodes[j])[k]).sum();
+            if k == 0 { 1.0 - sum } else { -sum }
+        });
+        let b = from_fn(|j| {
+            let p = legendre(s, nodes[j]);
+            rough[j] * (1.0 + (0..s).map(|k| (2 * k + 1) as f64 * p[k] * defects[k]).sum::<f64>())
+        });
+        // The Lagrange polynomial of node j is b_j sum (2k+1) P_k(x_j) P_k, and the integral of P_k a difference of two.
+        let a: [[f64; MOST]; MOST] = from_fn(|i| {
+            let at = legendre(s, nodes[i]);
+            from_fn(|j| {
+                let p = legendre(s, nodes[j]);
+                let rest: f64 = (1..s).map(|k| p[k] * (at[k + 1] - at[k - 1])).sum();
+                if i < s { b[j] * (c[i] + 0.5 * rest) } else { 0.0 }
+            })
+        });
+        let aa = from_fn(|i| from_fn(|j| (0..s).map(|k| a[i][k] * a[k][j]).sum()));
+        let tail = [s - 1, s - 2].map(|k| from_fn(|j| (2 * k + 1) as f64 * b[j] * legendre(s, nodes[j])[k]));
+        let refine = from_fn(|i| {
+            let at = legendre(s, beyond[i]);
+            from_fn(|j| {
+                let p = legendre(s, nodes[j]);
+                let sum: f64 = (0..s).map(|k| (2 * k + 1) as f64 * p[k] * at[k]).sum();
+                if i < next { b[j] * sum } else { 0.0 }
+            })
+        });
+        Gauss { s, refine, c, b, a, aa, end: from_fn(|j| b[j] * (1.0 - c[j])), tail }
+    }
+}
+
+/// The tables, made once.
+static TABLES: LazyLock<[Gauss; 4]> =
+    LazyLock::new(|| from_fn(|i| Gauss::new(SIZES[i], *SIZES.get(i + 1).unwrap_or(&SIZES[i]))));
+
+/// The collocations from the one with fewest nodes to the one with most.
+pub(crate) fn collocations() -> &'static [Gauss; 4] {
+    &TABLES
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Weights integrate all polynomials of degree `2s - 1`, the matrix those of degree `s - 1`; both to a few units of
+    /// round-off, the sums being of positive terms or of terms below one.
+    #[test]
+    fn the_coefficients_integrate_polynomials() {
+        let eps = 4.0 * f64::EPSILON;
+        for g in collocations() {
+            for k in 0..2 * g.s {
+                let sum: f64 = (0..g.s).map(|j| g.b[j] * g.c[j].powi(k as i32)).sum();
+                assert!((sum - 1.0 / (k + 1) as f64).abs() < eps, "s = {}, degree {k}: {sum}", g.s);
+            }
+            for (i, k) in (0..g.s).flat_map(|i| (0..g.s).map(move |k| (i, k))) {
+                let row = |m: &[[f64; MOST]; MOST]| (0..g.s).map(|j| m[i][j] * g.c[j].powi(k as i32)).sum::<f64>();
+                let (once, n) = (g.c[i].powi(k as i32 + 1), (k + 1) as f64);
+                assert!((row(&g.a) - once / n).abs() < eps, "s = {}, row {i}, degree {k}", g.s);
+                if k + 1 < g.s {
+                    assert!((row(&g.aa) - once * g.c[i] / (n * (n + 1.0))).abs() < eps, "twice: {i}, {k}");
+                }
+            }
+        }
+    }
+
+    /// Polynomials of degree `s - 1` are carried to the next nodes.
+    #[test]
+    fn refinement_is_interpolation() {
+        for pair in collocations().windows(2) {
+            let ([from, to], degree) = ([&pair[0], &pair[1]], pair[0].s as i32 - 1);
+            for i in 0..to.s {
+                let value: f64 = (0..from.s).map(|j| from.refine[i][j] * from.c[j].powi(degree)).sum();
+                assert!((value - to.c[i].powi(degree)).abs() < 1e-14, "{} to {}, node {i}", from.s, to.s);
+            }
+        }
+    }
+
+    /// On Legendre polynomials themselves.
+    #[test]
+    fn the_tail_is_the_last_two_legendre_coefficients() {
+        for g in collocations() {
+            for (row, k) in [g.s - 1, g.s - 2].into_iter().enumerate() {
+                let of =
+                    |m: usize| (0..g.s).map(|j| g.tail[row][j] * legendre(g.s, 2.0 * g.c[j] - 1.0)[m]).sum::<f64>();
+                assert!((of(k) - 1.0).abs() < 1e-14);
+                assert!((0..g.s).filter(|m| *m != k).all(|m| of(m).abs() < 1e-14));
+            }
+        }
+    }
+}

@@ -1,0 +1,352 @@
+//! The exact retractions: the motion from one point to another.
+
+use crate::exact_lagrangian::seeded;
+use crate::exponential::singular_values;
+use crate::flow::{ACCURACY, Herglotz, integrate};
+use crate::panel::{End, Problem, Rates, State, collocate};
+use crate::{ContactExponential, ExactError, Motion, herglotz_flow};
+use contact_geom::linear::solve;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{DiscretePoint, Dual, Lagrangian, Scalar, VelocityPoint};
+use discrete_herglotz::InputError;
+
+/// The Newton iterations that a retraction may take.
+pub(crate) const ITERATIONS: u32 = 50;
+
+/// The accuracy of the first Newton iterations: of what is only a guess for the last.
+const ROUGH: f64 = 1e-6;
+
+/// The smallest singular value of `dq1/dv0`, in units of h, below which the end points count as conjugate.
+const CONJUGATE: f64 = 64.0 * f64::EPSILON;
+
+/// How the motion between two points was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Route {
+    /// By collocation with both positions given: the shortest way, taken where its iteration contracts.
+    Collocation,
+    /// By Newton's method on the exponential map.
+    Newton,
+    /// By Newton's method, led from a short time to h along the straight line between the points.
+    Continuation,
+}
+
+/// The motion from `q0` to `q1` in time h: `R_h^(e-)` is its start, `R_h^(e+) = phi_h o R_h^(e-)` its end; paper, section 4.1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Retraction<const N: usize> {
+    /// `R_h^(e-)(q0, q1, z0) = (q0, v0, z0)`.
+    pub start: VelocityPoint<N>,
+    /// `R_h^(e+)(q0, q1, z0) = (q1, v1, z1)`.
+    pub end: VelocityPoint<N>,
+    /// The action `z1 - z0`, to round-off of itself: the value of `L_h^e`.
+    pub action: f64,
+    /// `b = int L_z dt` along the motion.
+    pub b: f64,
+    /// How it was found.
+    pub route: Route,
+    /// The evaluations of the vector field that the last pass took.
+    pub evaluations: u32,
+}
+
+/// The motion with its derivatives in the initial velocity.
+type Shot<const N: usize> = Motion<N, Dual<f64, SVector<f64, N>>>;
+
+/// A motion through both points, and the inverse of `dq1/dv0` there.
+struct Found<const N: usize> {
+    retraction: Retraction<N>,
+    inverse: SMatrix<f64, N, N>,
+}
+
+/// The smallest singular value of a matrix with this inverse, up to a factor of at most `sqrt N`.
+fn smallest<const N: usize>(inverse: &SMatrix<f64, N, N>) -> f64 {
+    1.0 / inverse.norm()
+}
+
+impl<L> ContactExponential<L> {
+    /// The retraction of two points at time t.
+    ///
+    /// Where several motions join the points in time h this is the one that the motions of shorter times between points on the
+    /// straight line lead to; [`retract_near`](Self::retract_near) finds others, and
+    /// [`conjugate_points`](Self::conjugate_points) tells whether there may be some: before the first conjugate point the
+    /// motion is locally the only one.
+    ///
+    /// First by collocation with both positions given, which costs no more than the motion itself; then by Newton's method on
+    /// `exp_h`, from `(q1 - q0)/h`, and by continuation in h.
+    ///
+    /// # Errors
+    /// [`ExactError::Input`] for a non-finite point, a singular W, or (where there is no unique motion)
+    /// [`InputError::EqualPoints`]; [`ExactError::NotConverged`], [`ExactError::ConjugatePoint`],
+    /// [`ExactError::OutsideDomain`] with the last motion tried.
+    pub fn retract<const N: usize>(&self, t: f64, x: &DiscretePoint<N>) -> Result<Retraction<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        x.check()?;
+        let guess = (x.q1 - x.q0) / self.h;
+        let free = SMatrix::from_diagonal_element(1.0 / self.h);
+        if let Some(found) = self.by_collocation(t, x, &guess, &free)? {
+            return Ok(found);
+        }
+        let failed = match self.by_newton(t, x, &guess) {
+            Ok(found) => return Ok(found),
+            Err(failed) => failed,
+        };
+        match self.lead(t, x) {
+            Some(found) => Ok(Retraction { route: Route::Continuation, ..found.retraction }),
+            None if x.q0 == x.q1 => Err(InputError::EqualPoints.into()),
+            None => Err(failed),
+        }
+    }
+
+    /// The retraction on the branch of a guess of the initial velocity: by Newton's method from there, and only that.
+    ///
+    /// # Errors
+    /// Like those of [`retract`](Self::retract).
+    pub fn retract_near<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+        guess: &SVector<f64, N>,
+    ) -> Result<Retraction<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        x.check()?;
+        self.by_newton(t, x, guess)
+    }
+
+    /// The different motions among those that Newton's method finds from these guesses of the initial velocity, in the order of
+    /// the guesses; guesses that lead nowhere are left out. Two motions are the same if their velocities agree to half of the
+    /// digits.
+    ///
+    /// # Errors
+    /// [`ExactError::Input`] for a point that is not finite.
+    pub fn branches<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+        guesses: &[SVector<f64, N>],
+    ) -> Result<Vec<Retraction<N>>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        x.check()?;
+        let mut found: Vec<Retraction<N>> = Vec::new();
+        for guess in guesses {
+            if let Ok(new) = self.by_newton(t, x, guess) {
+                let same = |old: &Retraction<N>| {
+                    let apart = (old.start.v - new.start.v).amax();
+                    apart <= f64::EPSILON.sqrt() * old.start.v.amax().max(new.start.v.amax())
+                };
+                if !found.iter().any(same) {
+                    found.push(new);
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// The motion over any scalar that starts near a motion found before, as a function of the two points: the derivatives of
+    /// the end points go through flow and shooting. Newton's method with the slope of the values: each pass makes one more
+    /// order of differentials exact.
+    pub(crate) fn lifted<T: Scalar, const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N, T>,
+        guess: Option<&SVector<f64, N>>,
+    ) -> Result<(VelocityPoint<N, T>, Motion<N, T>), ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let values = DiscretePoint { q0: x.q0.map(|c| c.re()), q1: x.q1.map(|c| c.re()), z0: x.z0.re() };
+        let near = match guess {
+            Some(guess) => *guess,
+            None => self.retract(t, &values)?.start.v,
+        };
+        let Found { retraction, inverse } = self.shoot(t, &values, &near, self.h, ACCURACY)?;
+        let mut start = VelocityPoint { q: x.q0, v: retraction.start.v.map(T::from), z: x.z0 };
+        let mut before = f64::INFINITY;
+        for pass in 0..ITERATIONS {
+            let motion = herglotz_flow(&self.lagrangian, t, &start, self.h)?;
+            let missed = SVector::<T, N>::from_fn(|i, _| motion.displacement[i] - (x.q1[i] - x.q0[i]));
+            let size = missed.iter().map(|m| m.extent()).fold(0.0, f64::max);
+            let scale = motion.displacement.iter().map(|d| d.extent()).fold(0.0, f64::max);
+            // Differentials of second order may grow in the passes in which those of first order vanish.
+            if size <= 2.0 * f64::EPSILON * scale || (pass >= 3 && size >= 0.5 * before) {
+                return Ok((start, motion));
+            }
+            before = size;
+            for i in 0..N {
+                for j in 0..N {
+                    start.v[i] -= missed[j] * inverse[(i, j)];
+                }
+            }
+        }
+        Err(ExactError::NotConverged { last: retraction.start, residual: before, smallest: smallest(&inverse) })
+    }
+
+    /// The motion by collocation on one panel with both positions given, from a guess of the initial velocity and of the
+    /// inverse of `dq1/dv0`; if the iteration contracts and the error is below round-off.
+    fn by_collocation<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+        guess: &SVector<f64, N>,
+        inverse: &SMatrix<f64, N, N>,
+    ) -> Result<Option<Retraction<N>>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let rates = Herglotz(&self.lagrangian);
+        let from = State { q: x.q0, v: *guess, z: x.z0, b: 0.0 };
+        let start = rates.at(t, &from)?;
+        let end = End { displacement: &(x.q1 - x.q0), inverse };
+        let problem = Problem { t, h: self.h, from: &from, end: Some(end), accuracy: ACCURACY };
+        Ok(match collocate(&rates, &problem, start) {
+            Ok(panel) if panel.error <= ACCURACY => Some(Retraction {
+                start: VelocityPoint { q: x.q0, v: panel.v0, z: x.z0 },
+                end: VelocityPoint { q: x.q1, v: panel.v0 + panel.change.a, z: x.z0 + panel.change.z },
+                action: panel.change.z,
+                b: panel.change.b,
+                route: Route::Collocation,
+                evaluations: panel.evaluations,
+            }),
+            _ => None,
+        })
+    }
+
+    /// Newton's method on `exp_h`: to some digits first; the rest by collocation with the slope found, or else to the end.
+    fn by_newton<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+        guess: &SVector<f64, N>,
+    ) -> Result<Retraction<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let rough = self.shoot(t, x, guess, self.h, ROUGH)?;
+        let near = rough.retraction.start.v;
+        if let Some(found) = self.by_collocation(t, x, &near, &rough.inverse)? {
+            // Still the motion that Newton's method has found, not another one.
+            if (found.start.v - near).amax() <= ROUGH.sqrt() * near.amax() {
+                return Ok(Retraction { route: Route::Newton, ..found });
+            }
+        }
+        Ok(self.shoot(t, x, &near, self.h, ACCURACY)?.retraction)
+    }
+
+    /// Newton's method on `exp_h` with the slope `dq1/dv0` of the variational equation. A change that takes the motion out of
+    /// its domain, or farther from the second point, is halved.
+    fn shoot<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+        guess: &SVector<f64, N>,
+        h: f64,
+        accuracy: f64,
+    ) -> Result<Found<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let displacement = x.q1 - x.q0;
+        let (mut v, mut change) = (*guess, SVector::<f64, N>::zeros());
+        let (mut before, mut nearest) = (f64::INFINITY, f64::INFINITY);
+        let mut last = None;
+        for _ in 0..ITERATIONS {
+            let start = VelocityPoint { q: x.q0, v, z: x.z0 };
+            let moving = seeded(&start);
+            let from = State { q: moving.q, v: moving.v, z: moving.z, b: Dual::constant(0.0) };
+            let shot = match integrate(&Herglotz(&self.lagrangian), t, &from, h, accuracy) {
+                Ok(shot) => shot,
+                Err(error) if last.is_none() => return Err(error),
+                Err(_) => {
+                    change *= 0.5;
+                    v -= change;
+                    continue;
+                }
+            };
+            let missed = shot.displacement.map(|d| d.re) - displacement;
+            let slope = SMatrix::<f64, N, N>::from_fn(|i, j| shot.displacement[i].d[j]);
+            let residual = missed.amax();
+            if residual > 2.0 * nearest && change.amax() > f64::EPSILON * v.amax() {
+                change *= 0.5;
+                v -= change;
+                continue;
+            }
+            nearest = nearest.min(residual);
+            last = Some((start, residual, slope));
+            change = -missed;
+            let (mut matrix, size) = (slope, v.amax());
+            if solve(&mut matrix, &mut change).is_err() {
+                break;
+            }
+            let now = change.amax();
+            // The next change is about now^3 / before^2 or, at round-off, what moves no position.
+            let predicted = now * (now / before) * (now / before) <= 2.0 * accuracy * size.max(now);
+            let resolution = 2.0 * accuracy * (x.q0.amax().max(x.q1.amax()) / h.abs()).max(size);
+            let stagnant = now >= 0.5 * before && now <= 64.0 * resolution;
+            if residual == 0.0 || (before.is_finite() && (predicted || stagnant)) {
+                let Some(inverse) = slope.try_inverse().filter(|i| smallest(i) > CONJUGATE * h.abs()) else { break };
+                return Ok(Found { retraction: moved(x, &start, &shot, &change), inverse });
+            }
+            v += change;
+            before = now;
+        }
+        let Some((start, residual, slope)) = last else {
+            return Err(ExactError::NotConverged {
+                last: VelocityPoint { q: x.q0, v: *guess, z: x.z0 },
+                residual: f64::INFINITY,
+                smallest: 0.0,
+            });
+        };
+        let smallest = singular_values(&slope).smallest;
+        // Newton's method is slow, and its limit ill determined, where the slope nearly vanishes.
+        Err(if smallest <= f64::EPSILON.sqrt() * h.abs() {
+            ExactError::ConjugatePoint { last: start, residual, smallest }
+        } else {
+            ExactError::NotConverged { last: start, residual, smallest }
+        })
+    }
+
+    /// Continuation: the motions in the times `s h` to the points `q0 + s (q1 - q0)`, for s from small to 1, each the guess for
+    /// the next.
+    fn lead<const N: usize>(&self, t: f64, x: &DiscretePoint<N>) -> Option<Found<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let (mut s, mut step) = (0.0, 0.125);
+        let mut v = (x.q1 - x.q0) / self.h;
+        while step > 1e-3 {
+            let next = f64::min(s + step, 1.0);
+            let target = DiscretePoint { q1: x.q0 + (x.q1 - x.q0) * next, ..*x };
+            match self.shoot(t, &target, &v, next * self.h, if next < 1.0 { ROUGH } else { ACCURACY }) {
+                Ok(found) if next == 1.0 => return Some(found),
+                Ok(found) => {
+                    v = found.retraction.start.v;
+                    s = next;
+                    step *= 1.5;
+                }
+                Err(_) => step *= 0.5,
+            }
+        }
+        None
+    }
+}
+
+/// The motion after the last small change of its initial velocity, to first order in it: no further pass is needed.
+fn moved<const N: usize>(
+    x: &DiscretePoint<N>,
+    start: &VelocityPoint<N>,
+    shot: &Shot<N>,
+    change: &SVector<f64, N>,
+) -> Retraction<N> {
+    let along = |c: &Dual<f64, SVector<f64, N>>| c.re + c.d.dot(change);
+    Retraction {
+        start: VelocityPoint { v: start.v + change, ..*start },
+        end: VelocityPoint { q: x.q1, v: SVector::from_fn(|i, _| along(&shot.end.v[i])), z: along(&shot.end.z) },
+        action: along(&shot.action),
+        b: along(&shot.b),
+        route: Route::Newton,
+        evaluations: shot.evaluations,
+    }
+}
