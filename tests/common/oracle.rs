@@ -1,7 +1,10 @@
 //! An independent integrator: dop853 of another library, on Herglotz' equations and their variational equation.
 
 use contact_geom::nalgebra::DMatrix;
-use contact_geom::{HerglotzField, Lagrangian, Smooth, Triple, VelocityPoint};
+use contact_geom::systems::System;
+use contact_geom::{
+    DarbouxField, HerglotzField, Lagrangian, PhasePoint, Scalar, Smooth, SmoothFunction, Triple, VelocityPoint,
+};
 use differential_equations::prelude::{ExplicitRungeKutta, IVP, ODE};
 
 /// The Herglotz field, its variational equation and the exponent `int L_z`, as one first-order system.
@@ -78,4 +81,43 @@ pub fn motion_with_derivative<const N: usize>(
     let y = integrate(lagrangian, t0, start, duration, true);
     let derivative = DMatrix::from_column_slice(m, m, &y[m..m + m * m]);
     (Triple::from_fn(|i| y[i]).into(), derivative, y[m + m * m].exp())
+}
+
+/// A system's Hamiltonian as a function.
+struct Known<'a, S>(&'a S);
+
+impl<const N: usize, S: System<N>> SmoothFunction<N> for Known<'_, S> {
+    fn value<T: Scalar>(&self, t: T, x: &Triple<N, T>) -> T {
+        self.0.hamiltonian(t, &(*x).into()).unwrap_or(T::from(f64::NAN))
+    }
+}
+
+/// The contact Hamiltonian equations of a known H.
+struct HamiltonianOde<'a, S, const N: usize>(&'a S);
+
+impl<const N: usize, S: System<N>> ODE<f64, Vec<f64>> for HamiltonianOde<'_, S, N> {
+    fn diff(&self, t: f64, y: &Vec<f64>, d: &mut Vec<f64>) {
+        let x = Triple::<N>::from_fn(|i| y[i]);
+        match (DarbouxField { hamiltonian: &Known(self.0), t }).at(&x) {
+            Ok(f) => (0..2 * N + 1).for_each(|i| d[i] = f.component(i)),
+            Err(_) => d.fill(f64::NAN),
+        }
+    }
+}
+
+/// The state of the contact Hamiltonian flow after a time; none where H is not known.
+pub fn hamiltonian_motion<const N: usize>(
+    system: &impl System<N>,
+    t0: f64,
+    start: &PhasePoint<N>,
+    duration: f64,
+) -> Option<PhasePoint<N>> {
+    system.hamiltonian(t0, start)?;
+    let y = Triple::from(*start).to_vector().as_slice().to_vec();
+    let ode = HamiltonianOde::<_, N>(system);
+    let method = ExplicitRungeKutta::dop853().rtol(3e-14).atol(1e-15).max_steps(1_000_000);
+    let solution = IVP::ode(&ode, t0, t0 + duration, y).method(method).solve();
+    let end = solution.ok().and_then(|s| s.y.last().cloned());
+    assert!(end.is_some(), "the oracle did not reach the end");
+    Some(Triple::from_fn(|i| end.as_ref().map_or(f64::NAN, |y| y[i])).into())
 }

@@ -7,11 +7,11 @@ macro_rules! scalar {
     ($($number:ty),*) => {$(
         impl Scalar for $number {
             fn re(self) -> f64 {
-                <Self as DualNum>::re(&self)
+                self.re
             }
             /// Of the value alone: num-dual has no common access to the differentials.
             fn extent(self) -> f64 {
-                Scalar::extent(<Self as DualNum>::re(&self))
+                Scalar::extent(self.re)
             }
             fn recip(self) -> Self {
                 <Self as DualNum>::recip(&self)

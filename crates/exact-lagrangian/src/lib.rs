@@ -16,6 +16,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod composition;
 mod conjugate;
 mod error;
 mod exact_lagrangian;
@@ -23,13 +24,23 @@ mod exponential;
 mod flow;
 mod gauss;
 mod linear_exact;
+mod nonholonomic;
 mod panel;
+mod principle;
 mod retraction;
+mod spline_curve;
+pub mod statements;
+mod variational_error;
 
+pub use composition::{Composition, compose, through};
 pub use conjugate::ConjugatePoint;
 pub use error::ExactError;
 pub use exact_lagrangian::ExactLagrangian;
 pub use exponential::{ContactExponential, ExponentialDifferential, HerglotzFlow};
 pub use flow::{Motion, PANELS, herglotz_flow};
 pub use linear_exact::LinearExact;
+pub use nonholonomic::{Chetaev, ExtendedMotion, ExtendedPoint, NonHolonomic};
+pub use principle::{Curve, CurveAction, MotionCurve, VariedCurve, action, action_derivative};
 pub use retraction::{Retraction, Route};
+pub use spline_curve::SplineCurve;
+pub use variational_error::{ErrorOrders, MeasuredOrder, error_orders};

@@ -1,0 +1,419 @@
+//! The paper's section 4 as residuals: each statement evaluated on a Lagrangian at a point of TQ x R for a time step, relative
+//! to its terms' size.
+//!
+//! The numbers are those of the project's list of statements (NOTATION.md has it). The derivatives of `L_h^e` that the theorems speak
+//! of are taken by dual numbers through flow and shooting, never by the formulas that the theorems give. All is on the branch of
+//! motions near the one from the given point, so that conjugate points before h do no harm.
+//!
+//! A residual of a true statement is round-off. It is given in units of the condition of the motion, the largest entry of
+//! `T phi_h` where that is above one (its square for second derivatives): by so much the motion itself magnifies the rounding of
+//! its start, as when it passes near a collision. Where a velocity is recovered from two rounded positions, the residual is given
+//! in units of what that loses; see [`condition`].
+
+use crate::exponential::HerglotzFlow;
+use crate::gauss::collocations;
+use crate::{
+    ContactExponential, ExactError, ExactLagrangian, MotionCurve, NonHolonomic, VariedCurve, action, action_derivative,
+    compose, herglotz_flow, through,
+};
+use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::systems::System;
+use contact_geom::{
+    DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Smooth, Triple,
+    VelocityPoint, herglotz_rates, legendre, seed,
+};
+use discrete_herglotz::{
+    DiscreteLagrangian, InputError, StepError, derived_jet, derived_second_jet, discrete_flow, legendre_minus_inverse,
+};
+
+/// The statements of section 4 that [`residual`] evaluates, and statement 10 of section 2.
+pub const STATEMENTS: [u32; 11] = [10, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36];
+
+/// The residual of a statement for a system at a time and a point of TQ x R, with a time step h; `None` where the number is not
+/// one of [`STATEMENTS`].
+///
+/// # Errors
+/// Those of the motion over h (over 2h for statement 36).
+pub fn residual<S: System<N>, const N: usize>(
+    statement: u32,
+    system: &S,
+    t: f64,
+    x: &VelocityPoint<N>,
+    h: f64,
+) -> Result<Option<f64>, ExactError<N>> {
+    let at = Place { system, t, x, h, exponential: ContactExponential::new(system, h)? };
+    Ok(Some(match statement {
+        10 => at.principle()?,
+        27 => at.multiplier()?,
+        28 => at.projected_flow()?,
+        29 => at.local_diffeomorphism()?,
+        30 => at.two_exponentials()?,
+        31 => at.projection()?,
+        32 => at.retraction()?,
+        33 => at.linear_equation()?,
+        34 => at.derivatives()?,
+        35 => at.legendre_transforms()?,
+        36 => at.regular_and_exact()?,
+        _ => return Ok(None),
+    }))
+}
+
+/// The relative error that the initial velocity must have when it is recovered from two rounded positions, in units of
+/// round-off: `|q| |(dq1/dv0)^-1| / |v|`, at least 1. It grows like `1/h` as h goes to 0.
+///
+/// # Errors
+/// Those of the motion over h.
+pub fn condition<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+    h: f64,
+) -> Result<f64, ExactError<N>> {
+    let differential = ContactExponential::new(lagrangian, h)?.differential(t, x)?;
+    let position = x.q.amax().max(differential.image.q1.amax());
+    Ok((position / (differential.regularity().smallest * x.v.amax())).max(1.0))
+}
+
+/// How far a motion of a discrete Lagrangian's own equations is from the exact one: the discrete Herglotz equations of
+/// `L_h^e` solved step by step from `(q(0), q(h), z(0))`, against the flow of `xi_L`; the largest difference of `q_k` and `z_k`
+/// over a number of steps, in units of `k^2` times the largest position and action: the two rounded positions of each step are
+/// a velocity's rounding, which both grows with the motion and is added to in each step. Statement 36, item 3.
+///
+/// # Errors
+/// Those of the motion and of the steps.
+pub fn follows_motion<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+    h: f64,
+    steps: usize,
+) -> Result<f64, ExactError<N>> {
+    let exact = ByEquations(ExactLagrangian::new(lagrangian, h)?);
+    let mut at = herglotz_flow(lagrangian, t, x, h)?.end;
+    let mut pair = DiscretePoint { q0: x.q, q1: at.q, z0: x.z };
+    let (mut worst, mut size): (f64, f64) = (0.0, x.q.amax().max(x.z.abs()));
+    for k in 1..=steps {
+        let time = t + k as f64 * h;
+        pair = discrete_flow(&exact, time - h, &pair).map_err(|e| ExactError::Input(InputError::FirstStep(e)))?;
+        let z = at.z;
+        at = herglotz_flow(lagrangian, time, &at, h)?.end;
+        size = size.max(at.q.amax()).max(at.z.abs());
+        let growth = ((k + 1) * (k + 1)) as f64;
+        worst = worst.max((pair.q1 - at.q).amax().max((pair.z0 - z).abs()) / (size * growth));
+    }
+    Ok(worst)
+}
+
+/// An exact discrete Lagrangian whose steps are solved from the discrete Herglotz equations, as those of any other; not by
+/// the motion.
+struct ByEquations<L, const N: usize>(ExactLagrangian<L, N>);
+
+impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ByEquations<L, N> {
+    fn step_size(&self) -> f64 {
+        self.0.step_size()
+    }
+    fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
+        self.0.value(t, x)
+    }
+    fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
+        self.0.jet(t, x)
+    }
+    fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
+        self.0.second_jet(t, x)
+    }
+}
+
+/// Where a statement is evaluated.
+struct Place<'a, S, const N: usize> {
+    system: &'a S,
+    t: f64,
+    x: &'a VelocityPoint<N>,
+    h: f64,
+    exponential: ContactExponential<&'a S>,
+}
+
+/// The difference of two elements relative to the larger of them.
+fn relative<const N: usize>(a: impl Into<Triple<N>>, b: impl Into<Triple<N>>) -> f64 {
+    let (a, b) = (a.into(), b.into());
+    a.minus(b).amax() / a.amax().max(b.amax())
+}
+
+/// The difference of two numbers relative to a size.
+fn apart(a: f64, b: f64, size: f64) -> f64 {
+    (a - b).abs() / size
+}
+
+impl<S: System<N>, const N: usize> Place<'_, S, N> {
+    /// The exact discrete Lagrangian on the branch of the motion from `x`, and its point of Q x Q x R.
+    fn exact(&self) -> Result<(ExactLagrangian<&S, N>, DiscretePoint<N>), ExactError<N>> {
+        let exact = ExactLagrangian::new(self.system, self.h)?.near(self.x.v);
+        Ok((exact, self.exponential.at(self.t, self.x)?))
+    }
+
+    /// The condition of the motion: the largest entry of `T phi_h`, at least 1.
+    fn growth(&self) -> Result<f64, ExactError<N>> {
+        let end = self.exponential.varied(self.t, self.x)?.end;
+        let of =
+            |c: &SVector<_, N>| c.iter().map(|e: &contact_geom::Dual<f64, Triple<N>>| e.d.amax()).fold(1.0, f64::max);
+        Ok(of(&end.q).max(of(&end.v)).max(end.z.d.amax()))
+    }
+
+    fn step_error(e: StepError) -> ExactError<N> {
+        ExactError::Input(InputError::FirstStep(e))
+    }
+
+    /// Statement 10: along the motion the action's derivative vanishes for variations that vanish at the ends; along another
+    /// curve with the same ends it does not; and `dZ/dz0 = e^(int L_z)`.
+    fn principle(&self) -> Result<f64, ExactError<N>> {
+        let Place { system, t, x, h, .. } = *self;
+        let curve = MotionCurve { lagrangian: system, t0: t, start: *x };
+        let wave = |i: usize, k: f64| {
+            move |s: f64| {
+                let (sin, cos) = (k * std::f64::consts::PI * s / h).sin_cos();
+                let mut unit = SVector::<f64, N>::zeros();
+                unit[i] = 1.0;
+                (unit * sin, unit * (cos * k * std::f64::consts::PI / h))
+            }
+        };
+        let span = (t, h);
+        let motion = herglotz_flow(system, t, x, h)?;
+        // The terms that cancel: L_v times the variation's velocity, over the time, grown by sigma.
+        let p = legendre(system, t, x).p.amax().max(legendre(system, t + h, &motion.end).p.amax());
+        let mut worst: f64 = 0.0;
+        for i in 0..N {
+            for k in [1.0, 2.0] {
+                let variation = wave(i, k);
+                let slope = action_derivative(system, &curve, &variation, span, (x.z, 0.0))?;
+                let size = (1.0 + p) * k * std::f64::consts::PI * motion.sigma().max(1.0);
+                worst = worst.max(slope.abs() / size);
+            }
+            let bent = VariedCurve { curve: &curve, variation: &wave(i, 1.0), by: 0.01 * h };
+            let slope = action_derivative(system, &bent, &wave(i, 1.0), span, (x.z, 0.0))?;
+            // The second variation is W pi^2/(2h) times the bend 0.01 h, less h/2 times the force's gradient.
+            if slope.abs() < 1e-4 {
+                return Ok(f64::INFINITY);
+            }
+        }
+        let still = |_: f64| (SVector::<f64, N>::zeros(), SVector::<f64, N>::zeros());
+        let growth = action_derivative(system, &curve, &still, span, (x.z, 1.0))?;
+        let along = action(system, &curve, span, x.z)?;
+        let end = apart(along.z, motion.end.z, 1.0 + motion.end.z.abs());
+        Ok(worst.max(end).max(apart(growth, along.b.exp(), growth)).max(apart(along.b, motion.b, 1.0 + motion.b.abs())))
+    }
+
+    /// Statement 27: Chetaev's multiplier is `-L_z`, and the accelerations are Herglotz'.
+    fn multiplier(&self) -> Result<f64, ExactError<N>> {
+        let Place { system, t, x, .. } = *self;
+        let chetaev = NonHolonomic::new(system);
+        let solved = chetaev.chetaev(t, &chetaev.lift(t, x))?;
+        let (field, rate) = herglotz_rates(system, t, x)?;
+        let size = 1.0 + field.y.amax().max(rate.abs());
+        Ok(((solved.a - field.y).amax() / size).max(apart(solved.multiplier, -rate, size)))
+    }
+
+    /// Statement 28: `T pi (Gamma) = xi_L o pi`, and the flows are pi-related; the constraint is kept.
+    fn projected_flow(&self) -> Result<f64, ExactError<N>> {
+        let Place { system, t, x, h, .. } = *self;
+        let chetaev = NonHolonomic::new(system);
+        let start = chetaev.lift(t, x);
+        let gamma = chetaev.chetaev(t, &start)?;
+        let projected = Triple { x: start.v, y: gamma.a, z: start.w };
+        let field = relative(projected, HerglotzField { lagrangian: system, t }.at(&(*x).into())?);
+        let along = chetaev.flow(t, &start, h)?;
+        let flow = relative(along.end.project(), herglotz_flow(system, t, x, h)?.end) / self.growth()?;
+        Ok(field.max(flow).max(along.defect))
+    }
+
+    /// Statement 29: `exp_h` is a local diffeomorphism: `T exp_h` and the derivative of the retraction, by duals through the
+    /// shooting, are inverse to each other.
+    fn local_diffeomorphism(&self) -> Result<f64, ExactError<N>> {
+        let forward = self.exponential.differential(self.t, self.x)?;
+        if forward.regularity().smallest == 0.0 {
+            return Ok(f64::INFINITY);
+        }
+        let image: Triple<N> = forward.image.into();
+        let (start, _) = self.exponential.lifted(self.t, &seed(&image).into(), Some(&self.x.v))?;
+        let back = DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| match i {
+            _ if i < N => start.q[i].d.component(j),
+            _ if i < 2 * N => start.v[i - N].d.component(j),
+            _ => start.z.d.component(j),
+        });
+        let jacobian = forward.jacobian();
+        let defect = (&back * &jacobian - DMatrix::identity(2 * N + 1, 2 * N + 1)).amax();
+        Ok(defect / (back.amax() * jacobian.amax()).max(self.growth()?))
+    }
+
+    /// Statement 30: `exp_h^xi = pr~_1 o exp_h^Gamma o (pi|M_L)^-1`.
+    fn two_exponentials(&self) -> Result<f64, ExactError<N>> {
+        let chetaev = NonHolonomic::new(self.system);
+        let end = chetaev.flow(self.t, &chetaev.lift(self.t, self.x), self.h)?.end;
+        let through = DiscretePoint { q0: self.x.q, q1: end.q, z0: self.x.z };
+        Ok(relative(through, self.exponential.at(self.t, self.x)?) / self.growth()?)
+    }
+
+    /// Statement 31: `pr~_1` restricted to `M_d` is a local diffeomorphism, where `exp_h` is: infinite unless its smallest singular
+    /// value is at least round-off; and `T exp_h^xi = T pr~_1 T exp_h^Gamma T(pi|M_L)^-1`.
+    fn projection(&self) -> Result<f64, ExactError<N>> {
+        let Place { system, t, x, h, .. } = *self;
+        let chetaev = NonHolonomic::new(system);
+        if chetaev.projection_regularity(t, x, h)?.smallest < 1e3 * f64::EPSILON {
+            return Ok(f64::INFINITY);
+        }
+        // Rows q0, z0, q1 of the differential, in the order q0, q1, z0.
+        let differential = chetaev.exponential_differential(t, x, h)?;
+        let row = |i: usize| match i {
+            _ if i < N => i,
+            _ if i < 2 * N => i + 1,
+            _ => N,
+        };
+        let projected = DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| differential[(row(i), j)]);
+        let jacobian = self.exponential.differential(t, x)?.jacobian();
+        Ok((&projected - &jacobian).amax() / (jacobian.amax() * self.growth()?))
+    }
+
+    /// Statement 32: `R_h^(e-) o exp_h = id`, `exp_h o R_h^(e-) = id`, `R_h^(e+) = phi_h o R_h^(e-)`; velocities in units of the
+    /// condition of the exponential map.
+    fn retraction(&self) -> Result<f64, ExactError<N>> {
+        let (exact, y) = self.exact()?;
+        let found = exact.retract(self.t, &y)?;
+        let condition = condition(self.system, self.t, self.x, self.h)?;
+        let back = (found.start.v - self.x.v).amax() / (self.x.v.amax() * condition);
+        let forth = relative(self.exponential.at(self.t, &found.start)?, y);
+        let moved = HerglotzFlow { lagrangian: self.system, t: self.t, duration: self.h };
+        let end = relative(moved.at(&found.start.into())?, found.end);
+        Ok(back.max(forth.max(end) / self.growth()?))
+    }
+
+    /// Statement 33: along the motion a variation of z obeys `y' = a + b' y`, and is
+    /// `e^b(t) (int a e^(-b) ds + y(0))`; `L_h^e = z(h) - z(0)`. The integrals by Gauss' formula with 24 nodes on quarter panels.
+    fn linear_equation(&self) -> Result<f64, ExactError<N>> {
+        let Place { system, t, x, h, .. } = *self;
+        let [.., g] = collocations();
+        let (mut varied, end) = (seed(&Triple::from(*x)).into(), self.exponential.varied(t, x)?);
+        let mut integrals = Triple::<N>::from_fn(|_| 0.0);
+        let (mut sizes, mut action, mut exponent) = (0.0, 0.0, 0.0);
+        let parts = 4 * end.panels;
+        let part = h / f64::from(parts);
+        for k in 0..parts {
+            let from = t + f64::from(k) * part;
+            for (c, weight) in g.c.iter().zip(&g.b) {
+                let at = herglotz_flow(system, from, &varied, c * part)?;
+                let point = VelocityPoint { q: at.end.q.map(|e| e.re), v: at.end.v.map(|e| e.re), z: at.end.z.re };
+                let d = system.gradient(from + c * part, &point);
+                let decay = (-exponent - at.b.re).exp() * weight * part;
+                for i in 0..N {
+                    let (by_q, by_v) = (at.end.q[i].d.scale(d.x[i] * decay), at.end.v[i].d.scale(d.y[i] * decay));
+                    integrals = integrals.plus(by_q).plus(by_v);
+                    sizes += by_q.amax() + by_v.amax();
+                }
+                action += system.value(from + c * part, &point.q, &point.v, point.z) * weight * part;
+            }
+            let next = herglotz_flow(system, from, &varied, part)?;
+            exponent += next.b.re;
+            varied = next.end;
+        }
+        let growth = end.b.re.exp();
+        let formula = Triple { z: integrals.z + 1.0, ..integrals }.scale(growth);
+        let size = formula.amax().max(end.end.z.d.amax()).max(sizes * growth);
+        let formula = formula.minus(end.end.z.d).amax() / size;
+        let (exact, y) = self.exact()?;
+        let value = exact.retract(t, &y)?.action;
+        // The two positions are rounded, and the action depends on them by the momenta.
+        let terms = action.abs().max(end.action.re.abs());
+        let rounded = terms.max(self.momenta()? * y.q0.amax().max(y.q1.amax()));
+        let along = apart(end.action.re, action, terms.max(self.momenta()? * h));
+        Ok(formula.max(along).max(apart(value, action, rounded)) / self.growth()?)
+    }
+
+    /// The size of the momenta at both ends of the motion.
+    fn momenta(&self) -> Result<f64, ExactError<N>> {
+        let end = herglotz_flow(self.system, self.t, self.x, self.h)?.end;
+        let p0 = legendre(self.system, self.t, self.x).p.amax();
+        Ok(p0.max(legendre(self.system, self.t + self.h, &end).p.amax()))
+    }
+
+    /// Statement 34: `D1 L_h^e = -p0 e^b`, `D2 L_h^e = p1`, `Dz L_h^e = e^b - 1`, against the derivatives by duals; the second
+    /// derivatives from the variational equation likewise.
+    fn derivatives(&self) -> Result<f64, ExactError<N>> {
+        let (exact, y) = self.exact()?;
+        let of = |jet: DiscreteJet<N>| Triple { x: jet.d1, y: jet.d2, z: jet.dz };
+        let formula = exact.jet(self.t, &y).map_err(Self::step_error)?;
+        let derived = derived_jet(&exact, self.t, &y).map_err(Self::step_error)?;
+        let first = relative(of(formula), of(derived)).max(apart(formula.dz, derived.dz, derived.dz.abs().max(self.h)));
+        let sigma =
+            apart(formula.sigma(), herglotz_flow(self.system, self.t, self.x, self.h)?.sigma(), formula.sigma());
+        let closed = exact.second_jet(self.t, &y).map_err(Self::step_error)?;
+        let duals = derived_second_jet(&exact, self.t, &y).map_err(Self::step_error)?;
+        let size = duals.d11.amax().max(duals.d12.amax()).max(duals.d22.amax()).max(duals.d1z.amax());
+        let blocks = (closed.d11 - duals.d11).amax().max((closed.d12 - duals.d12).amax());
+        let blocks = blocks.max((closed.d22 - duals.d22).amax()).max((closed.d1z - duals.d1z).amax());
+        let blocks = blocks.max((closed.d2z - duals.d2z).amax()).max((closed.dzz - duals.dzz).abs());
+        let growth = self.growth()?;
+        Ok(first.max(sigma).max(blocks / (size * growth)) / growth)
+    }
+
+    /// The transforms `F-L_h^e` and `F+L_h^e` by their definition, the derivatives by duals.
+    fn transforms(&self) -> Result<(PhasePoint<N>, PhasePoint<N>, DiscretePoint<N>), ExactError<N>> {
+        let (exact, y) = self.exact()?;
+        let jet = derived_jet(&exact, self.t, &y).map_err(Self::step_error)?;
+        let minus = PhasePoint { q: y.q0, p: -jet.d1 / (1.0 + jet.dz), z: y.z0 };
+        Ok((minus, PhasePoint { q: y.q1, p: jet.d2, z: y.z0 + jet.value }, y))
+    }
+
+    /// Statement 35: `F(+-)L_h^e = FL o R_h^(e+-)`.
+    fn legendre_transforms(&self) -> Result<f64, ExactError<N>> {
+        let (minus, plus, y) = self.transforms()?;
+        let found = self.exact()?.0.retract(self.t, &y)?;
+        let start = legendre(self.system, self.t, &found.start);
+        let end = legendre(self.system, self.t + self.h, &found.end);
+        Ok(relative(minus, start).max(relative(plus, end)) / self.growth()?)
+    }
+
+    /// Statement 36: `L_h^e` is regular, `F+L_h^e = phi_h^{X_H} o F-L_h^e`, and one step of the discrete flow by the discrete
+    /// Herglotz equations is the motion; [`follows_motion`] has the many steps of item 3.
+    fn regular_and_exact(&self) -> Result<f64, ExactError<N>> {
+        let Place { t, h, .. } = *self;
+        let (minus, plus, y) = self.transforms()?;
+        let (exact, _) = self.exact()?;
+        let second = derived_second_jet(&exact, t, &y).map_err(Self::step_error)?;
+        if second.regularity().smallest == 0.0 {
+            return Ok(f64::INFINITY);
+        }
+        let guess = (y.q1 - y.q0) / h;
+        let step = exact.forward(t, &minus, &guess, &mut Default::default()).map_err(Self::step_error)?;
+        let flow = relative(step.end, plus);
+        let solved = legendre_minus_inverse(&ByEquations(exact), t, &minus, &guess).map_err(Self::step_error)?;
+        Ok(flow.max(relative(solved, y)) / self.growth()?)
+    }
+}
+
+/// Composition: `L_{h1+h2}^e(q0, q2, z0) = L_{h1}^e(q0, q1, z0) + L_{h2}^e(q1, q2, z1)` at the critical `q1`, which is where the
+/// motion passes, and only there: the residual of the equality, of the point and of the slope, infinite if the sum through another
+/// point is as near to critical.
+///
+/// # Errors
+/// Those of the motion over `h1 + h2` and of the steps.
+pub fn composition<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+    (h1, h2): (f64, f64),
+) -> Result<f64, ExactError<N>> {
+    let failed = |e| ExactError::Input(InputError::FirstStep(e));
+    let middle = herglotz_flow(lagrangian, t, x, h1)?.end;
+    let whole = herglotz_flow(lagrangian, t, x, h1 + h2)?;
+    let first = ExactLagrangian::new(lagrangian, h1)?.near(x.v);
+    let second = ExactLagrangian::new(lagrangian, h2)?.near(middle.v);
+    let ends = [x.q, whole.end.q];
+    let aside = |by: f64| middle.q + SVector::from_element(by * (h1 + h2) * (1.0 + x.v.amax()));
+    let found = compose(&first, &second, t, (&ends, x.z), &aside(1e-3)).map_err(failed)?;
+    let beside = through(&first, &second, t, (&ends, x.z), &aside(1e-2)).map_err(failed)?;
+    let p = lagrangian.gradient(t, x).y.amax().max(lagrangian.gradient(t + h1, &middle).y.amax());
+    if beside.slope.amax() < 1e-4 * p || beside.value == found.value {
+        return Ok(f64::INFINITY);
+    }
+    let size = x.q.amax().max(whole.end.q.amax()).max(middle.q.amax());
+    // The rounding of the ends moves the value by p times it.
+    let value = apart(found.value, whole.action, whole.action.abs() + p * size);
+    Ok(value.max((found.q1 - middle.q).amax() / size))
+}

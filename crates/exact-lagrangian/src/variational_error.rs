@@ -1,0 +1,141 @@
+//! Variational error analysis: how well a discrete Lagrangian matches the exact one, and what order its flow has.
+
+use crate::{ExactError, herglotz_flow};
+use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Triple, VelocityPoint};
+use discrete_herglotz::{DiscreteLagrangian, InputError, Solver, legendre_minus, legendre_plus};
+
+/// An order measured as the slope of an error against the time step, both logarithmic.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredOrder {
+    /// The least-squares slope; infinite where the error is round-off at every step, NaN never: 0 where no slope can be fitted.
+    pub order: f64,
+    /// All time steps with their errors, from the largest.
+    pub errors: Vec<(f64, f64)>,
+    /// The steps that the slope was fitted over: the smallest that stay clear of the round-off plateau.
+    pub fitted: Vec<(f64, f64)>,
+}
+
+/// The orders of a discrete Lagrangian against the exact one at a point.
+///
+/// For a method whose flow has order r: `value` and `flow` are `r + 1`, `legendre_minus` and `legendre_plus` at least r. In the
+/// textbooks' theorem all of them are `r + 1` (Marsden and West, Acta Numerica 10 (2001), theorem 2.3.1); but
+/// `L_d - L_h^e = h^(r+1) C(q0, u, z0)` is smooth in the mean velocity `u = (q1 - q0)/h`, so that its derivatives in `q0` and `q1`
+/// have a factor `1/h`, and the momenta match to order r only. The flow gains it back: `F-` is inverted by a change of `q1` of h
+/// times that error, and in `F+ o (F-)^-1` the errors of the two momenta cancel to leading order. Patrick and Cuell, "Error
+/// analysis of variational integrators of unconstrained Lagrangian systems", Numer. Math. 113 (2009), prove it so.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ErrorOrders {
+    /// Of `|L_d - L_h^e|`.
+    pub value: MeasuredOrder,
+    /// Of `|F-L_d - F-L_h^e|`.
+    pub legendre_minus: MeasuredOrder,
+    /// Of `|F+L_d - F+L_h^e|`.
+    pub legendre_plus: MeasuredOrder,
+    /// Of one step of the flow on T\*Q x R from the same state.
+    pub flow: MeasuredOrder,
+}
+
+/// The time steps tried: from the largest by factors of the square root of two.
+const STEPS: usize = 44;
+
+/// The steps that a slope is fitted over, if so many are clear of the plateau.
+const FIT: usize = 8;
+
+/// How far an error must be above its round-off to count: the slope of a fit over a factor of ten in h then errs by less than
+/// 0.01.
+const CLEAR: f64 = 200.0;
+
+/// Measures the orders of a discrete Lagrangian, given as a function of the time step, along the motion from a start at time t.
+/// `largest` is the largest step tried; the others are smaller by factors of the square root of two. For an author of a
+/// method: the documented order plus one is what `value` and `flow` should show, on a problem nonlinear in q and z.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::QuadraticInZ};
+/// use discrete_herglotz::Midpoint;
+/// use exact_lagrangian::error_orders;
+///
+/// let system = QuadraticInZ { c: 1.0 };
+/// let x = VelocityPoint::new([0.8], [-0.6], 0.4);
+/// let orders = error_orders(&system, |h| Midpoint::new(&system, h), 0.0, &x, 0.5)?;
+/// assert!((orders.value.order - 3.0).abs() < 0.15 && (orders.flow.order - 3.0).abs() < 0.15);
+/// # Ok::<(), exact_lagrangian::ExactError<1>>(())
+/// ```
+///
+/// # Errors
+/// [`ExactError::Input`] for bad arguments or a method that refuses a step, and those of the motion; steps at which the method
+/// itself fails are left out.
+pub fn error_orders<D: DiscreteLagrangian<N>, const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    method: impl Fn(f64) -> Result<D, InputError>,
+    t: f64,
+    x: &VelocityPoint<N>,
+    largest: f64,
+) -> Result<ErrorOrders, ExactError<N>> {
+    let p0 = lagrangian.gradient(t, x).y;
+    let start = PhasePoint { q: x.q, p: p0, z: x.z };
+    let mut rows: [Vec<Row>; 4] = Default::default();
+    let mut solver = Solver::default();
+    for k in 0..STEPS {
+        let h = largest * 0.5f64.powf(0.5 * k as f64);
+        let ld = method(h)?;
+        let motion = match herglotz_flow(lagrangian, t, x, h) {
+            Ok(motion) => motion,
+            Err(error @ ExactError::Input(_)) => return Err(error),
+            // A step too large for the motion; smaller ones follow.
+            Err(_) => continue,
+        };
+        let end = PhasePoint { q: motion.end.q, p: lagrangian.gradient(t + h, &motion.end).y, z: motion.end.z };
+        let point = DiscretePoint { q0: x.q, q1: end.q, z0: x.z };
+        // Round-off: of the positions, which p feels through W/h, and of the terms of z.
+        let position = f64::EPSILON * x.q.amax().max(end.q.amax());
+        let momentum = f64::EPSILON * p0.amax().max(end.p.amax()) + position * slope(lagrangian, t, x) / h;
+        let action = p0.amax().max(end.p.amax()) * position + f64::EPSILON * motion.action.abs();
+        let state = position + f64::EPSILON * end.p.amax().max(end.z.abs()).max(x.z.abs());
+        let away = |found: PhasePoint<N>, truth: PhasePoint<N>| Triple::from(found).minus(truth.into()).amax();
+        let mut put = |i: usize, error: Option<f64>, floor: f64| {
+            if let Some(error) = error.filter(|e: &f64| e.is_finite()) {
+                rows[i].push(Row { h, error, floor });
+            }
+        };
+        put(0, ld.value(t, &point).ok().map(|l: f64| (l - motion.action).abs()), action);
+        put(1, legendre_minus(&ld, t, &point).ok().map(|found| away(found, start)), momentum);
+        put(2, legendre_plus(&ld, t, &point).ok().map(|found| away(found, end)), momentum);
+        let step = ld.forward(t, &start, &(motion.displacement / h), &mut solver);
+        put(3, step.ok().map(|step| away(step.end, end)), state);
+    }
+    let [value, legendre_minus, legendre_plus, flow] = rows.map(fit);
+    Ok(ErrorOrders { value, legendre_minus, legendre_plus, flow })
+}
+
+/// The size of W, by which a momentum depends on a velocity.
+fn slope<const N: usize>(lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>) -> f64 {
+    lagrangian.hessian(t, x).vv.amax()
+}
+
+/// An error at a time step, and the round-off that it would have at least.
+struct Row {
+    h: f64,
+    error: f64,
+    floor: f64,
+}
+
+fn fit(rows: Vec<Row>) -> MeasuredOrder {
+    let errors = rows.iter().map(|r| (r.h, r.error)).collect();
+    let clear: Vec<(f64, f64)> =
+        rows.iter().take_while(|r| r.error > CLEAR * r.floor).map(|r| (r.h, r.error)).collect();
+    let fitted = clear[clear.len().saturating_sub(FIT)..].to_vec();
+    let order = match fitted.len() {
+        0 => f64::INFINITY,
+        1 | 2 => 0.0,
+        _ => least_squares_slope(&fitted),
+    };
+    MeasuredOrder { order, errors, fitted }
+}
+
+/// The least-squares slope of the logarithm of the second entries against that of the first.
+fn least_squares_slope(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), (h, e)| (x + h.ln() / n, y + e.ln() / n));
+    let covariance: f64 = points.iter().map(|(h, e)| (h.ln() - x) * (e.ln() - y)).sum();
+    covariance / points.iter().map(|(h, _)| (h.ln() - x).powi(2)).sum::<f64>()
+}

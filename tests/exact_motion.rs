@@ -1,0 +1,151 @@
+//! The flow of the Herglotz vector field: against closed forms, against another library's integrator, and at the end of its
+//! domain.
+
+use crate::common::oracle::motion;
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::{
+    FreeParticle, HarmonicOscillator, LaneEmden, Pendulum, System, SystemVisitor, visit_catalogue,
+};
+use contact_geom::{GeometryError, Lagrangian, Scalar, Triple, VelocityPoint};
+use discrete_herglotz::InputError;
+use exact_lagrangian::{ExactError, herglotz_flow};
+
+/// The largest error of q and v relative to the amplitude, and of z relative to it and to the amplitude's square.
+fn error(found: &VelocityPoint<1>, truth: &VelocityPoint<1>) -> f64 {
+    let size = truth.q.amax().max(truth.v.amax());
+    let state = (found.q - truth.q).amax().max((found.v - truth.v).amax()) / size;
+    state.max((found.z - truth.z).abs() / truth.z.abs().max(size * size))
+}
+
+/// Free particle and oscillator for `gamma h` from -50 to 5, at no drag and as near to it as can be, near the critical drag; and in
+/// the free particle's decay each component relative to itself.
+#[test]
+fn linear_motions() {
+    let start = VelocityPoint::new([0.7], [1.3], 0.4);
+    for gamma in [-50.0, -5.0, -2.0 - 1e-12, -2.0, -2.0 + 1e-12, -0.1, -1e-9, 0.0, 1e-9, 0.5, 5.0] {
+        for t in [1e-8, 1e-3, 0.3, 1.0, 10.0, -0.5] {
+            let reach: f64 = gamma * t;
+            if !(-50.0..=5.0).contains(&reach) {
+                continue;
+            }
+            let (free, spring) = (FreeParticle { gamma }, HarmonicOscillator { gamma });
+            let (a, b) = (herglotz_flow(&free, 0.0, &start, t), herglotz_flow(&spring, 0.0, &start, t));
+            assert!(a.is_ok() && b.is_ok(), "gamma = {gamma}, t = {t}");
+            let (Ok(a), Ok(b)) = (a, b) else { return };
+            let truth = free.solution(t, &start);
+            let each = (a.end.v[0] - truth.v[0]).abs() / truth.v[0].abs();
+            for (what, e) in [
+                ("free", error(&a.end, &truth).max(each)),
+                ("spring", error(&b.end, &spring.solution(t, &start))),
+                ("b", (a.b - reach).abs().max((b.b - reach).abs()) / (1.0 + reach.abs())),
+            ] {
+                assert!(e <= 1e-13, "{what}, gamma = {gamma}, t = {t}: {e:e}");
+            }
+        }
+    }
+}
+
+/// The regular solutions of the Lane-Emden equation, a drag that is singular in time, up to t = 10.
+#[test]
+fn lane_emden() {
+    for n in [0, 1, 5] {
+        let system = LaneEmden { n };
+        for t in [0.2, 1.0, 5.0, 10.0] {
+            let (found, truth) = (herglotz_flow(&system, 0.1, &system.initial(), t - 0.1), system.solution(t));
+            let (Ok(found), Some(truth)) = (found, truth) else { unreachable!("known for n = {n}") };
+            let e = error(&found.end, &truth);
+            assert!(e <= 1e-13, "n = {n}, t = {t}: {e:e}");
+            // sigma = (t0/t)^2.
+            let sigma = (0.1 / t).powi(2);
+            assert!((found.sigma() - sigma).abs() <= 1e-13 * sigma);
+        }
+    }
+}
+
+/// Every system from its natural start over two units of time, against dop853 at its tightest. The error is taken relative to the
+/// state, both integrators being within that of the truth.
+#[test]
+fn against_dop853() {
+    struct Visitor;
+    impl SystemVisitor for Visitor {
+        fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+            let (t, x) = (system.initial_time(), system.initial());
+            let oracle = Triple::from(motion(system, t, &x, 2.0));
+            let found = herglotz_flow(system, t, &x, 2.0).map(|m| Triple::from(m.end));
+            let apart = found.map_or(f64::NAN, |f| f.minus(oracle).amax() / oracle.amax());
+            assert!(apart <= 2e-13, "{}: {apart:e}", system.name());
+        }
+    }
+    visit_catalogue(&mut Visitor);
+}
+
+/// There and back again.
+#[test]
+fn reversible() {
+    let (system, x) = (Pendulum::default(), VelocityPoint::new([1.0], [0.7], 0.1));
+    let back = herglotz_flow(&system, 0.5, &x, 3.0).and_then(|m| herglotz_flow(&system, 3.5, &m.end, -3.0));
+    let apart = back.map_or(f64::NAN, |b| Triple::from(b.end).minus(x.into()).amax());
+    assert!(apart < 1e-14, "{apart:e}");
+}
+
+/// `q'' = q^2` blows up, `L = ln q` ends at `q = 0`: the time is found, and the state before it is kept.
+#[test]
+fn outside_the_domain() {
+    struct BlowUp;
+    impl Lagrangian<1> for BlowUp {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+            v[0] * v[0] * 0.5 + q[0] * q[0] * q[0] * 2.0
+        }
+    }
+    // q = 1/(1 - t)^2 solves q'' = 6 q^2.
+    let blown = herglotz_flow(&BlowUp, 0.0, &VelocityPoint::new([1.0], [2.0], 0.0), 3.0);
+    match blown {
+        Err(ExactError::OutsideDomain { t, reached, .. }) => {
+            assert!((t - 1.0).abs() < 1e-6 && t <= 1.0, "{t}");
+            assert!(reached.check().is_ok() && reached.q[0] > 1e6);
+        }
+        other => unreachable!("{other:?}"),
+    }
+    struct Wall;
+    impl Lagrangian<1> for Wall {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+            v[0] * v[0] * 0.5 + q[0].ln() * 1e-3 - z * 0.1
+        }
+    }
+    let walled = herglotz_flow(&Wall, 0.0, &VelocityPoint::new([1.0], [-1.0], 0.0), 3.0);
+    let ok = matches!(walled, Err(ExactError::OutsideDomain { t, reached, .. }) if t > 0.5 && t < 3.0 && reached.q[0] >= 0.0);
+    assert!(ok, "{walled:?}");
+}
+
+/// `W = 1 - v` vanishes on the way.
+#[test]
+fn a_singular_mass() {
+    struct Fading;
+    impl Lagrangian<1> for Fading {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+            v[0] * v[0] * 0.5 - v[0] * v[0] * v[0] / 6.0 + q[0]
+        }
+    }
+    // (1 - v) v' = 1: v = 1 - sqrt(1 - 2t).
+    let ended = herglotz_flow(&Fading, 0.0, &VelocityPoint::new([0.0], [0.0], 0.0), 2.0);
+    let ok = matches!(ended, Err(ExactError::OutsideDomain { t, .. }) if (t - 0.5).abs() < 1e-6);
+    assert!(ok, "{ended:?}");
+    let at_once = herglotz_flow(&Fading, 0.0, &VelocityPoint::new([0.0], [1.0], 0.0), 2.0);
+    let ok = matches!(at_once, Err(ExactError::Input(InputError::Geometry(GeometryError::Singular { .. }))));
+    assert!(ok, "{at_once:?}");
+}
+
+/// Numbers that are not finite are refused by name.
+#[test]
+fn not_finite() {
+    let (system, x) = (Pendulum::default(), VelocityPoint::new([1.0], [0.7], 0.1));
+    let of = |x: VelocityPoint<1>, t0: f64, d: f64| match herglotz_flow(&system, t0, &x, d) {
+        Err(ExactError::Input(InputError::Geometry(GeometryError::NonFinite { what, .. }))) => what,
+        _ => "accepted",
+    };
+    assert_eq!(of(x, f64::NAN, 1.0), "t0");
+    assert_eq!(of(x, 0.0, f64::INFINITY), "the duration");
+    assert_eq!(of(VelocityPoint { v: [f64::NAN].into(), ..x }, 0.0, 1.0), "v");
+    assert_eq!(of(VelocityPoint { z: f64::INFINITY, ..x }, 0.0, 1.0), "z");
+    assert!(herglotz_flow(&system, 0.0, &x, 0.0).is_ok_and(|m| m.end == x && m.b == 0.0));
+}

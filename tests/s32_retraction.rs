@@ -1,0 +1,74 @@
+//! Statement 32 (section 4.1): `R_h^(e-)` inverts `exp_h`, and `R_h^(e+) = phi_h o R_h^(e-)`.
+
+use crate::common::{AlongMotion, OverMotions, over_motions};
+use contact_geom::VelocityPoint;
+use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, System, visit_catalogue};
+use exact_lagrangian::{ContactExponential, ExactError, Route, statements};
+
+/// Along random motions of every system, from a guess on their branch.
+#[test]
+fn on_every_system() {
+    over_motions(32);
+}
+
+/// Without a guess the motion that is found joins the points, whether or not it is the one that they were made from.
+#[test]
+fn without_a_guess() {
+    struct Unguided;
+    impl AlongMotion for Unguided {
+        fn residual<const N: usize, S: System<N>>(
+            &mut self,
+            system: &S,
+            t: f64,
+            x: &VelocityPoint<N>,
+            h: f64,
+        ) -> Result<f64, ExactError<N>> {
+            let h = 0.3 * h;
+            let exp = ContactExponential::new(system, h)?;
+            let y = exp.at(t, x)?;
+            let found = match exp.retract(t, &y) {
+                // Two far points need not be joined by a motion near the straight line.
+                Err(ExactError::NotConverged { .. } | ExactError::ConjugatePoint { .. }) if h > 0.1 => return Ok(0.0),
+                found => found?,
+            };
+            let reached = exp.at(t, &found.start)?.q1;
+            let condition = statements::condition(system, t, &found.start, h)?.min(1e3);
+            Ok((reached - y.q1).amax() / (condition * (1.0 + y.q1.amax())))
+        }
+    }
+    visit_catalogue(&mut OverMotions(Unguided));
+}
+
+/// Down to h = 1e-8 the velocity is lost by what the condition of the exponential map says, and no more: the residual in its
+/// units stays round-off while the condition grows like 1/h.
+#[test]
+fn the_loss_at_small_steps_is_the_condition() {
+    let (system, x) = (Pendulum::default(), VelocityPoint::new([1.0], [0.7], 0.1));
+    for k in 0..=8 {
+        let h = 10f64.powi(-k);
+        let condition = statements::condition(&system, 0.0, &x, h).unwrap_or(f64::NAN);
+        let residual = statements::residual(32, &system, 0.0, &x, h).ok().flatten().unwrap_or(f64::NAN);
+        assert!(residual < 4.0 * f64::EPSILON, "h = {h}: {residual:e}");
+        assert!((0.2..5.0).contains(&(condition * h)), "h = {h}: condition {condition:e}");
+    }
+}
+
+/// Each route is taken where the one before fails, and says so.
+#[test]
+fn routes() {
+    let route = |h: f64, x: &VelocityPoint<2>| {
+        let exp = ContactExponential::new(Kepler::<2>::default(), h).map_err(ExactError::from)?;
+        Ok::<_, ExactError<2>>(exp.retract(0.0, &exp.at(0.0, x)?)?.route)
+    };
+    let pericentre = Kepler::<2>::default().initial();
+    assert_eq!(route(0.1, &pericentre), Ok(Route::Collocation));
+    assert_eq!(route(1.0, &pericentre), Ok(Route::Newton));
+    // Strong damping: the iteration with both ends given does not contract, Newton's method does.
+    for gamma in [-50.0, -20.0, 5.0] {
+        let Ok(exp) = ContactExponential::new(HarmonicOscillator { gamma }, 1.0) else { return };
+        let x = VelocityPoint::new([0.4], [1.2], 0.3);
+        let found = exp.at(0.0, &x).and_then(|y| exp.retract(0.0, &y)).map_or(f64::NAN, |r| r.start.v[0]);
+        // dq1/dv0 is 1/50: 50 roundings of q.
+        assert!((found - 1.2).abs() < 64.0 * 4.0 * f64::EPSILON, "gamma = {gamma}: {found}");
+    }
+}

@@ -1,0 +1,91 @@
+//! Statement 36 (section 4.2, theorem): `L_h^e` is regular, `F+L_h^e = phi_h^{X_H} o F-L_h^e`, and its discrete flow is the motion
+//! sampled.
+
+use crate::common::oracle::hamiltonian_motion;
+use crate::common::{AlongMotion, OverMotions, over_motions};
+use contact_geom::systems::{System, visit_catalogue};
+use contact_geom::{Triple, VelocityPoint};
+use discrete_herglotz::{FinalOnly, Flow, Status, legendre_minus, legendre_plus};
+use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow, statements};
+
+/// Along random motions of every system.
+#[test]
+fn on_every_system() {
+    over_motions(36);
+}
+
+/// `phi_h^{X_H}` by another library's integrator on the contact Hamiltonian equations, where H is known in closed form.
+#[test]
+fn against_the_contact_hamiltonian_flow() {
+    struct ByOracle;
+    impl AlongMotion for ByOracle {
+        fn residual<const N: usize, S: System<N>>(
+            &mut self,
+            system: &S,
+            t: f64,
+            x: &VelocityPoint<N>,
+            h: f64,
+        ) -> Result<f64, ExactError<N>> {
+            let h = 0.3 * h;
+            let exact = ExactLagrangian::new(system, h)?.near(x.v);
+            let y = ContactExponential::new(system, h)?.at(t, x)?;
+            let transforms = legendre_minus(&exact, t, &y).and_then(|m| Ok((m, legendre_plus(&exact, t, &y)?)));
+            let Ok((minus, plus)) = transforms else { return Ok(f64::INFINITY) };
+            let Some(end) = hamiltonian_motion(system, t, &minus, h) else { return Ok(0.0) };
+            let apart = Triple::from(end).minus(plus.into()).amax();
+            Ok(apart / Triple::from(plus).amax())
+        }
+    }
+    visit_catalogue(&mut OverMotions(ByOracle));
+}
+
+/// Fifty steps of the discrete Herglotz equations from `(q(0), q(h), z(0))` stay on the motion: `q_k = q(kh)`, `z_k = z(kh)`.
+#[test]
+fn fifty_steps() {
+    struct Steps;
+    impl AlongMotion for Steps {
+        fn residual<const N: usize, S: System<N>>(
+            &mut self,
+            system: &S,
+            _t: f64,
+            _x: &VelocityPoint<N>,
+            _h: f64,
+        ) -> Result<f64, ExactError<N>> {
+            statements::follows_motion(system, system.initial_time(), &system.initial(), 0.05, 50)
+        }
+    }
+    struct Once(OverMotions<Steps>);
+    impl contact_geom::systems::SystemVisitor for Once {
+        fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+            let (t, x) = (system.initial_time(), system.initial());
+            let residual = self.0.0.residual(system, t, &x, 0.05);
+            assert!(matches!(residual, Ok(r) if r < 1e-14), "{}: {residual:?}", system.name());
+        }
+    }
+    visit_catalogue(&mut Once(OverMotions(Steps)));
+}
+
+/// A run of `Flow`, as a user makes it, ends where the motion does, and sigma is `e^b` along it.
+#[test]
+fn a_run() {
+    struct Run;
+    impl contact_geom::systems::SystemVisitor for Run {
+        fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+            let (t, x, h) = (system.initial_time(), system.initial(), 0.1);
+            let Ok(ld) = ExactLagrangian::<_, N>::new(system, h) else { return };
+            let start = contact_geom::legendre(system, t, &x);
+            let end = Flow::new(&ld, t, start).and_then(|mut flow| {
+                assert_eq!(flow.run(20, &mut FinalOnly)?, Status::Completed);
+                Ok(*flow.state())
+            });
+            let truth = herglotz_flow(system, t, &x, 2.0).map(|m| contact_geom::legendre(system, t + 2.0, &m.end));
+            let apart = match (end, truth) {
+                (Ok(a), Ok(b)) => Triple::from(a).minus(b.into()).amax() / Triple::from(b).amax(),
+                _ => f64::NAN,
+            };
+            // Twenty roundings of the state, grown by the motion (a few tens for the double pendulum and Kepler).
+            assert!(apart < 1e-13, "{}: {apart:e}", system.name());
+        }
+    }
+    visit_catalogue(&mut Run);
+}
