@@ -2,6 +2,7 @@
 
 use contact_geom::GeometryError;
 use discrete_herglotz::{InputError, Status, StepError};
+use exact_lagrangian::ExactError;
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -41,6 +42,10 @@ pub enum Failure {
     /// A single step could not be taken: exit code 1.
     #[error("no step: {0}")]
     Step(#[from] StepError),
+    /// An exact motion, or the motion between two points, was not found; the text is that of the error, whose type depends on
+    /// the dimension. Exit code 1.
+    #[error("no exact motion: {0}")]
+    Exact(String),
     /// Statements that are theorems were found violated: exit code 1.
     #[error("{count} of {total} checks of the paper's statements fail:\n{list}")]
     Statements {
@@ -53,12 +58,21 @@ pub enum Failure {
     },
 }
 
+impl<const N: usize> From<ExactError<N>> for Failure {
+    fn from(error: ExactError<N>) -> Self {
+        match error {
+            ExactError::Input(cause) => Failure::Input(cause),
+            other => Failure::Exact(other.to_string()),
+        }
+    }
+}
+
 impl Failure {
     /// 2 for bad input, 1 for a run or a check that went wrong.
     fn code(&self) -> u8 {
         match self {
             Failure::Output { .. } | Failure::Terminal(_) | Failure::Input(_) | Failure::Geometry(_) => 2,
-            Failure::Run { .. } | Failure::Step(_) | Failure::Statements { .. } => 1,
+            Failure::Run { .. } | Failure::Step(_) | Failure::Exact(_) | Failure::Statements { .. } => 1,
         }
     }
 }

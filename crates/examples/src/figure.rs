@@ -2,13 +2,13 @@
 
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::legend::LegendPosition;
-use kuva::plot::{LinePlot, LineStyle, ScatterPlot};
+use kuva::plot::{LinePlot, LineStyle, MarkerShape, ScatterPlot};
 use kuva::render::figure::Figure;
 use kuva::render::layout::{Layout, TickAlign, TickFormat, TickPos};
 use kuva::render::plots::Plot;
 use std::sync::Arc;
 
-/// How a curve is drawn. The four patterns can be told apart in black and white.
+/// How a curve is drawn. The four patterns can be told apart in black and white, and so can the three markers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {
     /// Solid, blue: what a discrete Lagrangian gives.
@@ -19,17 +19,43 @@ pub enum Line {
     Dotted,
     /// Dash-dot, green: a second method.
     DashDot,
+    /// Blue discs without a line: single points on a curve.
+    Discs,
+    /// Grey diagonal crosses without a line.
+    Crosses,
+    /// Green upright crosses without a line.
+    Pluses,
 }
 
 impl Line {
-    fn plot(self, points: Vec<(f64, f64)>) -> LinePlot {
-        let (colour, width, pattern) = match self {
-            Line::Solid => (SOLID, 2.0, LineStyle::Solid),
-            Line::Dashed => ("#c1272d", 2.2, LineStyle::Custom("8 5".into())),
-            Line::Dotted => ("#555555", 2.2, LineStyle::Custom("2 3".into())),
-            Line::DashDot => ("#2a7f4f", 2.2, LineStyle::Custom("9 3 2 3".into())),
-        };
-        LinePlot::new().with_data(points).with_color(colour).with_stroke_width(width).with_line_style(pattern)
+    fn plot(self, points: Vec<(f64, f64)>, name: Option<&str>) -> Plot {
+        match self {
+            Line::Solid => drawn(points, SOLID, 2.0, LineStyle::Solid, name),
+            Line::Dashed => drawn(points, "#c1272d", 2.2, LineStyle::Custom("8 5".into()), name),
+            Line::Dotted => drawn(points, GREY, 2.2, LineStyle::Custom("2 3".into()), name),
+            Line::DashDot => drawn(points, GREEN, 2.2, LineStyle::Custom("9 3 2 3".into()), name),
+            Line::Discs => marked(points, SOLID, MarkerShape::Circle, name),
+            Line::Crosses => marked(points, GREY, MarkerShape::Cross, name),
+            Line::Pluses => marked(points, GREEN, MarkerShape::Plus, name),
+        }
+    }
+}
+
+/// Points joined by a line.
+fn drawn(points: Vec<(f64, f64)>, colour: &str, width: f64, pattern: LineStyle, name: Option<&str>) -> Plot {
+    let plot = LinePlot::new().with_data(points).with_color(colour).with_stroke_width(width).with_line_style(pattern);
+    match name {
+        Some(name) => plot.with_legend(name).into(),
+        None => plot.into(),
+    }
+}
+
+/// Points on their own.
+fn marked(points: Vec<(f64, f64)>, colour: &str, shape: MarkerShape, name: Option<&str>) -> Plot {
+    let plot = ScatterPlot::new().with_data(points).with_color(colour).with_size(MARKER).with_marker(shape);
+    match name {
+        Some(name) => plot.with_legend(name).into(),
+        None => plot.into(),
     }
 }
 
@@ -114,6 +140,15 @@ pub struct Panel {
 /// The colour of solid curves and of their points.
 const SOLID: &str = "#1f5fa8";
 
+/// The colour of dotted curves and of diagonal crosses.
+const GREY: &str = "#555555";
+
+/// The colour of dash-dot curves and of upright crosses.
+const GREEN: &str = "#2a7f4f";
+
+/// The size of markers without a line, in pixels.
+const MARKER: f64 = 3.6;
+
 /// The width and the height of a panel, in pixels.
 const SIZE: (f64, f64) = (560.0, 400.0);
 
@@ -128,11 +163,7 @@ impl Panel {
         };
         let mut plots: Vec<Plot> = Vec::new();
         for curve in &self.curves {
-            let plot = curve.line.plot(place(&curve.points));
-            plots.push(match &curve.name {
-                Some(name) => plot.with_legend(name).into(),
-                None => plot.into(),
-            });
+            plots.push(curve.line.plot(place(&curve.points), curve.name.as_deref()));
         }
         if !self.marks.is_empty() {
             plots.push(ScatterPlot::new().with_data(place(&self.marks)).with_color(SOLID).with_size(2.6).into());
