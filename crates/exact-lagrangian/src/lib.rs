@@ -24,6 +24,7 @@ mod flow;
 mod gauss;
 mod linear_exact;
 mod panel;
+mod quadratic_exact;
 mod retraction;
 
 pub use conjugate::ConjugatePoint;
@@ -32,4 +33,5 @@ pub use exact_lagrangian::ExactLagrangian;
 pub use exponential::{ContactExponential, ExponentialDifferential, HerglotzFlow};
 pub use flow::{Motion, PANELS, herglotz_flow};
 pub use linear_exact::LinearExact;
+pub use quadratic_exact::QuadraticExact;
 pub use retraction::{Retraction, Route};
