@@ -42,6 +42,22 @@ pub enum InputError {
         "q0 = q1 at the start, and the discrete Lagrangian is not regular on the diagonal; pass two different points"
     )]
     EqualPoints,
+    /// A method is only for Lagrangians of a form that this one does not claim to have.
+    #[error("the Lagrangian does not claim to be {claim}; claim it in `structure` if it is, or take another method")]
+    Unclaimed {
+        /// The name of the claim, a field of [`Structure`](contact_geom::Structure).
+        claim: &'static str,
+    },
+    /// A claim on the Lagrangian's form does not hold.
+    #[error(
+        "the Lagrangian claims to be {claim}, and is not: a derivative that should vanish has the relative size {size:e}"
+    )]
+    FalseClaim {
+        /// The name of the claim, a field of [`Structure`](contact_geom::Structure).
+        claim: &'static str,
+        /// The size of what the claim says is zero; see [`Defect`](contact_geom::Defect).
+        size: f64,
+    },
     /// The first step cannot be solved.
     #[error("no first step from this start: {0}")]
     FirstStep(StepError),

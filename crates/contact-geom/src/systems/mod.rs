@@ -19,6 +19,7 @@ mod perturbed_kepler;
 mod quadratic_in_z;
 mod relativistic;
 mod spherical_pendulum;
+mod uniform_field;
 mod van_der_pol;
 
 pub use chain::{Chain, Ends};
@@ -37,6 +38,7 @@ pub use perturbed_kepler::PerturbedKepler;
 pub use quadratic_in_z::QuadraticInZ;
 pub use relativistic::Relativistic;
 pub use spherical_pendulum::SphericalPendulum;
+pub use uniform_field::UniformField;
 pub use van_der_pol::VanDerPol;
 
 use crate::{Lagrangian, PhasePoint, Scalar, Symmetry, VelocityPoint};

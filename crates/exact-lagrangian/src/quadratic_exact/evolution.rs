@@ -1,0 +1,72 @@
+//! The matrix exponential with the quadratic form that grows along it.
+
+use contact_geom::nalgebra::{DMatrix, DVector};
+use discrete_herglotz::{InputError, StepError};
+
+/// The terms of the series, whose k-th is below `1/k!`: the last is far below the rounding of the first.
+const TERMS: i32 = 24;
+
+/// The matrix `E = e^A`, its diagonal less one, and the form `G = int_0^1 e^(r (1 - s)) e^(A s)^T S e^(A s) ds`.
+pub(super) struct Evolution {
+    pub e: DMatrix<f64>,
+    /// The diagonal of `E - 1`, apart because E loses its digits where they are small.
+    pub d: DVector<f64>,
+    pub g: DMatrix<f64>,
+}
+
+impl Evolution {
+    /// From A, S and r; `size` is a norm of A but for its last column, which is only a source.
+    ///
+    /// # Errors
+    /// [`InputError::FirstStep`] where they overflow.
+    pub fn over(a: &DMatrix<f64>, s: &DMatrix<f64>, r: f64, size: f64) -> Result<Self, InputError> {
+        let non_finite = InputError::FirstStep(StepError::NonFinite);
+        let finite = |m: &DMatrix<f64>| m.iter().all(|e| e.is_finite());
+        // A form is moved by two factors of E, so its series converges like that of 2 |A| + |r|.
+        let doublings = (2.0 * size + r.abs()).log2().ceil().max(0.0);
+        if !(doublings.is_finite() && finite(a) && finite(s)) {
+            return Err(non_finite);
+        }
+        let short = (-doublings).exp2();
+        let mut evolution = Self::series(&(a * short), &(s * short), r * short);
+        let mut r = r * short;
+        for _ in 0..doublings as u32 {
+            evolution.double(r);
+            r *= 2.0;
+        }
+        if finite(&evolution.e) && finite(&evolution.g) { Ok(evolution) } else { Err(non_finite) }
+    }
+
+    /// By the series in the time, for rates that are at most one.
+    fn series(a: &DMatrix<f64>, s: &DMatrix<f64>, r: f64) -> Self {
+        let identity = DMatrix::identity(a.nrows(), a.nrows());
+        let minus_one = a * (2..=TERMS).rev().fold(identity.clone(), |sum, k| &identity + a * sum / f64::from(k));
+        // G' = r G + R with R = E^T S E, so that R' = A^T R + R A.
+        let (mut moved, mut terms) = (s.clone(), vec![s.clone()]);
+        for (i, k) in (2..=TERMS).enumerate() {
+            moved = (a.tr_mul(&moved) + &moved * a) / f64::from(k - 1);
+            terms.push((&terms[i] * r + &moved) / f64::from(k));
+        }
+        // From the smallest.
+        let g = terms.iter().rev().fold(s * 0.0, |sum, term| sum + term);
+        Evolution { d: minus_one.diagonal(), e: minus_one + identity, g }
+    }
+
+    /// Doubles the time, over which `e^r` is the growth of the action.
+    fn double(&mut self, r: f64) {
+        let n = self.d.len();
+        self.g = &self.g * r.exp() + self.e.tr_mul(&(&self.g * &self.e));
+        let mut square = &self.e * &self.e;
+        for i in 0..n {
+            let cross: f64 = (0..n).filter(|k| *k != i).map(|k| self.e[(i, k)] * self.e[(k, i)]).sum();
+            let d = self.d[i] * (2.0 + self.d[i]) + cross;
+            // Near one E has its digits from E - 1; far from it, where it may decay to nothing, from itself.
+            if d.abs() < 0.5 {
+                (self.d[i], square[(i, i)]) = (d, 1.0 + d);
+            } else {
+                self.d[i] = square[(i, i)] - 1.0;
+            }
+        }
+        self.e = square;
+    }
+}
