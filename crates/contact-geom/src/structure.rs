@@ -52,7 +52,9 @@ impl Structure {
         let still = VelocityPoint { q: x.q.map(Dual::constant), v: x.v.map(Dual::constant), z: Dual::constant(x.z) };
         let clock = Dual { re: t, d: Line::new(1.0) };
 
-        let largest = |entries: &mut dyn Iterator<Item = f64>| entries.fold(0.0, |m: f64, e| m.max(e.abs()));
+        // `f64::max` would hide a NaN.
+        let worse = |m: f64, e: f64| if e.is_nan() { f64::INFINITY } else { m.max(e.abs()) };
+        let largest = |entries: &mut dyn Iterator<Item = f64>| entries.fold(0.0, worse);
         let h = lagrangian.hessian(Dual::constant(t), &moving);
         let mixed_z = largest(&mut h.qz.iter().chain(&h.vz).map(|e| e.re));
         let scale = 1.0 + mixed_z.max(largest(&mut h.qq.iter().chain(&h.qv).chain(&h.vv).map(|e| e.re)));
@@ -63,7 +65,8 @@ impl Structure {
         let mut defects = Vec::new();
         let mut claim = |made: bool, claim: &'static str, size: &dyn Fn() -> f64| {
             if made {
-                defects.push(Defect { claim, size: size() / scale });
+                let size = if scale.is_finite() { size() / scale } else { f64::INFINITY };
+                defects.push(Defect { claim, size });
             }
         };
         claim(self.autonomous, "autonomous", &|| {

@@ -73,20 +73,27 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
 
     /// The velocity at which `L_v` is a given momentum: Newton's method, its slope W.
     fn velocity(&self, t: f64, x: &PhasePoint<N>, guess: &SVector<f64, N>) -> Result<SVector<f64, N>, StepError> {
-        let mut v = *guess;
+        let (mut v, mut change) = (*guess, SVector::<f64, N>::zeros());
         let (mut before, mut residual) = (f64::INFINITY, f64::INFINITY);
         for _ in 0..ITERATION_LIMIT {
             let point = seeded(&VelocityPoint { q: x.q, v, z: x.z });
             let p = self.exponential.lagrangian.gradient(Dual::from(t), &point).y;
-            let mut change = SVector::<f64, N>::from_fn(|i, _| x.p[i] - p[i].re);
+            let missed = SVector::<f64, N>::from_fn(|i, _| x.p[i] - p[i].re);
+            if !missed.sum().is_finite() {
+                // Outside the domain, as beyond the velocity of light: back half-way.
+                if before == f64::INFINITY {
+                    return Err(StepError::NonFinite);
+                }
+                change *= 0.5;
+                v -= change;
+                continue;
+            }
+            residual = missed.amax();
+            change = missed;
             let mut w = SMatrix::<f64, N, N>::from_fn(|i, j| p[i].d[j]);
-            residual = change.amax();
             solve(&mut w, &mut change).map_err(|e| StepError::Singular { pivot: e.pivot })?;
             v += change;
             let now = change.amax();
-            if !now.is_finite() {
-                return Err(StepError::NonFinite);
-            }
             let predicted = before.is_finite() && now * (now / before) * (now / before) <= f64::EPSILON * v.amax();
             if now == 0.0 || predicted || (now >= 0.5 * before && now <= 64.0 * f64::EPSILON * v.amax()) {
                 return Ok(v);

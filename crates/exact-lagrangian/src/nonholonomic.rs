@@ -172,8 +172,11 @@ impl<L> NonHolonomic<L> {
     }
 
     /// How regular `pr~_1 : (q0, z0, q1, z1) -> (q0, q1, z0)` restricted to `M_d` is: the singular values of its restriction to the
-    /// tangent space of `M_d`, in an orthonormal basis of that. It is a local diffeomorphism where the smallest does not vanish;
-    /// paper, section 4.1, lemma.
+    /// tangent space of `M_d`, in an orthonormal basis of that; paper, section 4.1, lemma.
+    ///
+    /// `M_d` is a graph over Q x Q x R, of `z1 = z0 + L_h^e`. So the smallest is
+    /// `(1 + |D1 L_h^e|^2 + |D2 L_h^e|^2 + sigma_d^2)^(-1/2)` wherever the exponential map is an embedding, and never vanishes
+    /// there: a conjugate point is where that map itself folds, and `M_d` has no tangent space.
     ///
     /// # Errors
     /// Those of [`flow`](Self::flow).

@@ -61,6 +61,8 @@ pub(crate) struct Panel<const N: usize, T> {
     pub last: Rate<N, T>,
     /// The estimated relative error of the end values.
     pub error: f64,
+    /// The largest factor by which a sweep after the second reduced the changes.
+    pub contraction: f64,
     /// The number of nodes.
     pub nodes: usize,
     /// The sweeps that were made with the last number of nodes.
@@ -166,13 +168,14 @@ pub(crate) fn collocate<const N: usize, T: Scalar>(
     guess: Rate<N, T>,
 ) -> Result<Panel<N, T>, Refused> {
     let mut nodes = [guess; MOST];
-    let (mut v0, mut evaluations) = (problem.from.v, 0);
+    let (mut v0, mut evaluations, mut contraction) = (problem.from.v, 0, 0.0);
     for g in collocations() {
         let largest = g.s == MOST;
         let panel = sweeps(rates, problem, g, &mut nodes[..g.s], &mut v0, largest)?;
         evaluations += panel.evaluations;
+        contraction = panel.contraction.max(contraction);
         if panel.error <= problem.accuracy || largest {
-            return Ok(Panel { evaluations, ..panel });
+            return Ok(Panel { evaluations, contraction, ..panel });
         }
         let coarse = nodes;
         for (node, row) in nodes.iter_mut().zip(&g.refine) {
@@ -198,7 +201,7 @@ fn sweeps<const N: usize, T: Scalar>(
 ) -> Result<Panel<N, T>, Refused> {
     let Problem { t, h, from, end, accuracy } = problem;
     let (t, h) = (*t, *h);
-    let mut before = f64::INFINITY;
+    let (mut before, mut contraction) = (f64::INFINITY, 0.0f64);
     for sweep in 1..=SWEEPS {
         if let Some(End { displacement, inverse }) = end {
             let twice = Rate::sum(nodes, &g.end).a;
@@ -230,6 +233,9 @@ fn sweeps<const N: usize, T: Scalar>(
         }
         let error = estimate(nodes, &seen, h, g);
         let ratio = if before.is_finite() { change / before } else { 1.0 };
+        if sweep > 2 && change > 1e3 * f64::EPSILON {
+            contraction = contraction.max(ratio);
+        }
         let predicted = change * ratio <= 0.5 * accuracy;
         let stagnant = before.is_finite() && ratio >= 0.8 && change <= 4096.0 * f64::EPSILON;
         let unresolved = !last && error > *accuracy && change <= 0.1 * error.sqrt();
@@ -245,6 +251,7 @@ fn sweeps<const N: usize, T: Scalar>(
                 change: Rate { a: mean.a.map(|a| a * h), z: mean.z * h, b: mean.b * h },
                 last: nodes[g.s - 1],
                 error,
+                contraction,
                 nodes: g.s,
                 sweeps: sweep,
                 evaluations: sweep * g.s as u32,

@@ -19,6 +19,13 @@ const ROUGH: f64 = 1e-6;
 /// The smallest singular value of `dq1/dv0`, in units of h, below which the end points count as conjugate.
 const CONJUGATE: f64 = 64.0 * f64::EPSILON;
 
+/// The same where the slope is known to [`ROUGH`] accuracy only.
+const NEARLY: f64 = 1e-4;
+
+/// The contraction below which a conjugate point is far: the slowest mode of the iteration with both ends given contracts by 1 at
+/// a conjugate point, the next by 1/4 there.
+const SAFE: f64 = 0.05;
+
 /// How the motion between two points was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Route {
@@ -83,8 +90,11 @@ impl<L> ContactExponential<L> {
         x.check()?;
         let guess = (x.q1 - x.q0) / self.h;
         let free = SMatrix::from_diagonal_element(1.0 / self.h);
-        if let Some(found) = self.by_collocation(t, x, &guess, &free)? {
-            return Ok(found);
+        if let Some((found, contraction)) = self.by_collocation(t, x, &guess, &free)? {
+            // Near a conjugate point all but one mode contract, and that one may be absent: see whether the slope vanishes.
+            if contraction < SAFE || self.is_regular(t, &found.start)? {
+                return Ok(found);
+            }
         }
         let failed = match self.by_newton(t, x, &guess) {
             Ok(found) => return Ok(found),
@@ -185,14 +195,14 @@ impl<L> ContactExponential<L> {
     }
 
     /// The motion by collocation on one panel with both positions given, from a guess of the initial velocity and of the
-    /// inverse of `dq1/dv0`; if the iteration contracts and the error is below round-off.
+    /// inverse of `dq1/dv0`; if the iteration contracts and the error is below round-off. With it the factor of contraction.
     fn by_collocation<const N: usize>(
         &self,
         t: f64,
         x: &DiscretePoint<N>,
         guess: &SVector<f64, N>,
         inverse: &SMatrix<f64, N, N>,
-    ) -> Result<Option<Retraction<N>>, ExactError<N>>
+    ) -> Result<Option<(Retraction<N>, f64)>, ExactError<N>>
     where
         L: Lagrangian<N>,
     {
@@ -202,16 +212,31 @@ impl<L> ContactExponential<L> {
         let end = End { displacement: &(x.q1 - x.q0), inverse };
         let problem = Problem { t, h: self.h, from: &from, end: Some(end), accuracy: ACCURACY };
         Ok(match collocate(&rates, &problem, start) {
-            Ok(panel) if panel.error <= ACCURACY => Some(Retraction {
-                start: VelocityPoint { q: x.q0, v: panel.v0, z: x.z0 },
-                end: VelocityPoint { q: x.q1, v: panel.v0 + panel.change.a, z: x.z0 + panel.change.z },
-                action: panel.change.z,
-                b: panel.change.b,
-                route: Route::Collocation,
-                evaluations: panel.evaluations,
-            }),
+            Ok(panel) if panel.error <= ACCURACY => Some((
+                Retraction {
+                    start: VelocityPoint { q: x.q0, v: panel.v0, z: x.z0 },
+                    end: VelocityPoint { q: x.q1, v: panel.v0 + panel.change.a, z: x.z0 + panel.change.z },
+                    action: panel.change.z,
+                    b: panel.change.b,
+                    route: Route::Collocation,
+                    evaluations: panel.evaluations,
+                },
+                panel.contraction,
+            )),
             _ => None,
         })
+    }
+
+    /// Whether `dq1/dv0` is far from singular along the motion from a start, to the accuracy of a guess.
+    fn is_regular<const N: usize>(&self, t: f64, start: &VelocityPoint<N>) -> Result<bool, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let moving = seeded(start);
+        let from = State { q: moving.q, v: moving.v, z: moving.z, b: Dual::constant(0.0) };
+        let shot = integrate(&Herglotz(&self.lagrangian), t, &from, self.h, ROUGH)?;
+        let slope = SMatrix::<f64, N, N>::from_fn(|i, j| shot.displacement[i].d[j]);
+        Ok(slope.try_inverse().is_some_and(|inverse| smallest(&inverse) > NEARLY * self.h))
     }
 
     /// Newton's method on `exp_h`: to some digits first; the rest by collocation with the slope found, or else to the end.
@@ -226,7 +251,8 @@ impl<L> ContactExponential<L> {
     {
         let rough = self.shoot(t, x, guess, self.h, ROUGH)?;
         let near = rough.retraction.start.v;
-        if let Some(found) = self.by_collocation(t, x, &near, &rough.inverse)? {
+        let regular = smallest(&rough.inverse) > NEARLY * self.h;
+        if regular && let Some((found, _)) = self.by_collocation(t, x, &near, &rough.inverse)? {
             // Still the motion that Newton's method has found, not another one.
             if (found.start.v - near).amax() <= ROUGH.sqrt() * near.amax() {
                 return Ok(Retraction { route: Route::Newton, ..found });

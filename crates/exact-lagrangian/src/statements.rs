@@ -251,14 +251,20 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         Ok(relative(through, self.exponential.at(self.t, self.x)?) / self.growth()?)
     }
 
-    /// Statement 31: `pr~_1` restricted to `M_d` is a local diffeomorphism, where `exp_h` is: infinite unless its smallest singular
-    /// value is at least round-off; and `T exp_h^xi = T pr~_1 T exp_h^Gamma T(pi|M_L)^-1`.
+    /// Statement 31: `pr~_1` restricted to `M_d` is a local diffeomorphism, and the graph of `z1 = z0 + L_h^e` its inverse: the smallest
+    /// singular value is `(1 + |D1|^2 + |D2|^2 + sigma_d^2)^(-1/2)`, with the derivatives by duals; and
+    /// `T exp_h^xi = T pr~_1 T exp_h^Gamma T(pi|M_L)^-1`.
     fn projection(&self) -> Result<f64, ExactError<N>> {
         let Place { system, t, x, h, .. } = *self;
         let chetaev = NonHolonomic::new(system);
-        if chetaev.projection_regularity(t, x, h)?.smallest < 1e3 * f64::EPSILON {
-            return Ok(f64::INFINITY);
-        }
+        let (exact, y) = self.exact()?;
+        let jet = derived_jet(&exact, t, &y).map_err(Self::step_error)?;
+        let slope = 1.0 + jet.d1.norm_squared() + jet.d2.norm_squared() + jet.sigma().powi(2);
+        let smallest = chetaev.projection_regularity(t, x, h)?.smallest;
+        let graph = apart(smallest, slope.sqrt().recip(), smallest);
+        // The basis is known to round-off times the condition of the differential that it spans.
+        let condition = self.exponential.differential(t, x)?.jacobian().singular_values();
+        let graph = graph / (condition.max() / condition.min());
         // Rows q0, z0, q1 of the differential, in the order q0, q1, z0.
         let differential = chetaev.exponential_differential(t, x, h)?;
         let row = |i: usize| match i {
@@ -268,7 +274,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         };
         let projected = DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| differential[(row(i), j)]);
         let jacobian = self.exponential.differential(t, x)?.jacobian();
-        Ok((&projected - &jacobian).amax() / (jacobian.amax() * self.growth()?))
+        Ok(graph.max((&projected - &jacobian).amax() / jacobian.amax()) / self.growth()?)
     }
 
     /// Statement 32: `R_h^(e-) o exp_h = id`, `exp_h o R_h^(e-) = id`, `R_h^(e+) = phi_h o R_h^(e-)`; velocities in units of the

@@ -1,11 +1,13 @@
-//! What the binaries share: where results go, how figures look, how a failure ends a program.
+//! What the binaries share: where results go, how figures look, which checks of statements passed, how a failure ends a program.
 //!
 //! No mechanics is computed here; that is what the library crates are for.
 
+mod checks;
 mod failure;
 mod figure;
 mod output;
 
+pub use checks::{Checks, Subject, TOLERANCE, fractions, title};
 pub use failure::{Failure, finish};
 pub use figure::{Axis, Curve, Line, Panel, draw, draw_row};
 pub use output::{Directory, number, print};

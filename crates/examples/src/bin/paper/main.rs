@@ -9,7 +9,6 @@
 //! `statements.csv`. Ends with 1 if a statement fails its check, with 2 if the output cannot be written.
 
 mod any_rule;
-mod checks;
 mod closed_exact;
 mod decay;
 mod explicit;

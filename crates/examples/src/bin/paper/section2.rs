@@ -1,6 +1,6 @@
 //! Section 2: the statements about flows, and about Hamiltonians that no regular Lagrangian has.
 
-use crate::checks::{Checks, Subject, fractions};
+use contact_examples::{Checks, Subject, fractions};
 use contact_geom::statements::{ActionSquared, ClosedFlow, conformal_flow};
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, Lienard, VanDerPol};
 use contact_geom::{

@@ -1,8 +1,8 @@
 //! Section 3: every statement for every system and every discretisation.
 
 use crate::any_rule::AnyRule;
-use crate::checks::{Checks, Subject, fractions};
 use crate::statements::STEPS;
+use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::System;
 use contact_geom::{DiscretePoint, GeometryError, Symmetry, VelocityPoint};

@@ -1,11 +1,11 @@
 //! Section 5: the examples' equations as the paper writes them, against the library's.
 
-use crate::checks::{Checks, Subject, fractions};
 use crate::closed_exact::ClosedExact;
 use crate::explicit::Explicit;
 use crate::section3::straight_step;
 use crate::series::{Example, GAMMA, STEP};
 use crate::statements::STEPS;
+use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Duffing, FreeParticle, HarmonicOscillator, Kepler, Pendulum, System};
 use contact_geom::{DiscretePoint, GeometryError, PhasePoint, VelocityPoint, legendre};
@@ -176,7 +176,7 @@ fn midpoint<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::checks::TOLERANCE;
+    use contact_examples::TOLERANCE;
 
     #[test]
     fn the_misprint_is_seen() {

@@ -1,48 +1,12 @@
 //! The paper's statements by their numbers in the project's list, and the walk over the catalogue that checks them.
 
-use crate::checks::{Checks, Subject, fractions};
 use crate::{section2, section3, section5};
+use contact_examples::{Checks, Subject, fractions};
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// The time steps at which discretisations are checked.
 pub const STEPS: [f64; 2] = [0.1, 0.01];
-
-/// A few words for a statement, for tables; NOTATION.md has the statements.
-pub fn title(statement: u32) -> &'static str {
-    match statement {
-        1 => "contact condition",
-        2 => "Reeb field, flat and sharp",
-        3 => "contact Hamiltonian vector field",
-        4 => "L_X eta = -R(f) eta",
-        5 => "conformal factor of a flow",
-        6 => "X_H(H) = -R(H) H",
-        7 => "L regular iff eta_L contact",
-        8 => "Herglotz field is of second order",
-        9 => "FL is a contactomorphism",
-        11 => "dissipated quantities",
-        12 => "Noether's theorem",
-        13 => "differential of the discrete action",
-        14 => "the same for two steps",
-        15 => "discrete Herglotz principle",
-        16 => "condition on Q x Q x R^2",
-        17 => "F+ and F- regular together",
-        18 => "momentum matching",
-        19 => "existence of the discrete flow",
-        20 => "three expressions of the flow",
-        21 => "eta+ and eta- are contact forms",
-        22 => "eta+ = sigma_d eta-, pullback to eta+",
-        23 => "conformal factors of Phi_d",
-        24 => "conformal factor of the flow on T*Q x R",
-        25 => "invariance of L_d",
-        26 => "discrete Noether theorem",
-        37 => "free particle, explicit",
-        38 => "oscillator, explicit",
-        39 => "midpoint rule for any V",
-        41 => "rules on Q x Q x R^2",
-        _ => "not in this program",
-    }
-}
 
 /// Checks every statement on everything that it applies to.
 pub fn check_all() -> Checks {

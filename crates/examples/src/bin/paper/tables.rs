@@ -1,9 +1,8 @@
 //! The tables that the program prints.
 
-use crate::checks::Checks;
 use crate::published::{Fixture, PublishedRow, solved_recurrence};
 use crate::series::{Row, distance};
-use crate::statements::title;
+use contact_examples::{Checks, title};
 
 /// The theorems of section 3.
 const THEOREMS: std::ops::RangeInclusive<u32> = 13..=26;

@@ -1,0 +1,149 @@
+//! Variational error analysis of every method on every system, and its figure.
+
+use contact_examples::{Axis, Checks, Curve, Directory, Failure, Line, Panel, Subject, draw_row, fractions};
+use contact_geom::VelocityPoint;
+use contact_geom::systems::{CoupledInZ, System, SystemVisitor, visit_catalogue};
+use discrete_herglotz::rules::{Discretisation, DiscretisationVisitor, visit_discretisations};
+use exact_lagrangian::{ErrorOrders, ExactError, MeasuredOrder, error_orders};
+
+/// The band around the documented order.
+const BAND: f64 = 0.15;
+
+/// The largest step tried.
+const LARGEST: f64 = 0.25;
+
+/// One measured order.
+struct Row {
+    system: &'static str,
+    method: &'static str,
+    quantity: &'static str,
+    documented: u32,
+    measured: MeasuredOrder,
+}
+
+/// The four quantities with the order that a method of order r has in each.
+fn quantities(orders: ErrorOrders, r: u32) -> [(&'static str, u32, MeasuredOrder); 4] {
+    [
+        ("value", r + 1, orders.value),
+        ("legendre_minus", r, orders.legendre_minus),
+        ("legendre_plus", r, orders.legendre_plus),
+        ("flow", r + 1, orders.flow),
+    ]
+}
+
+struct Walk<'a> {
+    checks: &'a mut Checks,
+    rows: Vec<Row>,
+}
+
+impl SystemVisitor for Walk<'_> {
+    fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+        struct Methods<'a, 'b, S, const N: usize>(&'a S, &'a mut Walk<'b>);
+        impl<S: System<N>, const N: usize> DiscretisationVisitor for Methods<'_, '_, S, N> {
+            fn visit(&mut self, method: &impl Discretisation) {
+                let (system, walk) = (self.0, &mut *self.1);
+                // A generic point: no symmetry makes a leading error vanish there.
+                let (t, x) = system.sample(&fractions(3, 2 * N + 2));
+                let subject = Subject::discrete(40, system.name(), method.name(), 0.0);
+                match error_orders(system, |h| method.discretise(system, h), t, &x, LARGEST) {
+                    Err(error) => walk.checks.record_within(BAND, &subject, Err::<Option<f64>, _>(error)),
+                    Ok(orders) => {
+                        for (quantity, documented, measured) in quantities(orders, method.order()) {
+                            let off = (measured.order - f64::from(documented)).abs();
+                            walk.checks.record_within(BAND, &subject, Ok::<_, ExactError<N>>(Some(off)));
+                            let (system, method) = (system.name(), method.name());
+                            walk.rows.push(Row { system, method, quantity, documented, measured });
+                        }
+                    }
+                }
+            }
+        }
+        visit_discretisations(&mut Methods(system, self));
+    }
+}
+
+/// Measures all orders into the checks, writes table and figure; what they show, in words.
+pub fn write(out: &Directory, checks: &mut Checks) -> Result<String, Failure> {
+    let mut walk = Walk { checks, rows: Vec::new() };
+    visit_catalogue(&mut walk);
+    let rows = walk.rows;
+    let columns = ["system", "method", "quantity", "documented", "measured", "smallest_h", "steps_fitted"];
+    out.table(
+        "orders.csv",
+        &columns,
+        rows.iter().map(|row| {
+            let smallest = row.measured.fitted.last().map_or(f64::NAN, |(h, _)| *h);
+            let (measured, count) = (format!("{:.3}", row.measured.order), row.measured.fitted.len());
+            let names = [row.system, row.method, row.quantity].map(String::from);
+            let numbers = [row.documented.to_string(), measured, format!("{smallest:.3e}"), count.to_string()];
+            names.into_iter().chain(numbers)
+        }),
+    )?;
+    figure(out)?;
+
+    let mut text = format!(
+        "\nOrders against the exact discrete Lagrangian: lowest and highest slope over the catalogue\n\n  {:<16}{:>16}{:>16}{:>16}{:>16}\n",
+        "method", "|L_d - L_h^e|", "F-", "F+", "flow, one step"
+    );
+    let mut methods: Vec<&str> = rows.iter().map(|r| r.method).collect();
+    methods.dedup();
+    methods.sort_unstable();
+    methods.dedup();
+    for method in methods {
+        text += &format!("  {method:<16}");
+        for quantity in ["value", "legendre_minus", "legendre_plus", "flow"] {
+            let of = || rows.iter().filter(|r| r.method == method && r.quantity == quantity).map(|r| r.measured.order);
+            let (low, high) = (of().fold(f64::INFINITY, f64::min), of().fold(0.0, f64::max));
+            text += &format!("{:>16}", format!("{low:.2} .. {high:.2}"));
+        }
+        text += "\n";
+    }
+    text += "\n  For a method of order r the value and the flow show r + 1, as the theory has it, the Legendre transforms only r:\n  \
+             they are derivatives of L_d - L_h^e = h^(r+1) C(q0, u, z0) in q0 and q1, and u = (q1 - q0)/h brings a factor 1/h. The\n  \
+             flow gains it back: in F+ o (F-)^-1 the two errors cancel to leading order (Patrick and Cuell, 2009).\n";
+    Ok(text)
+}
+
+/// The errors over the step, for a system nonlinear in z.
+fn figure(out: &Directory) -> Result<(), Failure> {
+    struct Curves(Vec<(Line, &'static str, ErrorOrders)>, Option<ExactError<1>>);
+    let system = CoupledInZ { gamma: -1.0, ..CoupledInZ::default() };
+    struct Methods<'a>(&'a CoupledInZ, &'a mut Curves);
+    impl DiscretisationVisitor for Methods<'_> {
+        fn visit(&mut self, method: &impl Discretisation) {
+            let x = VelocityPoint::new([0.8], [-0.6], 0.4);
+            let line = [Line::Dotted, Line::Dashed, Line::Solid, Line::DashDot][self.1.0.len() % 4];
+            match error_orders(self.0, |h| method.discretise(self.0, h), 0.0, &x, LARGEST) {
+                Ok(orders) => self.1.0.push((line, method.name(), orders)),
+                Err(error) => self.1.1 = Some(error),
+            }
+        }
+    }
+    let mut curves = Curves(Vec::new(), None);
+    visit_discretisations(&mut Methods(&system, &mut curves));
+    let Curves(curves, failed) = curves;
+    if let Some(error) = failed {
+        return Err(error.into());
+    }
+    let panel = |y_label: &str, of: fn(&ErrorOrders) -> &MeasuredOrder, named: bool| Panel {
+        x_label: "time step h (dimensionless)".into(),
+        y_label: y_label.into(),
+        x: Axis::Logarithmic(-6, 0, 1),
+        y: Axis::Logarithmic(-20, 0, 4),
+        legend: (0.03, 0.98),
+        curves: curves
+            .iter()
+            .map(|(line, name, orders)| {
+                let points = of(orders).errors.iter().copied().filter(|(_, e)| *e > 0.0);
+                if named { Curve::new(name, *line, points) } else { Curve::unnamed(*line, points) }
+            })
+            .collect(),
+        marks: Vec::new(),
+    };
+    let panels = [
+        panel("|L_d - L_h^e| (dimensionless)", |o| &o.value, true),
+        panel("error of F-L_d (dimensionless)", |o| &o.legendre_minus, false),
+        panel("error of one step (dimensionless)", |o| &o.flow, false),
+    ];
+    out.text("orders.svg", &draw_row(&panels))
+}

@@ -1,0 +1,134 @@
+//! The statements of section 4 on every system, over six decades of the time step.
+
+use contact_examples::{Checks, Directory, Failure, Subject, fractions, number, title};
+use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use exact_lagrangian::{ContactExponential, ExactError, statements};
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// The time steps.
+const STEPS: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0];
+
+/// The largest residual, in units of the condition of the motion: round-off is 1e-15, a wrong formula is off by h at least.
+const TOLERANCE: f64 = 1e-12;
+
+/// What a velocity loses that is recovered from two positions, at one step.
+pub struct Loss {
+    system: &'static str,
+    pub h: f64,
+    /// The relative error of the velocity, `R_h^(e-) o exp_h` against the identity.
+    pub found: f64,
+    /// The error that the condition of the exponential map predicts.
+    pub predicted: f64,
+}
+
+/// Checks all statements; the residuals, and the losses at steps down to 1e-8.
+pub fn check() -> (Checks, Vec<Loss>) {
+    struct Counter(u64);
+    impl SystemVisitor for Counter {
+        fn visit<const N: usize, S: System<N>>(&mut self, _system: &S) {
+            self.0 += 1;
+        }
+    }
+    let mut counter = Counter(0);
+    visit_catalogue(&mut counter);
+    let style = ProgressStyle::with_template("checking statements {bar:30} {pos}/{len}  {msg}");
+    let bar = ProgressBar::new(counter.0).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let mut walk = Walk { checks: Checks::default(), losses: Vec::new(), bar: &bar };
+    visit_catalogue(&mut walk);
+    bar.finish_and_clear();
+    (walk.checks, walk.losses)
+}
+
+struct Walk<'a> {
+    checks: Checks,
+    losses: Vec<Loss>,
+    bar: &'a ProgressBar,
+}
+
+impl SystemVisitor for Walk<'_> {
+    fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+        self.bar.set_message(system.name());
+        // The second duals of many coordinates are long.
+        let samples = if N > 2 { 2 } else { 4 };
+        for (h, statement) in STEPS.into_iter().flat_map(|h| statements::STATEMENTS.map(|s| (h, s))) {
+            let subject = Subject::discrete(statement, system.name(), "exact", h);
+            for i in 0..samples {
+                let (t, x) = system.sample(&fractions(i, 2 * N + 2));
+                match statements::residual(statement, system, t, &x, h) {
+                    // Outside U_h the statements say nothing.
+                    Err(ExactError::OutsideDomain { .. }) => {}
+                    residual => self.checks.record_within(TOLERANCE, &subject, residual),
+                }
+            }
+        }
+        for k in 0..=8 {
+            let h = 10f64.powi(-k);
+            let loss = |i: usize| -> Result<(f64, f64), ExactError<N>> {
+                let (t, x) = system.sample(&fractions(i, 2 * N + 2));
+                let exponential = ContactExponential::new(system, h)?;
+                let found = exponential.retract_near(t, &exponential.at(t, &x)?, &x.v)?.start;
+                let predicted = f64::EPSILON * statements::condition(system, t, &x, h)?;
+                Ok(((found.v - x.v).amax() / x.v.amax(), predicted))
+            };
+            let all: Vec<_> = (0..samples).filter_map(|i| loss(i).ok()).collect();
+            let worst = |of: fn(&(f64, f64)) -> f64| all.iter().map(of).fold(0.0, f64::max);
+            let (found, predicted) = (worst(|l| l.0), worst(|l| l.1));
+            self.losses.push(Loss { system: system.name(), h, found, predicted });
+        }
+        self.bar.inc(1);
+    }
+}
+
+/// Writes the losses as a table.
+pub fn write_losses(out: &Directory, losses: &[Loss]) -> Result<(), Failure> {
+    let rows = losses.iter().map(|l| vec![l.system.into(), l.h.to_string(), number(l.found), number(l.predicted)]);
+    out.table("velocity_loss.csv", &["system", "h", "relative_error", "predicted_by_condition"], rows)
+}
+
+/// The worst residual of each statement at each step, and for each system at each step.
+pub fn tables(checks: &Checks) -> String {
+    let header = |first: &str| {
+        let steps: String = STEPS.iter().map(|h| format!("{h:>9e}")).collect();
+        format!("  {first:<40}{steps}\n")
+    };
+    let row = |name: &str, of: &dyn Fn(&Subject) -> bool| {
+        let worst = |h: f64| {
+            let at = checks.iter().filter(|(subject, _)| subject.time_step() == h && of(subject));
+            at.map(|(_, residual)| residual).reduce(f64::max)
+        };
+        let entries: String =
+            STEPS.iter().map(|h| worst(*h).map_or(format!("{:>9}", "-"), |r| format!("{r:>9.0e}"))).collect();
+        format!("  {name:<40}{entries}\n")
+    };
+    let mut text = String::from(
+        "The statements of section 4: worst residual over the catalogue, in units of the condition of the motion, by h\n\n",
+    );
+    text += &header("statement");
+    for statement in statements::STATEMENTS {
+        text += &row(&format!("{statement:>2}  {}", title(statement)), &|s| s.statement == statement);
+    }
+    text += "\nThe same for each system: worst over the statements\n\n";
+    text += &header("system");
+    let mut systems: Vec<&str> = checks.iter().map(|(subject, _)| subject.system).collect();
+    systems.sort_unstable();
+    systems.dedup();
+    for system in systems {
+        text += &row(system, &|s| s.system == system);
+    }
+    text
+}
+
+/// How the velocity's loss compares with its prediction, worst over the catalogue.
+pub fn loss(losses: &[Loss]) -> String {
+    let mut text = String::from(
+        "\nA velocity from two rounded positions, R_h^(e-) o exp_h: relative error, and what the condition of exp_h predicts\n\n",
+    );
+    let steps: Vec<f64> = (0..=8).rev().map(|k| 10f64.powi(-k)).collect();
+    let row = |name: &str, of: &dyn Fn(&Loss) -> f64| {
+        let worst = |h: f64| losses.iter().filter(|l| l.h == h).map(of).fold(0.0, f64::max);
+        let entries: String = steps.iter().map(|h| format!("{:>9.0e}", worst(*h))).collect();
+        format!("  {name:<12}{entries}\n")
+    };
+    text += &format!("  {:<12}{}\n", "h", steps.iter().map(|h| format!("{h:>9e}")).collect::<String>());
+    text + &row("found", &|l| l.found) + &row("predicted", &|l| l.predicted)
+}
