@@ -7,6 +7,7 @@ use discrete_herglotz::{
     DiscreteLagrangian, DiscretePath, Every, FinalOnly, Flow, InputError, LeftMidpoint, Midpoint, Record, Rectangle,
     Status, StepError,
 };
+use exact_lagrangian::{ContactExponential, Curve, ExactError, ExactLagrangian, SplineCurve, compose, error_orders};
 
 /// A step that is not a positive finite number.
 #[test]
@@ -127,4 +128,94 @@ fn blow_up() {
 fn good_slices() {
     let x = VelocityPoint::<2>::from_slices(&[1.0, 2.0], &[3.0, 4.0], 5.0);
     assert_eq!(x, Ok(VelocityPoint::new([1.0, 2.0], [3.0, 4.0], 5.0)));
+}
+
+/// The exact side: steps, points, a singular W, equal points where no motion joins them.
+#[test]
+fn exact_input() {
+    for h in [0.0, -0.5, f64::INFINITY] {
+        assert_eq!(ExactLagrangian::<_, 1>::new(Pendulum::default(), h).err(), Some(InputError::Step { h }));
+        assert_eq!(ContactExponential::new(Pendulum::default(), h).err(), Some(InputError::Step { h }));
+        let orders = error_orders(
+            &Pendulum::default(),
+            |h| Midpoint::new(Pendulum::default(), h),
+            0.0,
+            &VelocityPoint::new([1.0], [0.5], 0.0),
+            h,
+        );
+        assert_eq!(orders.err(), Some(ExactError::Input(InputError::Step { h })));
+    }
+    let Ok(exp) = ContactExponential::new(Pendulum::default(), 0.5) else { return };
+    let bad = exp.retract(0.0, &DiscretePoint::new([0.1], [f64::NAN], 0.0));
+    assert!(matches!(bad, Err(ExactError::Input(InputError::Geometry(GeometryError::NonFinite { what: "q1", .. })))));
+    struct Massless;
+    impl Lagrangian<1> for Massless {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+            v[0] * q[0] + z
+        }
+    }
+    let Ok(exp) = ContactExponential::new(Massless, 0.5) else { return };
+    let singular = exp.retract(0.0, &DiscretePoint::new([0.1], [0.2], 0.0));
+    let ok = matches!(singular, Err(ExactError::Input(InputError::Geometry(GeometryError::Singular { .. }))));
+    assert!(ok, "{singular:?}");
+    // Equal points as such are no bad input: the pendulum at rest joins them.
+    let Ok(exp) = ContactExponential::new(Pendulum::default(), 0.5) else { return };
+    assert!(exp.retract(0.0, &DiscretePoint::new([0.0], [0.0], 0.0)).is_ok_and(|r| r.start.v[0] == 0.0));
+}
+
+/// No motion joins the points: the last one tried is handed on, with its miss and a singular value, and it is finite.
+#[test]
+fn no_motion_between_points() {
+    // Bratu's problem q'' = -6 e^q: beyond h^2 = 3.5/6 no motion joins points near 0.
+    struct Bratu;
+    impl Lagrangian<1> for Bratu {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+            v[0] * v[0] * 0.5 - q[0].exp() * 6.0 - z * 0.01
+        }
+    }
+    let Ok(exp) = ContactExponential::new(Bratu, 4.0) else { return };
+    let x = DiscretePoint::new([0.0], [0.1], 0.0);
+    match exp.retract(0.0, &x) {
+        Err(
+            ExactError::NotConverged { last, residual, smallest }
+            | ExactError::ConjugatePoint { last, residual, smallest },
+        ) => {
+            assert!(
+                last.check().is_ok() && residual > 1e-9 && smallest.is_finite(),
+                "{last:?}, {residual}, {smallest}"
+            );
+        }
+        Err(ExactError::OutsideDomain { reached, .. }) => assert!(reached.check().is_ok()),
+        other => unreachable!("{other:?}"),
+    }
+}
+
+/// Splines: too few nodes, unequal lists, times that do not increase, numbers that are not finite; and times outside.
+#[test]
+fn splines() {
+    let points = [0.0, 1.0, 0.5].map(|q| SVector::from([q]));
+    let of = |times: &[f64], points: &[SVector<f64, 1>]| SplineCurve::new(times, points, None);
+    assert!(matches!(of(&[0.0, 1.0], &points[..2]), Err(InputError::Count { least: 3, found: 2, .. })));
+    let short = of(&[0.0, 1.0, 2.0], &points[..2]).err();
+    assert!(matches!(short, Some(InputError::Geometry(GeometryError::WrongSize { expected: 3, found: 2, .. }))));
+    assert!(of(&[0.0, 1.0, 1.0], &points).is_err() && of(&[0.0, f64::NAN, 1.0], &points).is_err());
+    let Ok(curve) = of(&[0.0, 1.0, 2.0], &points) else { return };
+    assert!(curve.at(1.5).is_ok() && curve.at(2.5).is_err() && curve.at(f64::NAN).is_err());
+}
+
+/// A composition without a critical point is refused.
+#[test]
+fn no_critical_point() {
+    struct Flat;
+    impl DiscreteLagrangian<1> for Flat {
+        fn step_size(&self) -> f64 {
+            0.1
+        }
+        fn value<T: Scalar>(&self, _t: f64, x: &DiscretePoint<1, T>) -> Result<T, StepError> {
+            Ok(x.q1[0] - x.q0[0] * 2.0)
+        }
+    }
+    let ends = [SVector::from([0.0]), SVector::from([1.0])];
+    let refused = compose(&Flat, &Flat, 0.0, (&ends, 0.0), &SVector::from([0.4]));
+    assert!(matches!(refused, Err(StepError::Singular { .. })), "{refused:?}");
 }

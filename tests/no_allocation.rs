@@ -1,9 +1,11 @@
-//! A step of a small system allocates nothing, with any rule, however the derivatives are found.
+//! A step of a small system allocates nothing, with any rule, however the derivatives are found; nor does the exact discrete
+//! Lagrangian with its derivatives.
 
 use contact_geom::systems::{DoublePendulum, Kepler, Pendulum, System};
 use contact_geom::{PhasePoint, legendre};
 use discrete_herglotz::rules::{Discretisation, DiscretisationVisitor, visit_discretisations};
-use discrete_herglotz::{FinalOnly, Flow, Status};
+use discrete_herglotz::{DiscreteLagrangian, FinalOnly, Flow, Status};
+use exact_lagrangian::{ContactExponential, ExactLagrangian, Route};
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
 
@@ -64,4 +66,37 @@ fn steps() {
         assert_eq!((status, count), (Ok(Status::Completed), 0), "{} with {}", system.name(), method.name());
     }
     visit_discretisations(&mut Visitor);
+}
+
+/// The exact discrete Lagrangian, its jets and steps, by each route to the motion between two points.
+#[test]
+fn exact() {
+    fn run<const N: usize, S: System<N>>(system: &S, h: f64, expected: Route) {
+        let x = system.initial();
+        let ld = ExactLagrangian::<_, N>::new(system, h);
+        let point = ContactExponential::new(system, h).ok().and_then(|e| e.at(0.0, &x).ok());
+        assert!(ld.is_ok() && point.is_some());
+        let (Ok(ld), Some(point)) = (ld, point) else { return };
+        let mut solver = Default::default();
+        let mut all = (None, None, None, None);
+        let mut count = 0;
+        // The first round makes the tables of coefficients.
+        for _ in 0..2 {
+            count = allocations(|| {
+                let state = legendre(system, 0.0, &x);
+                all = (
+                    ld.retract(0.0, &point).ok(),
+                    ld.jet(0.0, &point).ok(),
+                    ld.second_jet(0.0, &point).ok(),
+                    ld.forward(0.0, &state, &x.v, &mut solver).ok(),
+                );
+            });
+        }
+        assert!(all.1.is_some() && all.2.is_some() && all.3.is_some());
+        assert_eq!((all.0.map(|r| r.route), count), (Some(expected), 0), "{}", system.name());
+    }
+    run(&Pendulum::default(), 0.5, Route::Collocation);
+    run(&DoublePendulum::default(), 0.1, Route::Collocation);
+    run(&Kepler::<3>::default(), 0.1, Route::Collocation);
+    run(&Kepler::<2>::default(), 1.0, Route::Newton);
 }

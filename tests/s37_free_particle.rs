@@ -5,7 +5,7 @@ use crate::common::{on_random, within};
 use contact_geom::systems::FreeParticle;
 use contact_geom::{DiscretePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, LeftMidpoint, Rectangle, StepError, discrete_flow, legendre_minus};
-use exact_lagrangian::LinearExact;
+use exact_lagrangian::QuadraticExact;
 
 /// The exact discrete Lagrangian as printed, with the wrong sign of z0.
 struct Misprinted {
@@ -56,8 +56,7 @@ fn explicit_step() {
 fn exact_discrete_lagrangian() {
     random("exact free particle", |gamma, h, x| {
         let system = FreeParticle { gamma };
-        let (Ok(ld), Some(v0)) = (LinearExact::free_particle(gamma, h), system.velocity_through(x.q0[0], x.q1[0], h))
-        else {
+        let (Ok(ld), Some(v0)) = (QuadraticExact::new(&system, h), system.velocity_through(x.q0[0], x.q1[0], h)) else {
             return f64::NAN;
         };
         let at = |t| system.solution(t, &VelocityPoint::new(x.q0, [v0], x.z0));

@@ -5,7 +5,7 @@ use crate::common::{METHODS, on_random, over_discretisations, step_from, systems
 use contact_geom::systems::{Duffing, HarmonicOscillator, Pendulum, System};
 use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, Flow, InputError, LeftMidpoint, discrete_flow};
-use exact_lagrangian::LinearExact;
+use exact_lagrangian::QuadraticExact;
 
 /// `q2 = -((h^3 g + 4 h g + h^2 + 4) q0 + (h^3 g - 4 h g + 2 h^2 - 8) q1) / (h^2 + 4)`, and z1.
 #[test]
@@ -32,7 +32,7 @@ fn exact_dynamics() {
         let x = DiscretePoint::new([4.0 * u[0] - 2.0], [4.0 * u[1] - 2.0], u[2] - 0.5);
         for gamma in [-0.05, -2.0, -2.5, 0.3] {
             let (system, h) = (HarmonicOscillator { gamma }, 0.1 + u[3]);
-            let ld = LinearExact::oscillator(gamma, h).map_err(|e| e.to_string())?;
+            let ld = QuadraticExact::new(&HarmonicOscillator { gamma }, h).map_err(|e| e.to_string())?;
             let v0 = system.velocity_through(x.q0[0], x.q1[0], h).ok_or("conjugate")?;
             let at = |t| system.solution(t, &VelocityPoint::new(x.q0, [v0], x.z0));
             let next = discrete_flow(&ld, 0.0, &x).map_err(|e| e.to_string())?;
@@ -44,7 +44,7 @@ fn exact_dynamics() {
         }
         Ok(())
     });
-    assert!(LinearExact::oscillator(0.0, std::f64::consts::PI).is_err());
+    assert!(QuadraticExact::new(&HarmonicOscillator { gamma: 0.0 }, std::f64::consts::PI).is_err());
 }
 
 /// `(q1 - q0)/h - h/2 V'((q0 + q1)/2) = ((q2 - q1)/h + h/2 V'((q1 + q2)/2)) / (1 + h gamma)` for a potential given by V'.

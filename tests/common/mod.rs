@@ -189,7 +189,7 @@ pub fn systems() -> usize {
 }
 
 /// The systems that declare a symmetry.
-pub const SYMMETRIC: usize = 7;
+pub const SYMMETRIC: usize = 8;
 
 /// The number of discretisations.
 pub const METHODS: usize = 4;

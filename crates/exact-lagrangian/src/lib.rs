@@ -1,20 +1,44 @@
-//! Exact discrete Lagrangians: `L_h^e(q0, q1, z0) = z(h) - z0`, the action along the motion from `q0` to `q1` in time `h`.
+//! The exact discrete Lagrangian of contact mechanics, and all that section 4 of the paper says of it, to round-off.
 //!
-//! Their discrete flow is the motion itself, sampled; every theorem on discrete Lagrangians holds for them, with
-//! `sigma_d = e^(int L_z)`. So far the crate holds those that are known in closed form through a linear motion.
+//! A regular Lagrangian has the flow `phi_t` of its Herglotz vector field ([`herglotz_flow`]), the exponential map
+//! `exp_h : (q0, v0, z0) -> (q0, q1, z0)` ([`ContactExponential`]) and its inverse, the exact retraction
+//! `R_h^(e-)` ([`retract`](ContactExponential::retract)). The action along the motion from `q0` to `q1` is
+//! `L_h^e(q0, q1, z0) = z(h) - z0` ([`ExactLagrangian`]): one more discrete Lagrangian, whose flow is the motion itself.
 //!
 //! ```
-//! use contact_geom::DiscretePoint;
-//! use discrete_herglotz::{DiscreteLagrangian, discrete_flow};
-//! use exact_lagrangian::LinearExact;
+//! use contact_geom::{DiscretePoint, legendre, systems::CoupledInZ};
+//! use discrete_herglotz::legendre_minus;
+//! use exact_lagrangian::ExactLagrangian;
 //!
-//! let ld = LinearExact::oscillator(-0.05, 0.5)?;
-//! let x = DiscretePoint::new([0.0], [1.0], 0.0);
-//! let next = discrete_flow(&ld, 0.0, &x)?; // (q(h), q(2h), z(h)), exactly
-//! assert!((ld.jet(0.0, &x)?.sigma() - (-0.05f64 * 0.5).exp()).abs() < 1e-15);
-//! # let _ = next;
+//! let system = CoupledInZ::default(); // nonlinear in q and z, W depends on q, v, z
+//! let exact = ExactLagrangian::<_, 1>::new(&system, 0.5)?;
+//! let x = DiscretePoint::new([0.3], [0.6], 0.2);
+//! let motion = exact.retract(0.0, &x)?; // R_h^(e-) and R_h^(e+)
+//! let (minus, start) = (legendre_minus(&exact, 0.0, &x)?, legendre(&system, 0.0, &motion.start));
+//! assert!((minus.p - start.p).amax() < 1e-15); // F-L_h^e = FL o R_h^(e-)
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! The theorem in one picture, commuting in both signs; the numbers are the worst relative defects over the 19 systems of the
+//! catalogue and steps from 1e-6 to 1 (`cargo run --release --bin exact_tour`), the derivatives in `F(+-)L_h^e` taken by dual numbers
+//! through flow and shooting:
+//!
+//! ```text
+//!                    R_h^(e+-)          R o exp = id: 0.6 eps times the condition
+//!     Q x Q x R  ---------------->  TQ x R
+//!            \                         |
+//!             \  F(+-)L_h^e            | FL
+//!              \                       |
+//!               '----------------->  T*Q x R
+//!                   defect @DEFECT@
+//! ```
+//!
+//! Also here: [`NonHolonomic`], the constrained system that the paper proves its theorems with; Herglotz' principle for any curve
+//! ([`action`], [`action_derivative`]); [`error_orders`], the variational error analysis of a discrete Lagrangian against
+//! the exact one; [`compose`]; closed forms ([`QuadraticExact`]); and [`statements`], the theorems as residuals.
+//!
+//! How exact: against closed forms some 1e-15, of the motion's own size where it decays by `e^-50`. How fast: `L_h^e` with its first
+//! derivatives costs 1 to 2 calls of a dop853 that computes the motion alone to 1e-13. Nothing allocates for static N.
 
 mod composition;
 mod conjugate;
@@ -23,7 +47,6 @@ mod exact_lagrangian;
 mod exponential;
 mod flow;
 mod gauss;
-mod linear_exact;
 mod nonholonomic;
 mod panel;
 mod principle;
@@ -39,7 +62,6 @@ pub use error::ExactError;
 pub use exact_lagrangian::ExactLagrangian;
 pub use exponential::{ContactExponential, ExponentialDifferential, HerglotzFlow};
 pub use flow::{Motion, PANELS, herglotz_flow};
-pub use linear_exact::LinearExact;
 pub use nonholonomic::{Chetaev, ExtendedMotion, ExtendedPoint, NonHolonomic};
 pub use principle::{Curve, CurveAction, MotionCurve, VariedCurve, action, action_derivative};
 pub use quadratic_exact::QuadraticExact;

@@ -237,7 +237,9 @@ fn sweeps<const N: usize, T: Scalar>(
             contraction = contraction.max(ratio);
         }
         let predicted = change * ratio <= 0.5 * accuracy;
-        let stagnant = before.is_finite() && ratio >= 0.8 && change <= 4096.0 * f64::EPSILON;
+        // After few sweeps a larger change may still be one that is on its way.
+        let noise = if sweep < 6 { 16.0 } else { 4096.0 } * f64::EPSILON;
+        let stagnant = before.is_finite() && ratio >= 0.8 && change <= noise;
         let unresolved = !last && error > *accuracy && change <= 0.1 * error.sqrt();
         if predicted || stagnant || unresolved {
             let (mean, twice) = (Rate::sum(nodes, &g.b), Rate::sum(nodes, &g.end).a);

@@ -81,6 +81,7 @@ pub trait SystemVisitor {
 /// them: they have a contact Hamiltonian, but no regular Lagrangian.
 pub fn visit_catalogue(visitor: &mut impl SystemVisitor) {
     visitor.visit(&FreeParticle::default());
+    visitor.visit(&UniformField::<2>::default());
     visitor.visit(&HarmonicOscillator::default());
     visitor.visit(&Pendulum::default());
     visitor.visit(&Duffing::default());

@@ -135,14 +135,14 @@ fn figure(out: &Directory) -> Result<(), Failure> {
             .iter()
             .map(|(line, name, orders)| {
                 let points = of(orders).errors.iter().copied().filter(|(_, e)| *e > 0.0);
-                if named { Curve::new(name, *line, points) } else { Curve::unnamed(*line, points) }
+                if named { Curve::new(&name.replace('_', " "), *line, points) } else { Curve::unnamed(*line, points) }
             })
             .collect(),
         marks: Vec::new(),
     };
     let panels = [
-        panel("|L_d - L_h^e| (dimensionless)", |o| &o.value, true),
-        panel("error of F-L_d (dimensionless)", |o| &o.legendre_minus, false),
+        panel("error of Ld (dimensionless)", |o| &o.value, true),
+        panel("error of F\u{207b}Ld (dimensionless)", |o| &o.legendre_minus, false),
         panel("error of one step (dimensionless)", |o| &o.flow, false),
     ];
     out.text("orders.svg", &draw_row(&panels))

@@ -13,7 +13,7 @@ use discrete_herglotz::{
     DiscreteLagrangian, HamiltonianFlow, InputError, LeftMidpoint, Rectangle, derived_jet, discrete_flow,
     hamiltonian_flow, sigma_d,
 };
-use exact_lagrangian::LinearExact;
+use exact_lagrangian::QuadraticExact;
 
 /// The points at which each example is checked.
 const SAMPLES: usize = 32;
@@ -31,10 +31,10 @@ pub fn check(checks: &mut Checks) {
         for (statement, system, method, residual) in [
             (37, free.name(), "rectangle", free_particle_step(&free, h, t, &points)),
             (37, free.name(), "closed_exact", exact(&closed, &free, gamma, t, &points)),
-            (37, free.name(), "linear_exact", linear(LinearExact::free_particle(gamma, h), &free, gamma, t, &points)),
+            (37, free.name(), "quadratic_exact", linear(QuadraticExact::new(&free, h), &free, gamma, t, &points)),
             (38, spring.name(), "left_midpoint", oscillator_step(&spring, h, t, &points)),
             (38, spring.name(), "closed_motion", Ok(oscillator_motion(&spring, h, x.v[0]))),
-            (38, spring.name(), "linear_exact", linear(LinearExact::oscillator(gamma, h), &spring, gamma, t, &points)),
+            (38, spring.name(), "quadratic_exact", linear(QuadraticExact::new(&spring, h), &spring, gamma, t, &points)),
         ] {
             checks.record(&Subject::discrete(statement, system, method, h), residual.map(Some));
         }
