@@ -85,4 +85,14 @@ fn branches() {
         assert!((end - y.q1[0]).abs() < 1e-12);
     }
     assert!(found.iter().any(|m| (m.start.v[0] - 1.0).abs() < 1e-12));
+    // Each says whether it has passed a conjugate point, and when.
+    for motion in &found {
+        let first = exp.conjugate_points(0.0, &motion.start).ok().and_then(|c| c.first().map(|p| p.after));
+        match (motion.conjugate, first) {
+            (None, None) => {}
+            (Some(by), Some(after)) => assert!(after <= by && by - after <= 8.0 / 32.0 + 1e-9, "{after}, {by}"),
+            other => unreachable!("{other:?}"),
+        }
+    }
+    assert!(found.iter().any(|m| m.conjugate.is_some()));
 }

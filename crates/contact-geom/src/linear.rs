@@ -19,7 +19,8 @@ impl SingularMatrix {
     }
 }
 
-/// Solves `a x = b` by elimination with row pivoting, in place, over any [`Scalar`]; `a` and `b` are used up.
+/// Solves `a x = b` by elimination with row pivoting, in place, over any [`Scalar`]; `a` and `b` are used up. Returns the
+/// determinant of `a`, the product of the pivots.
 ///
 /// nalgebra's factorisations ask for a field, which duals are not; and for the sizes of few-body mechanics this is faster
 /// than any library call. Its cost is `N^3 / 3` products.
@@ -30,8 +31,9 @@ impl SingularMatrix {
 pub fn solve<T: Scalar, D: Dim>(
     a: &mut Matrix<T, D, D, impl StorageMut<T, D, D>>,
     b: &mut Matrix<T, D, U1, impl StorageMut<T, D>>,
-) -> Result<(), SingularMatrix> {
+) -> Result<T, SingularMatrix> {
     let n = a.nrows();
+    let mut determinant = T::one();
     for k in 0..n {
         let mut row = k;
         for i in k + 1..n {
@@ -46,7 +48,9 @@ pub fn solve<T: Scalar, D: Dim>(
         if row != k {
             a.swap_rows(k, row);
             b.swap_rows(k, row);
+            determinant = -determinant;
         }
+        determinant *= a[(k, k)];
         let inverse = a[(k, k)].recip();
         for i in k + 1..n {
             let factor = a[(i, k)] * inverse;
@@ -65,5 +69,5 @@ pub fn solve<T: Scalar, D: Dim>(
         }
         b[k] = sum / a[(k, k)];
     }
-    Ok(())
+    Ok(determinant)
 }

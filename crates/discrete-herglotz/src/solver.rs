@@ -50,7 +50,7 @@ impl<const N: usize> Solver<N> {
     #[inline]
     pub fn solve(&mut self, a: &mut SMatrix<f64, N, N>, b: &mut SVector<f64, N>) -> Result<(), StepError> {
         match &mut self.large {
-            None => linear::solve(a, b).map_err(|e| StepError::Singular { pivot: e.pivot }),
+            None => linear::solve(a, b).map(drop).map_err(|e| StepError::Singular { pivot: e.pivot }),
             Some(large) => large.solve(a, b),
         }
     }

@@ -48,6 +48,10 @@ pub struct Retraction<const N: usize> {
     pub action: f64,
     /// `b = int L_z dt` along the motion.
     pub b: f64,
+    /// The time from the start, to a part in 32 of h, by which the motion has met a conjugate point: then other motions join the
+    /// points as well, and this is one of several. `None` if it meets none by the sign of `det dq(t)/dv0`;
+    /// [`conjugate_points`](ContactExponential::conjugate_points) looks more closely, also for those of even multiplicity.
+    pub conjugate: Option<f64>,
     /// How it was found.
     pub route: Route,
     /// The evaluations of the vector field that the last pass took.
@@ -97,11 +101,11 @@ impl<L> ContactExponential<L> {
             }
         }
         let failed = match self.by_newton(t, x, &guess) {
-            Ok(found) => return Ok(found),
+            Ok(found) => return self.marked(t, found),
             Err(failed) => failed,
         };
         match self.lead(t, x) {
-            Some(found) => Ok(Retraction { route: Route::Continuation, ..found.retraction }),
+            Some(found) => self.marked(t, Retraction { route: Route::Continuation, ..found.retraction }),
             None if x.q0 == x.q1 => Err(InputError::EqualPoints.into()),
             None => Err(failed),
         }
@@ -121,7 +125,7 @@ impl<L> ContactExponential<L> {
         L: Lagrangian<N>,
     {
         x.check()?;
-        self.by_newton(t, x, guess)
+        self.marked(t, self.by_newton(t, x, guess)?)
     }
 
     /// The different motions among those that Newton's method finds from these guesses of the initial velocity, in the order of
@@ -148,7 +152,7 @@ impl<L> ContactExponential<L> {
                     apart <= f64::EPSILON.sqrt() * old.start.v.amax().max(new.start.v.amax())
                 };
                 if !found.iter().any(same) {
-                    found.push(new);
+                    found.push(self.marked(t, new)?);
                 }
             }
         }
@@ -218,6 +222,8 @@ impl<L> ContactExponential<L> {
                     end: VelocityPoint { q: x.q1, v: panel.v0 + panel.change.a, z: x.z0 + panel.change.z },
                     action: panel.change.z,
                     b: panel.change.b,
+                    // The iteration contracts before the first conjugate point only.
+                    conjugate: None,
                     route: Route::Collocation,
                     evaluations: panel.evaluations,
                 },
@@ -225,6 +231,24 @@ impl<L> ContactExponential<L> {
             )),
             _ => None,
         })
+    }
+
+    /// A retraction with the time by which its motion has met a conjugate point.
+    fn marked<const N: usize>(&self, t: f64, found: Retraction<N>) -> Result<Retraction<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        const PARTS: u32 = 32;
+        let (part, mut at) = (self.h / f64::from(PARTS), seeded(&found.start));
+        for k in 0..PARTS {
+            let from = State { q: at.q, v: at.v, z: at.z, b: Dual::constant(0.0) };
+            at = integrate(&Herglotz(&self.lagrangian), t + f64::from(k) * part, &from, part, ROUGH)?.end;
+            let mut slope = SMatrix::<f64, N, N>::from_fn(|i, j| at.q[i].d[j]);
+            if solve(&mut slope, &mut SVector::<f64, N>::zeros()).is_ok_and(|determinant| determinant < 0.0) {
+                return Ok(Retraction { conjugate: Some(f64::from(k + 1) * part), ..found });
+            }
+        }
+        Ok(found)
     }
 
     /// Whether `dq1/dv0` is far from singular along the motion from a start, to the accuracy of a guess.
@@ -372,6 +396,7 @@ fn moved<const N: usize>(
         end: VelocityPoint { q: x.q1, v: SVector::from_fn(|i, _| along(&shot.end.v[i])), z: along(&shot.end.z) },
         action: along(&shot.action),
         b: along(&shot.b),
+        conjugate: None,
         route: Route::Newton,
         evaluations: shot.evaluations,
     }
