@@ -4,6 +4,7 @@ use crate::linear::solve;
 use crate::{Border, Dual, GeometryError, Lagrangian, Module, PhasePoint, Scalar, Smooth, SmoothFunction};
 use crate::{OneParameterGroup, Triple, VelocityPoint};
 use nalgebra::{DMatrix, SMatrix, SVector};
+use num_traits::One;
 
 /// How regular a matrix of the theory is: W for a Lagrangian, the derivative of F-L_d for a discrete one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,8 +93,9 @@ impl<const N: usize, L: Lagrangian<N>> Smooth<N> for Legendre<'_, L> {
 /// The Herglotz vector field `xi_L = (v, a, L)` on TQ x R: Herglotz' equations
 /// `d/dt L_v = L_q + L_v L_z`, `zdot = L` solved for the acceleration `a`; paper, section 2.2.
 ///
-/// For any regular L: `W a = L_q + L_v L_z - (L_vq v + L_vz L + L_vt)`. One evaluation on duals along the `N` velocities
-/// and along the drift `(v, 0, L, 1)` gives W and the bracket together.
+/// For any regular L: `W a = L_q + L_v L_z - (L_vq v + L_vz L + L_vt)`. One evaluation on nested duals along the `N` velocities
+/// and along the drift `(v, 0, L, 1)` gives W and the bracket together, one before along q and z the rest: two thirds of the
+/// work of all mixed second derivatives.
 ///
 /// # Errors
 /// [`GeometryError::Singular`] where W is singular.
@@ -117,24 +119,36 @@ pub fn herglotz_rates<T: Scalar, const N: usize>(
     t: T,
     x: &VelocityPoint<N, T>,
 ) -> Result<(Triple<N, T>, T), GeometryError> {
-    let zdot = lagrangian.value(t, &x.q, &x.v, x.z);
-    let g = {
-        let moving = |re: T, drift: T| Dual { re, d: Border::<N, T> { x: Module::null(), z: drift } };
-        let mut y = VelocityPoint {
-            q: SVector::from_fn(|i, _| moving(x.q[i], x.v[i])),
-            v: x.v.map(|v| moving(v, T::zero())),
-            z: moving(x.z, zdot),
-        };
-        for i in 0..N {
-            y.v[i].d.x[i] = T::one();
-        }
-        lagrangian.gradient(moving(t, T::one()), &y)
+    // L_q, L_z and L along the N + 1 directions of q and z.
+    let still = Dual::<T, Border<N, T>>::constant;
+    let mut y = VelocityPoint { q: x.q.map(still), v: x.v.map(still), z: still(x.z) };
+    for i in 0..N {
+        y.q[i].d.x[i] = T::one();
+    }
+    y.z.d.z = T::one();
+    let Dual { re: zdot, d: slope } = lagrangian.along(t, &y);
+    // L_v, and its derivatives along the velocities and the drift: only these second derivatives are needed.
+    let moving = |re: T, drift: T| {
+        Dual::<Dual<T, Border<N, T>>, SVector<Dual<T, Border<N, T>>, N>>::constant(Dual {
+            re,
+            d: Border { x: Module::null(), z: drift },
+        })
     };
-    let mut a = SVector::<T, N>::from_fn(|i, _| g.x[i].re + g.y[i].re * g.z.re - g.y[i].d.z);
-    let mut w = SMatrix::<T, N, N>::from_fn(|i, j| g.y[i].d.x[j]);
+    let mut y = VelocityPoint {
+        q: SVector::from_fn(|i, _| moving(x.q[i], x.v[i])),
+        v: x.v.map(|v| moving(v, T::zero())),
+        z: moving(x.z, zdot),
+    };
+    for i in 0..N {
+        y.v[i].re.d.x[i] = T::one();
+        y.v[i].d[i] = Dual::one();
+    }
+    let p = lagrangian.along(Dual { re: t, d: Border { x: Module::null(), z: T::one() } }, &y).d;
+    let mut a = SVector::<T, N>::from_fn(|i, _| slope.x[i] + p[i].re * slope.z - p[i].d.z);
+    let mut w = SMatrix::<T, N, N>::from_fn(|i, j| p[i].d.x[j]);
     solve(&mut w, &mut a)
         .map_err(|e| e.of("W = L_vv", "Herglotz' equations have no unique acceleration here; L is not regular"))?;
-    Ok((Triple { x: x.v, y: a, z: zdot }, g.z.re))
+    Ok((Triple { x: x.v, y: a, z: zdot }, slope.z))
 }
 
 /// The Herglotz vector field at a fixed time, as a field that can be differentiated.

@@ -184,7 +184,7 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
             return Err(ExactError::Unfinished { t: t0 + done, reached: reached().into() });
         }
         let problem = Problem { t: t0 + done, h, from: &at, end: None, accuracy };
-        match collocate(rates, &problem, guess) {
+        match collocate(rates, &problem, guess, &mut at.v.clone_owned()) {
             Ok(panel) => {
                 evaluations += panel.evaluations;
                 if panel.error > accuracy {

@@ -29,7 +29,7 @@ impl<const N: usize, T: Scalar> Rate<N, T> {
     }
 
     /// The sum of the nodes' rates with these weights.
-    #[inline]
+    #[inline(always)]
     fn sum(nodes: &[Self], weights: &[f64; MOST]) -> Self {
         let mut sum = Self::zero();
         for (rate, w) in nodes.iter().zip(weights) {
@@ -76,6 +76,8 @@ pub(crate) struct End<'a, const N: usize, T> {
     pub displacement: &'a SVector<T, N>,
     /// The inverse of `dq1/dv0`, or what is known of it: `1/h` is that of a free motion, and good enough in a short time.
     pub inverse: &'a SMatrix<f64, N, N>,
+    /// The factor of contraction above which the iteration is given up, for want of a better inverse.
+    pub patience: f64,
 }
 
 /// Why a panel could not be solved; a shorter one may be.
@@ -97,10 +99,17 @@ const SWEEPS: u32 = 40;
 struct Size([f64; 2]);
 
 impl Size {
-    #[inline]
+    #[inline(always)]
     fn see<T: Scalar>(&mut self, x: T) {
-        self.0[0] = self.0[0].max(x.modulus());
-        self.0[1] = self.0[1].max(x.extent());
+        // Comparisons rather than `f64::max`: an extent is no NaN, and of a plain number it is the modulus.
+        let (extent, plain) = (x.extent(), size_of::<T>() == size_of::<f64>());
+        let modulus = if plain { extent } else { x.modulus() };
+        if modulus > self.0[0] {
+            self.0[0] = modulus;
+        }
+        if extent > self.0[1] {
+            self.0[1] = extent;
+        }
     }
 
     #[inline]
@@ -149,7 +158,7 @@ impl Sweep {
     }
 }
 
-/// A panel from a state at a time over a duration; where the end is given, `from.v` is the guess of the initial velocity.
+/// A panel from a state at a time over a duration; where the end is given, the initial velocity is an unknown, and `from.v` not read.
 pub(crate) struct Problem<'a, const N: usize, T> {
     pub t: f64,
     pub h: f64,
@@ -161,17 +170,19 @@ pub(crate) struct Problem<'a, const N: usize, T> {
 
 /// Solves a panel, first with few nodes; with more, from where these have led, as long as they do not resolve the motion.
 ///
-/// A panel that the most nodes do not resolve is returned with its error.
+/// `v0` is the initial velocity, or a guess of it that is improved upon, also if the panel is refused. A panel that the most nodes
+/// do not resolve is returned with its error.
 pub(crate) fn collocate<const N: usize, T: Scalar>(
     rates: &impl Rates<N>,
     problem: &Problem<N, T>,
     guess: Rate<N, T>,
+    v0: &mut SVector<T, N>,
 ) -> Result<Panel<N, T>, Refused> {
     let mut nodes = [guess; MOST];
-    let (mut v0, mut evaluations, mut contraction) = (problem.from.v, 0, 0.0);
+    let (mut evaluations, mut contraction) = (0, 0.0);
     for g in collocations() {
         let largest = g.s == MOST;
-        let panel = sweeps(rates, problem, g, &mut nodes[..g.s], &mut v0, largest)?;
+        let panel = sweeps(rates, problem, g, &mut nodes[..g.s], v0, largest)?;
         evaluations += panel.evaluations;
         contraction = panel.contraction.max(contraction);
         if panel.error <= problem.accuracy || largest {
@@ -203,7 +214,7 @@ fn sweeps<const N: usize, T: Scalar>(
     let (t, h) = (*t, *h);
     let (mut before, mut contraction) = (f64::INFINITY, 0.0f64);
     for sweep in 1..=SWEEPS {
-        if let Some(End { displacement, inverse }) = end {
+        if let Some(End { displacement, inverse, .. }) = end {
             let twice = Rate::sum(nodes, &g.end).a;
             let missed = SVector::<T, N>::from_fn(|i, _| displacement[i] - (v0[i] + twice[i] * h) * h);
             for (i, j) in (0..N).flat_map(|i| (0..N).map(move |j| (i, j))) {
@@ -212,7 +223,15 @@ fn sweeps<const N: usize, T: Scalar>(
         }
         let mut seen = Sweep::default();
         for i in 0..g.s {
-            let (once, twice) = (Rate::sum(nodes, &g.a[i]), Rate::sum(nodes, &g.aa[i]).a);
+            let (mut once, mut twice) = (Rate::<N, T>::zero(), SVector::<T, N>::from_element(T::zero()));
+            for ((rate, a), aa) in nodes.iter().zip(&g.a[i]).zip(&g.aa[i]) {
+                for k in 0..N {
+                    once.a[k] += rate.a[k] * *a;
+                    twice[k] += rate.a[k] * *aa;
+                }
+                once.z += rate.z * *a;
+                once.b += rate.b * *a;
+            }
             let x = State {
                 q: SVector::from_fn(|k, _| from.q[k] + (v0[k] * g.c[i] + twice[k] * h) * h),
                 v: SVector::from_fn(|k, _| v0[k] + once.a[k] * h),
@@ -233,7 +252,8 @@ fn sweeps<const N: usize, T: Scalar>(
         }
         let error = estimate(nodes, &seen, h, g);
         let ratio = if before.is_finite() { change / before } else { 1.0 };
-        if sweep > 2 && change > 1e3 * f64::EPSILON {
+        let above_noise = change > 1e3 * f64::EPSILON;
+        if sweep > 2 && above_noise {
             contraction = contraction.max(ratio);
         }
         let predicted = change * ratio <= 0.5 * accuracy;
@@ -259,7 +279,8 @@ fn sweeps<const N: usize, T: Scalar>(
                 evaluations: sweep * g.s as u32,
             });
         }
-        if ratio >= 1.0 && sweep > 8 {
+        let patience = end.as_ref().map_or(1.0, |end| end.patience);
+        if (ratio >= 1.0 && sweep > 8) || (ratio > patience && sweep > 3 && above_noise) {
             return Err(Refused::Slow);
         }
         before = change;

@@ -24,7 +24,18 @@ const NEARLY: f64 = 1e-4;
 
 /// The contraction below which a conjugate point is far: the slowest mode of the iteration with both ends given contracts by 1 at
 /// a conjugate point, the next by 1/4 there.
-const SAFE: f64 = 0.05;
+const SAFE: f64 = 0.1;
+
+/// The contraction above which the slope is worth its cost.
+const PATIENCE: f64 = 0.3;
+
+/// The contraction that an iteration with the slope must have: it shows that the slope is that of this motion.
+const SLOPED: f64 = 0.8;
+
+/// Whether a matrix reverses orientation.
+fn reverses<const N: usize>(mut m: SMatrix<f64, N, N>) -> bool {
+    solve(&mut m, &mut SVector::<f64, N>::zeros()).is_ok_and(|determinant| determinant < 0.0)
+}
 
 /// How the motion between two points was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,8 +60,9 @@ pub struct Retraction<const N: usize> {
     /// `b = int L_z dt` along the motion.
     pub b: f64,
     /// The time from the start, to a part in 32 of h, by which the motion has met a conjugate point: then other motions join the
-    /// points as well, and this is one of several. `None` if it meets none by the sign of `det dq(t)/dv0`;
-    /// [`conjugate_points`](ContactExponential::conjugate_points) looks more closely, also for those of even multiplicity.
+    /// points as well, and this is one of several. `None` if it meets none by the sign of `det dq(t)/dv0`, which on the quick route
+    /// is looked at in the end only; [`conjugate_points`](ContactExponential::conjugate_points) looks more closely, also for those
+    /// of even multiplicity.
     pub conjugate: Option<f64>,
     /// How it was found.
     pub route: Route,
@@ -75,8 +87,8 @@ fn smallest<const N: usize>(inverse: &SMatrix<f64, N, N>) -> f64 {
 impl<L> ContactExponential<L> {
     /// The retraction of two points at time t.
     ///
-    /// Where several motions join the points in time h this is the one that the motions of shorter times between points on the
-    /// straight line lead to; [`retract_near`](Self::retract_near) finds others, and
+    /// Where several motions join the points in time h this is as a rule the one that the motions of shorter times between points on
+    /// the straight line lead to; [`retract_near`](Self::retract_near) finds others, and
     /// [`conjugate_points`](Self::conjugate_points) tells whether there may be some: before the first conjugate point the
     /// motion is locally the only one.
     ///
@@ -93,11 +105,22 @@ impl<L> ContactExponential<L> {
     {
         x.check()?;
         let guess = (x.q1 - x.q0) / self.h;
-        let free = SMatrix::from_diagonal_element(1.0 / self.h);
-        if let Some((found, contraction)) = self.by_collocation(t, x, &guess, &free)? {
-            // Near a conjugate point all but one mode contract, and that one may be absent: see whether the slope vanishes.
-            if contraction < SAFE || self.is_regular(t, &found.start)? {
-                return Ok(found);
+        let (free, mut v0) = (SMatrix::from_diagonal_element(1.0 / self.h), guess);
+        let quick = self.by_collocation(t, x, &mut v0, &free, PATIENCE)?;
+        if let Some((found, contraction)) = quick
+            && contraction < SAFE
+        {
+            return Ok(found);
+        }
+        // Slow, or perhaps near a conjugate point, where all modes but one contract and that one may be absent: ask the slope, and
+        // where the iteration was given up go on with it.
+        if let Some(inverse) = self.slope_inverse(t, &VelocityPoint { q: x.q0, v: v0, z: x.z0 }) {
+            let found = match quick {
+                Some(found) => Some(found),
+                None => self.by_collocation(t, x, &mut v0, &inverse, SLOPED)?,
+            };
+            if let Some((found, _)) = found {
+                return if reverses(inverse) { self.marked(t, found) } else { Ok(found) };
             }
         }
         let failed = match self.by_newton(t, x, &guess) {
@@ -204,18 +227,19 @@ impl<L> ContactExponential<L> {
         &self,
         t: f64,
         x: &DiscretePoint<N>,
-        guess: &SVector<f64, N>,
+        v0: &mut SVector<f64, N>,
         inverse: &SMatrix<f64, N, N>,
+        patience: f64,
     ) -> Result<Option<(Retraction<N>, f64)>, ExactError<N>>
     where
         L: Lagrangian<N>,
     {
         let rates = Herglotz(&self.lagrangian);
-        let from = State { q: x.q0, v: *guess, z: x.z0, b: 0.0 };
+        let from = State { q: x.q0, v: *v0, z: x.z0, b: 0.0 };
         let start = rates.at(t, &from)?;
-        let end = End { displacement: &(x.q1 - x.q0), inverse };
+        let end = End { displacement: &(x.q1 - x.q0), inverse, patience };
         let problem = Problem { t, h: self.h, from: &from, end: Some(end), accuracy: ACCURACY };
-        Ok(match collocate(&rates, &problem, start) {
+        Ok(match collocate(&rates, &problem, start, v0) {
             Ok(panel) if panel.error <= ACCURACY => Some((
                 Retraction {
                     start: VelocityPoint { q: x.q0, v: panel.v0, z: x.z0 },
@@ -243,24 +267,24 @@ impl<L> ContactExponential<L> {
         for k in 0..PARTS {
             let from = State { q: at.q, v: at.v, z: at.z, b: Dual::constant(0.0) };
             at = integrate(&Herglotz(&self.lagrangian), t + f64::from(k) * part, &from, part, ROUGH)?.end;
-            let mut slope = SMatrix::<f64, N, N>::from_fn(|i, j| at.q[i].d[j]);
-            if solve(&mut slope, &mut SVector::<f64, N>::zeros()).is_ok_and(|determinant| determinant < 0.0) {
+            if reverses(SMatrix::<f64, N, N>::from_fn(|i, j| at.q[i].d[j])) {
                 return Ok(Retraction { conjugate: Some(f64::from(k + 1) * part), ..found });
             }
         }
         Ok(found)
     }
 
-    /// Whether `dq1/dv0` is far from singular along the motion from a start, to the accuracy of a guess.
-    fn is_regular<const N: usize>(&self, t: f64, start: &VelocityPoint<N>) -> Result<bool, ExactError<N>>
+    /// The inverse of `dq1/dv0` along the motion from a start, to the accuracy of a guess; none where it is nearly singular, or the
+    /// motion not defined.
+    fn slope_inverse<const N: usize>(&self, t: f64, start: &VelocityPoint<N>) -> Option<SMatrix<f64, N, N>>
     where
         L: Lagrangian<N>,
     {
         let moving = seeded(start);
         let from = State { q: moving.q, v: moving.v, z: moving.z, b: Dual::constant(0.0) };
-        let shot = integrate(&Herglotz(&self.lagrangian), t, &from, self.h, ROUGH)?;
+        let shot = integrate(&Herglotz(&self.lagrangian), t, &from, self.h, ROUGH).ok()?;
         let slope = SMatrix::<f64, N, N>::from_fn(|i, j| shot.displacement[i].d[j]);
-        Ok(slope.try_inverse().is_some_and(|inverse| smallest(&inverse) > NEARLY * self.h))
+        slope.try_inverse().filter(|inverse| smallest(inverse) > NEARLY * self.h)
     }
 
     /// Newton's method on `exp_h`: to some digits first; the rest by collocation with the slope found, or else to the end.
@@ -276,7 +300,7 @@ impl<L> ContactExponential<L> {
         let rough = self.shoot(t, x, guess, self.h, ROUGH)?;
         let near = rough.retraction.start.v;
         let regular = smallest(&rough.inverse) > NEARLY * self.h;
-        if regular && let Some((found, _)) = self.by_collocation(t, x, &near, &rough.inverse)? {
+        if regular && let Some((found, _)) = self.by_collocation(t, x, &mut near.clone_owned(), &rough.inverse, 1.0)? {
             // Still the motion that Newton's method has found, not another one.
             if (found.start.v - near).amax() <= ROUGH.sqrt() * near.amax() {
                 return Ok(Retraction { route: Route::Newton, ..found });
