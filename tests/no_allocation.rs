@@ -1,7 +1,7 @@
 //! A step of a small system allocates nothing, with any rule, however the derivatives are found; nor does the exact discrete
 //! Lagrangian with its derivatives.
 
-use contact_geom::systems::{DoublePendulum, Kepler, Pendulum, System};
+use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, System};
 use contact_geom::{PhasePoint, legendre};
 use discrete_herglotz::rules::{Discretisation, DiscretisationVisitor, visit_discretisations};
 use discrete_herglotz::{DiscreteLagrangian, FinalOnly, Flow, Status};
@@ -98,5 +98,6 @@ fn exact() {
     run(&Pendulum::default(), 0.5, Route::Collocation);
     run(&DoublePendulum::default(), 0.1, Route::Collocation);
     run(&Kepler::<3>::default(), 0.1, Route::Collocation);
-    run(&Kepler::<2>::default(), 1.0, Route::Newton);
+    run(&Kepler::<2>::default(), 1.0, Route::Collocation);
+    run(&HarmonicOscillator::default(), 3.0, Route::Newton);
 }

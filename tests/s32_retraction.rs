@@ -2,7 +2,7 @@
 
 use crate::common::{AlongMotion, OverMotions, over_motions};
 use contact_geom::VelocityPoint;
-use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, System, visit_catalogue};
+use contact_geom::systems::{HarmonicOscillator, Pendulum, System, visit_catalogue};
 use exact_lagrangian::{ContactExponential, ExactError, Route, statements};
 
 /// Along random motions of every system, from a guess on their branch.
@@ -53,16 +53,18 @@ fn the_loss_at_small_steps_is_the_condition() {
     }
 }
 
-/// Each route is taken where the one before fails, and says so.
+/// Each route is taken where the one before fails, and says so: near a conjugate point the iteration with both ends given does not
+/// contract, and beyond it Newton's method may need to be led there.
 #[test]
 fn routes() {
-    let route = |h: f64, x: &VelocityPoint<2>| {
-        let exp = ContactExponential::new(Kepler::<2>::default(), h).map_err(ExactError::from)?;
-        Ok::<_, ExactError<2>>(exp.retract(0.0, &exp.at(0.0, x)?)?.route)
+    let route = |h: f64, q: f64, v: f64| {
+        let exp = ContactExponential::new(HarmonicOscillator { gamma: 0.0 }, h).map_err(ExactError::from)?;
+        let found = exp.retract(0.0, &exp.at(0.0, &VelocityPoint::new([q], [v], 0.0))?)?;
+        Ok::<_, ExactError<1>>((found.route, found.conjugate.is_some()))
     };
-    let pericentre = Kepler::<2>::default().initial();
-    assert_eq!(route(0.1, &pericentre), Ok(Route::Collocation));
-    assert_eq!(route(1.0, &pericentre), Ok(Route::Newton));
+    assert_eq!(route(1.0, 0.4, 1.2), Ok((Route::Collocation, false)));
+    assert_eq!(route(3.0, 0.4, 1.2), Ok((Route::Newton, false)));
+    assert_eq!(route(3.2, 1.0, 0.0), Ok((Route::Continuation, true)));
     // Strong damping: the iteration with both ends given does not contract, Newton's method does.
     for gamma in [-50.0, -20.0, 5.0] {
         let Ok(exp) = ContactExponential::new(HarmonicOscillator { gamma }, 1.0) else { return };
