@@ -2,8 +2,9 @@
 
 use crate::common::{AlongMotion, OverMotions};
 use contact_geom::VelocityPoint;
-use contact_geom::systems::{System, visit_catalogue};
-use exact_lagrangian::{ExactError, statements};
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::{CoupledInZ, System, visit_catalogue};
+use exact_lagrangian::{ExactError, ExactLagrangian, compose, statements, through};
 
 /// Along random motions of every system, with unequal steps.
 #[test]
@@ -21,4 +22,23 @@ fn on_every_system() {
         }
     }
     visit_catalogue(&mut OverMotions(Composition));
+}
+
+/// The slope of a composition is the derivative of its value: central differences, extrapolated once.
+#[test]
+fn the_slope_is_that_of_the_value() {
+    let system = CoupledInZ::default();
+    let (Ok(a), Ok(b)) = (ExactLagrangian::<_, 1>::new(&system, 0.3), ExactLagrangian::<_, 1>::new(&system, 0.4))
+    else {
+        return;
+    };
+    let ends = [SVector::from([0.3]), SVector::from([0.9])];
+    let at = |q1: f64| through(&a, &b, 0.1, (&ends, 0.4), &SVector::from([q1]));
+    let value = |q1: f64| at(q1).map_or(f64::NAN, |c| c.value);
+    let slope = |d: f64| (value(0.7 + d) - value(0.7 - d)) / (2.0 * d);
+    let differences = (4.0 * slope(5e-4) - slope(1e-3)) / 3.0;
+    let formula = at(0.7).map_or(f64::NAN, |c| c.slope[0]);
+    assert!((formula - differences).abs() < 1e-11 && formula.abs() > 0.1, "{formula} and {differences}");
+    let critical = compose(&a, &b, 0.1, (&ends, 0.4), &SVector::from([0.6])).map_or(f64::NAN, |c| c.slope[0]);
+    assert!(critical.abs() < 1e-13, "{critical:e}");
 }

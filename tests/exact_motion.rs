@@ -6,7 +6,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     FreeParticle, HarmonicOscillator, LaneEmden, Pendulum, System, SystemVisitor, visit_catalogue,
 };
-use contact_geom::{GeometryError, Lagrangian, Scalar, Triple, VelocityPoint};
+use contact_geom::{Dual, GeometryError, Lagrangian, Scalar, Triple, VelocityPoint};
 use discrete_herglotz::InputError;
 use exact_lagrangian::{ExactError, herglotz_flow};
 
@@ -148,4 +148,47 @@ fn not_finite() {
     assert_eq!(of(VelocityPoint { v: [f64::NAN].into(), ..x }, 0.0, 1.0), "v");
     assert_eq!(of(VelocityPoint { z: f64::INFINITY, ..x }, 0.0, 1.0), "z");
     assert!(herglotz_flow(&system, 0.0, &x, 0.0).is_ok_and(|m| m.end == x && m.b == 0.0));
+}
+
+/// Two oscillators, slow and fast.
+struct SlowAndFast;
+impl Lagrangian<2> for SlowAndFast {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
+        (v[0] * v[0] + v[1] * v[1] - q[0] * q[0] * 1e-2 - q[1] * q[1] * 1e2) * 0.5
+    }
+}
+
+/// However large the differentials are, the values converge as they would alone.
+#[test]
+fn values_do_not_hide_behind_differentials() {
+    for size in [1.0, 1e6, 1e12] {
+        let still = Dual::<f64, SVector<f64, 1>>::constant;
+        let mut x = VelocityPoint {
+            q: SVector::from([still(0.0), still(0.0)]),
+            v: SVector::from([still(1.0), still(1.0)]),
+            z: still(0.0),
+        };
+        x.v[0].d[0] = size;
+        let end = herglotz_flow(&SlowAndFast, 0.0, &x, 1.0).map_or(f64::NAN, |m| m.end.q[1].re);
+        let truth = 0.1 * 10f64.sin();
+        assert!((end - truth).abs() < 1e-13, "{size:e}: {end} for {truth}");
+    }
+}
+
+/// A force that depends on time alone.
+struct Driven;
+impl Lagrangian<1> for Driven {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        v[0] * v[0] * 0.5 + q[0] * t.sin()
+    }
+}
+
+/// The sums over thousands of panels round once: the end and the displacement belong together.
+#[test]
+fn many_panels_round_once() {
+    let start = VelocityPoint::new([1e6], [0.0], 0.0);
+    let Ok(motion) = herglotz_flow(&Driven, 0.0, &start, 20000.0) else { unreachable!() };
+    let rounding = f64::EPSILON * motion.end.q[0];
+    let lost = (motion.end.q[0] - start.q[0] - motion.displacement[0]).abs();
+    assert!(motion.panels > 100 && lost <= rounding, "{} panels: {} units", motion.panels, lost / rounding);
 }

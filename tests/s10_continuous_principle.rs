@@ -3,8 +3,10 @@
 
 use crate::common::over_motions;
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{CoupledInZ, Pendulum, System};
-use exact_lagrangian::{Curve, MotionCurve, SplineCurve, VariedCurve, action, action_derivative};
+use contact_geom::systems::{CoupledInZ, HarmonicOscillator, Pendulum, System};
+use contact_geom::{Lagrangian, Scalar};
+use exact_lagrangian::{Curve, ExactError, MotionCurve, SplineCurve, VariedCurve, action, action_derivative};
+use std::cell::Cell;
 
 /// Along random motions of every system, and along bent curves with the same ends.
 #[test]
@@ -51,4 +53,77 @@ fn splines_through_nodes() {
     // The velocity's error is of the third order, and its square of the sixth.
     let order = (error(8) / error(32)).log2() / 2.0;
     assert!((order - 6.0).abs() < 0.5, "order {order}, errors {:e}, {:e}", error(8), error(32));
+}
+
+/// `dZ/dz0` along a curve at rest, where the action itself does not change.
+#[test]
+fn the_growth_of_dz_along_a_curve_at_rest() {
+    let rest = |_: f64| (SVector::<f64, 1>::zeros(), SVector::<f64, 1>::zeros());
+    for gamma in [-5.0f64, -1.0, 2.0] {
+        let system = HarmonicOscillator { gamma };
+        let growth = action_derivative(&system, &rest, &rest, (0.0, 1.0), (0.0, 1.0)).unwrap_or(f64::NAN);
+        assert!((growth / gamma.exp() - 1.0).abs() < 1e-14, "gamma = {gamma}: {growth}");
+    }
+}
+
+/// A logarithm that ends at q = 0.
+struct Wall;
+impl Lagrangian<1> for Wall {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 + q[0].ln() * 1e-3 - z * 0.1
+    }
+}
+
+/// A curve that leaves the domain of L: the time and the state on the curve.
+#[test]
+fn a_curve_that_leaves_the_domain() {
+    let curve = |s: f64| (SVector::from([1.0 - s]), SVector::from([-1.0]));
+    match action(&Wall, &curve, (5.0, 3.0), 0.2) {
+        Err(ExactError::OutsideDomain { t, reached, .. }) => {
+            assert!(
+                t > 5.5 && t <= 6.0 && (reached.q[0] - (6.0 - t)).abs() < 1e-12 && reached.v[0] == -1.0,
+                "{t}, {reached:?}"
+            );
+        }
+        other => unreachable!("{other:?}"),
+    }
+}
+
+struct Counted<'a, C> {
+    curve: &'a C,
+    count: Cell<u32>,
+}
+impl<C: Curve<1>> Curve<1> for Counted<'_, C> {
+    fn at(&self, s: f64) -> Result<(SVector<f64, 1>, SVector<f64, 1>), contact_geom::GeometryError> {
+        self.count.set(self.count.get() + 1);
+        self.curve.at(s)
+    }
+    fn breaks(&self) -> &[f64] {
+        self.curve.breaks()
+    }
+}
+
+/// The action along a spline is computed from node to node, in both directions: else its kinks would cost thousands of evaluations.
+#[test]
+fn a_spline_breaks_at_its_nodes() {
+    let times: Vec<f64> = (0..=8).map(|k| -1.0 + 0.25 * f64::from(k)).collect();
+    let points: Vec<_> = times.iter().map(|t| SVector::from([(3.0 * t).sin()])).collect();
+    let Ok(spline) = SplineCurve::new(&times, &points, None) else { unreachable!() };
+    let still = |_: f64| (SVector::<f64, 1>::zeros(), SVector::<f64, 1>::zeros());
+    assert_eq!(spline.breaks(), times);
+    assert_eq!(VariedCurve { curve: &spline, variation: &still, by: 1.0 }.breaks(), times);
+    // There and back, by few evaluations: no panel contains a break.
+    let system = Pendulum { gamma: -0.3 };
+    for duration in [-1.0, 1.0] {
+        let counted = Counted { curve: &spline, count: Cell::new(0) };
+        let whole = action(&system, &counted, (0.0, duration), 0.4).map_or(f64::NAN, |a| a.z);
+        let mut pieces = 0.4;
+        for k in 0..4 {
+            let from = 0.25 * duration * f64::from(k);
+            let piece = |s: f64| spline.at(from + s).unwrap_or((SVector::from([f64::NAN]), SVector::from([f64::NAN])));
+            pieces = action(&system, &piece, (from, 0.25 * duration), pieces).map_or(f64::NAN, |a| a.z);
+        }
+        assert!((whole - pieces).abs() < 1e-15);
+        assert!(counted.count.get() < 600, "{} evaluations", counted.count.get());
+    }
 }

@@ -1,8 +1,9 @@
 //! Statement 29 (section 4.1, theorem): `exp_h` is a local diffeomorphism; and where it is not, at conjugate points.
 
 use crate::common::over_motions;
-use contact_geom::VelocityPoint;
+use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{ChargedParticle, HarmonicOscillator, Pendulum};
+use contact_geom::{Lagrangian, Scalar, VelocityPoint};
 use exact_lagrangian::{ContactExponential, ExactError};
 
 /// Along random motions of every system.
@@ -26,22 +27,6 @@ fn conjugate_points_of_the_oscillator() {
             assert!((point.after - truth).abs() < 1e-13 * truth, "{point:?} for {truth}");
             assert!(point.smallest < 1e-13);
         }
-    }
-}
-
-/// A conjugate point of multiplicity two, where the determinant does not change its sign: the cyclotron period.
-#[test]
-fn conjugate_points_without_a_change_of_sign() {
-    let particle = ChargedParticle::default();
-    let Ok(exp) = ContactExponential::new(particle, 8.0) else { return };
-    let x = VelocityPoint::new([0.4, 0.1], [1.2, 0.3], 0.0);
-    let determinant = |h: f64| {
-        let d = ContactExponential::new(particle, h).ok().and_then(|e| e.differential(0.0, &x).ok());
-        d.map_or(f64::NAN, |d| d.v[(0, 0)] * d.v[(1, 1)] - d.v[(0, 1)] * d.v[(1, 0)])
-    };
-    for point in exp.conjugate_points(0.0, &x).unwrap_or_default() {
-        let (before, after) = (determinant(point.after - 1e-3), determinant(point.after + 1e-3));
-        assert!(determinant(point.after).abs() < 1e-12 && before.abs() > 1e-8 && after.abs() > 1e-8, "{point:?}");
     }
 }
 
@@ -95,4 +80,88 @@ fn branches() {
         }
     }
     assert!(found.iter().any(|m| m.conjugate.is_some()));
+}
+
+/// The derivatives of a motion at rest, whose values say nothing of their convergence.
+#[test]
+fn the_slope_of_a_motion_at_rest() {
+    for gamma in [0.0f64, -0.4] {
+        for h in [0.1, 1.0, 2.5] {
+            let w = (1.0 - gamma * gamma / 4.0).sqrt();
+            let slope = ContactExponential::new(HarmonicOscillator { gamma }, h)
+                .ok()
+                .and_then(|exp| exp.differential(0.0, &VelocityPoint::new([0.0], [0.0], 0.0)).ok())
+                .map_or(f64::NAN, |d| d.v[(0, 0)]);
+            let truth = (gamma * h / 2.0).exp() * (w * h).sin() / w;
+            assert!((slope - truth).abs() < 1e-14, "gamma = {gamma}, h = {h}: {slope} for {truth}");
+        }
+    }
+}
+
+/// No two branches are the same motion.
+#[test]
+fn branches_are_different() {
+    let pendulum = Pendulum { gamma: -0.05 };
+    let Ok(exp) = ContactExponential::new(pendulum, 8.0) else { return };
+    let Ok(y) = exp.at(0.0, &VelocityPoint::new([0.0], [1.0], 0.0)) else { return };
+    let guesses: Vec<_> = (-8..=8).map(|k| [0.24 * f64::from(k)].into()).collect();
+    let found = exp.branches(0.0, &y, &guesses).unwrap_or_default();
+    for (i, one) in found.iter().enumerate() {
+        for other in &found[..i] {
+            assert!((one.start.v - other.start.v).amax() > 1e-6, "{one:?} and {other:?}");
+        }
+    }
+}
+
+/// Conjugate points of multiplicity two, where the determinant does not change its sign: the half periods of a charged particle in
+/// a magnetic field and a harmonic well.
+#[test]
+fn double_conjugate_points() {
+    let particle = ChargedParticle::default();
+    let Ok(exp) = ContactExponential::new(particle, 8.0) else { return };
+    let found = exp.conjugate_points(0.0, &VelocityPoint::new([0.4, 0.1], [1.2, 0.3], 0.0)).unwrap_or_default();
+    // dq1/dv0 is a complex number times sin(w h), its square root that of the characteristic polynomial.
+    let ChargedParticle { b, k, gamma } = particle;
+    let w = 0.5 * (b * b + 4.0 * k - gamma * gamma).sqrt();
+    assert_eq!(found.len(), (8.0 * w / std::f64::consts::PI) as usize);
+    for (i, point) in found.iter().enumerate() {
+        let truth = (i + 1) as f64 * std::f64::consts::PI / w;
+        assert!((point.after - truth).abs() < 1e-13 * truth && point.smallest < 1e-13, "{point:?} for {truth}");
+    }
+}
+
+/// A spring that fades and turns into a repulsion.
+struct FadingSpring(f64);
+impl Lagrangian<1> for FadingSpring {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        (v[0] * v[0] + (t - self.0) * q[0] * q[0]) * 0.5
+    }
+}
+
+/// A minimum of the slope that is not zero is no conjugate point.
+#[test]
+fn a_minimum_that_is_not_zero_is_no_conjugate_point() {
+    let x = VelocityPoint::new([0.4], [1.2], 0.0);
+    // Its slope has a minimum of 0.55 near h = 3.
+    let Ok(exp) = ContactExponential::new(FadingSpring(2.2), 5.0) else { return };
+    assert_eq!(exp.conjugate_points(0.0, &x), Ok(vec![]));
+}
+
+/// A slow spring.
+struct Soft(f64);
+impl Lagrangian<1> for Soft {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        (v[0] * v[0] - q[0] * q[0] * (self.0 * self.0)) * 0.5
+    }
+}
+
+/// The unit of time does not matter.
+#[test]
+fn conjugate_points_in_any_unit_of_time() {
+    for w in [1e-6, 1e6] {
+        let Ok(exp) = ContactExponential::new(Soft(w), 7.0 / w) else { return };
+        let found = exp.conjugate_points(0.0, &VelocityPoint::new([0.4], [1.2 * w], 0.0)).unwrap_or_default();
+        assert_eq!(found.len(), 2);
+        assert!(found.iter().all(|c| c.smallest < 1e-13), "{found:?}");
+    }
 }

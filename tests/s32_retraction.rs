@@ -1,9 +1,10 @@
 //! Statement 32 (section 4.1): `R_h^(e-)` inverts `exp_h`, and `R_h^(e+) = phi_h o R_h^(e-)`.
 
 use crate::common::{AlongMotion, OverMotions, over_motions};
-use contact_geom::VelocityPoint;
+use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Pendulum, System, visit_catalogue};
-use exact_lagrangian::{ContactExponential, ExactError, Route, statements};
+use contact_geom::{DiscretePoint, Lagrangian, Scalar, VelocityPoint};
+use exact_lagrangian::{ContactExponential, ExactError, Route, herglotz_flow, statements};
 
 /// Along random motions of every system, from a guess on their branch.
 #[test]
@@ -72,5 +73,47 @@ fn routes() {
         let found = exp.at(0.0, &x).and_then(|y| exp.retract(0.0, &y)).map_or(f64::NAN, |r| r.start.v[0]);
         // dq1/dv0 is 1/50: 50 roundings of q.
         assert!((found - 1.2).abs() < 64.0 * 4.0 * f64::EPSILON, "gamma = {gamma}: {found}");
+    }
+}
+
+/// Uniform motion, and an oscillator under a small force.
+struct Tremor {
+    force: f64,
+    stiffness: f64,
+}
+impl Lagrangian<2> for Tremor {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
+        (v[0] * v[0] + v[1] * v[1] - q[1] * q[1] * self.stiffness) * 0.5 + q[1] * self.force
+    }
+}
+
+/// An iteration that contracts slowly, near a conjugate point, is not taken for one that has ended.
+#[test]
+fn a_slow_iteration_is_not_taken_for_one_that_has_ended() {
+    for force in [1e-6, 1e-8, 1e-10, 1e-11, 1e-12, 1e-13] {
+        for part in [0.5, 0.7, 0.8, 0.9, 0.95, 0.97] {
+            let w = std::f64::consts::PI * f64::sqrt(part);
+            let Ok(exp) = ContactExponential::new(Tremor { force, stiffness: w * w }, 1.0) else { unreachable!() };
+            let found = exp.retract(0.0, &DiscretePoint::new([0.0, 0.0], [1.0, 0.0], 0.0));
+            let off = found.map_or(f64::NAN, |r| (r.start.v[1] + force / w * (0.5 * w).tan()).abs());
+            assert!(off < 1e-13, "force {force:e}, {part} of the way to a conjugate point: {off:e}");
+        }
+    }
+}
+
+/// The end, the action and b of a retraction are those of the motion from its start, also after the last small change.
+#[test]
+fn the_end_belongs_to_the_start() {
+    let pendulum = Pendulum { gamma: -0.05 };
+    let Ok(exp) = ContactExponential::new(pendulum, 8.0) else { return };
+    let Ok(y) = exp.at(0.0, &VelocityPoint::new([0.0], [1.0], 0.3)) else { return };
+    for k in -8..=8 {
+        let Ok(found) = exp.retract_near(0.0, &y, &[0.24 * f64::from(k)].into()) else { continue };
+        let motion = herglotz_flow(&pendulum, 0.0, &found.start, 8.0);
+        let apart = motion.map_or(f64::NAN, |m| {
+            let end = (m.end.v - found.end.v).amax().max((m.end.z - found.end.z).abs());
+            end.max((m.action - found.action).abs()).max((m.b - found.b).abs())
+        });
+        assert!(apart < 1e-13, "guess {k}: {apart:e}");
     }
 }

@@ -1,10 +1,11 @@
 //! Statement 34 (section 4.2): `D1 L_h^e = -p0 e^b`, `D2 L_h^e = p1`, `Dz L_h^e = e^b - 1`; `sigma_d = e^b`.
 
 use crate::common::over_motions;
+use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, QuadraticInZ, System};
-use contact_geom::{DiscretePoint, Triple, VelocityPoint};
-use discrete_herglotz::DiscreteLagrangian;
-use exact_lagrangian::{ContactExponential, ExactLagrangian};
+use contact_geom::{DiscretePoint, Lagrangian, Scalar, Triple, VelocityPoint, legendre};
+use discrete_herglotz::{DiscreteLagrangian, Midpoint, Solver};
+use exact_lagrangian::{ContactExponential, ExactLagrangian, error_orders, statements as exact};
 
 /// First and second derivatives, against duals through flow and shooting, along random motions of every system.
 #[test]
@@ -63,4 +64,70 @@ fn sigma_under_strong_damping() {
     // The rounding of b = -50 is worth 32 units.
     let truth = (-50f64).exp();
     assert!((sigma - truth).abs() < 64.0 * f64::EPSILON * truth, "{sigma:e}");
+}
+
+/// A momentum that depends on time, as no system of the catalogue has: a mass that swells, and a velocity term that is driven.
+struct Swelling;
+impl Lagrangian<1> for Swelling {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        let (q, v) = (q[0], v[0]);
+        (t * 0.7).exp() * v * v * 0.5 + q * v * t.cos() * 0.4 - q * q * (t + 1.0) * 0.5 - z * (q * q + 0.3) * 0.2
+    }
+}
+impl System<1> for Swelling {
+    fn name(&self) -> &'static str {
+        "swelling"
+    }
+    fn initial(&self) -> VelocityPoint<1> {
+        VelocityPoint::new([0.8], [0.3], 0.1)
+    }
+    fn sample(&self, u: &[f64]) -> (f64, VelocityPoint<1>) {
+        let between = |u: f64| 2.0 * u - 1.0;
+        (u[3], VelocityPoint::new([between(u[0])], [between(u[1])], between(u[2])))
+    }
+}
+
+/// All statements of section 4 and the orders for it.
+#[test]
+fn a_momentum_that_depends_on_time() {
+    let (x, h) = (VelocityPoint::new([0.8], [0.3], 0.1), 0.4);
+    for t in [0.0, 0.6] {
+        for statement in exact::STATEMENTS {
+            let residual = exact::residual(statement, &Swelling, t, &x, h);
+            assert!(matches!(residual, Ok(Some(r)) if r < 1e-12), "statement {statement}, t = {t}: {residual:?}");
+        }
+        let composed = exact::composition(&Swelling, t, &x, (0.1, 0.2));
+        assert!(composed.as_ref().is_ok_and(|r| *r < 1e-12), "t = {t}: {composed:?}");
+        let orders = error_orders(&Swelling, |h| Midpoint::new(&Swelling, h), t, &x, 0.25);
+        let ok = orders.as_ref().is_ok_and(|o| {
+            let found =
+                [o.value.order - 3.0, o.legendre_minus.order - 2.0, o.legendre_plus.order - 2.0, o.flow.order - 3.0];
+            found.iter().all(|d| d.abs() < 0.15)
+        });
+        assert!(ok, "t = {t}: {orders:?}");
+    }
+}
+
+/// A step forth and back, with a momentum that depends on time: the state, the mean velocity and sigma return.
+#[test]
+fn forward_and_backward() {
+    let (x, h, t) = (VelocityPoint::new([0.8], [0.3], 0.1), 0.4, 0.3);
+    let Ok(ld) = ExactLagrangian::<_, 1>::new(Swelling, h) else { unreachable!() };
+    let (start, mut solver) = (legendre(&Swelling, t, &x), Solver::default());
+    let Ok(forward) = ld.forward(t, &start, &x.v, &mut solver) else { unreachable!() };
+    let Ok(back) = ld.backward(t, &forward.end, &forward.velocity, &mut solver) else { unreachable!() };
+    let apart = Triple::from(back.end).minus(start.into()).amax();
+    assert!(apart < 1e-14 && (back.velocity - forward.velocity).amax() < 1e-14, "{apart:e}");
+    assert!((back.sigma / forward.sigma - 1.0).abs() < 1e-14, "{} and {}", forward.sigma, back.sigma);
+}
+
+/// `Dz L_h^e` keeps its digits where it is small.
+#[test]
+fn dz_of_a_short_step() {
+    for h in [1e-3, 1e-5, 1e-7] {
+        let Ok(ld) = ExactLagrangian::<_, 1>::new(HarmonicOscillator { gamma: -0.3 }, h) else { unreachable!() };
+        let dz = ld.jet(0.0, &DiscretePoint::new([0.4], [0.4 + 1.2 * h], 0.3)).map_or(f64::NAN, |jet| jet.dz);
+        let truth = (-0.3 * h).exp_m1();
+        assert!((dz / truth - 1.0).abs() < 1e-14, "h = {h}: {dz:e} for {truth:e}");
+    }
 }

@@ -256,10 +256,12 @@ fn sweeps<const N: usize, T: Scalar>(
         if sweep > 2 && above_noise {
             contraction = contraction.max(ratio);
         }
-        let predicted = change * ratio <= 0.5 * accuracy;
+        // The first ratio compares with the change from a guess, and may be far below those that follow.
+        let expected = if sweep < 3 { ratio.max(1e-3) } else { ratio };
+        let predicted = change * expected <= 0.5 * accuracy;
         // After few sweeps a larger change may still be one that is on its way.
         let noise = if sweep < 6 { 16.0 } else { 4096.0 } * f64::EPSILON;
-        let stagnant = before.is_finite() && ratio >= 0.8 && change <= noise;
+        let stagnant = before.is_finite() && ratio >= 1.0 && change <= noise;
         let unresolved = !last && error > *accuracy && change <= 0.1 * error.sqrt();
         if predicted || stagnant || unresolved {
             let (mean, twice) = (Rate::sum(nodes, &g.b), Rate::sum(nodes, &g.end).a);
