@@ -176,15 +176,15 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
             y: SVector::from_fn(|i, _| at.v[i].re()),
             z: at.z.re(),
         };
-        // Below this the time does not move, or a singularity is closer than round-off.
-        if h.abs() <= 4.0 * f64::EPSILON * duration.abs() || t0 + done + h == t0 + done {
+        // A singularity is closer than round-off.
+        if h.abs() <= 4.0 * f64::EPSILON * duration.abs() {
             return Err(ExactError::OutsideDomain { t: t0 + done, reached: reached().into(), cause });
         }
         if panels == PANELS {
             return Err(ExactError::Unfinished { t: t0 + done, reached: reached().into() });
         }
         let problem = Problem { t: t0 + done, h, from: &at, end: None, accuracy };
-        match collocate(rates, &problem, guess, &mut at.v.clone_owned()) {
+        match collocate(rates, &problem, guess, &mut { at.v }) {
             Ok(panel) => {
                 evaluations += panel.evaluations;
                 if panel.error > accuracy {

@@ -73,6 +73,11 @@ pub struct Retraction<const N: usize> {
 /// The motion with its derivatives in the initial velocity.
 type Shot<const N: usize> = Motion<N, Dual<f64, SVector<f64, N>>>;
 
+/// The derivative `dq1/dv0` of a shot.
+fn slope<const N: usize>(shot: &Shot<N>) -> SMatrix<f64, N, N> {
+    SMatrix::from_fn(|i, j| shot.displacement[i].d[j])
+}
+
 /// A motion through both points, and the inverse of `dq1/dv0` there.
 struct Found<const N: usize> {
     retraction: Retraction<N>,
@@ -265,13 +270,27 @@ impl<L> ContactExponential<L> {
         const PARTS: u32 = 32;
         let (part, mut at) = (self.h / f64::from(PARTS), seeded(&found.start));
         for k in 0..PARTS {
-            let from = State { q: at.q, v: at.v, z: at.z, b: Dual::constant(0.0) };
-            at = integrate(&Herglotz(&self.lagrangian), t + f64::from(k) * part, &from, part, ROUGH)?.end;
+            at = self.shot(t + f64::from(k) * part, &at, part, ROUGH)?.end;
             if reverses(SMatrix::<f64, N, N>::from_fn(|i, j| at.q[i].d[j])) {
                 return Ok(Retraction { conjugate: Some(f64::from(k + 1) * part), ..found });
             }
         }
         Ok(found)
+    }
+
+    /// The motion with its derivatives in the initial velocity, to an accuracy.
+    fn shot<const N: usize>(
+        &self,
+        t: f64,
+        start: &VelocityPoint<N, Dual<f64, SVector<f64, N>>>,
+        h: f64,
+        accuracy: f64,
+    ) -> Result<Shot<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let from = State { q: start.q, v: start.v, z: start.z, b: Dual::constant(0.0) };
+        integrate(&Herglotz(&self.lagrangian), t, &from, h, accuracy)
     }
 
     /// The inverse of `dq1/dv0` along the motion from a start, to the accuracy of a guess; none where it is nearly singular, or the
@@ -280,11 +299,8 @@ impl<L> ContactExponential<L> {
     where
         L: Lagrangian<N>,
     {
-        let moving = seeded(start);
-        let from = State { q: moving.q, v: moving.v, z: moving.z, b: Dual::constant(0.0) };
-        let shot = integrate(&Herglotz(&self.lagrangian), t, &from, self.h, ROUGH).ok()?;
-        let slope = SMatrix::<f64, N, N>::from_fn(|i, j| shot.displacement[i].d[j]);
-        slope.try_inverse().filter(|inverse| smallest(inverse) > NEARLY * self.h)
+        let shot = self.shot(t, &seeded(start), self.h, ROUGH).ok()?;
+        slope(&shot).try_inverse().filter(|inverse| smallest(inverse) > NEARLY * self.h)
     }
 
     /// Newton's method on `exp_h`: to some digits first; the rest by collocation with the slope found, or else to the end.
@@ -300,7 +316,7 @@ impl<L> ContactExponential<L> {
         let rough = self.shoot(t, x, guess, self.h, ROUGH)?;
         let near = rough.retraction.start.v;
         let regular = smallest(&rough.inverse) > NEARLY * self.h;
-        if regular && let Some((found, _)) = self.by_collocation(t, x, &mut near.clone_owned(), &rough.inverse, 1.0)? {
+        if regular && let Some((found, _)) = self.by_collocation(t, x, &mut { near }, &rough.inverse, 1.0)? {
             // Still the motion that Newton's method has found, not another one.
             if (found.start.v - near).amax() <= ROUGH.sqrt() * near.amax() {
                 return Ok(Retraction { route: Route::Newton, ..found });
@@ -328,9 +344,7 @@ impl<L> ContactExponential<L> {
         let mut last = None;
         for _ in 0..ITERATIONS {
             let start = VelocityPoint { q: x.q0, v, z: x.z0 };
-            let moving = seeded(&start);
-            let from = State { q: moving.q, v: moving.v, z: moving.z, b: Dual::constant(0.0) };
-            let shot = match integrate(&Herglotz(&self.lagrangian), t, &from, h, accuracy) {
+            let shot = match self.shot(t, &seeded(&start), h, accuracy) {
                 Ok(shot) => shot,
                 Err(error) if last.is_none() => return Err(error),
                 Err(_) => {
@@ -340,7 +354,7 @@ impl<L> ContactExponential<L> {
                 }
             };
             let missed = shot.displacement.map(|d| d.re) - displacement;
-            let slope = SMatrix::<f64, N, N>::from_fn(|i, j| shot.displacement[i].d[j]);
+            let slope = slope(&shot);
             let residual = missed.amax();
             if residual > 2.0 * nearest && change.amax() > f64::EPSILON * v.amax() {
                 change *= 0.5;
