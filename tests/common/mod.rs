@@ -112,7 +112,7 @@ pub fn over_discretisations(statement: u32) -> usize {
     visitor.1
 }
 
-/// The bound on the residuals of section 4, in units of the condition of the motion: what the issue of exactness asks. They are
+/// The bound on the residuals of section 4, in units of the condition of the motion. They are
 /// some 1e-15; a wrong formula (a sign, a factor e^b) is off by h.
 pub const EXACT: f64 = 1e-12;
 
