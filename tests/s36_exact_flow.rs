@@ -3,7 +3,7 @@
 
 use crate::common::oracle::hamiltonian_motion;
 use crate::common::{AlongMotion, OverMotions, over_motions};
-use contact_geom::systems::{System, visit_catalogue};
+use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::{Triple, VelocityPoint};
 use discrete_herglotz::{FinalOnly, Flow, Status, legendre_minus, legendre_plus};
 use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow, statements};
@@ -43,33 +43,20 @@ fn against_the_contact_hamiltonian_flow() {
 #[test]
 fn fifty_steps() {
     struct Steps;
-    impl AlongMotion for Steps {
-        fn residual<const N: usize, S: System<N>>(
-            &mut self,
-            system: &S,
-            _t: f64,
-            _x: &VelocityPoint<N>,
-            _h: f64,
-        ) -> Result<f64, ExactError<N>> {
-            statements::follows_motion(system, system.initial_time(), &system.initial(), 0.05, 50)
-        }
-    }
-    struct Once(OverMotions<Steps>);
-    impl contact_geom::systems::SystemVisitor for Once {
+    impl SystemVisitor for Steps {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-            let (t, x) = (system.initial_time(), system.initial());
-            let residual = self.0.0.residual(system, t, &x, 0.05);
+            let residual = statements::follows_motion(system, system.initial_time(), &system.initial(), 0.05, 50);
             assert!(matches!(residual, Ok(r) if r < 1e-14), "{}: {residual:?}", system.name());
         }
     }
-    visit_catalogue(&mut Once(OverMotions(Steps)));
+    visit_catalogue(&mut Steps);
 }
 
 /// A run of `Flow`, as a user makes it, ends where the motion does, and sigma is `e^b` along it.
 #[test]
 fn a_run() {
     struct Run;
-    impl contact_geom::systems::SystemVisitor for Run {
+    impl SystemVisitor for Run {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
             let (t, x, h) = (system.initial_time(), system.initial(), 0.1);
             let Ok(ld) = ExactLagrangian::<_, N>::new(system, h) else { return };

@@ -175,18 +175,7 @@ pub fn over_motions(statement: u32) {
     visit_catalogue(&mut OverMotions(Statement(statement)));
 }
 
-/// The number of systems of the catalogue.
-pub fn systems() -> usize {
-    struct Count(usize);
-    impl SystemVisitor for Count {
-        fn visit<const N: usize, S: System<N>>(&mut self, _system: &S) {
-            self.0 += 1;
-        }
-    }
-    let mut count = Count(0);
-    visit_catalogue(&mut count);
-    count.0
-}
+pub use contact_geom::systems::catalogue_size as systems;
 
 /// The systems that declare a symmetry.
 pub const SYMMETRIC: usize = 8;

@@ -43,7 +43,7 @@ pub use legendre::{
     legendre_plus_inverse, sigma_d,
 };
 pub use momentum::{MomentumDecay, MomentumRow, discrete_momentum, discrete_symmetry_defect};
-pub use newton::ITERATION_LIMIT;
+pub use newton::{ITERATION_LIMIT, last_correction};
 pub use path::{DiscretePath, discrete_action};
 pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
 pub use rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};

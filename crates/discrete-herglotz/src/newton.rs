@@ -51,11 +51,11 @@ pub(crate) fn largest<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) ->
     largest
 }
 
-/// Whether the correction after this one is below round-off: convergence is quadratic, so from two corrections
-/// `before > now` the next is about `now^3 / before^2`.
+/// Whether the correction of a Newton iteration after this one is within a tolerance: convergence is quadratic, so from two
+/// corrections `before > now` the next is about `now^3 / before^2`.
 #[inline]
-fn last_correction(now: f64, before: f64, scale: f64) -> bool {
-    now == 0.0 || now * (now / before) * (now / before) <= f64::EPSILON * scale
+pub fn last_correction(now: f64, before: f64, tolerance: f64) -> bool {
+    now == 0.0 || now * (now / before) * (now / before) <= tolerance
 }
 
 /// Solves the step equations for `(u, z)` from a guess.
@@ -97,8 +97,8 @@ pub(crate) fn newton<const N: usize>(
         let u_size = largest(&u);
         let (size, z_size) = (largest(&change), z_change.abs());
         let predicted = last_size.is_finite()
-            && last_correction(size, last_size, u_size)
-            && last_correction(z_size, last_z_size, z.abs());
+            && last_correction(size, last_size, f64::EPSILON * u_size)
+            && last_correction(z_size, last_z_size, f64::EPSILON * z.abs());
         let round_off = 8.0 * f64::EPSILON;
         let exact = residual_size <= round_off * at.size && at.z_change.abs() <= round_off * z.abs();
         let stagnant = size >= 0.5 * last_size && size <= round_off * (resolution + u_size);

@@ -3,7 +3,7 @@
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscretePoint, Triple};
-use discrete_herglotz::{DiscreteLagrangian, ITERATION_LIMIT, StepError};
+use discrete_herglotz::{DiscreteLagrangian, ITERATION_LIMIT, StepError, last_correction};
 
 /// Two steps through a point `q1` in between, and the action's change over both.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,7 +71,7 @@ pub fn compose<const N: usize>(
         if !now.is_finite() {
             return Err(StepError::NonFinite);
         }
-        let predicted = before.is_finite() && now * (now / before) * (now / before) <= f64::EPSILON * size;
+        let predicted = before.is_finite() && last_correction(now, before, f64::EPSILON * size);
         if now == 0.0 || predicted || (now >= 0.5 * before && now <= 64.0 * f64::EPSILON * size) {
             return through(first, second, t, (ends, z0), &q1);
         }

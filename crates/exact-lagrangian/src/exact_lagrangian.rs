@@ -7,7 +7,9 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
     DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Triple, VelocityPoint,
 };
-use discrete_herglotz::{DiscreteLagrangian, ITERATION_LIMIT, InputError, Solver, StepError, Transition};
+use discrete_herglotz::{
+    DiscreteLagrangian, ITERATION_LIMIT, InputError, Solver, StepError, Transition, last_correction,
+};
 
 /// The exact discrete Lagrangian `L_h^e(q0, q1, z0) = int_0^h L o phi_t o R_h^(e-) dt = z(h) - z0`, the action along the motion from
 /// `q0` to `q1` in time h; paper, section 4.2.
@@ -58,6 +60,14 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
         }
     }
 
+    /// The same with no more than a jet needs: conjugate points are not looked for.
+    fn between(&self, t: f64, x: &DiscretePoint<N>) -> Result<Retraction<N>, ExactError<N>> {
+        match &self.near {
+            None => self.exponential.between(t, x),
+            Some(guess) => self.exponential.between_near(t, x, guess),
+        }
+    }
+
     /// The momentum `L_v` at a point of TQ x R.
     fn momentum(&self, t: f64, x: &VelocityPoint<N>) -> SVector<f64, N> {
         self.exponential.lagrangian.gradient(t, x).y
@@ -94,7 +104,7 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
             solve(&mut w, &mut change).map_err(|e| StepError::Singular { pivot: e.pivot })?;
             v += change;
             let now = change.amax();
-            let predicted = before.is_finite() && now * (now / before) * (now / before) <= f64::EPSILON * v.amax();
+            let predicted = before.is_finite() && last_correction(now, before, f64::EPSILON * v.amax());
             if now == 0.0 || predicted || (now >= 0.5 * before && now <= 64.0 * f64::EPSILON * v.amax()) {
                 return Ok(v);
             }
@@ -142,13 +152,13 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ExactLagrangian
     }
 
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
-        Ok(self.jet_of(t, &self.retract(t, x)?))
+        Ok(self.jet_of(t, &self.between(t, x)?))
     }
 
     /// From the derivatives of the motion in its start: with `dq1 = A dq0 + B dv0 + c dz0` the variation of `v0` is
     /// `B^-1 (dq1 - A dq0 - c dz0)`, and along it vary `p0`, `p1` and b.
     fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
-        let (retraction, h) = (self.retract(t, x)?, self.exponential.h);
+        let (retraction, h) = (self.between(t, x)?, self.exponential.h);
         let varied = self.exponential.varied(t, &retraction.start)?;
         let slope = SMatrix::<f64, N, N>::from_fn(|i, j| varied.displacement[i].d.y[j]);
         let inverse = slope.try_inverse().ok_or(StepError::ConjugatePoint { smallest: 0.0 })?;

@@ -8,7 +8,7 @@ use crate::{ContactExponential, ExactError, Motion, herglotz_flow};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscretePoint, Dual, Lagrangian, Scalar, VelocityPoint};
-use discrete_herglotz::InputError;
+use discrete_herglotz::{InputError, last_correction};
 
 /// The Newton iterations that a retraction may take.
 pub(crate) const ITERATIONS: u32 = 50;
@@ -108,6 +108,16 @@ impl<L> ContactExponential<L> {
     where
         L: Lagrangian<N>,
     {
+        let found = self.between(t, x)?;
+        if found.route == Route::Collocation && found.conjugate.is_none() { Ok(found) } else { self.marked(t, found) }
+    }
+
+    /// The retraction of two points without a search for the first conjugate point, which a jet does not need: `conjugate` is the
+    /// whole time where `dq1/dv0` is seen to reverse orientation.
+    pub(crate) fn between<const N: usize>(&self, t: f64, x: &DiscretePoint<N>) -> Result<Retraction<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
         x.check()?;
         let guess = (x.q1 - x.q0) / self.h;
         let (free, mut v0) = (SMatrix::from_diagonal_element(1.0 / self.h), guess);
@@ -125,15 +135,15 @@ impl<L> ContactExponential<L> {
                 None => self.by_collocation(t, x, &mut v0, &inverse, SLOPED)?,
             };
             if let Some((found, _)) = found {
-                return if reverses(inverse) { self.marked(t, found) } else { Ok(found) };
+                return Ok(Retraction { conjugate: reverses(inverse).then_some(self.h), ..found });
             }
         }
         let failed = match self.by_newton(t, x, &guess) {
-            Ok(found) => return self.marked(t, found),
+            Ok(found) => return Ok(found),
             Err(failed) => failed,
         };
         match self.lead(t, x) {
-            Some(found) => self.marked(t, Retraction { route: Route::Continuation, ..found.retraction }),
+            Some(found) => Ok(Retraction { route: Route::Continuation, ..found.retraction }),
             None if x.q0 == x.q1 => Err(InputError::EqualPoints.into()),
             None => Err(failed),
         }
@@ -152,8 +162,21 @@ impl<L> ContactExponential<L> {
     where
         L: Lagrangian<N>,
     {
+        self.marked(t, self.between_near(t, x, guess)?)
+    }
+
+    /// The same without a search for the first conjugate point.
+    pub(crate) fn between_near<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+        guess: &SVector<f64, N>,
+    ) -> Result<Retraction<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
         x.check()?;
-        self.marked(t, self.by_newton(t, x, guess)?)
+        self.by_newton(t, x, guess)
     }
 
     /// The different motions among those that Newton's method finds from these guesses of the initial velocity, in the order of
@@ -202,7 +225,7 @@ impl<L> ContactExponential<L> {
         let values = DiscretePoint { q0: x.q0.map(|c| c.re()), q1: x.q1.map(|c| c.re()), z0: x.z0.re() };
         let near = match guess {
             Some(guess) => *guess,
-            None => self.retract(t, &values)?.start.v,
+            None => self.between(t, &values)?.start.v,
         };
         let Found { retraction, inverse } = self.shoot(t, &values, &near, self.h, ACCURACY)?;
         let mut start = VelocityPoint { q: x.q0, v: retraction.start.v.map(T::from), z: x.z0 };
@@ -275,7 +298,7 @@ impl<L> ContactExponential<L> {
                 return Ok(Retraction { conjugate: Some(f64::from(k + 1) * part), ..found });
             }
         }
-        Ok(found)
+        Ok(Retraction { conjugate: None, ..found })
     }
 
     /// The motion with its derivatives in the initial velocity, to an accuracy.
@@ -370,7 +393,7 @@ impl<L> ContactExponential<L> {
             }
             let now = change.amax();
             // The next change is about now^3 / before^2 or, at round-off, what moves no position.
-            let predicted = now * (now / before) * (now / before) <= 2.0 * accuracy * size.max(now);
+            let predicted = last_correction(now, before, 2.0 * accuracy * size.max(now));
             let resolution = 2.0 * accuracy * (x.q0.amax().max(x.q1.amax()) / h.abs()).max(size);
             let stagnant = now >= 0.5 * before && now <= 64.0 * resolution;
             if residual == 0.0 || (before.is_finite() && (predicted || stagnant)) {

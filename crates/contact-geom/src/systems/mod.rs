@@ -101,6 +101,19 @@ pub fn visit_catalogue(visitor: &mut impl SystemVisitor) {
     visitor.visit(&Chain::<3>::free());
 }
 
+/// The number of systems that [`visit_catalogue`] visits.
+pub fn catalogue_size() -> usize {
+    struct Count(usize);
+    impl SystemVisitor for Count {
+        fn visit<const N: usize, S: System<N>>(&mut self, _system: &S) {
+            self.0 += 1;
+        }
+    }
+    let mut count = Count(0);
+    visit_catalogue(&mut count);
+    count.0
+}
+
 /// The point of the interval `[low, high]` at the fraction `u` of its length.
 fn between(low: f64, high: f64, u: f64) -> f64 {
     low + (high - low) * u

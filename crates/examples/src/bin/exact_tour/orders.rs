@@ -86,7 +86,6 @@ pub fn write(out: &Directory, checks: &mut Checks) -> Result<String, Failure> {
         "method", "|L_d - L_h^e|", "F-", "F+", "flow, one step"
     );
     let mut methods: Vec<&str> = rows.iter().map(|r| r.method).collect();
-    methods.dedup();
     methods.sort_unstable();
     methods.dedup();
     for method in methods {

@@ -1,7 +1,7 @@
 //! The statements of section 4 on every system, over six decades of the time step.
 
 use contact_examples::{Checks, Directory, Failure, Subject, fractions, number, title};
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use exact_lagrangian::{ContactExponential, ExactError, statements};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -23,16 +23,9 @@ pub struct Loss {
 
 /// Checks all statements; the residuals, and the losses at steps down to 1e-8.
 pub fn check() -> (Checks, Vec<Loss>) {
-    struct Counter(u64);
-    impl SystemVisitor for Counter {
-        fn visit<const N: usize, S: System<N>>(&mut self, _system: &S) {
-            self.0 += 1;
-        }
-    }
-    let mut counter = Counter(0);
-    visit_catalogue(&mut counter);
     let style = ProgressStyle::with_template("checking statements {bar:30} {pos}/{len}  {msg}");
-    let bar = ProgressBar::new(counter.0).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar =
+        ProgressBar::new(catalogue_size() as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let mut walk = Walk { checks: Checks::default(), losses: Vec::new(), bar: &bar };
     visit_catalogue(&mut walk);
     bar.finish_and_clear();

@@ -2,7 +2,7 @@
 
 use crate::{section2, section3, section5};
 use contact_examples::{Checks, Subject, fractions};
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// The time steps at which discretisations are checked.
@@ -10,9 +10,7 @@ pub const STEPS: [f64; 2] = [0.1, 0.01];
 
 /// Checks every statement on everything that it applies to.
 pub fn check_all() -> Checks {
-    let mut counter = Counter(0);
-    visit_catalogue(&mut counter);
-    let bar = ProgressBar::new(counter.0 + 1).with_style(
+    let bar = ProgressBar::new(catalogue_size() as u64 + 1).with_style(
         ProgressStyle::with_template("checking statements {bar:30} {pos}/{len}  {msg}")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
@@ -25,15 +23,6 @@ pub fn check_all() -> Checks {
     section5::check(&mut checks);
     bar.finish_and_clear();
     checks
-}
-
-/// Counts the systems.
-struct Counter(u64);
-
-impl SystemVisitor for Counter {
-    fn visit<const N: usize, S: System<N>>(&mut self, _system: &S) {
-        self.0 += 1;
-    }
 }
 
 /// Checks the statements of sections 2 and 3 on each system.
