@@ -33,6 +33,7 @@ mod run;
 mod solver;
 pub mod statements;
 mod step_equations;
+mod stepper;
 mod unknowns;
 
 pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};
@@ -49,5 +50,6 @@ pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
 pub use rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
 pub use run::{Every, FinalOnly, Flow, Observer, Record, Step};
 pub use solver::{CROSSOVER, Solver};
+pub use stepper::{Halt, Stepper};
 
 pub use contact_geom;

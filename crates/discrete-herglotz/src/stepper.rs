@@ -1,0 +1,38 @@
+//! A method at work on one motion.
+
+use crate::StepError;
+use contact_geom::PhasePoint;
+
+/// A method at work on one motion: its state, its workspace, and what it carries from one step to the next (guesses,
+/// compensations, a kick that two steps share).
+///
+/// This is what a run advances. A [`DiscreteLagrangian`](crate::DiscreteLagrangian) is a function, and a
+/// [`Flow`](crate::Flow) a stepper on it; methods that gain by more than a guess of the velocity have a stepper of their own.
+pub trait Stepper<const N: usize> {
+    /// Takes `steps` steps with nothing observed between them.
+    ///
+    /// # Errors
+    /// [`Halt`] where a step cannot be taken: the state is then that before it.
+    fn advance(&mut self, steps: usize) -> Result<(), Halt>;
+
+    /// The state `(q, p, z)`. Where the stepper was told that nobody wants the action, `z` stays what it was at the start.
+    fn state(&self) -> PhasePoint<N>;
+
+    /// The time of the state.
+    fn time(&self) -> f64;
+
+    /// `sigma_d` of the last step; 1 before the first.
+    fn sigma(&self) -> f64;
+
+    /// The evaluations of forces, or of gradients of L, since the start: one a point of R x TQ x R.
+    fn evaluations(&self) -> u64;
+}
+
+/// A run that ended before its last step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Halt {
+    /// The steps taken before.
+    pub taken: usize,
+    /// Why the next could not be taken.
+    pub cause: StepError,
+}
