@@ -24,18 +24,18 @@ pub trait Module<T>: Copy + PartialEq + Debug + 'static {
 }
 
 impl<T: Scalar, const N: usize> Module<T> for SVector<T, N> {
-    #[inline]
+    #[inline(always)]
     fn null() -> Self {
         SVector::from_array_storage(nalgebra::ArrayStorage([[T::zero(); N]]))
     }
-    #[inline]
+    #[inline(always)]
     fn each(mut self, mut f: impl FnMut(T) -> T) -> Self {
         for a in self.data.0[0].iter_mut() {
             *a = f(*a);
         }
         self
     }
-    #[inline]
+    #[inline(always)]
     fn join(mut self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
         for (a, b) in self.data.0[0].iter_mut().zip(other.data.0[0]) {
             *a = f(*a, b);
@@ -54,15 +54,15 @@ pub struct Border<const N: usize, T = f64> {
 }
 
 impl<T: Scalar, const N: usize> Module<T> for Border<N, T> {
-    #[inline]
+    #[inline(always)]
     fn null() -> Self {
         Border { x: Module::null(), z: T::zero() }
     }
-    #[inline]
+    #[inline(always)]
     fn each(self, mut f: impl FnMut(T) -> T) -> Self {
         Border { x: Module::each(self.x, &mut f), z: f(self.z) }
     }
-    #[inline]
+    #[inline(always)]
     fn join(self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
         Border { x: Module::join(self.x, other.x, &mut f), z: f(self.z, other.z) }
     }
@@ -90,27 +90,33 @@ pub struct Dual<T, D> {
 
 impl<T: Scalar, D: Module<T>> Dual<T, D> {
     /// A constant: its differential vanishes.
-    #[inline]
+    #[inline(always)]
     pub fn constant(re: T) -> Self {
         Dual { re, d: D::null() }
     }
 
     /// `f(x)` by the chain rule, given `f(re)` and `f'(re)`.
-    #[inline]
+    #[inline(always)]
     fn chain(self, value: T, slope: T) -> Self {
-        Dual { re: value, d: self.d.each(|a| a * slope) }
+        Dual {
+            re: value,
+            d: self.d.each(
+                #[inline(always)]
+                |a| a * slope,
+            ),
+        }
     }
 }
 
 impl<T: Scalar, D: Module<T>> From<f64> for Dual<T, D> {
-    #[inline]
+    #[inline(always)]
     fn from(x: f64) -> Self {
         Dual::constant(T::from(x))
     }
 }
 
 impl<T: Scalar, D: Module<T>> Zero for Dual<T, D> {
-    #[inline]
+    #[inline(always)]
     fn zero() -> Self {
         Dual::constant(T::zero())
     }
@@ -120,7 +126,7 @@ impl<T: Scalar, D: Module<T>> Zero for Dual<T, D> {
 }
 
 impl<T: Scalar, D: Module<T>> One for Dual<T, D> {
-    #[inline]
+    #[inline(always)]
     fn one() -> Self {
         Dual::constant(T::one())
     }
@@ -128,49 +134,83 @@ impl<T: Scalar, D: Module<T>> One for Dual<T, D> {
 
 impl<T: Scalar, D: Module<T>> Neg for Dual<T, D> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn neg(self) -> Self {
-        Dual { re: -self.re, d: self.d.each(|a| -a) }
+        Dual {
+            re: -self.re,
+            d: self.d.each(
+                #[inline(always)]
+                |a| -a,
+            ),
+        }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Add for Dual<T, D> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn add(self, b: Self) -> Self {
-        Dual { re: self.re + b.re, d: self.d.join(b.d, |x, y| x + y) }
+        Dual {
+            re: self.re + b.re,
+            d: self.d.join(
+                b.d,
+                #[inline(always)]
+                |x, y| x + y,
+            ),
+        }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Sub for Dual<T, D> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn sub(self, b: Self) -> Self {
-        Dual { re: self.re - b.re, d: self.d.join(b.d, |x, y| x - y) }
+        Dual {
+            re: self.re - b.re,
+            d: self.d.join(
+                b.d,
+                #[inline(always)]
+                |x, y| x - y,
+            ),
+        }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Mul for Dual<T, D> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn mul(self, b: Self) -> Self {
         let a = self.re;
-        Dual { re: a * b.re, d: self.d.join(b.d, |x, y| x * b.re + a * y) }
+        Dual {
+            re: a * b.re,
+            d: self.d.join(
+                b.d,
+                #[inline(always)]
+                |x, y| x * b.re + a * y,
+            ),
+        }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Div for Dual<T, D> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn div(self, b: Self) -> Self {
         let (quotient, inverse) = (self.re / b.re, b.re.recip());
-        Dual { re: quotient, d: self.d.join(b.d, |x, y| (x - quotient * y) * inverse) }
+        Dual {
+            re: quotient,
+            d: self.d.join(
+                b.d,
+                #[inline(always)]
+                |x, y| (x - quotient * y) * inverse,
+            ),
+        }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Add<f64> for Dual<T, D> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn add(self, b: f64) -> Self {
         Dual { re: self.re + b, d: self.d }
     }
@@ -178,7 +218,7 @@ impl<T: Scalar, D: Module<T>> Add<f64> for Dual<T, D> {
 
 impl<T: Scalar, D: Module<T>> Sub<f64> for Dual<T, D> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn sub(self, b: f64) -> Self {
         Dual { re: self.re - b, d: self.d }
     }
@@ -186,24 +226,36 @@ impl<T: Scalar, D: Module<T>> Sub<f64> for Dual<T, D> {
 
 impl<T: Scalar, D: Module<T>> Mul<f64> for Dual<T, D> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn mul(self, b: f64) -> Self {
-        Dual { re: self.re * b, d: self.d.each(|a| a * b) }
+        Dual {
+            re: self.re * b,
+            d: self.d.each(
+                #[inline(always)]
+                |a| a * b,
+            ),
+        }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Div<f64> for Dual<T, D> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn div(self, b: f64) -> Self {
-        Dual { re: self.re / b, d: self.d.each(|a| a / b) }
+        Dual {
+            re: self.re / b,
+            d: self.d.each(
+                #[inline(always)]
+                |a| a / b,
+            ),
+        }
     }
 }
 
 macro_rules! assign {
     ($($name:ident, $method:ident, $op:tt;)*) => {$(
         impl<T: Scalar, D: Module<T>> $name for Dual<T, D> {
-            #[inline]
+            #[inline(always)]
             fn $method(&mut self, b: Self) {
                 *self = *self $op b;
             }
@@ -218,30 +270,33 @@ assign! {
 }
 
 impl<T: Scalar, D: Module<T>> Scalar for Dual<T, D> {
-    #[inline]
+    #[inline(always)]
     fn re(self) -> f64 {
         self.re.re()
     }
-    #[inline]
+    #[inline(always)]
     fn extent(self) -> f64 {
         let mut largest = self.re.extent();
-        self.d.each(|a| {
-            largest = largest.max(a.extent());
-            a
-        });
+        self.d.each(
+            #[inline(always)]
+            |a| {
+                largest = largest.max(a.extent());
+                a
+            },
+        );
         largest
     }
-    #[inline]
+    #[inline(always)]
     fn recip(self) -> Self {
         let r = self.re.recip();
         self.chain(r, -(r * r))
     }
-    #[inline]
+    #[inline(always)]
     fn sqrt(self) -> Self {
         let r = self.re.sqrt();
         self.chain(r, r.recip() * 0.5)
     }
-    #[inline]
+    #[inline(always)]
     fn powi(self, n: i32) -> Self {
         if n == 0 {
             return Self::one();
@@ -249,53 +304,53 @@ impl<T: Scalar, D: Module<T>> Scalar for Dual<T, D> {
         let below = self.re.powi(n - 1);
         self.chain(below * self.re, below * f64::from(n))
     }
-    #[inline]
+    #[inline(always)]
     fn powf(self, a: f64) -> Self {
         let below = self.re.powf(a - 1.0);
         self.chain(below * self.re, below * a)
     }
-    #[inline]
+    #[inline(always)]
     fn exp(self) -> Self {
         let e = self.re.exp();
         self.chain(e, e)
     }
-    #[inline]
+    #[inline(always)]
     fn exp_m1(self) -> Self {
         let e = self.re.exp_m1();
         self.chain(e, e + 1.0)
     }
-    #[inline]
+    #[inline(always)]
     fn ln(self) -> Self {
         self.chain(self.re.ln(), self.re.recip())
     }
-    #[inline]
+    #[inline(always)]
     fn ln_1p(self) -> Self {
         self.chain(self.re.ln_1p(), (self.re + 1.0).recip())
     }
-    #[inline]
+    #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let (s, c) = self.re.sin_cos();
         (self.chain(s, c), self.chain(c, -s))
     }
-    #[inline]
+    #[inline(always)]
     fn sin_versine(self) -> (Self, Self) {
         let (s, v) = self.re.sin_versine();
         (self.chain(s, -v + 1.0), self.chain(v, s))
     }
-    #[inline]
+    #[inline(always)]
     fn sinh(self) -> Self {
         self.chain(self.re.sinh(), self.re.cosh())
     }
-    #[inline]
+    #[inline(always)]
     fn cosh(self) -> Self {
         self.chain(self.re.cosh(), self.re.sinh())
     }
-    #[inline]
+    #[inline(always)]
     fn tanh(self) -> Self {
         let t = self.re.tanh();
         self.chain(t, -(t * t) + 1.0)
     }
-    #[inline]
+    #[inline(always)]
     fn atan(self) -> Self {
         self.chain(self.re.atan(), (self.re * self.re + 1.0).recip())
     }

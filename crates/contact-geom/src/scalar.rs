@@ -36,7 +36,7 @@ pub trait Scalar:
     fn re(self) -> f64;
     /// The size of the value without its differentials, used only to choose pivots and to see that a number is finite.
     /// For lanes: of the lane that matters most to a pivot, the smallest.
-    #[inline]
+    #[inline(always)]
     fn modulus(self) -> f64 {
         self.re().abs()
     }
@@ -62,25 +62,29 @@ pub trait Scalar:
     /// Sine and cosine together, which costs hardly more than one of them.
     fn sin_cos(self) -> (Self, Self);
     /// The sine.
+    #[inline(always)]
     fn sin(self) -> Self {
         self.sin_cos().0
     }
     /// The cosine.
+    #[inline(always)]
     fn cos(self) -> Self {
         self.sin_cos().1
     }
     /// Sine and versine `1 - cos x` together, the latter without cancellation near 0: both through the half angle.
-    #[inline]
+    #[inline(always)]
     fn sin_versine(self) -> (Self, Self) {
         let (s, c) = (self * 0.5).sin_cos();
         let twice = s * 2.0;
         (twice * c, twice * s)
     }
     /// The versine `1 - cos x`, the height of a pendulum above its lowest point.
+    #[inline(always)]
     fn versine(self) -> Self {
         self.sin_versine().1
     }
     /// The tangent.
+    #[inline(always)]
     fn tan(self) -> Self {
         let (s, c) = self.sin_cos();
         s / c

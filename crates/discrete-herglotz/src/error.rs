@@ -12,6 +12,12 @@ pub enum InputError {
         /// The step that was passed.
         h: f64,
     },
+    /// A collocation method has no such number of stages.
+    #[error("{found} stages; contact Gauss collocation has from 1 to 16")]
+    Stages {
+        /// The number of stages that was passed.
+        found: usize,
+    },
     /// The configuration space has dimension 0.
     #[error("the configuration space has dimension 0; a Lagrangian needs at least one coordinate")]
     Dimension,

@@ -23,6 +23,8 @@
 mod discrete_lagrangian;
 mod error;
 mod flow;
+mod gauss;
+mod lanes;
 mod legendre;
 mod momentum;
 mod newton;
@@ -35,10 +37,12 @@ pub mod statements;
 mod step_equations;
 mod stepper;
 mod unknowns;
+mod verified;
 
 pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};
 pub use error::{InputError, Status, StepError};
 pub use flow::{HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian};
+pub use gauss::{Gauss, GaussRoute, GaussStepper};
 pub use legendre::{
     DiscreteRegularity, discrete_regularity, legendre_minus, legendre_minus_inverse, legendre_plus,
     legendre_plus_inverse, sigma_d,
@@ -51,5 +55,7 @@ pub use rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
 pub use run::{Every, FinalOnly, Flow, Observer, Record, Step};
 pub use solver::{CROSSOVER, Solver};
 pub use stepper::{Halt, Stepper};
+
+pub use verified::verified;
 
 pub use contact_geom;

@@ -1,0 +1,121 @@
+//! Coefficients of Gauss collocation, in double-double precision.
+
+use num_traits::{One, Zero};
+use qd::Quad;
+use std::array::from_fn;
+use std::sync::OnceLock;
+
+/// The largest number of stages.
+pub(crate) const MOST: usize = 16;
+
+/// Gauss collocation with `s` stages on `[0, 1]`.
+///
+/// In twice the working precision, because what a run multiplies with is computed from these once, and its rounding acts in
+/// the same direction in every step: see Hairer, McLachlan and Razakarivony, "Achieving Brouwer's law with implicit Runge-Kutta
+/// methods", BIT 48 (2008).
+pub(crate) struct Coefficients {
+    /// The nodes.
+    pub c: [Quad; MOST],
+    /// The weights.
+    pub b: [Quad; MOST],
+    /// The integrals of the Lagrange polynomials from 0 to each node.
+    pub a: [[Quad; MOST]; MOST],
+    /// The values at the next step's nodes of the polynomial through the values at this step's: `[i][j]` for node i.
+    pub ahead: [[f64; MOST]; MOST],
+}
+
+/// The Legendre polynomials `P_0(x) .. P_s(x)` on `[-1, 1]`.
+fn legendre(s: usize, x: Quad) -> [Quad; MOST + 1] {
+    let mut p = [Quad::one(); MOST + 1];
+    p[1] = x;
+    for k in 1..s {
+        let n = Quad::from(k as f64);
+        p[k + 1] = ((n + n + Quad::one()) * x * p[k] - n * p[k - 1]) / (n + Quad::one());
+    }
+    p
+}
+
+impl Coefficients {
+    /// The coefficients for a number of stages from 1 to 16, made once.
+    pub fn of(s: usize) -> &'static Coefficients {
+        static TABLES: [OnceLock<Box<Coefficients>>; MOST] = [const { OnceLock::new() }; MOST];
+        TABLES[s.clamp(1, MOST) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MOST))))
+    }
+
+    fn new(s: usize) -> Self {
+        let (one, half, n) = (Quad::one(), Quad::from(0.5), Quad::from(s as f64));
+        let nodes: [Quad; MOST] = from_fn(|i| {
+            if i >= s {
+                return Quad::zero();
+            }
+            // Tricomi's guess, then Newton: quadratic, so that six steps are more than enough for 30 digits.
+            let mut x = Quad::from(-(std::f64::consts::PI * (i as f64 + 0.75) / (s as f64 + 0.5)).cos());
+            for _ in 0..6 {
+                let p = legendre(s, x);
+                x = x - p[s] * (x * x - one) / (n * (x * p[s] - p[s - 1]));
+            }
+            x
+        });
+        let at = nodes.map(|x| legendre(s, x));
+        let odd = |k: usize| Quad::from((2 * k + 1) as f64);
+        let c = nodes.map(|x| (x + one) * half);
+        let b: [Quad; MOST] = from_fn(|j| {
+            let below = n * at[j][s - 1];
+            if j < s { (one - nodes[j] * nodes[j]) / (below * below) } else { Quad::zero() }
+        });
+        // The Lagrange polynomial of node j is b_j sum (2k+1) P_k(x_j) P_k, and the integral of P_k a difference of two.
+        let a = from_fn(|i| {
+            from_fn(|j| {
+                let rest = (1..s).fold(Quad::zero(), |sum, k| sum + at[j][k] * (at[i][k + 1] - at[i][k - 1]));
+                if i < s { b[j] * (c[i] + half * rest) } else { Quad::zero() }
+            })
+        });
+        let ahead = from_fn(|i| {
+            let p = legendre(s, nodes[i] + one + one);
+            from_fn(|j| {
+                let sum = (0..s).fold(Quad::zero(), |sum, k| sum + odd(k) * at[j][k] * p[k]);
+                if i < s { (b[j] * sum).0 } else { 0.0 }
+            })
+        });
+        Coefficients { c, b, a, ahead }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Weights integrate all polynomials of degree `2s - 1`, rows of the matrix those of degree `s - 1`, and the matrix is
+    /// symplectic, `b_i a_ij + b_j a_ji = b_i b_j`: all to double-double round-off, 1e-30 for a sum of up to sixteen terms.
+    #[test]
+    fn the_coefficients_are_those_of_gauss() {
+        let power = |x: Quad, k: usize| (0..k).fold(Quad::one(), |p, _| p * x);
+        let small = |x: Quad| x.0.abs() < 1e-30;
+        for s in 1..=MOST {
+            let g = Coefficients::of(s);
+            for k in 0..2 * s {
+                let sum = (0..s).fold(Quad::zero(), |sum, j| sum + g.b[j] * power(g.c[j], k));
+                assert!(small(sum - Quad::one() / Quad::from((k + 1) as f64)), "s = {s}, degree {k}");
+            }
+            for (i, k) in (0..s).flat_map(|i| (0..s).map(move |k| (i, k))) {
+                let sum = (0..s).fold(Quad::zero(), |sum, j| sum + g.a[i][j] * power(g.c[j], k));
+                assert!(small(sum - power(g.c[i], k + 1) / Quad::from((k + 1) as f64)), "s = {s}, row {i}, degree {k}");
+                assert!(small(g.b[i] * g.a[i][k] + g.b[k] * g.a[k][i] - g.b[i] * g.b[k]), "s = {s}: {i}, {k}");
+            }
+        }
+    }
+
+    /// Polynomials of degree `s - 1` are carried to the next step: to round-off times the size of the extrapolation's entries.
+    #[test]
+    fn extrapolation_is_that_of_the_polynomial() {
+        for s in 1..=MOST {
+            let g = Coefficients::of(s);
+            for i in 0..s {
+                let size: f64 = g.ahead[i].iter().map(|e| e.abs()).sum();
+                let sum: f64 = (0..s).map(|j| g.ahead[i][j] * g.c[j].0.powi(s as i32 - 1)).sum();
+                let expected = (1.0 + g.c[i].0).powi(s as i32 - 1);
+                assert!((sum - expected).abs() <= 4.0 * f64::EPSILON * (size + expected), "s = {s}, node {i}");
+            }
+        }
+    }
+}

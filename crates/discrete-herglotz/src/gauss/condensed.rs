@@ -1,0 +1,148 @@
+//! Contact Gauss collocation condensed to the positions, for constant mass and constant rate of the conformal factor.
+
+use super::coefficients::{Coefficients, MOST};
+use super::stages::{Exact, StageMap, Stages, Weights, padded, solve_exactly};
+use crate::InputError;
+use num_traits::{One, Zero};
+use qd::Quad;
+use std::array::from_fn;
+
+/// The step of `L = v.Mv/2 - V(t, q) + gamma z` in the accelerations `a_i = M^-1 L_q(t_i, Q_i)` alone: with the stages
+/// `rho_i` of the integrating factor, which depend on `gamma h` only,
+/// `Q = q0 + u v0 + B a`, `V_i = v0 / rho_i + (D a)_i`, and at the end `q1 = q0 + end_u v0 + end_b.a`,
+/// `v1 = v0 + grow v0 + end_v.a`, `z1 = z0 + grow z0 + end_v.(L - gamma z)`, `sigma_d = 1 + grow`.
+pub(super) struct Condensed {
+    pub s: usize,
+    /// `B`: from the accelerations to the positions.
+    pub b: [Exact; MOST],
+    /// `u`.
+    pub u: Exact,
+    /// `D`: from the accelerations to the velocities.
+    pub d: StageMap,
+    /// `1 / rho_i`.
+    pub inverse_rho: Stages,
+    /// The times of the stages after the step's start.
+    pub times: Stages,
+    /// `end_u`, head and tail.
+    pub end_u: [f64; 2],
+    pub end_b: Weights,
+    /// The same in double-double precision, and `D`, `1 / rho`, `end_u`, `grow` and `end_v` likewise.
+    pub exact: Box<ExactEnd>,
+    /// `sigma_d - 1`, head and tail.
+    pub grow: [f64; 2],
+    pub end_v: Weights,
+    /// From the stages of one step to those of the next.
+    pub ahead: StageMap,
+}
+
+/// The coefficients of a [`Condensed`] step that its linear case takes in double-double precision.
+pub(super) struct ExactEnd {
+    pub d: [Exact; MOST],
+    pub inverse_rho: Exact,
+    pub end_u: Quad,
+    pub end_b: Exact,
+    pub grow: Quad,
+    pub end_v: Exact,
+}
+
+impl Condensed {
+    /// # Errors
+    /// [`InputError::Sigma`] where a stage of the integrating factor, or its end, is not positive: the step is too long for
+    /// this rate.
+    pub fn new(s: usize, h: f64, gamma: f64) -> Result<Self, InputError> {
+        let g = Coefficients::of(s);
+        let (one, zero, step, rate) = (Quad::one(), Quad::zero(), Quad::from(h), Quad::from(gamma));
+        // (1 + gamma h A) rho = 1.
+        let mut rows: Vec<Vec<Quad>> = (0..s)
+            .map(|i| {
+                let entry = |j: usize| if i == j { one } else { zero } + rate * step * g.a[i][j];
+                (0..s).map(entry).chain([one]).collect()
+            })
+            .collect();
+        if !solve_exactly(&mut rows) {
+            return Err(InputError::Sigma { sigma: f64::NAN });
+        }
+        let rho: Exact = from_fn(|i| if i < s { rows[i][s] } else { one });
+        let sum = |f: &dyn Fn(usize) -> Quad| (0..s).fold(zero, |sum, j| sum + f(j));
+        let fallen = step * rate * sum(&|j| g.b[j] * rho[j]);
+        let end_rho = one - fallen;
+        let least = rho.iter().map(|r| r.0).fold(end_rho.0, f64::min);
+        // Not `<= 0`: that would let a NaN pass.
+        if !(least > 0.0 && least.is_finite()) {
+            return Err(InputError::Sigma { sigma: 1.0 / least });
+        }
+        let velocity: [Exact; MOST] = from_fn(|i| from_fn(|j| step * g.a[i][j] * rho[j] / rho[i]));
+        let b = from_fn(|i| from_fn(|k| step * sum(&|j| g.a[i][j] * velocity[j][k])));
+        let u = from_fn(|i| step * sum(&|j| g.a[i][j] / rho[j]));
+        let exact = ExactEnd {
+            d: velocity,
+            inverse_rho: rho.map(|r| one / r),
+            end_u: step * sum(&|j| g.b[j] / rho[j]),
+            end_b: from_fn(|k| if k < s { step * sum(&|j| g.b[j] * velocity[j][k]) } else { zero }),
+            grow: fallen / end_rho,
+            end_v: from_fn(|j| if j < s { step * g.b[j] * rho[j] / end_rho } else { zero }),
+        };
+        let pair = |x: Quad| [x.0, x.1];
+        Ok(Condensed {
+            s,
+            b,
+            u,
+            d: StageMap::from_exact(&velocity, s),
+            inverse_rho: padded(&exact.inverse_rho, s),
+            times: padded(&g.c.map(|c| c * step), s),
+            end_u: pair(exact.end_u),
+            end_b: Weights::new(&exact.end_b),
+            grow: pair(exact.grow),
+            end_v: Weights::new(&exact.end_v),
+            ahead: StageMap::new(&g.ahead, s),
+            exact: Box::new(exact),
+        })
+    }
+
+    /// The step's equations with the linear force `-kappa q` taken to the left: `Q = left q0 + left_u v0 + left_b (a + kappa Q)`.
+    ///
+    /// The solution is the same for every kappa; the iteration contracts the faster the nearer kappa is to the true slope of
+    /// the force. `None` where the matrix `1 + kappa B` is near to singular.
+    pub fn preconditioned(&self, kappa: f64) -> Option<Preconditioned> {
+        let s = self.s;
+        let mut rows: [[f64; MOST + 2]; MOST] = from_fn(|i| {
+            from_fn(|j| match j {
+                MOST => 1.0,
+                j if j > MOST => self.u[i].0,
+                j => self.b[i][j].0,
+            })
+        });
+        let mut left: [[f64; MOST]; MOST] =
+            from_fn(|i| from_fn(|j| if i == j { 1.0 } else { 0.0 } + kappa * self.b[i][j].0));
+        if kappa != 0.0 {
+            for k in 0..s {
+                if left[k][k].abs() < 1e-3 {
+                    return None;
+                }
+                let inverse = 1.0 / left[k][k];
+                left[k].iter_mut().for_each(|e| *e *= inverse);
+                rows[k].iter_mut().for_each(|e| *e *= inverse);
+                let (above, above_right) = (left[k], rows[k]);
+                for i in (0..s).filter(|i| *i != k) {
+                    let factor = left[i][k];
+                    left[i].iter_mut().zip(&above).for_each(|(e, a)| *e -= factor * a);
+                    rows[i].iter_mut().zip(&above_right).for_each(|(e, a)| *e -= factor * a);
+                }
+            }
+        }
+        Some(Preconditioned {
+            kappa,
+            q: Stages(from_fn(|i| rows[i.min(s - 1)][MOST])),
+            u: Stages(from_fn(|i| rows[i.min(s - 1)][MOST + 1])),
+            b: StageMap(from_fn(|j| Stages(from_fn(|i| rows[i.min(s - 1)][j])))),
+        })
+    }
+}
+
+/// See [`Condensed::preconditioned`].
+pub(super) struct Preconditioned {
+    pub kappa: f64,
+    pub q: Stages,
+    pub u: Stages,
+    pub b: StageMap,
+}

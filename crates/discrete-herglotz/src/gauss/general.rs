@@ -1,0 +1,304 @@
+//! Steps of contact Gauss collocation for every regular Lagrangian.
+
+use super::coefficients::{Coefficients, MOST};
+use super::separable::Compensated;
+use super::stages::{StageMap, Stages, Weights, blocks, padded};
+use super::sweeps::{Progress, Sweeps};
+use crate::lanes::Lanes;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, linear, seed};
+use pulp::Simd;
+use qd::Quad;
+
+/// The products of the coefficients with the step.
+pub(super) struct Table {
+    pub s: usize,
+    /// `h A`.
+    pub a: StageMap,
+    /// `h b`.
+    pub b: Weights,
+    /// The times of the stages after the step's start.
+    pub times: Stages,
+    /// From the stages of one step to those of the next.
+    pub ahead: StageMap,
+}
+
+impl Table {
+    pub fn new(s: usize, h: f64) -> Self {
+        let (g, step) = (Coefficients::of(s), Quad::from(h));
+        Table {
+            s,
+            a: StageMap::from_exact(&g.a.map(|row| row.map(|e| step * e)), s),
+            b: Weights::new(&std::array::from_fn(|j| if j < s { step * g.b[j] } else { Quad::from(0.0) })),
+            times: padded(&g.c.map(|c| step * c), s),
+            ahead: StageMap::new(&g.ahead, s),
+        }
+    }
+}
+
+/// How velocities are found from momenta.
+pub(super) enum Mass<const N: usize> {
+    /// `W^-1`, the same everywhere.
+    Constant(SMatrix<f64, N, N>),
+    /// `W^-1` at the stages, taken anew in each step.
+    Stages(Box<[[Stages; N]; N]>),
+}
+
+/// The state and the workspace of the general step.
+///
+/// The unknowns are the velocities V, the actions Z and the integrating factors rho of the stages:
+/// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`. A sweep takes the right-hand sides
+/// from the gradients of L before, and the velocities from the momenta by `W^-1`.
+pub(super) struct General<'a, L, const N: usize> {
+    pub lagrangian: &'a L,
+    pub table: Table,
+    pub mass: Mass<N>,
+    pub q: [Compensated; N],
+    pub p: [Compensated; N],
+    pub z: Compensated,
+    /// The stages: velocities, `L_v`, `rho L_q`, and `L`, `rho L_z`, rho, Z.
+    pub v: [Stages; N],
+    l_v: [Stages; N],
+    pub force: [Stages; N],
+    pub l: Stages,
+    pub rate: Stages,
+    rho: Stages,
+    z_stages: Stages,
+    x: [Stages; N],
+    /// `1 - rho` at the end of the last step.
+    pub fallen: f64,
+    warm: bool,
+    pub evaluations: u64,
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
+    /// From a state with a velocity that belongs to it, or a guess of it.
+    pub fn new(lagrangian: &'a L, table: Table, mass: Mass<N>, state: &PhasePoint<N>, v: &SVector<f64, N>) -> Self {
+        let mut general = General {
+            lagrangian,
+            table,
+            mass,
+            q: [0.0.into(); N],
+            p: [0.0.into(); N],
+            z: 0.0.into(),
+            v: [Stages::ZERO; N],
+            l_v: [Stages::ZERO; N],
+            force: [Stages::ZERO; N],
+            l: Stages::ZERO,
+            rate: Stages::ZERO,
+            rho: Stages::ZERO,
+            z_stages: Stages::ZERO,
+            x: [Stages::ZERO; N],
+            fallen: 0.0,
+            warm: false,
+            evaluations: 0,
+        };
+        general.restart(state, v);
+        general
+    }
+
+    /// Goes on from another state with its velocity, without what was carried.
+    pub fn restart(&mut self, state: &PhasePoint<N>, v: &SVector<f64, N>) {
+        self.q = std::array::from_fn(|i| state.q[i].into());
+        self.p = std::array::from_fn(|i| state.p[i].into());
+        self.z = state.z.into();
+        self.v = std::array::from_fn(|i| Stages([v[i]; MOST]));
+        self.warm = false;
+    }
+
+    /// The point of TQ x R at a block of stages.
+    #[inline(always)]
+    fn point<S: Simd>(&self, r: usize) -> VelocityPoint<N, Lanes<S>> {
+        VelocityPoint {
+            q: SVector::from_fn(|d, _| self.x[d].block(r)),
+            v: SVector::from_fn(|d, _| self.v[d].block(r)),
+            z: self.z_stages.block(r),
+        }
+    }
+
+    /// Evaluates L and its gradient at the stages.
+    #[inline(always)]
+    fn evaluate<S: Simd>(&mut self, t: f64) {
+        for r in 0..blocks::<S>(self.table.s) {
+            let x = seed(&Triple::from(self.point::<S>(r)));
+            let Dual { re, d } = self.lagrangian.along(self.table.times.block::<S>(r) + t, &x.into());
+            let rho = self.rho.block::<S>(r);
+            self.l.set(r, re);
+            self.rate.set(r, rho * d.z);
+            for i in 0..N {
+                self.force[i].set(r, rho * d.x[i]);
+                self.l_v[i].set(r, d.y[i]);
+            }
+        }
+        self.evaluations += self.table.s as u64;
+    }
+
+    /// Inverts W at the stages; `false` where it is singular.
+    #[inline(always)]
+    fn invert_mass<S: Simd>(&mut self, t: f64) -> bool {
+        if matches!(self.mass, Mass::Constant(_)) {
+            return true;
+        }
+        let mut inverse: [[Stages; N]; N] = [[Stages::ZERO; N]; N];
+        for r in 0..blocks::<S>(self.table.s) {
+            type Along<S, const N: usize> = Dual<Lanes<S>, SVector<Lanes<S>, N>>;
+            let x = self.point::<S>(r);
+            let still = Dual::<Along<S, N>, SVector<Along<S, N>, N>>::constant;
+            let mut y = VelocityPoint {
+                q: x.q.map(|q| still(Dual::constant(q))),
+                v: x.v.map(|v| still(Dual::constant(v))),
+                z: still(Dual::constant(x.z)),
+            };
+            for i in 0..N {
+                y.v[i].re.d[i] = Lanes::splat(1.0);
+                y.v[i].d[i] = Dual::constant(Lanes::splat(1.0));
+            }
+            let p = self.lagrangian.along(Dual::constant(self.table.times.block::<S>(r) + t), &y).d;
+            let w = SMatrix::<Lanes<S>, N, N>::from_fn(|i, j| p[i].d[j]);
+            for j in 0..N {
+                let mut column = SVector::<Lanes<S>, N>::from_fn(|i, _| Lanes::splat(if i == j { 1.0 } else { 0.0 }));
+                if linear::solve(&mut w.clone(), &mut column).is_err() {
+                    return false;
+                }
+                for i in 0..N {
+                    inverse[i][j].set(r, column[i]);
+                }
+            }
+        }
+        if let Mass::Stages(stored) = &mut self.mass {
+            **stored = inverse;
+        }
+        true
+    }
+
+    /// The positions and the actions of the stages from their velocities and Lagrangians.
+    #[inline(always)]
+    fn place<S: Simd>(&mut self) {
+        let (table, s) = (&self.table, self.table.s);
+        for d in 0..N {
+            let q = Lanes::<S>::splat(self.q[d].value);
+            table.a.apply(&self.v[d], s, &mut self.x[d], |_| q);
+        }
+        let z = Lanes::<S>::splat(self.z.value);
+        table.a.apply(&self.l, s, &mut self.z_stages, |_| z);
+    }
+
+    /// The guesses of a step: the last one's polynomials carried on.
+    #[inline(always)]
+    fn carry<S: Simd>(&mut self) {
+        let s = self.table.s;
+        let renewed = 1.0 / (1.0 - self.fallen);
+        let same = self.v.iter_mut().chain(&mut self.l_v).chain([&mut self.l]).map(|x| (x, 1.0));
+        // rho starts from 1 again.
+        let scaled = self.force.iter_mut().chain([&mut self.rate]).map(|x| (x, renewed));
+        for (x, factor) in same.chain(scaled) {
+            let before = *x;
+            self.table.ahead.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
+            for r in 0..blocks::<S>(s) {
+                x.set(r, x.block::<S>(r) * factor);
+            }
+        }
+    }
+
+    /// Takes one step from the time `t`; on failure the state is unchanged.
+    #[inline(always)]
+    pub fn step<S: Simd>(&mut self, t: f64) -> Progress {
+        // Without a step before, from a motion of constant velocity.
+        let mut cold = !self.warm;
+        if self.warm {
+            self.carry::<S>();
+        } else {
+            self.l = Stages::ZERO;
+            self.rho = Stages([1.0; MOST]);
+        }
+        self.warm = false;
+        self.place::<S>();
+        if !self.invert_mass::<S>(t) {
+            return Progress::NonFinite;
+        }
+        let mut sweeps = Sweeps::default();
+        // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
+        loop {
+            let change = if cold { f64::INFINITY } else { self.sweep::<S>() };
+            self.evaluate::<S>(t);
+            if cold {
+                cold = false;
+                continue;
+            }
+            match sweeps.judge(change, 1.0) {
+                Progress::Going => {}
+                Progress::Done => return self.finish::<S>(),
+                refused => return refused,
+            }
+        }
+    }
+
+    /// New velocities, positions, actions and factors of the stages; returns the largest change, each in units of the
+    /// largest of its kind.
+    #[inline(always)]
+    fn sweep<S: Simd>(&mut self) -> f64 {
+        let s = self.table.s;
+        let m = blocks::<S>(s);
+        let zero = Lanes::<S>::splat(0.0);
+        let (mut falling, mut impulses) = (Stages::ZERO, [Stages::ZERO; N]);
+        self.table.a.apply(&self.rate, s, &mut falling, |_| zero);
+        for d in 0..N {
+            let p = Lanes::<S>::splat(self.p[d].value);
+            self.table.a.apply(&self.force[d], s, &mut impulses[d], |_| p);
+        }
+        let (mut dv, mut sv, mut dr) = (zero, zero, zero);
+        for r in 0..m {
+            let rho = Lanes::<S>::splat(1.0) - falling.block(r);
+            dr = dr.max((rho - self.rho.block(r)).abs());
+            self.rho.set(r, rho);
+            let inverse = rho.recip();
+            let excess =
+                SVector::<Lanes<S>, N>::from_fn(|d, _| impulses[d].block::<S>(r) * inverse - self.l_v[d].block(r));
+            for i in 0..N {
+                let change = (0..N).fold(zero, |sum, j| {
+                    let entry = match &self.mass {
+                        Mass::Constant(w) => Lanes::splat(w[(i, j)]),
+                        Mass::Stages(w) => w[i][j].block(r),
+                    };
+                    entry.mul_add(excess[j], sum)
+                });
+                let v = self.v[i].block::<S>(r) + change;
+                dv = dv.max(change.abs());
+                sv = sv.max(v.abs());
+                self.v[i].set(r, v);
+            }
+        }
+        let before = self.z_stages;
+        self.place::<S>();
+        let (mut dz, mut sz) = (zero, zero);
+        for r in 0..m {
+            let z = self.z_stages.block::<S>(r);
+            dz = dz.max((z - before.block(r)).abs());
+            sz = sz.max(z.abs());
+        }
+        let relative = |change: f64, size: f64| if change > 0.0 { change / size } else { change };
+        let change = relative(dv.largest(), sv.largest()).max(dr.largest());
+        let of_action = relative(dz.largest(), sz.largest());
+        // `f64::max` would hide a NaN.
+        if of_action > change || of_action.is_nan() { of_action } else { change }
+    }
+
+    /// The end of the step from its stages.
+    #[inline(always)]
+    fn finish<S: Simd>(&mut self) -> Progress {
+        let (b, s) = (&self.table.b, self.table.s);
+        let fallen = b.sum::<S>(&self.rate, s);
+        if !(fallen < 1.0) {
+            return Progress::SigmaVanished { sigma: 1.0 / (1.0 - fallen) };
+        }
+        for d in 0..N {
+            self.q[d].add(b.sum::<S>(&self.v[d], s));
+            let p = self.p[d].value;
+            self.p[d].add((p * fallen + b.sum::<S>(&self.force[d], s)) / (1.0 - fallen));
+        }
+        self.z.add(b.sum::<S>(&self.l, s));
+        self.fallen = fallen;
+        self.warm = true;
+        Progress::Done
+    }
+}

@@ -1,0 +1,173 @@
+//! Steps of contact Gauss collocation for a linear motion: one matrix, made once.
+
+use super::condensed::Condensed;
+use super::separable::Compensated;
+use super::stages::solve_exactly;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Hessian, Lagrangian, VelocityPoint};
+use num_traits::{One, Zero};
+use qd::Quad;
+
+/// A matrix with the part that one double leaves out: in a product that is repeated in every step the rounding of the
+/// entries adds up, that of the product does not.
+#[derive(Clone, Copy)]
+struct Twofold<const N: usize> {
+    head: SMatrix<f64, N, N>,
+    tail: SMatrix<f64, N, N>,
+}
+
+impl<const N: usize> Twofold<N> {
+    fn from_fn(f: impl Fn(usize, usize) -> Quad) -> Self {
+        Twofold { head: SMatrix::from_fn(|i, j| f(i, j).0), tail: SMatrix::from_fn(|i, j| f(i, j).1) }
+    }
+
+    #[inline(always)]
+    fn row(&self, i: usize, x: &[f64; N]) -> [f64; 2] {
+        let (mut head, mut tail) = (0.0, 0.0);
+        for j in 0..N {
+            head += self.head[(i, j)] * x[j];
+            tail += self.tail[(i, j)] * x[j];
+        }
+        [head, tail]
+    }
+}
+
+/// The change of the action, a polynomial of degree two in (q, v), beside `grow z`.
+struct Action<const N: usize> {
+    qq: SMatrix<f64, N, N>,
+    qv: SMatrix<f64, N, N>,
+    vv: SMatrix<f64, N, N>,
+    q: SVector<f64, N>,
+    v: SVector<f64, N>,
+    constant: f64,
+}
+
+/// The state of a linear motion and the affine map that advances it, as changes: `q1 - q0`, `v1 - v0`.
+pub(super) struct Linear<const N: usize> {
+    qq: Twofold<N>,
+    qv: Twofold<N>,
+    vq: Twofold<N>,
+    vv: Twofold<N>,
+    shift_q: SVector<f64, N>,
+    shift_v: SVector<f64, N>,
+    grow: [f64; 2],
+    action: Option<Action<N>>,
+    pub q: [Compensated; N],
+    pub v: [Compensated; N],
+    pub z: Compensated,
+}
+
+impl<const N: usize> Linear<N> {
+    /// For `a = M^-1 L_q = -K q + f`; `None` where the stage equations have no solution.
+    pub fn new<L: Lagrangian<N>>(
+        lagrangian: &L,
+        table: &Condensed,
+        inverse_mass: &SMatrix<f64, N, N>,
+        t: f64,
+        start: &VelocityPoint<N>,
+        wants_z: bool,
+    ) -> Option<Self> {
+        let (s, zero, one) = (table.s, Quad::zero(), Quad::one());
+        let origin = VelocityPoint::new([0.0; N], [0.0; N], 0.0);
+        let Hessian { qq, qv, vv, .. } = lagrangian.hessian(t, start);
+        let at_origin = lagrangian.gradient(t, &origin);
+        let (slope, constant) = (inverse_mass * qq, inverse_mass * at_origin.x);
+        let unit = |d: usize, e: usize, x: Quad| if d == e { x } else { zero };
+        // The stages' accelerations: rows (i, d), a_id - sum slope B a = slope (q0 + u v0) + f; as right-hand sides the unit
+        // vectors of q0 and v0, and f.
+        let sides = 2 * N + 1;
+        let mut rows: Vec<Vec<Quad>> = (0..s * N)
+            .map(|row| {
+                let (i, d) = (row / N, row % N);
+                let left = (0..s * N).map(|column| {
+                    let (k, e) = (column / N, column % N);
+                    unit(row, column, one) - Quad::from(slope[(d, e)]) * table.b[i][k]
+                });
+                let right = (0..sides).map(|side| match side {
+                    side if side < N => Quad::from(slope[(d, side)]),
+                    side if side < 2 * N => Quad::from(slope[(d, side - N)]) * table.u[i],
+                    _ => Quad::from(constant[d]),
+                });
+                left.chain(right).collect()
+            })
+            .collect();
+        if !solve_exactly(&mut rows) {
+            return None;
+        }
+        let a = |i: usize, d: usize, side: usize| rows[i * N + d][s * N + side];
+        let exact = &table.exact;
+        let sum = |w: &[Quad], d: usize, side: usize| (0..s).fold(zero, |sum, j| sum + w[j] * a(j, d, side));
+        let action = wants_z.then(|| {
+            // The stages as affine functions of (q0, v0, 1), and the sum of L over them.
+            let position = |i: usize, d: usize, side: usize| {
+                unit(side, d, one) + unit(side, N + d, table.u[i]) + sum(&table.b[i], d, side)
+            };
+            let velocity =
+                |i: usize, d: usize, side: usize| unit(side, N + d, exact.inverse_rho[i]) + sum(&exact.d[i], d, side);
+            let rest = lagrangian.value(t, &origin.q, &origin.v, 0.0);
+            let form = |a: usize, b: usize| {
+                (0..s).fold(0.0, |total, i| {
+                    let x = |side: usize| SVector::<f64, N>::from_fn(|d, _| position(i, d, side).0);
+                    let y = |side: usize| SVector::<f64, N>::from_fn(|d, _| velocity(i, d, side).0);
+                    let (xa, xb, ya, yb) = (x(a), x(b), y(a), y(b));
+                    let second = xa.dot(&(qq * xb)) + ya.dot(&(vv * yb)) + xa.dot(&(qv * yb)) + xb.dot(&(qv * ya));
+                    let first = |side: usize| at_origin.x.dot(&x(side)) + at_origin.y.dot(&y(side));
+                    let last = 2 * N;
+                    let linear = if b == last { first(a) } else { 0.0 };
+                    let (half, once) = if a == last { (0.5, rest) } else { (if b == last { 1.0 } else { 0.5 }, 0.0) };
+                    total + exact.end_v[i].0 * (half * second + linear + once)
+                })
+            };
+            Action {
+                qq: SMatrix::from_fn(|a, b| form(a, b)),
+                qv: SMatrix::from_fn(|a, b| 2.0 * form(a, N + b)),
+                vv: SMatrix::from_fn(|a, b| form(N + a, N + b)),
+                q: SVector::from_fn(|a, _| form(a, 2 * N)),
+                v: SVector::from_fn(|a, _| form(N + a, 2 * N)),
+                constant: form(2 * N, 2 * N),
+            }
+        });
+        Some(Linear {
+            qq: Twofold::from_fn(|d, e| sum(&exact.end_b, d, e)),
+            qv: Twofold::from_fn(|d, e| unit(d, e, exact.end_u) + sum(&exact.end_b, d, N + e)),
+            vq: Twofold::from_fn(|d, e| sum(&exact.end_v, d, e)),
+            vv: Twofold::from_fn(|d, e| unit(d, e, exact.grow) + sum(&exact.end_v, d, N + e)),
+            shift_q: SVector::from_fn(|d, _| sum(&exact.end_b, d, 2 * N).0),
+            shift_v: SVector::from_fn(|d, _| sum(&exact.end_v, d, 2 * N).0),
+            grow: table.grow,
+            action,
+            q: std::array::from_fn(|i| start.q[i].into()),
+            v: std::array::from_fn(|i| start.v[i].into()),
+            z: start.z.into(),
+        })
+    }
+
+    /// `sigma_d`.
+    pub fn sigma(&self) -> f64 {
+        1.0 + self.grow[0]
+    }
+
+    /// Takes one step.
+    #[inline(always)]
+    pub fn step(&mut self) {
+        let (q, v) = (self.q.map(|q| q.value), self.v.map(|v| v.value));
+        if let Some(action) = &self.action {
+            let mut change = action.constant + self.grow[0] * self.z.value;
+            for i in 0..N {
+                let (mut of_q, mut of_v) = (action.q[i], action.v[i]);
+                for j in 0..N {
+                    of_q += action.qq[(i, j)] * q[j] + action.qv[(i, j)] * v[j];
+                    of_v += action.vv[(i, j)] * v[j];
+                }
+                change += of_q * q[i] + of_v * v[i];
+            }
+            self.z.add(change + self.grow[1] * self.z.value);
+        }
+        for i in 0..N {
+            let ([a, a_tail], [b, b_tail]) = (self.qq.row(i, &q), self.qv.row(i, &v));
+            self.q[i].add((a_tail + b_tail + self.shift_q[i]) + (a + b));
+            let ([a, a_tail], [b, b_tail]) = (self.vq.row(i, &q), self.vv.row(i, &v));
+            self.v[i].add((a_tail + b_tail + self.shift_v[i]) + (a + b));
+        }
+    }
+}

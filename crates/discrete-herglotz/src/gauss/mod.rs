@@ -1,0 +1,206 @@
+//! Contact Gauss collocation.
+
+mod coefficients;
+mod condensed;
+mod general;
+mod linear;
+mod separable;
+mod stage_equations;
+mod stages;
+mod stepper;
+mod sweeps;
+
+pub use stepper::{GaussRoute, GaussStepper};
+
+use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
+use coefficients::MOST;
+use contact_geom::nalgebra::{DMatrix, DVector, SVector};
+use contact_geom::{DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar};
+use stage_equations::{Given, Products, StageEquations, Unknowns};
+
+/// Contact Gauss collocation with `s` stages, of order `2s`, for every regular Lagrangian: the discrete Lagrangian
+/// `L_d(q0, q1, z0) = z1 - z0` of the stage equations
+///
+/// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`,
+///
+/// whose sums with `hb` end the step: `q1 = q0 + hb.V`, `p1 = (p0 + hb.(rho L_q)) / rho1`, `sigma_d = 1 / rho1`.
+///
+/// `(rho L_v)' = rho L_q` with `rho' = -rho L_z` is Herglotz' equation, and the method is Gauss collocation of the symplectified
+/// motion, reduced again; so the flow is conformally contact up to round-off. Symmetric. Its steps as a
+/// [`DiscreteLagrangian`] solve the stages by Newton's method from a constant velocity; [`stepper`](Self::stepper) makes the
+/// fast ones.
+///
+/// ```
+/// use contact_geom::{PhasePoint, systems::DoublePendulum};
+/// use discrete_herglotz::{Gauss, Stepper};
+/// let gauss = Gauss::new(DoublePendulum::default(), 8, 0.1)?;
+/// let mut run = gauss.stepper(0.0, PhasePoint::new([1.0, 0.5], [0.0, 0.0], 0.0), [0.0, 0.0].into())?;
+/// run.advance(100).map_err(|halt| discrete_herglotz::InputError::FirstStep(halt.cause))?;
+/// println!("t = {}: {:?}", run.time(), run.state());
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+pub struct Gauss<L> {
+    lagrangian: L,
+    forward: Products,
+    backward: Products,
+}
+
+impl<L> Gauss<L> {
+    /// The largest number of stages.
+    pub const STAGES: usize = MOST;
+
+    /// The method with `stages` from 1 to 16 and the time step `h`.
+    ///
+    /// # Errors
+    /// [`InputError::Stages`], [`InputError::Step`], [`InputError::Dimension`].
+    pub fn new<const N: usize>(lagrangian: L, stages: usize, h: f64) -> Result<Self, InputError>
+    where
+        L: Lagrangian<N>,
+    {
+        if !(1..=MOST).contains(&stages) {
+            return Err(InputError::Stages { found: stages });
+        }
+        if !(h > 0.0 && h.is_finite()) {
+            return Err(InputError::Step { h });
+        }
+        if N == 0 {
+            return Err(InputError::Dimension);
+        }
+        Ok(Gauss { lagrangian, forward: Products::new(stages, h), backward: Products::new(stages, -h) })
+    }
+
+    /// The number of stages.
+    pub fn stages(&self) -> usize {
+        self.forward.s
+    }
+
+    /// A stepper from a state at a time, by the cheapest route that the Lagrangian's declared structure allows. `guess` is a
+    /// guess of the velocity at the start, from which it is found.
+    ///
+    /// # Errors
+    /// [`InputError`] where the state is not finite, a claim of the structure is false, or no velocity belongs to the momentum.
+    pub fn stepper<const N: usize>(
+        &self,
+        t0: f64,
+        state: PhasePoint<N>,
+        guess: SVector<f64, N>,
+    ) -> Result<GaussStepper<'_, L, N>, InputError>
+    where
+        L: Lagrangian<N>,
+    {
+        GaussStepper::new(self, t0, state, guess, true)
+    }
+
+    /// Like [`stepper`](Self::stepper) for a run of which nobody wants the action: where z decouples it is not computed.
+    ///
+    /// # Errors
+    /// Those of [`stepper`](Self::stepper).
+    pub fn stepper_without_action<const N: usize>(
+        &self,
+        t0: f64,
+        state: PhasePoint<N>,
+        guess: SVector<f64, N>,
+    ) -> Result<GaussStepper<'_, L, N>, InputError>
+    where
+        L: Lagrangian<N>,
+    {
+        GaussStepper::new(self, t0, state, guess, false)
+    }
+
+    /// The stage equations of a step forward or backward in time.
+    fn equations<const N: usize>(&self, t: f64, forward: bool) -> StageEquations<'_, L, N> {
+        let products = if forward { &self.forward } else { &self.backward };
+        StageEquations { lagrangian: &self.lagrangian, products, t }
+    }
+
+    /// A step from a state, forward or backward.
+    fn transition<const N: usize>(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        forward: bool,
+    ) -> Result<Transition<N>, StepError>
+    where
+        L: Lagrangian<N>,
+    {
+        let equations = self.equations(t, forward);
+        let given = Given::Start(*from);
+        let n = equations.size(&given);
+        let mut x = Unknowns::uniform(self.stages(), guess, &from.p, from.z);
+        let iterations = equations.solve(&given, &mut x, &mut DMatrix::zeros(n, n), &mut DVector::zeros(n))?;
+        let end = equations.end(&given, &x);
+        let velocity = (0..self.stages()).fold(SVector::zeros(), |sum, j| sum + x.v[j] * self.forward.weight(j));
+        Transition {
+            end: PhasePoint { q: end.q, p: end.p, z: from.z + end.action },
+            velocity,
+            sigma: if forward { 1.0 / end.rho } else { end.rho },
+            iterations,
+        }
+        .checked()
+    }
+
+    /// The stages between two points, without differentials.
+    fn between<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+    ) -> Result<(Given<N, f64>, Unknowns<N, f64>), StepError>
+    where
+        L: Lagrangian<N>,
+    {
+        let equations = self.equations(t, true);
+        let given = Given::Ends { q0: x.q0, q1: x.q1, z0: x.z0 };
+        let n = equations.size(&given);
+        let u = (x.q1 - x.q0) / self.forward.h;
+        let middle = contact_geom::VelocityPoint { q: (x.q0 + x.q1) * 0.5, v: u, z: x.z0 };
+        let p = self.lagrangian.gradient(t + 0.5 * self.forward.h, &middle).y;
+        let mut stages = Unknowns::uniform(self.stages(), &u, &p, x.z0);
+        equations.solve(&given, &mut stages, &mut DMatrix::zeros(n, n), &mut DVector::zeros(n))?;
+        Ok((given, stages))
+    }
+}
+
+impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Gauss<L> {
+    fn step_size(&self) -> f64 {
+        self.forward.h
+    }
+
+    fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
+        let point = DiscretePoint { q0: x.q0.map(|e| e.re()), q1: x.q1.map(|e| e.re()), z0: x.z0.re() };
+        let (plain, solution) = self.between(t, &point)?;
+        let equations = self.equations(t, true);
+        let given = Given::Ends { q0: x.q0, q1: x.q1, z0: x.z0 };
+        let stages = equations.lift(&given, &plain, &solution)?;
+        Ok(equations.end(&given, &stages).action)
+    }
+
+    /// By the step itself: `D1 = -sigma_d p0`, `D2 = p1`.
+    fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
+        let (given, stages) = self.between(t, x)?;
+        let end = self.equations(t, true).end(&given, &stages);
+        let sigma = 1.0 / end.rho;
+        Ok(DiscreteJet::new(end.action, stages.p0 * -sigma, end.p, (1.0 - end.rho) * sigma).with_sigma(sigma))
+    }
+
+    fn forward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        _solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        self.transition(t, from, guess, true)
+    }
+
+    /// The method is symmetric: a step with `-h` from the end.
+    fn backward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        _solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        self.transition(t + self.forward.h, from, guess, false)
+    }
+}

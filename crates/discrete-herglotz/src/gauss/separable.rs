@@ -1,0 +1,231 @@
+//! Steps of contact Gauss collocation for `L = v.Mv/2 - V(t, q) + gamma z`.
+
+use super::condensed::{Condensed, Preconditioned};
+use super::stages::{Stages, blocks};
+use super::sweeps::{Progress, Sweeps};
+use crate::lanes::Lanes;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Dual, Lagrangian, PhasePoint, VelocityPoint};
+use pulp::Simd;
+
+/// A number with the part that its last digit leaves out, so that a sum of small changes loses nothing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Compensated {
+    pub value: f64,
+    rest: f64,
+}
+
+impl From<f64> for Compensated {
+    fn from(value: f64) -> Self {
+        Compensated { value, rest: 0.0 }
+    }
+}
+
+impl Compensated {
+    /// Adds a change that is smaller than the value, or not by much larger.
+    #[inline(always)]
+    pub fn add(&mut self, change: f64) {
+        let change = change + self.rest;
+        let sum = self.value + change;
+        // Knuth's exact difference, since the change may be the larger.
+        let virtual_change = sum - self.value;
+        self.rest = (self.value - (sum - virtual_change)) + (change - virtual_change);
+        self.value = sum;
+    }
+}
+
+/// The state and the workspace of the condensed step.
+pub(super) struct Separable<'a, L, const N: usize> {
+    pub lagrangian: &'a L,
+    pub table: Condensed,
+    pub left: Preconditioned,
+    /// `M^-1`; `None` where M is the identity.
+    inverse_mass: Option<SMatrix<f64, N, N>>,
+    pub wants_z: bool,
+    pub q: [Compensated; N],
+    pub v: [Compensated; N],
+    pub z: Compensated,
+    /// What the force adds to the linear one, `a_i + kappa Q_i`: the unknown of the iteration.
+    rest: [Stages; N],
+    /// The accelerations of the last sweep.
+    pub a: [Stages; N],
+    x: [Stages; N],
+    /// Whether `rest` belongs to the step before.
+    warm: bool,
+    /// Steps since the start, and the one at which the slope of the force is looked at again.
+    taken: usize,
+    review: usize,
+    pub evaluations: u64,
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
+    pub fn new(
+        lagrangian: &'a L,
+        table: Condensed,
+        left: Preconditioned,
+        inverse_mass: Option<SMatrix<f64, N, N>>,
+        start: &VelocityPoint<N>,
+        wants_z: bool,
+    ) -> Self {
+        Separable {
+            lagrangian,
+            table,
+            left,
+            inverse_mass,
+            wants_z,
+            q: std::array::from_fn(|i| start.q[i].into()),
+            v: std::array::from_fn(|i| start.v[i].into()),
+            z: start.z.into(),
+            rest: [Stages::ZERO; N],
+            a: [Stages::ZERO; N],
+            x: [Stages::ZERO; N],
+            warm: false,
+            taken: 0,
+            review: 1,
+            evaluations: 0,
+        }
+    }
+
+    /// Goes on from another state, without what was carried.
+    pub fn restart(&mut self, state: &PhasePoint<N>, v: &SVector<f64, N>) {
+        self.q = std::array::from_fn(|i| state.q[i].into());
+        self.v = std::array::from_fn(|i| v[i].into());
+        self.z = state.z.into();
+        self.warm = false;
+    }
+
+    /// The accelerations at positions, one block of stages.
+    #[inline(always)]
+    fn accelerations<S: Simd>(&self, t: f64, r: usize) -> SVector<Lanes<S>, N> {
+        let zero = Lanes::<S>::splat(0.0);
+        let mut x = VelocityPoint::<N, Dual<Lanes<S>, SVector<Lanes<S>, N>>> {
+            q: SVector::from_fn(|d, _| Dual::constant(self.x[d].block(r))),
+            v: SVector::from_fn(|_, _| Dual::constant(zero)),
+            z: Dual::constant(zero),
+        };
+        for d in 0..N {
+            x.q[d].d[d] = Lanes::splat(1.0);
+        }
+        let force = self.lagrangian.along(self.table.times.block::<S>(r) + t, &x).d;
+        match &self.inverse_mass {
+            None => force,
+            Some(inverse) => SVector::from_fn(|i, _| (0..N).fold(zero, |sum, j| sum + force[j] * inverse[(i, j)])),
+        }
+    }
+
+    /// Takes one step from the time `t`; on failure the state is unchanged.
+    #[inline(always)]
+    pub fn step<S: Simd>(&mut self, t: f64) -> Progress {
+        let s = self.table.s;
+        let m = blocks::<S>(s);
+        let kappa = Lanes::<S>::splat(self.left.kappa);
+        if self.warm {
+            for d in 0..N {
+                let before = self.rest[d];
+                self.table.ahead.apply(&before, s, &mut self.rest[d], |_| Lanes::<S>::splat(0.0));
+            }
+        }
+        let mut sweeps = Sweeps::default();
+        let outcome = loop {
+            for d in 0..N {
+                let (q, v) = (Lanes::<S>::splat(self.q[d].value), Lanes::<S>::splat(self.v[d].value));
+                let left = &self.left;
+                left.b.apply(&self.rest[d], s, &mut self.x[d], |r| left.u.block(r).mul_add(v, left.q.block(r) * q));
+            }
+            let (mut change, mut size) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
+            for r in 0..m {
+                let a = self.accelerations::<S>(t, r);
+                for d in 0..N {
+                    let linear = kappa * self.x[d].block(r);
+                    let rest = a[d] + linear;
+                    change = change.max((rest - self.rest[d].block(r)).abs());
+                    size = size.max(a[d].abs()).max(linear.abs());
+                    self.rest[d].set(r, rest);
+                    self.a[d].set(r, a[d]);
+                }
+            }
+            self.evaluations += s as u64;
+            match sweeps.judge(change.largest(), size.largest()) {
+                Progress::Going => {}
+                done => break done,
+            }
+        };
+        if outcome != Progress::Done {
+            self.warm = false;
+            return outcome;
+        }
+        self.finish::<S>(t);
+        self.warm = true;
+        self.taken += 1;
+        if self.taken == self.review {
+            self.review *= 2;
+            self.adapt();
+        }
+        Progress::Done
+    }
+
+    /// The end of the step from its accelerations.
+    #[inline(always)]
+    fn finish<S: Simd>(&mut self, t: f64) {
+        let (table, s) = (&self.table, self.table.s);
+        if self.wants_z {
+            let grown = table.grow[0] * self.z.value + table.grow[1] * self.z.value;
+            let action = self.action::<S>(t);
+            self.z.add(grown + self.table.end_v.sum::<S>(&action, s));
+        }
+        let table = &self.table;
+        for d in 0..N {
+            let v = self.v[d].value;
+            let moved = table.end_b.sum::<S>(&self.a[d], s) + table.end_u[1] * v;
+            self.q[d].add(moved + table.end_u[0] * v);
+            let pushed = table.end_v.sum::<S>(&self.a[d], s) + table.grow[1] * v;
+            self.v[d].add(pushed + table.grow[0] * v);
+        }
+    }
+
+    /// `L - gamma z` at the stages.
+    #[inline(always)]
+    fn action<S: Simd>(&self, t: f64) -> Stages {
+        let (table, s) = (&self.table, self.table.s);
+        let mut velocities = [Stages::ZERO; N];
+        for d in 0..N {
+            let v = Lanes::<S>::splat(self.v[d].value);
+            table.d.apply(&self.a[d], s, &mut velocities[d], |r| table.inverse_rho.block(r) * v);
+        }
+        let mut action = Stages::ZERO;
+        for r in 0..blocks::<S>(s) {
+            let q = SVector::from_fn(|d, _| self.x[d].block::<S>(r));
+            let v = SVector::from_fn(|d, _| velocities[d].block::<S>(r));
+            action.set(r, self.lagrangian.value(table.times.block::<S>(r) + t, &q, &v, Lanes::splat(0.0)));
+        }
+        action
+    }
+
+    /// Takes the slope of the force anew from the stages of the last step, by least squares, where it has changed enough to
+    /// be worth a new matrix.
+    #[inline(never)]
+    fn adapt(&mut self) {
+        let s = self.table.s;
+        let (mut products, mut squares) = (0.0, 0.0);
+        for d in 0..N {
+            let (x, a) = (&self.x[d].0[..s], &self.a[d].0[..s]);
+            let mean = |y: &[f64]| y.iter().sum::<f64>() / s as f64;
+            let (mx, ma) = (mean(x), mean(a));
+            for (x, a) in x.iter().zip(a) {
+                products += (x - mx) * (a - ma);
+                squares += (x - mx) * (x - mx);
+            }
+        }
+        let kappa = -products / squares;
+        if !kappa.is_finite() || (kappa - self.left.kappa).abs() <= 0.02 * kappa.abs() {
+            return;
+        }
+        if let Some(left) = self.table.preconditioned(kappa) {
+            let change = kappa - self.left.kappa;
+            for (rest, x) in self.rest.iter_mut().zip(&self.x) {
+                rest.0.iter_mut().zip(&x.0).for_each(|(r, x)| *r += change * x);
+            }
+            self.left = left;
+        }
+    }
+}

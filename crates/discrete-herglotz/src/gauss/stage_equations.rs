@@ -1,0 +1,329 @@
+//! The stage equations of contact Gauss collocation, with their Jacobian: for Newton's method, and for the discrete Lagrangian.
+
+use super::coefficients::{Coefficients, MOST};
+use crate::{ITERATION_LIMIT, StepError, last_correction};
+use contact_geom::nalgebra::{DMatrix, DVector, SVector};
+use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, linear, seed};
+
+/// The products of the coefficients with a step, which may be negative.
+pub(super) struct Products {
+    pub s: usize,
+    pub h: f64,
+    a: [[f64; MOST]; MOST],
+    b: [f64; MOST],
+    c: [f64; MOST],
+}
+
+impl Products {
+    pub fn new(s: usize, h: f64) -> Self {
+        let g = Coefficients::of(s);
+        Products { s, h, a: g.a.map(|row| row.map(|e| h * e.0)), b: g.b.map(|e| h * e.0), c: g.c.map(|e| h * e.0) }
+    }
+}
+
+impl Products {
+    /// The weight of a stage in a mean over the step.
+    pub fn weight(&self, j: usize) -> f64 {
+        self.b[j] / self.h
+    }
+}
+
+/// What a step starts from.
+#[derive(Clone, Copy)]
+pub(super) enum Given<const N: usize, T> {
+    /// The state `(q0, p0, z0)`.
+    Start(PhasePoint<N, T>),
+    /// `(q0, q1, z0)`; the momentum is an unknown.
+    Ends { q0: SVector<T, N>, q1: SVector<T, N>, z0: T },
+}
+
+/// The unknowns: velocity, action and integrating factor of each stage, and the momentum at the start.
+#[derive(Clone)]
+pub(super) struct Unknowns<const N: usize, T> {
+    pub v: Vec<SVector<T, N>>,
+    pub z: Vec<T>,
+    pub rho: Vec<T>,
+    pub p0: SVector<T, N>,
+}
+
+impl<const N: usize> Unknowns<N, f64> {
+    /// A motion of constant velocity.
+    pub fn uniform(s: usize, v: &SVector<f64, N>, p0: &SVector<f64, N>, z0: f64) -> Self {
+        Unknowns { v: vec![*v; s], z: vec![z0; s], rho: vec![1.0; s], p0: *p0 }
+    }
+
+    /// The same over another scalar, without differentials.
+    pub fn lifted<T: Scalar>(&self) -> Unknowns<N, T> {
+        Unknowns {
+            v: self.v.iter().map(|v| v.map(T::from)).collect(),
+            z: self.z.iter().map(|z| T::from(*z)).collect(),
+            rho: self.rho.iter().map(|r| T::from(*r)).collect(),
+            p0: self.p0.map(T::from),
+        }
+    }
+}
+
+/// The end of a step.
+pub(super) struct End<const N: usize, T> {
+    pub q: SVector<T, N>,
+    pub p: SVector<T, N>,
+    /// `z1 - z0`.
+    pub action: T,
+    /// `rho` at the end, `1 / sigma_d`.
+    pub rho: T,
+}
+
+/// The stage equations of a step.
+pub(super) struct StageEquations<'a, L, const N: usize> {
+    pub lagrangian: &'a L,
+    pub products: &'a Products,
+    pub t: f64,
+}
+
+impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
+    /// The number of unknowns.
+    pub fn size<T>(&self, given: &Given<N, T>) -> usize {
+        self.products.s * (N + 2) + if matches!(given, Given::Ends { .. }) { N } else { 0 }
+    }
+
+    /// `q0 + hA V` at a stage.
+    fn position<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>, i: usize) -> SVector<T, N> {
+        let (Given::Start(PhasePoint { q: q0, .. }) | Given::Ends { q0, .. }) = given;
+        x.v.iter().zip(&self.products.a[i]).fold(*q0, |sum, (v, a)| sum + v.map(|e| e * *a))
+    }
+
+    /// L and its gradient at the stages.
+    pub fn stages<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>) -> Vec<Dual<T, Triple<N, T>>> {
+        let at = |i: usize| {
+            let y = VelocityPoint { q: self.position(given, x, i), v: x.v[i], z: x.z[i] };
+            self.lagrangian.along(T::from(self.t + self.products.c[i]), &seed(&Triple::from(y)).into())
+        };
+        (0..self.products.s).map(at).collect()
+    }
+
+    /// The residuals: of the momenta, then of the actions, the factors, and the end position.
+    pub fn residual<T: Scalar>(
+        &self,
+        given: &Given<N, T>,
+        x: &Unknowns<N, T>,
+        l: &[Dual<T, Triple<N, T>>],
+        out: &mut DVector<T>,
+    ) {
+        let Products { s, a, b, .. } = self.products;
+        let (p0, z0) = match given {
+            Given::Start(state) => (state.p, state.z),
+            Given::Ends { z0, .. } => (x.p0, *z0),
+        };
+        for i in 0..*s {
+            let mut momentum = SVector::<T, N>::from_fn(|d, _| x.rho[i] * l[i].d.y[d] - p0[d]);
+            let (mut action, mut factor) = (x.z[i] - z0, x.rho[i] - 1.0);
+            for j in 0..*s {
+                for d in 0..N {
+                    momentum[d] -= x.rho[j] * l[j].d.x[d] * a[i][j];
+                }
+                action -= l[j].re * a[i][j];
+                factor += x.rho[j] * l[j].d.z * a[i][j];
+            }
+            for d in 0..N {
+                out[i * N + d] = momentum[d];
+            }
+            out[s * N + i] = action;
+            out[s * (N + 1) + i] = factor;
+        }
+        if let Given::Ends { q0, q1, .. } = given {
+            for d in 0..N {
+                let moved = x.v.iter().zip(b).fold(T::zero(), |sum, (v, b)| sum + v[d] * *b);
+                out[s * (N + 2) + d] = q0[d] - q1[d] + moved;
+            }
+        }
+    }
+
+    /// The derivatives of the residuals.
+    pub fn jacobian(
+        &self,
+        given: &Given<N, f64>,
+        x: &Unknowns<N, f64>,
+        l: &[Dual<f64, Triple<N>>],
+        out: &mut DMatrix<f64>,
+    ) {
+        let Products { s, a, b, c, .. } = self.products;
+        let s = *s;
+        out.fill(0.0);
+        let (row_z, row_r) = (s * N, s * (N + 1));
+        for k in 0..s {
+            let y = VelocityPoint { q: self.position(given, x, k), v: x.v[k], z: x.z[k] };
+            let Hessian { qq, qv, vv, qz, vz, zz } = self.lagrangian.hessian(self.t + c[k], &y);
+            let (rho, g) = (x.rho[k], &l[k].d);
+            // What stage k adds to the equations of stage i, through its own velocity, action and factor.
+            for i in 0..s {
+                let (own, w) = (if i == k { 1.0 } else { 0.0 }, a[i][k]);
+                for d in 0..N {
+                    for e in 0..N {
+                        out[(i * N + d, k * N + e)] += rho * (own * vv[(d, e)] - w * qv[(d, e)]);
+                    }
+                    out[(i * N + d, row_z + k)] += rho * (own * vz[d] - w * qz[d]);
+                    out[(i * N + d, row_r + k)] += own * g.y[d] - w * g.x[d];
+                    out[(row_z + i, k * N + d)] -= w * g.y[d];
+                    out[(row_r + i, k * N + d)] += w * rho * vz[d];
+                }
+                out[(row_z + i, row_z + k)] += own - w * g.z;
+                out[(row_r + i, row_z + k)] += w * rho * zz;
+                out[(row_r + i, row_r + k)] += own + w * g.z;
+            }
+            // And through its position, which the velocities of all stages move.
+            for j in 0..s {
+                let moved = a[k][j];
+                for e in 0..N {
+                    for d in 0..N {
+                        out[(k * N + d, j * N + e)] += rho * qv[(e, d)] * moved;
+                    }
+                    for i in 0..s {
+                        let w = a[i][k] * moved;
+                        for d in 0..N {
+                            out[(i * N + d, j * N + e)] -= w * rho * qq[(d, e)];
+                        }
+                        out[(row_z + i, j * N + e)] -= w * g.x[e];
+                        out[(row_r + i, j * N + e)] += w * rho * qz[e];
+                    }
+                }
+            }
+        }
+        if let Given::Ends { .. } = given {
+            let last = s * (N + 2);
+            for d in 0..N {
+                for i in 0..s {
+                    out[(i * N + d, last + d)] = -1.0;
+                    out[(last + d, i * N + d)] = b[i];
+                }
+            }
+        }
+    }
+
+    /// Adds a correction to the unknowns; returns the largest, each in units of the largest of its kind.
+    fn correct<T: Scalar>(&self, x: &mut Unknowns<N, T>, change: &DVector<T>, with_momentum: bool) -> f64 {
+        let s = self.products.s;
+        let mut worst = 0.0f64;
+        let mut see = |change: f64, size: f64| {
+            let relative = if change > 0.0 { change / size } else { change };
+            // `f64::max` would hide a NaN.
+            if relative > worst || relative.is_nan() {
+                worst = relative;
+            }
+        };
+        let (mut dv, mut sv, mut dz, mut sz, mut dr, mut dp, mut sp) =
+            (0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
+        for i in 0..s {
+            for d in 0..N {
+                x.v[i][d] -= change[i * N + d];
+                dv = larger(dv, change[i * N + d].extent());
+                sv = larger(sv, x.v[i][d].extent());
+            }
+            x.z[i] -= change[s * N + i];
+            x.rho[i] -= change[s * (N + 1) + i];
+            dz = larger(dz, change[s * N + i].extent());
+            sz = larger(sz, x.z[i].extent());
+            dr = larger(dr, change[s * (N + 1) + i].extent());
+        }
+        if with_momentum {
+            for d in 0..N {
+                x.p0[d] -= change[s * (N + 2) + d];
+                dp = larger(dp, change[s * (N + 2) + d].extent());
+                sp = larger(sp, x.p0[d].extent());
+            }
+        }
+        see(dv, sv);
+        see(dz, sz);
+        see(dr, 1.0);
+        see(dp, sp);
+        worst
+    }
+
+    /// Solves the stage equations by Newton's method from the guess in `x`; `jacobian` and `residual` are workspace of the
+    /// right size. Returns the iterations.
+    ///
+    /// # Errors
+    /// [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`].
+    pub fn solve(
+        &self,
+        given: &Given<N, f64>,
+        x: &mut Unknowns<N, f64>,
+        jacobian: &mut DMatrix<f64>,
+        residual: &mut DVector<f64>,
+    ) -> Result<u32, StepError> {
+        let ends = matches!(given, Given::Ends { .. });
+        let mut before = f64::INFINITY;
+        for iterations in 1..=ITERATION_LIMIT {
+            let l = self.stages(given, x);
+            self.residual(given, x, &l, residual);
+            self.jacobian(given, x, &l, jacobian);
+            linear::solve(jacobian, residual).map_err(|e| StepError::Singular { pivot: e.pivot })?;
+            let change = self.correct(x, residual, ends);
+            if !change.is_finite() {
+                return Err(StepError::NonFinite);
+            }
+            let predicted = before.is_finite() && last_correction(change, before, f64::EPSILON);
+            let stagnant = change >= 0.5 * before && change <= 1e3 * f64::EPSILON;
+            if change <= f64::EPSILON || predicted || stagnant {
+                return Ok(iterations);
+            }
+            before = change;
+        }
+        Err(StepError::NotConverged { residual: before, iterations: ITERATION_LIMIT })
+    }
+
+    /// The end of the step whose stages are solved.
+    pub fn end<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>) -> End<N, T> {
+        let Products { b, .. } = self.products;
+        let l = self.stages(given, x);
+        let (q0, p0) = match given {
+            Given::Start(state) => (state.q, state.p),
+            Given::Ends { q0, .. } => (*q0, x.p0),
+        };
+        let sum = |f: &dyn Fn(usize) -> T| (0..self.products.s).fold(T::zero(), |sum, j| sum + f(j) * b[j]);
+        let rho = -sum(&|j| x.rho[j] * l[j].d.z) + 1.0;
+        End {
+            q: SVector::from_fn(|d, _| q0[d] + sum(&|j| x.v[j][d])),
+            p: SVector::from_fn(|d, _| (p0[d] + sum(&|j| x.rho[j] * l[j].d.x[d])) / rho),
+            action: sum(&|j| l[j].re),
+            rho,
+        }
+    }
+
+    /// The solution over a scalar with differentials, from that without: each correction by the inverse Jacobian settles one
+    /// more order of derivatives.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`], [`StepError::NotConverged`].
+    pub fn lift<T: Scalar>(
+        &self,
+        given: &Given<N, T>,
+        plain: &Given<N, f64>,
+        solution: &Unknowns<N, f64>,
+    ) -> Result<Unknowns<N, T>, StepError> {
+        let n = self.size(plain);
+        let mut jacobian = DMatrix::zeros(n, n);
+        self.jacobian(plain, solution, &self.stages(plain, solution), &mut jacobian);
+        let inverse = jacobian.try_inverse().ok_or(StepError::Singular { pivot: 0.0 })?;
+        let mut x = solution.lifted::<T>();
+        let (mut residual, mut change) = (DVector::from_element(n, T::zero()), DVector::from_element(n, T::zero()));
+        let mut before = f64::INFINITY;
+        for _ in 0..ITERATION_LIMIT {
+            self.residual(given, &x, &self.stages(given, &x), &mut residual);
+            for i in 0..n {
+                change[i] = (0..n).fold(T::zero(), |sum, j| sum + residual[j] * inverse[(i, j)]);
+            }
+            let size = self.correct(&mut x, &change, matches!(given, Given::Ends { .. }));
+            // The iteration ends in finitely many steps but for round-off.
+            if size <= f64::EPSILON || (size >= 0.5 * before && size <= 1e-10) {
+                return Ok(x);
+            }
+            before = size;
+        }
+        Err(StepError::NotConverged { residual: before, iterations: ITERATION_LIMIT })
+    }
+}
+
+/// The larger; a NaN counts as infinite in an extent, so that none is hidden.
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
+}

@@ -1,0 +1,134 @@
+//! Values at the stages of a collocation step, and linear maps between them, in vector lanes.
+
+use super::coefficients::MOST;
+use crate::lanes::Lanes;
+use pulp::Simd;
+use qd::Quad;
+use std::array::from_fn;
+
+/// One number for each stage, padded to whole registers. What is beyond the last stage repeats it, so that formulas that are
+/// regular at the stages are so everywhere, or is multiplied by 0.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Stages(pub [f64; MOST]);
+
+impl Stages {
+    pub const ZERO: Stages = Stages([0.0; MOST]);
+
+    #[inline(always)]
+    pub fn block<S: Simd>(&self, r: usize) -> Lanes<S> {
+        Lanes(S::as_simd_f64s(&self.0).0[r])
+    }
+
+    #[inline(always)]
+    pub fn set<S: Simd>(&mut self, r: usize, x: Lanes<S>) {
+        S::as_mut_simd_f64s(&mut self.0).0[r] = x.0;
+    }
+}
+
+/// The registers that hold `s` stages.
+#[inline(always)]
+pub(super) fn blocks<S: Simd>(s: usize) -> usize {
+    s.div_ceil(Lanes::<S>::COUNT)
+}
+
+/// Numbers for the stages in double-double precision, with 0 beyond the last.
+pub(super) type Exact = [Quad; MOST];
+
+/// The leading parts of numbers for the stages, the last one repeated beyond it.
+pub(super) fn padded(x: &Exact, s: usize) -> Stages {
+    Stages(from_fn(|i| x[i.min(s - 1)].0))
+}
+
+/// Weights of the stages, 0 beyond the last, with the part that one double leaves out.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weights {
+    head: Stages,
+    tail: Stages,
+}
+
+impl Weights {
+    pub fn new(x: &Exact) -> Self {
+        Weights { head: Stages(x.map(|w| w.0)), tail: Stages(x.map(|w| w.1)) }
+    }
+
+    /// The weighted sum over the stages.
+    #[inline(always)]
+    pub fn sum<S: Simd>(&self, x: &Stages, s: usize) -> f64 {
+        let mut head = Lanes::<S>::splat(0.0);
+        let mut tail = Lanes::<S>::splat(0.0);
+        for r in 0..blocks::<S>(s) {
+            head = self.head.block(r).mul_add(x.block(r), head);
+            tail = self.tail.block(r).mul_add(x.block(r), tail);
+        }
+        (head + tail).sum()
+    }
+}
+
+/// A linear map between stage values, by columns.
+#[derive(Clone, Debug)]
+pub(super) struct StageMap(pub [Stages; MOST]);
+
+impl StageMap {
+    /// The map with these rows.
+    pub fn new(rows: &[[f64; MOST]; MOST], s: usize) -> Self {
+        StageMap(from_fn(|j| Stages(from_fn(|i| rows[i.min(s - 1)][j]))))
+    }
+
+    pub fn from_exact(rows: &[Exact; MOST], s: usize) -> Self {
+        Self::new(&rows.map(|row| row.map(|e| e.0)), s)
+    }
+
+    /// `y = start + M x`.
+    ///
+    /// Two registers at a time, even and odd columns apart: four sums under way keep the multipliers busy.
+    #[inline(always)]
+    pub fn apply<S: Simd>(&self, x: &Stages, s: usize, y: &mut Stages, start: impl Fn(usize) -> Lanes<S>) {
+        let m = blocks::<S>(s);
+        let mut r = 0;
+        while r + 1 < m {
+            let (mut even, mut odd) = ([start(r), start(r + 1)], [Lanes::<S>::splat(0.0); 2]);
+            for pair in 0..s.min(MOST).div_ceil(2) {
+                let (k, l) = (2 * pair, 2 * pair + 1);
+                let (a, b) = (Lanes::splat(x.0[k]), Lanes::splat(x.0[l]));
+                even[0] = self.0[k].block(r).mul_add(a, even[0]);
+                even[1] = self.0[k].block(r + 1).mul_add(a, even[1]);
+                odd[0] = self.0[l].block(r).mul_add(b, odd[0]);
+                odd[1] = self.0[l].block(r + 1).mul_add(b, odd[1]);
+            }
+            y.set(r, even[0] + odd[0]);
+            y.set(r + 1, even[1] + odd[1]);
+            r += 2;
+        }
+        if r < m {
+            let (mut even, mut odd) = (start(r), Lanes::<S>::splat(0.0));
+            for pair in 0..s.min(MOST).div_ceil(2) {
+                let (k, l) = (2 * pair, 2 * pair + 1);
+                even = self.0[k].block(r).mul_add(Lanes::splat(x.0[k]), even);
+                odd = self.0[l].block(r).mul_add(Lanes::splat(x.0[l]), odd);
+            }
+            y.set(r, even + odd);
+        }
+    }
+}
+
+/// Solves `M X = R` for `columns` right-hand sides in double-double precision, by Gauss and Jordan with row pivoting; rows of
+/// `n` unknowns followed by the right-hand sides, which are left as the solution. `false` where M is singular.
+pub(super) fn solve_exactly(rows: &mut [Vec<Quad>]) -> bool {
+    let n = rows.len();
+    for k in 0..n {
+        let pivot = (k..n).max_by(|i, j| rows[*i][k].0.abs().total_cmp(&rows[*j][k].0.abs())).unwrap_or(k);
+        rows.swap(k, pivot);
+        if !(rows[k][k].0.abs() > 0.0 && rows[k][k].0.is_finite()) {
+            return false;
+        }
+        let above = rows[k].clone();
+        for (i, row) in rows.iter_mut().enumerate() {
+            let factor = if i == k { Quad::from(1.0) - above[k].recip() } else { row[k] / above[k] };
+            for (e, a) in row.iter_mut().zip(&above).skip(k) {
+                *e = *e - factor * *a;
+            }
+        }
+    }
+    true
+}

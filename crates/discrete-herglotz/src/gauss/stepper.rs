@@ -1,0 +1,292 @@
+//! Runs of contact Gauss collocation.
+
+use super::Gauss;
+use super::condensed::Condensed;
+use super::general::{General, Mass, Table};
+use super::linear::Linear;
+use super::separable::Separable;
+use super::stage_equations::{Given, Products, StageEquations, Unknowns};
+use super::stages::Stages;
+use super::sweeps::Progress;
+use crate::{Halt, InputError, StepError, Stepper, verified};
+use contact_geom::nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use contact_geom::{Lagrangian, PhasePoint, Triple, VelocityPoint, linear};
+use pulp::{Arch, Simd, WithSimd};
+
+/// How the steps of contact Gauss collocation are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GaussRoute {
+    /// The motion is linear: one matrix, made once.
+    Linear,
+    /// Constant mass and constant rate of the conformal factor: the accelerations of the stages alone are iterated.
+    Condensed,
+    /// Velocities, actions and factors of the stages are iterated; the matrix W is constant.
+    ConstantMass,
+    /// The same with W taken at the stages of each step.
+    General,
+}
+
+/// The state and the workspace of a route.
+enum Route<'a, L, const N: usize> {
+    Linear(Linear<N>),
+    Condensed(Separable<'a, L, N>),
+    General(General<'a, L, N>),
+}
+
+/// Contact Gauss collocation at work: stages in the lanes of the processor's vector registers, each step's start extrapolated
+/// from the one before, iteration to round-off, Newton's method where the iteration does not contract, compensated sums.
+pub struct GaussStepper<'a, L, const N: usize> {
+    lagrangian: &'a L,
+    products: &'a Products,
+    route: Box<Route<'a, L, N>>,
+    mass: Option<SMatrix<f64, N, N>>,
+    arch: Arch,
+    t0: f64,
+    k: usize,
+    sigma: f64,
+    newton: bool,
+    newton_steps: u64,
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
+    pub(super) fn new(
+        gauss: &'a Gauss<L>,
+        t0: f64,
+        state: PhasePoint<N>,
+        guess: SVector<f64, N>,
+        wants_z: bool,
+    ) -> Result<Self, InputError> {
+        state.check()?;
+        let (lagrangian, s, h) = (&gauss.lagrangian, gauss.stages(), gauss.forward.h);
+        let v = velocity(lagrangian, t0, &state, guess)?;
+        let start = VelocityPoint { q: state.q, v, z: state.z };
+        let structure = verified(lagrangian, t0, &start)?;
+        let identity = SMatrix::<f64, N, N>::identity();
+        let w = lagrangian.hessian(t0, &start).vv;
+        let mut inverse = identity;
+        for j in 0..N {
+            let mut column = SVector::from_fn(|i, _| identity[(i, j)]);
+            linear::solve(&mut w.clone(), &mut column)
+                .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
+            inverse.set_column(j, &column);
+        }
+        // A term linear in v has no place in the condensed step: `p = M v` there.
+        let at_rest = lagrangian.gradient(t0, &VelocityPoint { v: SVector::zeros(), ..start });
+        let drag = structure.z_affine || structure.z_free;
+        let condensed = structure.separable && structure.autonomous && drag && at_rest.y.amax() == 0.0;
+        let mut mass = None;
+        let route = if condensed {
+            let table = Condensed::new(s, h, at_rest.z)?;
+            mass = Some(w);
+            let linear =
+                if structure.quadratic { Linear::new(lagrangian, &table, &inverse, t0, &start, wants_z) } else { None };
+            match linear {
+                Some(linear) => Route::Linear(linear),
+                None => {
+                    let left = table.preconditioned(0.0).ok_or(InputError::Step { h })?;
+                    let inverse = (w != identity).then_some(inverse);
+                    Route::Condensed(Separable::new(lagrangian, table, left, inverse, &start, wants_z))
+                }
+            }
+        } else {
+            let mass = if structure.constant_mass || structure.separable {
+                Mass::Constant(inverse)
+            } else {
+                Mass::Stages(Box::new([[Stages::ZERO; N]; N]))
+            };
+            Route::General(General::new(lagrangian, Table::new(s, h), mass, &state, &v))
+        };
+        Ok(GaussStepper {
+            lagrangian,
+            products: &gauss.forward,
+            route: Box::new(route),
+            mass,
+            arch: Arch::new(),
+            t0,
+            k: 0,
+            sigma: 1.0,
+            newton: true,
+            newton_steps: 0,
+        })
+    }
+
+    /// Without Newton's method: a step whose iteration does not contract then fails with [`StepError::NotConverged`].
+    pub fn without_newton(mut self) -> Self {
+        self.newton = false;
+        self
+    }
+
+    /// How the steps are computed.
+    pub fn route(&self) -> GaussRoute {
+        match &*self.route {
+            Route::Linear(_) => GaussRoute::Linear,
+            Route::Condensed(_) => GaussRoute::Condensed,
+            Route::General(General { mass: Mass::Constant(_), .. }) => GaussRoute::ConstantMass,
+            Route::General(_) => GaussRoute::General,
+        }
+    }
+
+    /// The steps that were solved by Newton's method, since the iteration did not contract.
+    pub fn newton_steps(&self) -> u64 {
+        self.newton_steps
+    }
+
+    /// Takes a step by Newton's method.
+    #[cold]
+    #[inline(never)]
+    fn newton_step(&mut self, t: f64, refused: StepError) -> Result<(), StepError> {
+        if !self.newton {
+            return Err(refused);
+        }
+        let from = self.state();
+        let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t };
+        let given = Given::Start(from);
+        let n = equations.size(&given);
+        let v = velocity(self.lagrangian, t, &from, SVector::zeros()).map_err(|_| refused)?;
+        let mut x = Unknowns::uniform(self.products.s, &v, &from.p, from.z);
+        equations.solve(&given, &mut x, &mut DMatrix::zeros(n, n), &mut DVector::zeros(n))?;
+        let end = equations.end(&given, &x);
+        let next = PhasePoint { q: end.q, p: end.p, z: from.z + end.action };
+        if !Triple::from(next).is_finite() {
+            return Err(StepError::NonFinite);
+        }
+        self.sigma = 1.0 / end.rho;
+        if !(end.rho > 0.0) {
+            return Err(StepError::SigmaVanished { sigma: self.sigma });
+        }
+        self.newton_steps += 1;
+        match &mut *self.route {
+            Route::Linear(_) => {}
+            Route::Condensed(run) => {
+                let v = x.v.last().copied().unwrap_or(v);
+                run.restart(&next, &velocity(self.lagrangian, t, &next, v).map_err(|_| refused)?);
+            }
+            Route::General(run) => {
+                let v = x.v.last().copied().unwrap_or(v);
+                run.restart(&next, &velocity(self.lagrangian, t, &next, v).map_err(|_| refused)?);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Steps in the lanes of one instruction set; ends at a step that cannot be taken.
+struct Advance<'b, 'a, L, const N: usize> {
+    run: &'b mut GaussStepper<'a, L, N>,
+    steps: usize,
+}
+
+impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
+    type Output = Result<(), (usize, Progress)>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let Advance { run, steps } = self;
+        let (t0, h) = (run.t0, run.products.h);
+        for taken in 0..steps {
+            let t = t0 + run.k as f64 * h;
+            let progress = match &mut *run.route {
+                Route::Linear(linear) => {
+                    linear.step();
+                    Progress::Done
+                }
+                Route::Condensed(condensed) => condensed.step::<S>(t),
+                Route::General(general) => general.step::<S>(t),
+            };
+            if progress != Progress::Done {
+                return Err((taken, progress));
+            }
+            run.k += 1;
+        }
+        Ok(())
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
+    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        let mut done = 0;
+        while done < steps {
+            let outcome = self.arch.dispatch(Advance { run: self, steps: steps - done });
+            let Err((taken, progress)) = outcome else { break };
+            done += taken;
+            let refused = match progress {
+                Progress::SigmaVanished { sigma } => {
+                    return Err(Halt { taken: done, cause: StepError::SigmaVanished { sigma } });
+                }
+                Progress::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
+                _ => StepError::NonFinite,
+            };
+            self.newton_step(self.time(), refused).map_err(|cause| Halt { taken: done, cause })?;
+            self.k += 1;
+            done += 1;
+        }
+        // A linear step is not looked at one by one.
+        if !Triple::from(self.state()).is_finite() {
+            return Err(Halt { taken: done, cause: StepError::NonFinite });
+        }
+        match &*self.route {
+            Route::Linear(run) => self.sigma = run.sigma(),
+            Route::Condensed(run) => self.sigma = 1.0 + run.table.grow[0],
+            Route::General(run) => self.sigma = 1.0 / (1.0 - run.fallen),
+        }
+        Ok(())
+    }
+
+    fn state(&self) -> PhasePoint<N> {
+        let (q, y, z) = match &*self.route {
+            Route::Linear(run) => (&run.q, &run.v, run.z),
+            Route::Condensed(run) => (&run.q, &run.v, run.z),
+            Route::General(run) => (&run.q, &run.p, run.z),
+        };
+        let y = SVector::from_fn(|i, _| y[i].value);
+        let p = match &self.mass {
+            Some(mass) => mass * y,
+            None => y,
+        };
+        PhasePoint { q: SVector::from_fn(|i, _| q[i].value), p, z: z.value }
+    }
+
+    fn time(&self) -> f64 {
+        self.t0 + self.k as f64 * self.products.h
+    }
+
+    fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    fn evaluations(&self) -> u64 {
+        match &*self.route {
+            Route::Linear(_) => 0,
+            Route::Condensed(run) => run.evaluations,
+            Route::General(run) => run.evaluations,
+        }
+    }
+}
+
+/// The velocity that belongs to a momentum, `L_v(t, q, v, z) = p`, by Newton's method.
+fn velocity<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    state: &PhasePoint<N>,
+    guess: SVector<f64, N>,
+) -> Result<SVector<f64, N>, InputError> {
+    let mut x = VelocityPoint { q: state.q, v: guess, z: state.z };
+    let mut before = f64::INFINITY;
+    for _ in 0..crate::ITERATION_LIMIT {
+        let mut change = lagrangian.gradient(t, &x).y - state.p;
+        let mut w = lagrangian.hessian(t, &x).vv;
+        linear::solve(&mut w, &mut change)
+            .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
+        x.v -= change;
+        let (size, scale) = (change.amax(), x.v.amax());
+        if !(size + scale).is_finite() {
+            return Err(InputError::FirstStep(StepError::NonFinite));
+        }
+        let round_off = f64::EPSILON * scale;
+        if crate::last_correction(size, before, round_off) || (size >= 0.5 * before && size <= 64.0 * round_off) {
+            return Ok(x.v);
+        }
+        before = size;
+    }
+    Err(InputError::FirstStep(StepError::NotConverged { residual: before, iterations: crate::ITERATION_LIMIT }))
+}

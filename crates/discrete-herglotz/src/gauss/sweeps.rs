@@ -1,0 +1,67 @@
+//! When an iteration of the stages ends.
+
+/// What is to be done after a sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Progress {
+    /// Another sweep.
+    Going,
+    /// The stages are solved to round-off.
+    Done,
+    /// The iteration does not contract: the largest change of the last sweep, relative to the terms.
+    Slow { change: f64, sweeps: u32 },
+    /// A value is not finite.
+    NonFinite,
+    /// The step is not conformally contact.
+    SigmaVanished { sigma: f64 },
+}
+
+/// The sweeps after which an iteration counts as not contracting.
+const LIMIT: u32 = 60;
+
+/// The changes of the sweeps of one step.
+///
+/// The iteration ends when the next change, predicted from the last two, is below the round-off of the terms, or when changes
+/// near round-off no longer fall. It is given up when larger changes have not fallen three times, or at the limit: so it
+/// neither stalls nor loops.
+#[derive(Default)]
+pub(super) struct Sweeps {
+    count: u32,
+    before: f64,
+    ratio: f64,
+    risen: u32,
+}
+
+impl Sweeps {
+    /// Judges a sweep by its largest change and the largest term.
+    #[inline(always)]
+    pub fn judge(&mut self, change: f64, size: f64) -> Progress {
+        self.count += 1;
+        let round_off = 0.5 * f64::EPSILON * size;
+        if change <= round_off {
+            return Progress::Done;
+        }
+        if !(change.is_finite() && size.is_finite()) {
+            return Progress::NonFinite;
+        }
+        if self.count > 1 {
+            // The slower of the last two contractions: the first is often that of components which die out at once.
+            let ratio = change / self.before;
+            let expected = if self.count > 2 { f64::max(ratio, self.ratio) } else { f64::max(ratio, 0.1) };
+            if change * expected <= round_off {
+                return Progress::Done;
+            }
+            if ratio >= 1.0 {
+                if change <= 256.0 * round_off {
+                    return Progress::Done;
+                }
+                self.risen += 1;
+            }
+            if self.risen > 3 || self.count > LIMIT {
+                return Progress::Slow { change: change / size, sweeps: self.count };
+            }
+            self.ratio = ratio;
+        }
+        self.before = change;
+        Progress::Going
+    }
+}

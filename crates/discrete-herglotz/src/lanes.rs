@@ -1,0 +1,300 @@
+//! Lanes of a vector register as numbers that a Lagrangian can be written over.
+
+use contact_geom::Scalar;
+use pulp::{Simd, bytemuck};
+use std::fmt::{Debug, Formatter};
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+
+/// As many numbers as a register of the instruction set `S` has lanes, worked on at once.
+///
+/// The instruction set is found at run time: kernels are generic over `S` and entered through [`pulp::Arch::dispatch`], so that a
+/// default build uses what the processor has. Lanes are made inside such kernels only, and never leave them.
+#[derive(Clone, Copy)]
+pub(crate) struct Lanes<S: Simd>(pub S::f64s);
+
+/// The token of an instruction set, out of nothing.
+#[allow(unsafe_code)]
+#[inline(always)]
+fn token<S: Simd>() -> S {
+    const { assert!(size_of::<S>() == 0, "a token carries nothing") };
+    // SAFETY: a token is a proof, of size 0, that the processor has the instructions. `Lanes<S>` is private to this crate, which
+    // makes them only below `Arch::dispatch`, which has handed out a token of the same type there.
+    unsafe { std::mem::zeroed() }
+}
+
+impl<S: Simd> Lanes<S> {
+    /// The lanes of a register.
+    pub const COUNT: usize = S::F64_LANES;
+
+    #[inline(always)]
+    pub fn splat(x: f64) -> Self {
+        Lanes(token::<S>().splat_f64s(x))
+    }
+
+    /// `self * b + c`, fused where the instruction set can.
+    #[inline(always)]
+    pub fn mul_add(self, b: Self, c: Self) -> Self {
+        Lanes(token::<S>().mul_add_e_f64s(self.0, b.0, c.0))
+    }
+
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Lanes(token::<S>().abs_f64s(self.0))
+    }
+
+    /// Lane by lane the larger; where one is not a number, the result may be either.
+    #[inline(always)]
+    pub fn max(self, b: Self) -> Self {
+        Lanes(token::<S>().max_f64s(self.0, b.0))
+    }
+
+    #[inline(always)]
+    pub fn sum(self) -> f64 {
+        token::<S>().reduce_sum_f64s(self.0)
+    }
+
+    #[inline(always)]
+    pub fn largest(self) -> f64 {
+        token::<S>().reduce_max_f64s(self.0)
+    }
+
+    /// The lanes as a slice.
+    #[inline(always)]
+    pub fn lanes(&self) -> &[f64] {
+        bytemuck::cast_slice(std::slice::from_ref(&self.0))
+    }
+
+    /// A function of one number, lane by lane: for the functions that are rare in mechanics.
+    #[inline]
+    fn each(mut self, f: impl Fn(f64) -> f64) -> Self {
+        for x in bytemuck::cast_slice_mut::<_, f64>(std::slice::from_mut(&mut self.0)) {
+            *x = f(*x);
+        }
+        self
+    }
+
+    /// `sin(x + k pi)` where `x - turns pi` is small: the odd polynomial of the rest, with the sign of the turns.
+    ///
+    /// pi in three parts, of which the first two have so few digits that their products with the turns are exact.
+    #[inline(always)]
+    fn reduced_sine(self, turns: Self, sign_of: Self) -> Self {
+        let r = turns.mul_add(Self::splat(-PI[0]), self);
+        let r = turns.mul_add(Self::splat(-PI[1]), r);
+        let r = turns.mul_add(Self::splat(-PI[2]), r);
+        let square = r * r;
+        let mut sum = Self::splat(SINE[0]);
+        for c in &SINE[1..] {
+            sum = sum.mul_add(square, Self::splat(*c));
+        }
+        let sine = (square * r).mul_add(sum, r);
+        // 1 for an even number of half turns, -1 for an odd one.
+        let half = sign_of * 0.5;
+        let odd = (half - half.rounded()) * 2.0;
+        sine * (Self::splat(1.0) - odd.abs() * 2.0)
+    }
+
+    /// The nearest integer, for sizes below 2^51: adding and taking away 1.5 * 2^52 leaves no binary places.
+    #[inline(always)]
+    fn rounded(self) -> Self {
+        (self + ROUNDING) - ROUNDING
+    }
+
+    /// Whether all lanes are within the range of the argument reduction.
+    #[inline(always)]
+    fn reducible(self) -> bool {
+        self.abs().largest() < REDUCIBLE
+    }
+}
+
+/// See [`Lanes::rounded`].
+const ROUNDING: f64 = 6_755_399_441_055_744.0;
+
+/// The arguments up to which sine and cosine are reduced by three parts of pi: the half turns then have at most 19 binary
+/// digits.
+const REDUCIBLE: f64 = 5e5;
+
+/// pi to 140 binary digits: 33, 33 and the rest.
+const PI: [f64; 3] = [
+    f64::from_bits(0x4009_21fb_5440_0000),
+    f64::from_bits(0x3de0_b461_1a60_0000),
+    f64::from_bits(0x3bb3_198a_2e03_7073),
+];
+
+/// The coefficients `(-1)^k / (2k+1)!`, from k = 11 down to 1: the first one left out is below 1e-20 on a quarter turn.
+const SINE: [f64; 11] = [
+    -1.0 / 25_852_016_738_884_976_640_000.0,
+    1.0 / 51_090_942_171_709_440_000.0,
+    -1.0 / 121_645_100_408_832_000.0,
+    1.0 / 355_687_428_096_000.0,
+    -1.0 / 1_307_674_368_000.0,
+    1.0 / 6_227_020_800.0,
+    -1.0 / 39_916_800.0,
+    1.0 / 362_880.0,
+    -1.0 / 5_040.0,
+    1.0 / 120.0,
+    -1.0 / 6.0,
+];
+
+impl<S: Simd> Debug for Lanes<S> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        self.lanes().fmt(f)
+    }
+}
+
+impl<S: Simd> PartialEq for Lanes<S> {
+    fn eq(&self, b: &Self) -> bool {
+        self.lanes() == b.lanes()
+    }
+}
+
+impl<S: Simd> From<f64> for Lanes<S> {
+    #[inline(always)]
+    fn from(x: f64) -> Self {
+        Self::splat(x)
+    }
+}
+
+impl<S: Simd> num_traits::Zero for Lanes<S> {
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::splat(0.0)
+    }
+    fn is_zero(&self) -> bool {
+        *self == Self::zero()
+    }
+}
+
+impl<S: Simd> num_traits::One for Lanes<S> {
+    #[inline(always)]
+    fn one() -> Self {
+        Self::splat(1.0)
+    }
+}
+
+impl<S: Simd> Neg for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Lanes(token::<S>().neg_f64s(self.0))
+    }
+}
+
+macro_rules! arithmetic {
+    ($($op:ident, $method:ident, $assign:ident, $assign_method:ident, $of:ident;)*) => {$(
+        impl<S: Simd> $op for Lanes<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, b: Self) -> Self {
+                Lanes(token::<S>().$of(self.0, b.0))
+            }
+        }
+        impl<S: Simd> $op<f64> for Lanes<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, b: f64) -> Self {
+                self.$method(Self::splat(b))
+            }
+        }
+        impl<S: Simd> $assign for Lanes<S> {
+            #[inline(always)]
+            fn $assign_method(&mut self, b: Self) {
+                *self = self.$method(b);
+            }
+        }
+    )*};
+}
+arithmetic! {
+    Add, add, AddAssign, add_assign, add_f64s;
+    Sub, sub, SubAssign, sub_assign, sub_f64s;
+    Mul, mul, MulAssign, mul_assign, mul_f64s;
+    Div, div, DivAssign, div_assign, div_f64s;
+}
+
+impl<S: Simd> Scalar for Lanes<S> {
+    #[inline(always)]
+    fn re(self) -> f64 {
+        self.lanes()[0]
+    }
+    #[inline(always)]
+    fn modulus(self) -> f64 {
+        self.lanes().iter().fold(f64::INFINITY, |m, x| if x.abs() < m || x.is_nan() { x.abs() } else { m })
+    }
+    #[inline(always)]
+    fn extent(self) -> f64 {
+        self.lanes().iter().fold(0.0, |m, x| if x.is_nan() { f64::INFINITY } else { f64::max(m, x.abs()) })
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self::splat(1.0) / self
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Lanes(token::<S>().sqrt_f64s(self.0))
+    }
+    #[inline(always)]
+    fn powi(self, n: i32) -> Self {
+        let (mut power, mut base, mut left) = (Self::splat(1.0), self, n.unsigned_abs());
+        while left > 0 {
+            if left % 2 == 1 {
+                power *= base;
+            }
+            base *= base;
+            left /= 2;
+        }
+        if n < 0 { power.recip() } else { power }
+    }
+    fn powf(self, a: f64) -> Self {
+        self.each(|x| x.powf(a))
+    }
+    fn exp(self) -> Self {
+        self.each(f64::exp)
+    }
+    fn exp_m1(self) -> Self {
+        self.each(f64::exp_m1)
+    }
+    fn ln(self) -> Self {
+        self.each(f64::ln)
+    }
+    fn ln_1p(self) -> Self {
+        self.each(f64::ln_1p)
+    }
+    /// Two polynomials with nothing shared: where one of the results is not used, its work is dropped.
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        (Scalar::sin(self), Scalar::cos(self))
+    }
+    #[inline(always)]
+    fn sin(self) -> Self {
+        if !self.reducible() {
+            return self.each(f64::sin);
+        }
+        let turns = (self * std::f64::consts::FRAC_1_PI).rounded();
+        self.reduced_sine(turns, turns)
+    }
+    /// `cos x = sin(x + pi/2)`, the quarter turn put among the turns.
+    #[inline(always)]
+    fn cos(self) -> Self {
+        if !self.reducible() {
+            return self.each(f64::cos);
+        }
+        let turns = (self * std::f64::consts::FRAC_1_PI + 0.5).rounded();
+        self.reduced_sine(turns - 0.5, turns)
+    }
+    #[inline(always)]
+    fn sin_versine(self) -> (Self, Self) {
+        let half = Scalar::sin(self * 0.5);
+        (Scalar::sin(self), half * half * 2.0)
+    }
+    fn sinh(self) -> Self {
+        self.each(f64::sinh)
+    }
+    fn cosh(self) -> Self {
+        self.each(f64::cosh)
+    }
+    fn tanh(self) -> Self {
+        self.each(f64::tanh)
+    }
+    fn atan(self) -> Self {
+        self.each(f64::atan)
+    }
+}
