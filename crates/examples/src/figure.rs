@@ -178,7 +178,7 @@ const MARKER: f64 = 3.6;
 const SIZE: (f64, f64) = (560.0, 400.0);
 
 /// What a legend to the right of the axes adds to the width, in pixels.
-const BESIDE: f64 = 300.0;
+const BESIDE: f64 = 270.0;
 
 /// The factor by which all but the curves is enlarged. It makes the swatches of the legend long enough to show a pattern;
 /// the sizes of the fonts below are in units of it.

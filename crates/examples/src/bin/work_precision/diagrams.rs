@@ -11,7 +11,9 @@ const ERRORS: (i32, i32) = (-16, 0);
 pub fn write(out: &Directory, problem: &Problem, z: bool, rows: &[Row]) -> Result<(), Failure> {
     let (least, most) = (10f64.powi(ERRORS.0), 10f64.powi(ERRORS.1));
     let drawn = |row: &&Row| row.problem == problem.name && row.z == z && (least..=most).contains(&row.error);
-    let rows: Vec<&Row> = rows.iter().filter(drawn).collect();
+    let mut rows: Vec<&Row> = rows.iter().filter(drawn).collect();
+    // The library heads the legend; each part of it stays in the order of the table.
+    rows.sort_by_key(|row| row.origin != Origin::Library);
     let seconds = || rows.iter().map(|row| row.seconds);
     let (fastest, slowest) = (seconds().fold(f64::INFINITY, f64::min), seconds().fold(0.0, f64::max));
     if rows.is_empty() {

@@ -181,3 +181,26 @@ impl<F: Fn([f64; D]) -> [f64; D] + Copy, const D: usize> Candidate for OdeSolver
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problems::PROBLEMS;
+
+    #[test]
+    fn right_hand_sides_are_those_of_the_problems() -> Result<(), RunError> {
+        for (problem, z) in PROBLEMS.iter().flat_map(|problem| [false, true].map(|z| (problem, z))) {
+            let peers = candidates(problem, z);
+            assert_eq!(peers.len(), if problem.needs_z() && !z { 0 } else { 2 });
+            for peer in peers {
+                let run = peer.run(1e-12)?;
+                // The orbit of P3 amplifies the tolerance by 1e6; a wrong term would show in the first digit.
+                assert!(problem.error(&run.state) < 1e-5, "{} {}: {run:?}", problem.name, peer.name());
+                assert_eq!(problem.error_z(&run.state).is_some(), z);
+                assert!(problem.error_z(&run.state).is_none_or(|e| e < 1e-7), "{} {}", problem.name, peer.name());
+                assert!(run.steps > 0 && run.evaluations >= 11 * run.steps);
+            }
+        }
+        Ok(())
+    }
+}
