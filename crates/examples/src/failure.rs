@@ -22,6 +22,26 @@ pub enum Failure {
         /// What the system says.
         cause: io::Error,
     },
+    /// A name is not among those that are known. Bad input: exit code 2.
+    #[error("there is no {what} {name:?}; known are all, {known}")]
+    Unknown {
+        /// What it should name.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// The known names.
+        known: String,
+    },
+    /// A table that is to be read cannot be, or is not what it should be. Bad input: exit code 2.
+    #[error("cannot take the rows of {}: {cause}; {expected}", .path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        cause: String,
+        /// What would be accepted.
+        expected: String,
+    },
     /// The text for the terminal cannot be written: exit code 2.
     #[error("cannot write to the standard output: {0}")]
     Terminal(io::Error),
@@ -71,7 +91,12 @@ impl Failure {
     /// 2 for bad input, 1 for a run or a check that went wrong.
     fn code(&self) -> u8 {
         match self {
-            Failure::Output { .. } | Failure::Terminal(_) | Failure::Input(_) | Failure::Geometry(_) => 2,
+            Failure::Output { .. }
+            | Failure::Unknown { .. }
+            | Failure::Table { .. }
+            | Failure::Terminal(_)
+            | Failure::Input(_)
+            | Failure::Geometry(_) => 2,
             Failure::Run { .. } | Failure::Step(_) | Failure::Exact(_) | Failure::Statements { .. } => 1,
         }
     }

@@ -25,6 +25,24 @@ pub enum Line {
     Crosses,
     /// Green upright crosses without a line.
     Pluses,
+    /// One of many, where four patterns are too few: colour and pattern both change from one number to the next, and meet
+    /// again after 24.
+    Coloured(usize),
+    /// One of many references, in grey: patterns and widths change, and meet again after 8.
+    Grey(usize),
+}
+
+/// The colours of the many.
+const COLOURS: [&str; 6] = [SOLID, "#c1272d", GREEN, "#8e44ad", "#d98200", "#00838f"];
+
+/// The pattern of the many that has a number.
+fn pattern(number: usize) -> LineStyle {
+    match number % 4 {
+        0 => LineStyle::Solid,
+        1 => LineStyle::Custom("8 5".into()),
+        2 => LineStyle::Custom("2 3".into()),
+        _ => LineStyle::Custom("9 3 2 3".into()),
+    }
 }
 
 impl Line {
@@ -37,6 +55,12 @@ impl Line {
             Line::Discs => marked(points, SOLID, MarkerShape::Circle, name),
             Line::Crosses => marked(points, GREY, MarkerShape::Cross, name),
             Line::Pluses => marked(points, GREEN, MarkerShape::Plus, name),
+            Line::Coloured(number) => {
+                // The colours go round once while the patterns do one and a half times; shifted, all pairs are met.
+                let colour = COLOURS[number % COLOURS.len()];
+                drawn(points, colour, 2.0, pattern(number + number / 12), name)
+            }
+            Line::Grey(number) => drawn(points, GREY, if number % 8 < 4 { 2.6 } else { 1.2 }, pattern(number), name),
         }
     }
 }
@@ -129,7 +153,8 @@ pub struct Panel {
     pub x: Axis,
     /// The vertical axis.
     pub y: Axis,
-    /// The upper left corner of the legend, as fractions of the width and of the height from the lower left.
+    /// The upper left corner of the legend, as fractions of the width and of the height from the lower left; to the right of
+    /// the axes, in a figure of one panel, if the first is 1.
     pub legend: (f64, f64),
     /// The curves, the first one drawn first.
     pub curves: Vec<Curve>,
@@ -152,6 +177,9 @@ const MARKER: f64 = 3.6;
 /// The width and the height of a panel, in pixels.
 const SIZE: (f64, f64) = (560.0, 400.0);
 
+/// What a legend to the right of the axes adds to the width, in pixels.
+const BESIDE: f64 = 270.0;
+
 /// The factor by which all but the curves is enlarged. It makes the swatches of the legend long enough to show a pattern;
 /// the sizes of the fonts below are in units of it.
 const SCALE: f64 = 1.6;
@@ -171,9 +199,18 @@ impl Panel {
         plots
     }
 
+    fn legend_is_beside(&self) -> bool {
+        self.legend.0 >= 1.0
+    }
+
     fn layout(&self, plots: &[Plot]) -> Layout {
         let ((left, right, x_step), (bottom, top, y_step)) = (self.x.range(), self.y.range());
         let corner = (left + self.legend.0 * (right - left), bottom + self.legend.1 * (top - bottom));
+        let legend = if self.legend_is_beside() {
+            LegendPosition::OutsideRightTop
+        } else {
+            LegendPosition::DataCoords(corner.0, corner.1)
+        };
         Layout::auto_from_plots(plots)
             .with_scale(SCALE)
             .with_label_size(11)
@@ -188,7 +225,7 @@ impl Panel {
             .with_show_grid(false)
             .with_tick_align(TickAlign::Inside)
             .with_tick_pos(TickPos::Both)
-            .with_legend_position(LegendPosition::DataCoords(corner.0, corner.1))
+            .with_legend_position(legend)
             .with_legend_box(false)
             .with_x_axis_min(left)
             .with_x_axis_max(right)
@@ -220,7 +257,8 @@ fn power_of_ten(exponent: f64) -> String {
 /// A figure of one panel, as SVG.
 pub fn draw(panel: &Panel) -> String {
     let plots = panel.plots();
-    let layout = panel.layout(&plots).with_width(SIZE.0).with_height(SIZE.1);
+    let width = SIZE.0 + if panel.legend_is_beside() { BESIDE } else { 0.0 };
+    let layout = panel.layout(&plots).with_width(width).with_height(SIZE.1);
     kuva::render_to_svg(plots, layout)
 }
 

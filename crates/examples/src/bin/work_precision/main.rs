@@ -1,0 +1,162 @@
+//! Work against precision: what an error costs with the library's methods, and with what else there is.
+//!
+//! ```text
+//! cargo run --release --bin work_precision [-- --problem NAME --method NAME --z on|off --out DIR] [--peers FILE] [--quick]
+//! ```
+//!
+//! Four motions with known ends, solved with ever finer steps or tolerances, with the action and without. Each run is repeated
+//! (seven times at least, short ones for 20 ms or 200 times) and its median time taken. What is timed is the integration: plans,
+//! tables and solvers are made before, for the library and for the peers. Two implementations of dop853 are measured in the
+//! same run; rows of peers that are not in Rust are read from the file of `--peers`, which must have been measured on the same
+//! machine.
+//!
+//! Writes `work_precision.csv` and a diagram of each problem, and prints the times to three errors. Runs without a final state
+//! are counted on stderr. Ends with 2 if a name is unknown, the file of the peers is not what it should be, or the output cannot
+//! be written.
+
+mod candidate;
+mod diagrams;
+mod library;
+mod measure;
+mod peers;
+mod problems;
+mod recorded;
+mod row;
+mod summary;
+
+use candidate::Candidate;
+use clap::{Parser, ValueEnum};
+use contact_examples::{Directory, Failure, finish, print};
+use indicatif::{ProgressBar, ProgressStyle};
+use measure::{Effort, sweep};
+use problems::{PROBLEMS, Problem};
+use row::{Origin, Row, switch};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Measures what an error costs, with the library's methods and with others.
+#[derive(Parser)]
+struct Arguments {
+    /// The problems, separated by commas.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "all")]
+    problem: Vec<String>,
+    /// The methods, separated by commas.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "all")]
+    method: Vec<String>,
+    /// With or without the action; both, if it is not said.
+    #[arg(long)]
+    z: Option<Switch>,
+    /// The directory for table and diagrams; created where it does not exist.
+    #[arg(long, value_name = "DIR", default_value = "out/work_precision")]
+    out: PathBuf,
+    /// Rows of peers measured elsewhere, of which those of heyoka are taken.
+    #[arg(long, value_name = "FILE")]
+    peers: Option<PathBuf>,
+    /// Takes the rows of all peers in that file.
+    #[arg(long, requires = "peers")]
+    all_peers: bool,
+    /// Measures a third of the steps, and none that takes long.
+    #[arg(long)]
+    quick: bool,
+}
+
+/// A switch.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
+/// A candidate with what it is a candidate for.
+struct Entry {
+    problem: &'static Problem,
+    z: bool,
+    origin: Origin,
+    candidate: Box<dyn Candidate>,
+}
+
+fn main() -> ExitCode {
+    finish(run(&Arguments::parse()))
+}
+
+fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let all = entries();
+    let mut methods: Vec<&str> = all.iter().map(|entry| entry.candidate.name()).collect();
+    methods.sort_unstable();
+    methods.dedup();
+    check_names("problem", &arguments.problem, &PROBLEMS.map(|problem| problem.name))?;
+    check_names("method", &arguments.method, &methods)?;
+    let named = |names: &[String], name: &str| names.iter().any(|n| n == "all" || n == name);
+    let wanted = |problem: &Problem, z: bool| {
+        let with = arguments.z.is_none_or(|switch| (switch == Switch::On) == z);
+        with && named(&arguments.problem, problem.name)
+    };
+
+    let mut rows = match &arguments.peers {
+        Some(path) => recorded::read(path, arguments.all_peers)?,
+        None => Vec::new(),
+    };
+    rows.retain(|row| PROBLEMS.iter().any(|problem| problem.name == row.problem && wanted(problem, row.z)));
+    let out = Directory::create(&arguments.out)?;
+    let chosen: Vec<Entry> = all
+        .into_iter()
+        .filter(|entry| wanted(entry.problem, entry.z) && named(&arguments.method, entry.candidate.name()))
+        .collect();
+    rows.extend(measure(&chosen, Effort { quick: arguments.quick }));
+    row::sort(&mut rows);
+
+    out.table("work_precision.csv", &row::COLUMNS, rows.iter().map(Row::fields))?;
+    for (problem, z) in variants().filter(|(problem, z)| wanted(problem, *z)) {
+        diagrams::write(&out, problem, z, &rows)?;
+        print(&summary::of(problem, z, &rows))?;
+    }
+    print(&format!(
+        "\nRatios are times of the peer over ours: above 1, the library is the faster one.\n\
+         Table and diagrams are in {}.\n",
+        out.path().display()
+    ))
+}
+
+/// The problems without the action where they have a solution without, and with it.
+fn variants() -> impl Iterator<Item = (&'static Problem, bool)> {
+    let both = PROBLEMS.iter().flat_map(|problem| [false, true].map(|z| (problem, z)));
+    both.filter(|(problem, z)| *z || !problem.needs_z())
+}
+
+/// Everything that can be measured.
+fn entries() -> Vec<Entry> {
+    let of = |(problem, z)| {
+        let entry = move |origin| move |candidate| Entry { problem, z, origin, candidate };
+        let library = library::candidates(problem, z).into_iter().map(entry(Origin::Library));
+        library.chain(peers::candidates(problem, z).into_iter().map(entry(Origin::Peer)))
+    };
+    variants().flat_map(of).collect()
+}
+
+/// Refuses names that are neither `all` nor known.
+fn check_names(what: &'static str, names: &[String], known: &[&str]) -> Result<(), Failure> {
+    match names.iter().find(|name| *name != "all" && !known.contains(&name.as_str())) {
+        Some(name) => Err(Failure::Unknown { what, name: name.clone(), known: known.join(", ") }),
+        None => Ok(()),
+    }
+}
+
+/// Measures all entries, with a bar that shows how far it is.
+fn measure(entries: &[Entry], effort: Effort) -> Vec<Row> {
+    let style = ProgressStyle::with_template("measuring {bar:30} {pos}/{len}  {msg}");
+    let bar = ProgressBar::new(entries.len() as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let mut rows = Vec::new();
+    for Entry { problem, z, origin, candidate } in entries {
+        let subject = format!("{}, z {}, {}", problem.name, switch(*z), candidate.name());
+        bar.set_message(subject.clone());
+        let found = sweep(candidate.as_ref(), *origin, problem, *z, effort);
+        rows.extend(found.rows);
+        if let Some((control, cause)) = found.failed.first() {
+            let count = found.failed.len();
+            bar.suspend(|| eprintln!("note: {subject}: {count} runs without a final state; with {control:e}: {cause}"));
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    rows
+}

@@ -1,0 +1,206 @@
+//! Peers: what else there is in Rust for these equations. Two implementations of dop853, Hairer's explicit method of order 8,
+//! with right-hand sides written by hand as their users would.
+
+use crate::candidate::{Candidate, Control, Run, RunError};
+use crate::problems::{KEPLER, OSCILLATOR, PENDULUM, Problem, QUADRATIC, System};
+use differential_equations::methods::ExplicitRungeKutta;
+use differential_equations::prelude::{IVP, ODE};
+use ode_solvers::{Dop853, OutputType, SVector};
+use std::time::Instant;
+
+/// The largest number of steps of a run, of either peer.
+const MOST_STEPS: u32 = 100_000_000;
+
+/// The peers, set on a problem with or without the action.
+pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
+    match (problem.system, z) {
+        (System::Oscillator, false) => both(problem, |[q, v]: [f64; 2]| [v, OSCILLATOR.gamma * v - q]),
+        (System::Oscillator, true) => both(problem, |[q, v, z]: [f64; 3]| {
+            let gamma = OSCILLATOR.gamma;
+            [v, gamma * v - q, 0.5 * (v * v - q * q) + gamma * z]
+        }),
+        (System::Pendulum, false) => both(problem, |[q, v]: [f64; 2]| [v, PENDULUM.gamma * v - q.sin()]),
+        (System::Pendulum, true) => both(problem, |[q, v, z]: [f64; 3]| {
+            let gamma = PENDULUM.gamma;
+            [v, gamma * v - q.sin(), 0.5 * v * v - 1.0 + q.cos() + gamma * z]
+        }),
+        (System::Kepler, false) => both(problem, |[x, y, vx, vy]: [f64; 4]| {
+            let (_, force) = attraction(x, y);
+            [vx, vy, KEPLER.gamma * vx - x * force, KEPLER.gamma * vy - y * force]
+        }),
+        (System::Kepler, true) => both(problem, |[x, y, vx, vy, z]: [f64; 5]| {
+            let (inverse, force) = attraction(x, y);
+            let gamma = KEPLER.gamma;
+            let rate = 0.5 * (vx * vx + vy * vy) + inverse + gamma * z;
+            [vx, vy, gamma * vx - x * force, gamma * vy - y * force, rate]
+        }),
+        (System::Quadratic, true) => both(problem, |[q, v, z]: [f64; 3]| {
+            [v, -q - QUADRATIC.c * z * v, 0.5 * (v * v - q * q) - 0.5 * QUADRATIC.c * z * z]
+        }),
+        // Its position needs the action.
+        (System::Quadratic, false) => Vec::new(),
+    }
+}
+
+/// `1/r` and `1/r^3`.
+#[inline(always)]
+fn attraction(x: f64, y: f64) -> (f64, f64) {
+    let inverse = 1.0 / (x * x + y * y).sqrt();
+    (inverse, inverse * inverse * inverse)
+}
+
+/// Both peers with a right-hand side of D variables.
+fn both<const D: usize>(
+    problem: &Problem,
+    rhs: impl Fn([f64; D]) -> [f64; D] + Copy + 'static,
+) -> Vec<Box<dyn Candidate>> {
+    let adaptive = Adaptive { rhs: Rhs(rhs), problem: *problem };
+    vec![Box::new(DifferentialEquations(adaptive)), Box::new(OdeSolvers(adaptive))]
+}
+
+/// A right-hand side.
+#[derive(Clone, Copy)]
+struct Rhs<F>(F);
+
+impl<F: Fn([f64; D]) -> [f64; D], const D: usize> ODE<f64, [f64; D]> for Rhs<F> {
+    #[inline(always)]
+    fn diff(&self, _t: f64, y: &[f64; D], rate: &mut [f64; D]) {
+        *rate = (self.0)(*y);
+    }
+}
+
+impl<F: Fn([f64; D]) -> [f64; D], const D: usize> ode_solvers::System<f64, SVector<f64, D>> for Rhs<F> {
+    #[inline(always)]
+    fn system(&self, _t: f64, y: &SVector<f64, D>, rate: &mut SVector<f64, D>) {
+        rate.data.0 = [(self.0)(y.data.0[0])];
+    }
+}
+
+/// A problem of D variables with its right-hand side.
+#[derive(Clone, Copy)]
+struct Adaptive<F, const D: usize> {
+    rhs: Rhs<F>,
+    problem: Problem,
+}
+
+impl<F, const D: usize> Adaptive<F, D> {
+    /// The start.
+    fn start(&self) -> [f64; D] {
+        std::array::from_fn(|i| self.problem.start.get(i).copied().unwrap_or(f64::NAN))
+    }
+
+    /// The absolute tolerances: relative to the size that the motion ends with, as it decays by many orders of magnitude.
+    fn absolute(&self, tolerance: f64) -> [f64; D] {
+        let components = self.problem.components();
+        std::array::from_fn(|i| tolerance * if i < components { self.problem.amplitude } else { self.problem.z_scale })
+    }
+}
+
+/// The dop853 of differential-equations.
+struct DifferentialEquations<F, const D: usize>(Adaptive<F, D>);
+
+impl<F: Fn([f64; D]) -> [f64; D], const D: usize> Candidate for DifferentialEquations<F, D> {
+    fn name(&self) -> &'static str {
+        "differential_equations_dop853"
+    }
+
+    fn order(&self) -> u32 {
+        8
+    }
+
+    fn control(&self) -> Control {
+        Control::Tolerance
+    }
+
+    fn run(&self, tolerance: f64) -> Result<Run, RunError> {
+        let Adaptive { rhs, problem } = &self.0;
+        let method = ExplicitRungeKutta::dop853().rtol(tolerance).atol(self.0.absolute(tolerance));
+        let ivp = IVP::ode(rhs, 0.0, problem.duration, self.0.start())
+            .t_eval([problem.duration])
+            .method(method.max_steps(MOST_STEPS as usize));
+        let clock = Instant::now();
+        let solution = ivp.solve().map_err(|error| RunError::Peer(format!("{error:?}")))?;
+        let seconds = clock.elapsed().as_secs_f64();
+        let end = solution.y.last().ok_or_else(|| RunError::Peer("no final state".into()))?;
+        Ok(Run {
+            state: end.to_vec(),
+            steps: solution.steps.accepted as u64,
+            evaluations: solution.evals.function as u64,
+            seconds,
+        })
+    }
+}
+
+/// The dop853 of ode_solvers. It has one absolute tolerance for all variables: that of (q, v).
+struct OdeSolvers<F, const D: usize>(Adaptive<F, D>);
+
+impl<F: Fn([f64; D]) -> [f64; D] + Copy, const D: usize> Candidate for OdeSolvers<F, D> {
+    fn name(&self) -> &'static str {
+        "ode_solvers_dop853"
+    }
+
+    fn order(&self) -> u32 {
+        8
+    }
+
+    fn control(&self) -> Control {
+        Control::Tolerance
+    }
+
+    fn run(&self, tolerance: f64) -> Result<Run, RunError> {
+        let Adaptive { rhs, problem } = self.0;
+        let end = problem.duration;
+        // Its defaults, but for the number of steps; and no step is too small to be tried, nor suspected of stiffness.
+        let mut solver = Dop853::from_param(
+            rhs,
+            0.0,
+            end,
+            end,
+            SVector::from(self.0.start()),
+            tolerance,
+            tolerance * problem.amplitude,
+            0.9,
+            0.0,
+            0.333,
+            6.0,
+            end,
+            0.0,
+            MOST_STEPS,
+            u32::MAX,
+            OutputType::Sparse,
+        );
+        let clock = Instant::now();
+        let stats = solver.integrate().map_err(|error| RunError::Peer(error.to_string()))?;
+        let seconds = clock.elapsed().as_secs_f64();
+        let state = solver.y_out().last().ok_or_else(|| RunError::Peer("no final state".into()))?;
+        Ok(Run {
+            state: state.iter().copied().collect(),
+            steps: u64::from(stats.accepted_steps),
+            evaluations: u64::from(stats.num_eval),
+            seconds,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problems::PROBLEMS;
+
+    #[test]
+    fn right_hand_sides_are_those_of_the_problems() -> Result<(), RunError> {
+        for (problem, z) in PROBLEMS.iter().flat_map(|problem| [false, true].map(|z| (problem, z))) {
+            let peers = candidates(problem, z);
+            assert_eq!(peers.len(), if problem.needs_z() && !z { 0 } else { 2 });
+            for peer in peers {
+                let run = peer.run(1e-12)?;
+                // The orbit of P3 amplifies the tolerance by 1e6; a wrong term would show in the first digit.
+                assert!(problem.error(&run.state) < 1e-5, "{} {}: {run:?}", problem.name, peer.name());
+                assert_eq!(problem.error_z(&run.state).is_some(), z);
+                assert!(problem.error_z(&run.state).is_none_or(|e| e < 1e-7), "{} {}", problem.name, peer.name());
+                assert!(run.steps > 0 && run.evaluations >= 11 * run.steps);
+            }
+        }
+        Ok(())
+    }
+}

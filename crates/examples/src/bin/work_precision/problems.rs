@@ -1,0 +1,189 @@
+//! The problems: Lagrangians, starts, durations, and trusted final states.
+
+use contact_geom::PhasePoint;
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum, QuadraticInZ};
+
+/// The Lagrangian of P1.
+pub const OSCILLATOR: HarmonicOscillator = HarmonicOscillator { gamma: -0.05 };
+
+/// The Lagrangian of P2.
+pub const PENDULUM: Pendulum = Pendulum { gamma: -0.01 };
+
+/// The Lagrangian of P3.
+pub const KEPLER: Kepler<2> = Kepler { mu: 1.0, gamma: -1e-4 };
+
+/// The Lagrangian of P6.
+pub const QUADRATIC: QuadraticInZ = QuadraticInZ { c: 0.1 };
+
+/// Which of the Lagrangians above a problem has. They differ in type and dimension; what is done with one begins with a
+/// match on this.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum System {
+    /// [`OSCILLATOR`].
+    Oscillator,
+    /// [`PENDULUM`].
+    Pendulum,
+    /// [`KEPLER`].
+    Kepler,
+    /// [`QUADRATIC`].
+    Quadratic,
+}
+
+/// An initial value problem from t = 0, and its solution. `L_v = v` in all of them, so momenta are velocities.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Problem {
+    /// The name in tables and arguments.
+    pub name: &'static str,
+    /// What it is, for titles.
+    pub title: &'static str,
+    /// The Lagrangian.
+    pub system: System,
+    /// The final time, a whole number of time units.
+    pub duration: f64,
+    /// The start, in the order q, v, z.
+    pub start: &'static [f64],
+    /// The final state in the same order.
+    pub end: &'static [f64],
+    /// The smallest root mean square of (q, v) towards the end of the motion: what absolute tolerances are relative to.
+    pub amplitude: f64,
+    /// The largest |z| during the last `max(7, T/100)` time units: what errors of z are relative to.
+    pub z_scale: f64,
+}
+
+/// The problems, in the order of the tables.
+///
+/// The final states are those of the double initial data and parameters, rounded once: P1 from its closed form with 60
+/// digits, the others by Taylor's method (heyoka's) with 200 bits; that of 113 bits agrees to all digits of a double. The scales are
+/// read off 2001 states of the last stretch of the motion.
+pub const PROBLEMS: [Problem; 4] = [
+    Problem {
+        name: "P1",
+        title: "oscillator with drag",
+        system: System::Oscillator,
+        duration: 1000.0,
+        start: &[1.0, 0.0, 0.0],
+        end: &[1.1176166148212974e-11, -8.528426017237838e-12, -4.765755307569616e-23],
+        amplitude: 9.940842882958946e-12,
+        z_scale: 7.605478932373426e-23,
+    },
+    Problem {
+        name: "P2",
+        title: "pendulum with drag",
+        system: System::Pendulum,
+        duration: 1000.0,
+        start: &[1.0, 1.0, 0.0],
+        end: &[0.004560418507931897, 0.008546936292288776, -0.00033535425469830894],
+        amplitude: 0.006850092588860796,
+        z_scale: 0.00040832851245717816,
+    },
+    Problem {
+        name: "P3",
+        title: "Kepler problem with drag, e = 0.5",
+        system: System::Kepler,
+        duration: 2000.0,
+        start: &[0.5, 0.0, 0.0, 1.7320508075688772, 0.0],
+        end: &[-0.2355933153366884, 0.5741404019857265, -1.3045801099719607, 0.16965896370899058, 3366.2793866404986],
+        amplitude: 0.6141731794526933,
+        z_scale: 3366.279386640823,
+    },
+    Problem {
+        name: "P6",
+        title: "oscillator with drag proportional to the action",
+        system: System::Quadratic,
+        duration: 100.0,
+        start: &[1.0, 0.0, 1.0],
+        end: &[0.14829686459424563, 0.07506619014502397, 0.17297124462440955],
+        amplitude: 0.11753061931125197,
+        z_scale: 0.1849479143126594,
+    },
+];
+
+impl Problem {
+    /// Whether the position needs the action, so that there is no solving it without.
+    pub fn needs_z(&self) -> bool {
+        self.system == System::Quadratic
+    }
+
+    /// The largest relative tolerance that leaves a motion of the kind: with a larger one, the orbit of P3 collapses.
+    pub fn coarsest_tolerance(&self) -> f64 {
+        if self.system == System::Kepler { 2e-6 } else { 1.0 }
+    }
+
+    /// The number of components of (q, v).
+    pub fn components(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    /// The start as a point of T\*Q x R, for the dimension that the problem has.
+    pub fn phase_point<const N: usize>(&self) -> PhasePoint<N> {
+        let component = |i: usize| self.start.get(i).copied().unwrap_or(f64::NAN);
+        PhasePoint {
+            q: SVector::from_fn(|i, _| component(i)),
+            p: SVector::from_fn(|i, _| component(N + i)),
+            z: component(2 * N),
+        }
+    }
+
+    /// The error of a final state `q, v` or `q, v, z`: the 2-norm of that of (q, v), relative to the solution's.
+    pub fn error(&self, state: &[f64]) -> f64 {
+        let pairs = || state.iter().zip(self.end).take(self.components());
+        let error: f64 = pairs().map(|(found, true_one)| (found - true_one).powi(2)).sum();
+        let size: f64 = pairs().map(|(_, true_one)| true_one.powi(2)).sum();
+        (error / size).sqrt()
+    }
+
+    /// The error of the z of a final state that has one, relative to the problem's scale.
+    pub fn error_z(&self, state: &[f64]) -> Option<f64> {
+        let (found, true_one) = state.iter().zip(self.end).nth(self.components())?;
+        Some((found - true_one).abs() / self.z_scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The motion of P1 at a time: `e^(-gamma t) L` without its z is `-(cos 2wt + B sin 2wt)/2`, which is easily integrated.
+    fn oscillator(t: f64) -> [f64; 3] {
+        let gamma = OSCILLATOR.gamma;
+        let w = (1.0 - 0.25 * gamma * gamma).sqrt();
+        let b = -0.5 * gamma / w;
+        let (sin, cos) = (w * t).sin_cos();
+        let (sin_2, cos_2) = (2.0 * w * t).sin_cos();
+        let decay = (0.5 * gamma * t).exp();
+        [decay * (cos + b * sin), -decay * sin / w, decay * decay * (b * (cos_2 - 1.0) - sin_2) / (4.0 * w)]
+    }
+
+    #[test]
+    fn the_reference_of_p1_is_its_closed_form() {
+        let problem = PROBLEMS[0];
+        let end = oscillator(problem.duration);
+        // The phase of a thousand is rounded to 1e-13 in doubles.
+        assert!(problem.error(&end) < 1e-12, "{:e}", problem.error(&end));
+        assert!(problem.error_z(&end).is_some_and(|e| e < 1e-12));
+        assert_eq!(oscillator(0.0).to_vec(), problem.start);
+    }
+
+    #[test]
+    fn errors_are_relative_to_the_solution_and_to_the_scale_of_z() {
+        for problem in PROBLEMS {
+            assert_eq!(problem.error(problem.end), 0.0);
+            assert_eq!(problem.error_z(problem.end), Some(0.0));
+            let doubled: Vec<f64> = problem.end.iter().map(|x| 2.0 * x).collect();
+            assert!((problem.error(&doubled) - 1.0).abs() < 1e-15);
+            let mut off = problem.end.to_vec();
+            off[problem.components()] += problem.z_scale;
+            assert_eq!(problem.error(&off), 0.0, "z has no part in the error of (q, v)");
+            assert!(problem.error_z(&off).is_some_and(|e| (e - 1.0).abs() < 1e-12));
+            assert_eq!(problem.error_z(&off[..problem.components()]), None);
+        }
+    }
+
+    #[test]
+    fn a_start_is_a_point_of_the_phase_space() {
+        let kepler = PROBLEMS[2].phase_point::<2>();
+        assert_eq!((kepler.q[0], kepler.p[1], kepler.z), (0.5, 3f64.sqrt(), 0.0));
+        assert!(PROBLEMS[2].phase_point::<3>().check().is_err(), "of another dimension");
+    }
+}
