@@ -113,16 +113,17 @@ pub struct Pairs {
     pub symmetric: usize,
 }
 
+impl SystemVisitor for Pairs {
+    fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+        let structure = system.structure();
+        let met = Method::ALL.iter().filter(|method| method.check(&structure).is_ok()).count();
+        self.all += met;
+        self.symmetric += if system.symmetries().is_empty() { 0 } else { met };
+    }
+}
+
 /// Counts the pairs by the methods' hypotheses alone.
 pub fn pairs() -> Pairs {
-    impl SystemVisitor for Pairs {
-        fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-            let structure = system.structure();
-            let met = Method::ALL.iter().filter(|method| method.check(&structure).is_ok()).count();
-            self.all += met;
-            self.symmetric += if system.symmetries().is_empty() { 0 } else { met };
-        }
-    }
     let mut pairs = Pairs::default();
     visit_catalogue(&mut pairs);
     pairs
