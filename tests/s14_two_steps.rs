@@ -1,9 +1,9 @@
 //! Statement 14 (section 3, remark): the differential of the discrete action of two steps.
 
-use crate::common::{METHODS, over_discretisations, systems};
+use crate::common::{over_discretisations, pairs};
 
 /// With every discretisation of every system.
 #[test]
 fn with_every_discretisation() {
-    assert_eq!(over_discretisations(14), systems() * METHODS);
+    assert_eq!(over_discretisations(14), pairs().all);
 }

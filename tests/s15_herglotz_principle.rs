@@ -1,10 +1,10 @@
 //! Statement 15 (section 3, theorem): a path satisfies the discrete Herglotz principle exactly if it solves the discrete
 //! Herglotz equations, sigma_d not vanishing.
 
-use crate::common::{METHODS, over_discretisations, systems};
+use crate::common::{over_discretisations, pairs};
 
 /// With every discretisation of every system.
 #[test]
 fn with_every_discretisation() {
-    assert_eq!(over_discretisations(15), systems() * METHODS);
+    assert_eq!(over_discretisations(15), pairs().all);
 }

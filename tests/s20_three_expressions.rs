@@ -1,9 +1,9 @@
 //! Statement 20 (section 3.1): the three expressions of the discrete Hamiltonian flow, the commuting diagram.
 
-use crate::common::{METHODS, over_discretisations, systems};
+use crate::common::{over_discretisations, pairs};
 
 /// With every discretisation of every system.
 #[test]
 fn with_every_discretisation() {
-    assert_eq!(over_discretisations(20), systems() * METHODS);
+    assert_eq!(over_discretisations(20), pairs().all);
 }

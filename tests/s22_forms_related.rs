@@ -1,9 +1,9 @@
 //! Statement 22 (section 3.1, lemma): `eta+ = sigma_d eta-` and `Phi_d* eta- = eta+`.
 
-use crate::common::{METHODS, over_discretisations, systems};
+use crate::common::{over_discretisations, pairs};
 
 /// With every discretisation of every system.
 #[test]
 fn with_every_discretisation() {
-    assert_eq!(over_discretisations(22), systems() * METHODS);
+    assert_eq!(over_discretisations(22), pairs().all);
 }

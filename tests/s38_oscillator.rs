@@ -1,7 +1,7 @@
 //! Statements 38 and 39 (section 5): the midpoint rule's equations for any potential, and the oscillator's explicit q2; h
 //! small enough that sigma_d does not vanish.
 
-use crate::common::{METHODS, on_random, over_discretisations, step_from, systems, within};
+use crate::common::{on_random, over_discretisations, pairs, step_from, within};
 use contact_geom::systems::{Duffing, HarmonicOscillator, Pendulum, System};
 use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, Flow, InputError, LeftMidpoint, discrete_flow};
@@ -77,7 +77,7 @@ fn midpoint_equations() {
 /// On the samples sigma_d is positive.
 #[test]
 fn sigma_is_positive() {
-    assert_eq!(over_discretisations(39), systems() * METHODS);
+    assert_eq!(over_discretisations(39), pairs().all);
 }
 
 /// At `h gamma <= -1` it is not, and the flow is refused before its first step, with the value.

@@ -4,10 +4,9 @@
 use crate::common::{around, on_random, step_from};
 use contact_geom::systems::{Chain, Pendulum, System, SystemVisitor, visit_catalogue};
 use contact_geom::{DiscretePoint, PhasePoint, Scalar, Triple, legendre};
-use discrete_herglotz::rules::{Discretisation, DiscretisationVisitor, visit_discretisations};
 use discrete_herglotz::{
-    DiscreteLagrangian, Every, FinalOnly, Flow, LeftMidpoint, Midpoint, Record, Solver, Status, Step, StepError,
-    legendre_minus,
+    DiscreteLagrangian, Every, FinalOnly, Flow, LeftMidpoint, Method, Midpoint, Record, Solver, Status, Step,
+    StepError, legendre_minus,
 };
 use std::ops::ControlFlow;
 
@@ -30,19 +29,14 @@ fn forward_and_backward() {
     struct Visitor;
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-            struct Methods<'a, S, const N: usize>(&'a S);
-            impl<const N: usize, S: System<N>> DiscretisationVisitor for Methods<'_, S, N> {
-                fn visit(&mut self, method: &impl Discretisation) {
-                    let system = self.0;
-                    on_random(&format!("{} with {}", system.name(), method.name()), 2 * N + 3, |u| {
-                        let (t, v) = system.sample(&u[1..]);
-                        let h = step_from(u[0]);
-                        let ld = method.discretise(system, h).map_err(|e| e.to_string())?;
-                        compare(&ld, t, &around(&v, h)).map_err(|e| e.to_string())
-                    });
-                }
+            for method in Method::applicable(&system.structure()) {
+                on_random(&format!("{} with {method}", system.name()), 2 * N + 3, |u| {
+                    let (t, v) = system.sample(&u[1..]);
+                    let h = step_from(u[0]);
+                    let ld = method.discretise(system, h).map_err(|e| e.to_string())?;
+                    compare(&ld, t, &around(&v, h))
+                });
             }
-            visit_discretisations(&mut Methods(system));
         }
     }
     fn compare<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscretePoint<N>) -> Result<(), String> {

@@ -8,6 +8,7 @@ mod exact_composition;
 mod exact_is_discrete;
 mod exact_motion;
 mod exact_series;
+mod methods;
 mod orders;
 mod s01_contact_condition;
 mod s02_reeb_field;

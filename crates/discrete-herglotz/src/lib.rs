@@ -3,8 +3,8 @@
 //! A discrete Lagrangian `L_d(q0, q1, z0)` advances the action by `z1 = z0 + L_d`; the discrete Herglotz equations
 //! `D1 L_d(q1, q2, z1) + sigma_d D2 L_d(q0, q1, z0) = 0`, `sigma_d = 1 + Dz L_d`, advance the position. The flow on
 //! T\*Q x R is conformally contact by construction: it contracts the contact form, and every momentum of a symmetry, by
-//! exactly `sigma_d`. [`rules`] makes discrete Lagrangians from any Lagrangian, [`Flow`] runs them, [`statements`] checks
-//! the theory on them.
+//! exactly `sigma_d`. A [`Method`] makes discrete Lagrangians from Lagrangians, [`Flow`] runs them, [`statements`] checks the
+//! theory on them.
 //!
 //! ```
 //! use contact_geom::{PhasePoint, systems::DoublePendulum};
@@ -21,11 +21,13 @@
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
 mod discrete_lagrangian;
+mod discretised;
 mod error;
 mod flow;
 mod gauss;
 mod lanes;
 mod legendre;
+mod method;
 mod momentum;
 mod newton;
 mod path;
@@ -40,6 +42,7 @@ mod unknowns;
 mod verified;
 
 pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};
+pub use discretised::Discretised;
 pub use error::{InputError, Status, StepError};
 pub use flow::{HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian};
 pub use gauss::{Gauss, GaussRoute, GaussStepper};
@@ -47,6 +50,7 @@ pub use legendre::{
     DiscreteRegularity, discrete_regularity, legendre_minus, legendre_minus_inverse, legendre_plus,
     legendre_plus_inverse, sigma_d,
 };
+pub use method::{Method, UnknownMethod};
 pub use momentum::{MomentumDecay, MomentumRow, discrete_momentum, discrete_symmetry_defect};
 pub use newton::{ITERATION_LIMIT, last_correction};
 pub use path::{DiscretePath, discrete_action};

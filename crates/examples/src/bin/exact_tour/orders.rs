@@ -1,9 +1,9 @@
 //! Variational error analysis of every method on every system, and its figure.
 
 use contact_examples::{Axis, Checks, Curve, Directory, Failure, Line, Panel, Subject, draw_row, fractions};
-use contact_geom::VelocityPoint;
 use contact_geom::systems::{CoupledInZ, System, SystemVisitor, visit_catalogue};
-use discrete_herglotz::rules::{Discretisation, DiscretisationVisitor, visit_discretisations};
+use contact_geom::{Lagrangian, VelocityPoint};
+use discrete_herglotz::Method;
 use exact_lagrangian::{ErrorOrders, ExactError, MeasuredOrder, error_orders};
 
 /// The band around the documented order.
@@ -38,27 +38,28 @@ struct Walk<'a> {
 
 impl SystemVisitor for Walk<'_> {
     fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-        struct Methods<'a, 'b, S, const N: usize>(&'a S, &'a mut Walk<'b>);
-        impl<S: System<N>, const N: usize> DiscretisationVisitor for Methods<'_, '_, S, N> {
-            fn visit(&mut self, method: &impl Discretisation) {
-                let (system, walk) = (self.0, &mut *self.1);
-                // A generic point: no symmetry makes a leading error vanish there.
-                let (t, x) = system.sample(&fractions(3, 2 * N + 2));
-                let subject = Subject::discrete(40, system.name(), method.name(), 0.0);
-                match error_orders(system, |h| method.discretise(system, h), t, &x, LARGEST) {
-                    Err(error) => walk.checks.record_within(BAND, &subject, Err::<Option<f64>, _>(error)),
-                    Ok(orders) => {
-                        for (quantity, documented, measured) in quantities(orders, method.order()) {
-                            let off = (measured.order - f64::from(documented)).abs();
-                            walk.checks.record_within(BAND, &subject, Ok::<_, ExactError<N>>(Some(off)));
-                            let (system, method) = (system.name(), method.name());
-                            walk.rows.push(Row { system, method, quantity, documented, measured });
-                        }
+        // A generic point: no symmetry makes a leading error vanish there.
+        let (t, x) = system.sample(&fractions(3, 2 * N + 2));
+        for method in Method::applicable(&system.structure()) {
+            let (system_name, method_name) = (system.name(), method.name());
+            let subject = Subject::discrete(40, system_name, method_name, 0.0);
+            match error_orders(system, |h| method.discretise(system, h), t, &x, LARGEST) {
+                Err(error) => self.checks.record_within(BAND, &subject, Err::<Option<f64>, _>(error)),
+                Ok(orders) => {
+                    for (quantity, documented, measured) in quantities(orders, method.order()) {
+                        let off = (measured.order - f64::from(documented)).abs();
+                        self.checks.record_within(BAND, &subject, Ok::<_, ExactError<N>>(Some(off)));
+                        self.rows.push(Row {
+                            system: system_name,
+                            method: method_name,
+                            quantity,
+                            documented,
+                            measured,
+                        });
                     }
                 }
             }
         }
-        visit_discretisations(&mut Methods(system, self));
     }
 }
 
@@ -105,24 +106,13 @@ pub fn write(out: &Directory, checks: &mut Checks) -> Result<String, Failure> {
 
 /// The errors over the step, for a system nonlinear in z.
 fn figure(out: &Directory) -> Result<(), Failure> {
-    struct Curves(Vec<(Line, &'static str, ErrorOrders)>, Option<ExactError<1>>);
     let system = CoupledInZ { gamma: -1.0, ..CoupledInZ::default() };
-    struct Methods<'a>(&'a CoupledInZ, &'a mut Curves);
-    impl DiscretisationVisitor for Methods<'_> {
-        fn visit(&mut self, method: &impl Discretisation) {
-            let x = VelocityPoint::new([0.8], [-0.6], 0.4);
-            let line = [Line::Dotted, Line::Dashed, Line::Solid, Line::DashDot][self.1.0.len() % 4];
-            match error_orders(self.0, |h| method.discretise(self.0, h), 0.0, &x, LARGEST) {
-                Ok(orders) => self.1.0.push((line, method.name(), orders)),
-                Err(error) => self.1.1 = Some(error),
-            }
-        }
-    }
-    let mut curves = Curves(Vec::new(), None);
-    visit_discretisations(&mut Methods(&system, &mut curves));
-    let Curves(curves, failed) = curves;
-    if let Some(error) = failed {
-        return Err(error.into());
+    let x = VelocityPoint::new([0.8], [-0.6], 0.4);
+    let mut curves = Vec::new();
+    let lines = [Line::Dotted, Line::Dashed, Line::Solid, Line::DashDot].into_iter().cycle();
+    for (method, line) in Method::applicable(&system.structure()).zip(lines) {
+        let orders = error_orders(&system, |h| method.discretise(&system, h), 0.0, &x, LARGEST)?;
+        curves.push((line, method.name(), orders));
     }
     let panel = |y_label: &str, of: fn(&ErrorOrders) -> &MeasuredOrder, named: bool| Panel {
         x_label: "time step h (dimensionless)".into(),

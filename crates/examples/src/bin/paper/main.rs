@@ -8,7 +8,6 @@
 //! the paper calls exact by the formulas that produce them (`*_as_published.csv`), the figures as SVG, and
 //! `statements.csv`. Ends with 1 if a statement fails its check, with 2 if the output cannot be written.
 
-mod any_rule;
 mod closed_exact;
 mod decay;
 mod explicit;

@@ -1,14 +1,13 @@
 //! Section 3: every statement for every system and every discretisation.
 
-use crate::any_rule::AnyRule;
 use crate::statements::STEPS;
 use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::System;
-use contact_geom::{DiscretePoint, GeometryError, Symmetry, VelocityPoint};
-use discrete_herglotz::rules::{Discretisation, DiscretisationVisitor, visit_discretisations};
+use contact_geom::{DiscretePoint, GeometryError, VelocityPoint};
+use discrete_herglotz::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
 use discrete_herglotz::statements::{STATEMENTS, residual};
-use discrete_herglotz::{DiscreteLagrangian, DiscretePath, InputError, derived_jet};
+use discrete_herglotz::{DiscreteLagrangian, DiscretePath, InputError, Method, Quadrature, Rule, derived_jet};
 
 /// The points at which each statement is checked for each system, discretisation and step.
 const SAMPLES: usize = 16;
@@ -20,49 +19,55 @@ pub fn straight_step<const N: usize>(x: &VelocityPoint<N>, h: f64) -> DiscretePo
     DiscretePoint { q0: x.q - half, q1: x.q + half, z0: x.z }
 }
 
-/// Checks a system with all discretisations.
+/// Checks a system with all methods whose hypothesis it meets, and what is said of rules on Q x Q x R^2 with all rules.
 pub fn check<const N: usize, S: System<N>>(system: &S, checks: &mut Checks) {
-    visit_discretisations(&mut Methods { system, symmetries: system.symmetries(), checks });
+    for h in STEPS {
+        for method in Method::applicable(&system.structure()) {
+            with_method(method, system, h, checks);
+        }
+        with_rule::<RectangleRule, N, S>(system, h, checks);
+        with_rule::<LeftMidpointRule, N, S>(system, h, checks);
+        with_rule::<MidpointRule, N, S>(system, h, checks);
+        with_rule::<TrapezoidalRule, N, S>(system, h, checks);
+    }
 }
 
-/// Checks a system with each discretisation that visits.
-struct Methods<'a, const N: usize, S> {
-    system: &'a S,
-    symmetries: Vec<Symmetry<N>>,
-    checks: &'a mut Checks,
+/// The times and points at which a system is checked.
+fn points<const N: usize, S: System<N>>(system: &S, h: f64) -> Vec<(f64, DiscretePoint<N>)> {
+    let point = |i| {
+        let (t, x) = system.sample(&fractions(i, 2 * N + 2));
+        (t, straight_step(&x, h))
+    };
+    (0..SAMPLES).map(point).collect()
 }
 
-impl<const N: usize, S: System<N>> DiscretisationVisitor for Methods<'_, N, S> {
-    fn visit(&mut self, method: &impl Discretisation) {
-        for h in STEPS {
-            self.check(method.name(), h);
+/// The statements of section 3 that hold for every discrete Lagrangian.
+fn with_method<const N: usize, S: System<N>>(method: Method, system: &S, h: f64, checks: &mut Checks) {
+    let subject = |statement| Subject::discrete(statement, system.name(), method.name(), h);
+    let ld = match method.discretise(system, h) {
+        Ok(ld) => ld,
+        Err(error) => return checks.record(&subject(STATEMENTS[0]), Err(error)),
+    };
+    let symmetries = system.symmetries();
+    let points = points(system, h);
+    for statement in STATEMENTS {
+        let subject = subject(statement);
+        for (t, x) in &points {
+            checks.record(&subject, residual(statement, &ld, &symmetries, *t, x));
         }
     }
 }
 
-impl<const N: usize, S: System<N>> Methods<'_, N, S> {
-    fn check(&mut self, method: &str, h: f64) {
-        let subject = |statement| Subject::discrete(statement, self.system.name(), method, h);
-        let ld = match AnyRule::named(method, self.system, h) {
-            Ok(ld) => ld,
-            Err(error) => return self.checks.record(&subject(STATEMENTS[0]), Err(error)),
-        };
-        let points: Vec<(f64, DiscretePoint<N>)> = (0..SAMPLES)
-            .map(|i| {
-                let (t, x) = self.system.sample(&fractions(i, 2 * N + 2));
-                (t, straight_step(&x, h))
-            })
-            .collect();
-        for statement in STATEMENTS {
-            let subject = subject(statement);
-            for (t, x) in &points {
-                self.checks.record(&subject, residual(statement, &ld, &self.symmetries, *t, x));
-            }
-        }
-        for (t, x) in &points {
-            self.checks.record(&subject(16), equivalent_conditions(&ld, *t, x).map(Some));
-            self.checks.record(&subject(41), momenta_from_both_spaces(&ld, *t, x).map(Some));
-        }
+/// Statements 16 and 41, on rules alone.
+fn with_rule<R: Rule, const N: usize, S: System<N>>(system: &S, h: f64, checks: &mut Checks) {
+    let subject = |statement| Subject::discrete(statement, system.name(), R::NAME, h);
+    let ld = match Quadrature::<_, R>::new(system, h) {
+        Ok(ld) => ld,
+        Err(error) => return checks.record(&subject(16), Err(error)),
+    };
+    for (t, x) in points(system, h) {
+        checks.record(&subject(16), equivalent_conditions(&ld, t, &x).map(Some));
+        checks.record(&subject(41), momenta_from_both_spaces(&ld, t, &x).map(Some));
     }
 }
 
@@ -70,8 +75,8 @@ impl<const N: usize, S: System<N>> Methods<'_, N, S> {
 ///
 /// On a path that solves neither, their residuals differ by the factor `1 - S_z1` of the later step, which does not
 /// vanish; so they vanish together. Relative to the momenta that cancel in them.
-fn equivalent_conditions<const N: usize, S: System<N>>(
-    ld: &AnyRule<&S>,
+fn equivalent_conditions<R: Rule, const N: usize, S: System<N>>(
+    ld: &Quadrature<&S, R>,
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<f64, InputError> {
@@ -81,7 +86,7 @@ fn equivalent_conditions<const N: usize, S: System<N>>(
     let points = (0..5).map(|k| x.q0 + stride * (f64::from(k) + 0.1 * (1.7 * f64::from(k)).sin())).collect();
     let path = DiscretePath::<N>::new(points)?;
     let herglotz = path.herglotz_residuals(ld, t, x.z0).map_err(InputError::FirstStep)?;
-    let extended = ld.extended_residuals(&path, t, x.z0).map_err(InputError::FirstStep)?;
+    let extended = path.extended_residuals(ld, t, x.z0).map_err(InputError::FirstStep)?;
     let z = path.actions(ld, t, x.z0).map_err(InputError::FirstStep)?;
     let mut worst: f64 = 0.0;
     for (k, (herglotz, extended)) in herglotz.iter().zip(&extended).enumerate() {
@@ -102,8 +107,8 @@ fn equivalent_conditions<const N: usize, S: System<N>>(
 /// Statement 41, its first half: a rule on Q x Q x R^2 gives `p0 = -S_1/(1 + S_z0)`, `p1 = S_2/(1 - S_z1)` and the
 /// factor `(1 + S_z0)/(1 - S_z1)`, and these are the momenta and sigma_d of the L_d on Q x Q x R that solves it for `z1`,
 /// its derivatives taken from its value alone.
-fn momenta_from_both_spaces<const N: usize, S: System<N>>(
-    ld: &AnyRule<&S>,
+fn momenta_from_both_spaces<R: Rule, const N: usize, S: System<N>>(
+    ld: &Quadrature<&S, R>,
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<f64, GeometryError> {

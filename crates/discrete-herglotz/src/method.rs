@@ -1,0 +1,164 @@
+//! The table of methods: what is known of each, and a discrete Lagrangian by any of them, chosen at run time.
+
+use crate::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
+use crate::{Discretised, InputError, Node, Quadrature, Rule};
+use contact_geom::{Lagrangian, Structure};
+use std::fmt::{Display, Formatter};
+use std::str::FromStr;
+use thiserror::Error;
+
+/// A method that makes a discrete Lagrangian from a Lagrangian and a time step.
+///
+/// ```
+/// use contact_geom::{Lagrangian, systems::Pendulum};
+/// use discrete_herglotz::{DiscreteLagrangian, Method};
+///
+/// let system = Pendulum::default();
+/// for method in Method::applicable(&system.structure()) {
+///     let ld = method.discretise(&system, 0.1)?;
+///     println!("{method} of order {}, h = {}", method.order(), ld.step_size());
+/// }
+/// assert_eq!("midpoint".parse(), Ok(Method::Midpoint));
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+///
+/// Where the method is known when the program is written, its own type ([`Midpoint`](crate::Midpoint) and so on) saves the
+/// choice in every step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Method {
+    /// The rectangle rule, [`RectangleRule`].
+    Rectangle,
+    /// The paper's midpoint rule, [`LeftMidpointRule`].
+    LeftMidpoint,
+    /// The symmetric midpoint rule, [`MidpointRule`].
+    Midpoint,
+    /// The symmetric trapezoidal rule, [`TrapezoidalRule`].
+    Trapezoidal,
+}
+
+/// What is known of a method.
+struct Facts {
+    name: &'static str,
+    order: u32,
+    symmetric: bool,
+    implicit_in_z: bool,
+    exact_rate: bool,
+}
+
+impl Facts {
+    /// Those of a quadrature rule, read off its nodes.
+    fn of_rule<R: Rule>() -> Self {
+        let mirrored = |n: &Node| Node { weight: n.weight, place: 1.0 - n.place, action: 1.0 - n.action };
+        Facts {
+            name: R::NAME,
+            order: R::ORDER,
+            symmetric: R::NODES.iter().all(|node| R::NODES.contains(&mirrored(node))),
+            implicit_in_z: R::NODES.iter().any(|node| node.action != 0.0),
+            // Rational in h gamma, whatever the nodes.
+            exact_rate: false,
+        }
+    }
+}
+
+impl Method {
+    /// Every method. What holds for all of them is tested by walking this table.
+    pub const ALL: &'static [Method] =
+        &[Method::Rectangle, Method::LeftMidpoint, Method::Midpoint, Method::Trapezoidal];
+
+    /// The methods whose hypothesis a Lagrangian of this structure meets.
+    pub fn applicable(structure: &Structure) -> impl Iterator<Item = Method> {
+        Self::ALL.iter().copied().filter(|method| method.check(structure).is_ok())
+    }
+
+    fn facts(self) -> Facts {
+        match self {
+            Method::Rectangle => Facts::of_rule::<RectangleRule>(),
+            Method::LeftMidpoint => Facts::of_rule::<LeftMidpointRule>(),
+            Method::Midpoint => Facts::of_rule::<MidpointRule>(),
+            Method::Trapezoidal => Facts::of_rule::<TrapezoidalRule>(),
+        }
+    }
+
+    /// The name in tables, in lower case with underscores.
+    pub fn name(self) -> &'static str {
+        self.facts().name
+    }
+
+    /// The order of the flow.
+    pub fn order(self) -> u32 {
+        self.facts().order
+    }
+
+    /// Whether the method is its own adjoint: a step of the motion reversed in time leads back.
+    pub fn symmetric(self) -> bool {
+        self.facts().symmetric
+    }
+
+    /// Whether the action at the end of a step is defined by an equation that contains it, where L depends on z; otherwise
+    /// it is an explicit function of `(q0, q1, z0)`.
+    pub fn implicit_in_z(self) -> bool {
+        self.facts().implicit_in_z
+    }
+
+    /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the motion itself. A quadrature
+    /// rule has a rational function of `h gamma` in its place: `1 + h gamma` where it is explicit in z.
+    pub fn exact_rate(self) -> bool {
+        self.facts().exact_rate
+    }
+
+    /// Whether a Lagrangian of this structure meets the method's hypothesis. The quadrature rules take every regular
+    /// Lagrangian.
+    ///
+    /// # Errors
+    /// [`InputError::Unclaimed`] with the claim that is missing.
+    pub fn check(self, _structure: &Structure) -> Result<(), InputError> {
+        match self {
+            Method::Rectangle | Method::LeftMidpoint | Method::Midpoint | Method::Trapezoidal => Ok(()),
+        }
+    }
+
+    /// The discrete Lagrangian of this method for a Lagrangian, or a reference to one, with the time step `h`.
+    ///
+    /// # Errors
+    /// [`InputError::Step`] unless `h` is positive and finite, [`InputError::Dimension`] if `N = 0`, and those of
+    /// [`check`](Self::check).
+    pub fn discretise<const N: usize, L: Lagrangian<N>>(
+        self,
+        lagrangian: L,
+        h: f64,
+    ) -> Result<Discretised<L, N>, InputError> {
+        self.check(&lagrangian.structure())?;
+        Ok(match self {
+            Method::Rectangle => Discretised::Rectangle(Quadrature::new(lagrangian, h)?),
+            Method::LeftMidpoint => Discretised::LeftMidpoint(Quadrature::new(lagrangian, h)?),
+            Method::Midpoint => Discretised::Midpoint(Quadrature::new(lagrangian, h)?),
+            Method::Trapezoidal => Discretised::Trapezoidal(Quadrature::new(lagrangian, h)?),
+        })
+    }
+}
+
+/// The [`name`](Method::name).
+impl Display for Method {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// From the [`name`](Method::name).
+impl FromStr for Method {
+    type Err = UnknownMethod;
+
+    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
+        let named = Self::ALL.iter().find(|method| method.name() == name);
+        named.copied().ok_or_else(|| UnknownMethod { name: name.into() })
+    }
+}
+
+/// No method has this name.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("there is no method {name:?}; the methods are {}", Method::ALL.iter().map(|m| m.name()).collect::<Vec<_>>().join(", "))]
+pub struct UnknownMethod {
+    /// The name that was asked for.
+    pub name: String,
+}

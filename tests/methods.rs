@@ -1,0 +1,137 @@
+//! The table of methods: names, hypotheses, and every property that it states, each seen in the numbers.
+
+use crate::common::{Pairs, SYMMETRIC, pairs, systems};
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::{CoupledInZ, DoublePendulum, HarmonicOscillator, Pendulum, QuadraticInZ, System};
+use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, Triple, legendre};
+use discrete_herglotz::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
+use discrete_herglotz::{DiscreteLagrangian, InputError, Method, Quadrature, Rule};
+
+/// The methods that take every regular Lagrangian.
+const RULES: [Method; 4] = [Method::Rectangle, Method::LeftMidpoint, Method::Midpoint, Method::Trapezoidal];
+
+/// A name leads back to its method, so that no two are the same; an unknown one is answered with all that are known.
+#[test]
+fn names() {
+    for method in Method::ALL {
+        assert_eq!(method.to_string().parse(), Ok(*method));
+    }
+    let error = "simpson".parse::<Method>().err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(error.contains("simpson"));
+    assert!(Method::ALL.iter().all(|method| error.contains(method.name())), "{error}");
+}
+
+/// The rules take a Lagrangian that claims nothing, hence every system, and they are in the table.
+#[test]
+fn rules_take_every_lagrangian() {
+    assert!(RULES.iter().all(|rule| Method::ALL.contains(rule) && rule.check(&Structure::default()).is_ok()));
+    let Pairs { all, symmetric } = pairs();
+    assert!(all >= systems() * RULES.len() && all <= systems() * Method::ALL.len());
+    assert!(symmetric >= SYMMETRIC * RULES.len() && symmetric <= SYMMETRIC * Method::ALL.len());
+}
+
+/// Each entry of the table is the rule of its name, to the bit.
+#[test]
+fn rules_by_name() {
+    fn same<R: Rule>(method: Method) {
+        let (system, x) = (CoupledInZ::default(), DiscretePoint::new([0.3], [0.4], 0.7));
+        let (by_name, by_type) = (method.discretise(&system, 0.1), Quadrature::<_, R>::new(&system, 0.1));
+        assert!(by_name.is_ok() && by_type.is_ok());
+        let (Ok(by_name), Ok(by_type)) = (by_name, by_type) else { return };
+        assert_eq!(by_name.step_size(), by_type.step_size());
+        assert_eq!(by_name.value::<f64>(0.0, &x), by_type.value(0.0, &x));
+        assert_eq!(by_name.jet(0.0, &x), by_type.jet(0.0, &x));
+        assert_eq!(by_name.second_jet(0.0, &x), by_type.second_jet(0.0, &x));
+        let (from, guess, mut solver) = (PhasePoint::new([0.3], [0.8], 0.7), SVector::from([0.9]), Default::default());
+        assert_eq!(by_name.forward(0.0, &from, &guess, &mut solver), by_type.forward(0.0, &from, &guess, &mut solver));
+        assert_eq!(
+            by_name.backward(0.0, &from, &guess, &mut solver),
+            by_type.backward(0.0, &from, &guess, &mut solver)
+        );
+        assert_eq!((method.name(), method.order()), (R::NAME, R::ORDER));
+    }
+    same::<RectangleRule>(Method::Rectangle);
+    same::<LeftMidpointRule>(Method::LeftMidpoint);
+    same::<MidpointRule>(Method::Midpoint);
+    same::<TrapezoidalRule>(Method::Trapezoidal);
+}
+
+/// No method takes a step that is no positive finite number.
+#[test]
+fn bad_steps() {
+    let system = Pendulum::default();
+    for method in Method::applicable(&system.structure()) {
+        for h in [0.0, -0.1, f64::INFINITY, f64::NAN] {
+            let error = method.discretise::<1, _>(&system, h).err();
+            assert!(matches!(error, Some(InputError::Step { .. })), "{method}: {error:?}");
+        }
+    }
+}
+
+/// Linear drag in a long step: `sigma_d` is `e^(gamma h)` for the methods that say so, and visibly not for the others.
+#[test]
+fn exact_rates() {
+    let (system, h) = (HarmonicOscillator { gamma: -1.0 }, 0.5);
+    for method in Method::applicable(&system.structure()) {
+        let x = DiscretePoint::new([0.3], [0.4], 0.7);
+        let jet = method.discretise(&system, h).map(|ld| ld.jet(0.0, &x));
+        assert!(matches!(jet, Ok(Ok(_))), "{method}: {jet:?}");
+        let Ok(Ok(jet)) = jet else { continue };
+        let off = (jet.sigma() - (system.gamma * h).exp()).abs();
+        assert!(if method.exact_rate() { off < 1e-14 } else { off > 1e-3 }, "{method}: off by {off:e}");
+    }
+}
+
+/// Of an L quadratic in z, a method explicit in z makes an L_d quadratic in `z0`: its third difference is zero.
+#[test]
+fn implicit_in_z() {
+    let system = QuadraticInZ { c: 1.0 };
+    for method in Method::applicable(&system.structure()) {
+        let ld = method.discretise(&system, 0.5);
+        assert!(ld.is_ok());
+        let Ok(ld) = ld else { continue };
+        let at = |z0: f64| ld.value(0.0, &DiscretePoint::new([0.3], [0.4], z0)).unwrap_or(f64::NAN);
+        let third = (at(0.6) - 3.0 * at(0.4) + 3.0 * at(0.2) - at(0.0)).abs();
+        assert!(if method.implicit_in_z() { third > 1e-5 } else { third < 1e-14 }, "{method}: {third:e}");
+    }
+}
+
+/// The motion reversed in time is one of this Lagrangian: `z` changes its sign, and `dz/dt` does not.
+struct Reversed<'a, S>(&'a S);
+
+impl<const N: usize, S: System<N>> Lagrangian<N> for Reversed<'_, S> {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        self.0.value(-t, q, &v.map(|v| -v), -z)
+    }
+    fn structure(&self) -> Structure {
+        self.0.structure()
+    }
+}
+
+/// A symmetric method leads back to where a step began once the motion is reversed, to round-off; another one does not.
+#[test]
+fn symmetric() {
+    fn of<const N: usize, S: System<N>>(system: &S) {
+        let (h, t) = (0.1, system.initial_time());
+        let x = system.initial();
+        let start: PhasePoint<N> = legendre(system, t, &x);
+        let reversed = Reversed(system);
+        let turned = |x: PhasePoint<N>| PhasePoint { q: x.q, p: -x.p, z: -x.z };
+        for method in Method::applicable(&system.structure()) {
+            let there_and_back = || {
+                let mut solver = Default::default();
+                let there = method.discretise(system, h).ok()?.forward(t, &start, &x.v, &mut solver).ok()?;
+                let back = method.discretise(&reversed, h).ok()?;
+                back.forward(-(t + h), &turned(there.end), &-there.velocity, &mut solver).ok()
+            };
+            let back = there_and_back();
+            assert!(back.is_some(), "{} with {method}", system.name());
+            let off = back.map_or(f64::NAN, |back| Triple::from(turned(back.end)).minus(start.into()).amax());
+            let as_stated = if method.symmetric() { off < 1e-12 } else { off > 1e-5 };
+            assert!(as_stated, "{} with {method}: off by {off:e}", system.name());
+        }
+    }
+    of(&CoupledInZ { gamma: -1.0, ..CoupledInZ::default() });
+    of(&DoublePendulum { gamma: -1.0, ..DoublePendulum::default() });
+    of(&HarmonicOscillator { gamma: -1.0 });
+}
