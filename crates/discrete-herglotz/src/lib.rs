@@ -31,6 +31,7 @@ mod quadrature;
 pub mod rules;
 mod run;
 mod solver;
+mod splitting;
 pub mod statements;
 mod step_equations;
 mod stepper;
@@ -50,6 +51,7 @@ pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
 pub use rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
 pub use run::{Every, FinalOnly, Flow, Observer, Record, Step};
 pub use solver::{CROSSOVER, Solver};
+pub use splitting::{Splitting, SplittingScheme};
 pub use stepper::{Halt, Stepper};
 
 pub use contact_geom;

@@ -1,0 +1,12 @@
+//! Splittings of contact flows, with exact rate.
+
+mod linear_drag;
+#[cfg(test)]
+mod order_conditions;
+mod scheme;
+mod separable;
+#[cfg(test)]
+mod tests;
+
+pub use linear_drag::Splitting;
+pub use scheme::SplittingScheme;
