@@ -5,6 +5,7 @@ mod linear_drag;
 mod order_conditions;
 mod scheme;
 mod separable;
+mod sum;
 #[cfg(test)]
 mod tests;
 

@@ -2,7 +2,7 @@
 
 use crate::InputError;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, Module, PhasePoint, VelocityPoint, generic, linear};
+use contact_geom::{Dual, Lagrangian, PhasePoint, VelocityPoint, linear};
 
 /// What is left of a false claim's derivative by the rounding of a true one, with some margin.
 const FALSE_CLAIM: f64 = 1e-9;
@@ -43,7 +43,7 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
         if size.is_nan() || size > FALSE_CLAIM {
             return Err(InputError::FalseClaim { claim: "separable", size });
         }
-        let inverse = if mass == SMatrix::identity() { None } else { Some(inverted(&mass)?) };
+        let inverse = if mass == SMatrix::<f64, N, N>::identity() { None } else { Some(inverted(&mass)?) };
         Ok(Separable { lagrangian, mass, inverse })
     }
 
@@ -61,7 +61,7 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
                 z: Dual::constant(rest.z),
             };
             for i in 0..3 {
-                let clock = Dual { re: t + generic(i), d: SVector::<f64, 1>::new(1.0) };
+                let clock = Dual { re: t + without_symmetry(i), d: SVector::<f64, 1>::new(1.0) };
                 let gamma = self.lagrangian.gradient(clock, &still).z;
                 if gamma.d[0].is_nan() || gamma.d[0].abs() > FALSE_CLAIM * (1.0 + gamma.re.abs()) {
                     return Err(InputError::Hypothesis { hypothesis: "a linear drag gamma z with constant gamma" });
@@ -79,7 +79,7 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
         if let Some(gradient) = self.lagrangian.closed_gradient(t, &rest) {
             return (self.lagrangian.value(t, q, &rest.v, 0.0), gradient.x);
         }
-        let mut moving = q.map(Dual::constant);
+        let mut moving: SVector<Dual<f64, SVector<f64, N>>, N> = q.map(Dual::constant);
         for i in 0..N {
             moving[i].d[i] = 1.0;
         }
@@ -100,9 +100,9 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
 
 /// The state's position, and one beside it where the state's own may be special; with generic velocities.
 fn probes<const N: usize>(state: &PhasePoint<N>) -> [VelocityPoint<N>; 2] {
-    let v = SVector::from_fn(|i, _| generic(i));
-    let beside = SVector::from_fn(|i, _| state.q[i] * (1.0 + 0.01 * generic(i)) + 1e-3 * generic(N + i));
-    [VelocityPoint { q: state.q, v, z: state.z }, VelocityPoint { q: beside, v, z: state.z + generic(2 * N) }]
+    let v = SVector::from_fn(|i, _| without_symmetry(i));
+    let beside = SVector::from_fn(|i, _| state.q[i] * (1.0 + 0.01 * without_symmetry(i)) + 1e-3 * without_symmetry(N + i));
+    [VelocityPoint { q: state.q, v, z: state.z }, VelocityPoint { q: beside, v, z: state.z + without_symmetry(2 * N) }]
 }
 
 /// `M^-1`, column by column.
@@ -113,4 +113,9 @@ fn inverted<const N: usize>(mass: &SMatrix<f64, N, N>) -> Result<SMatrix<f64, N,
             .map_err(|e| e.of("the mass matrix L_vv", "take a regular Lagrangian"))?;
     }
     Ok(inverse)
+}
+
+/// Numbers between 0.3 and 1.3 without special relation.
+fn without_symmetry(i: usize) -> f64 {
+    0.3 + (((i + 1) * (i + 1)) as f64 * std::f64::consts::SQRT_2).fract()
 }
