@@ -20,6 +20,7 @@
 //!
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
+mod composition;
 mod discrete_lagrangian;
 mod error;
 mod flow;
@@ -37,6 +38,7 @@ mod step_equations;
 mod stepper;
 mod unknowns;
 
+pub use composition::Composition;
 pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};
 pub use error::{InputError, Status, StepError};
 pub use flow::{HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian};
@@ -51,7 +53,7 @@ pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
 pub use rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
 pub use run::{Every, FinalOnly, Flow, Observer, Record, Step};
 pub use solver::{CROSSOVER, Solver};
-pub use splitting::{Splitting, SplittingScheme};
+pub use splitting::{Splitting, SplittingScheme, Strang};
 pub use stepper::{Halt, Stepper};
 
 pub use contact_geom;

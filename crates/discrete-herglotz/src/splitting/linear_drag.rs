@@ -67,17 +67,17 @@ struct Stage {
 
 /// The flow of the kinetic part with the drag over a time s.
 #[derive(Clone, Copy, Debug)]
-struct Drift {
+pub(super) struct Drift {
     /// `(e^(gamma s) - 1)/gamma`.
-    length: f64,
+    pub(super) length: f64,
     /// `e^(gamma s) - 1`: a momentum that is multiplied by `e^(gamma s)` itself gathers the rounding of that factor.
-    damping: f64,
+    pub(super) damping: f64,
     /// The action of `p.M^-1 p`: `e^(gamma s) (e^(gamma s) - 1)/(2 gamma)`.
-    lift: f64,
+    pub(super) lift: f64,
 }
 
 impl Drift {
-    fn over(gamma: f64, s: f64) -> Self {
+    pub(super) fn over(gamma: f64, s: f64) -> Self {
         let damping = (gamma * s).exp_m1();
         let length = if gamma == 0.0 { s } else { damping / gamma };
         Drift { length, damping, lift: 0.5 * (1.0 + damping) * length }
@@ -135,18 +135,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
             return Err(InputError::FirstStep(StepError::NonFinite));
         }
         let table = Table::new(scheme, gamma, h);
-        Ok(Splitting {
-            form,
-            h,
-            t0,
-            gamma,
-            taken: 0,
-            evaluations: 1,
-            motion,
-            table,
-            action: true,
-            compensated: false,
-        })
+        Ok(Splitting { form, h, t0, gamma, taken: 0, evaluations: 1, motion, table, action: true, compensated: false })
     }
 
     /// Without the action: z stays what it is at the start, and costs nothing.

@@ -5,9 +5,11 @@ mod linear_drag;
 mod order_conditions;
 mod scheme;
 mod separable;
+mod strang;
 mod sum;
 #[cfg(test)]
 mod tests;
 
 pub use linear_drag::Splitting;
 pub use scheme::SplittingScheme;
+pub use strang::Strang;

@@ -93,12 +93,14 @@ fn nystrom_residual(scheme: &SplittingScheme, order: usize) -> f64 {
                 worst = worst.max(in_roundings(at(&|i| 1.0 - times[i]), tree.exact / (n * (n + 1)) as f64));
             }
         }
-        branches.extend(trees.into_iter().map(|tree| Tree {
-            weight: (0..kicks.len())
-                .map(|i| sum(&mut (0..i).map(|j| (kicks[j] * (times[i] - times[j]), tree.weight[j]))))
-                .collect(),
-            exact: tree.exact / (n * (n + 1)) as f64,
-            order: n + 1,
+        branches.extend(trees.into_iter().map(|tree| {
+            Tree {
+                weight: (0..kicks.len())
+                    .map(|i| sum(&mut (0..i).map(|j| (kicks[j] * (times[i] - times[j]), tree.weight[j]))))
+                    .collect(),
+                exact: tree.exact / (n * (n + 1)) as f64,
+                order: n + 1,
+            }
         }));
     }
     worst
@@ -156,7 +158,8 @@ fn every_scheme_has_its_order_on_nystrom_trees() {
 /// A Runge-Kutta-Nyström splitting lives on its hypothesis: without it the order is lower.
 #[test]
 fn nystrom_schemes_need_their_hypothesis() {
-    for scheme in [SplittingScheme::BLANES_MOAN_6, SplittingScheme::BLANES_MOAN_6_LONG, SplittingScheme::BLANES_CASAS_8] {
+    for scheme in [SplittingScheme::BLANES_MOAN_6, SplittingScheme::BLANES_MOAN_6_LONG, SplittingScheme::BLANES_CASAS_8]
+    {
         let order = scheme.order() as usize;
         let worst = (1..=order).map(|n| word_residual(&words(&scheme, order), n)).fold(0.0, f64::max);
         assert!(worst > 1e3 * ROUNDINGS, "{}: {worst}", scheme.name());

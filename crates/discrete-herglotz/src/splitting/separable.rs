@@ -101,7 +101,8 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
 /// The state's position, and one beside it where the state's own may be special; with generic velocities.
 fn probes<const N: usize>(state: &PhasePoint<N>) -> [VelocityPoint<N>; 2] {
     let v = SVector::from_fn(|i, _| without_symmetry(i));
-    let beside = SVector::from_fn(|i, _| state.q[i] * (1.0 + 0.01 * without_symmetry(i)) + 1e-3 * without_symmetry(N + i));
+    let beside =
+        SVector::from_fn(|i, _| state.q[i] * (1.0 + 0.01 * without_symmetry(i)) + 1e-3 * without_symmetry(N + i));
     [VelocityPoint { q: state.q, v, z: state.z }, VelocityPoint { q: beside, v, z: state.z + without_symmetry(2 * N) }]
 }
 

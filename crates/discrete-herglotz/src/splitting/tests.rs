@@ -48,7 +48,7 @@ fn order<const N: usize>(
 #[test]
 fn orders() -> Result<(), InputError> {
     for scheme in &SplittingScheme::ALL {
-        let forced = order(&Duffing::forced(), scheme, 4.0, [40,60,80])?;
+        let forced = order(&Duffing::forced(), scheme, 4.0, [40, 60, 80])?;
         let found = order(&Pendulum::default(), scheme, 4.0, [20, 30, 40])?;
         println!("{} {found} {forced}", scheme.name());
     }
