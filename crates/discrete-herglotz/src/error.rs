@@ -64,6 +64,12 @@ pub enum InputError {
         /// The size of what the claim says is zero; see [`Defect`](contact_geom::Defect).
         size: f64,
     },
+    /// A method rests on a hypothesis that this Lagrangian does not satisfy.
+    #[error("the method needs {hypothesis}; take another method or another Lagrangian")]
+    Hypothesis {
+        /// The hypothesis, in the field's terms.
+        hypothesis: &'static str,
+    },
     /// The first step cannot be solved.
     #[error("no first step from this start: {0}")]
     FirstStep(StepError),

@@ -20,6 +20,7 @@
 //!
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
+mod composition;
 mod discrete_lagrangian;
 mod discretised;
 mod error;
@@ -35,12 +36,14 @@ mod quadrature;
 pub mod rules;
 mod run;
 mod solver;
+mod splitting;
 pub mod statements;
 mod step_equations;
 mod stepper;
 mod unknowns;
 mod verified;
 
+pub use composition::Composition;
 pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};
 pub use discretised::Discretised;
 pub use error::{InputError, Status, StepError};
@@ -58,6 +61,7 @@ pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
 pub use rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
 pub use run::{Every, FinalOnly, Flow, Observer, Record, Step};
 pub use solver::{CROSSOVER, Solver};
+pub use splitting::{Splitting, SplittingScheme, Strang};
 pub use stepper::{Halt, Stepper};
 
 pub use verified::verified;

@@ -263,6 +263,6 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
 }
 
 /// Refuses a time that is not finite.
-fn check_time(t0: f64) -> Result<(), GeometryError> {
+pub(crate) fn check_time(t0: f64) -> Result<(), GeometryError> {
     if t0.is_finite() { Ok(()) } else { Err(GeometryError::NonFinite { what: "t0", index: 0, value: t0 }) }
 }

@@ -1,0 +1,281 @@
+//! Splittings where the drag is linear.
+
+use super::separable::Separable;
+use super::sum::Sum;
+use crate::{Halt, InputError, SplittingScheme, StepError, Stepper};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, PhasePoint, Triple};
+
+/// A splitting at work on `L = v.Mv/2 - V(t, q) + gamma z`.
+///
+/// The flow of the kinetic part with the drag, over a time s, is `q += (e^(gamma s) - 1)/gamma M^-1 p`,
+/// `p = e^(gamma s) p`; that of `-V` is the kick `p += s L_q`; each is exact, with its action, and is a conformal contact
+/// map, of rate `e^(gamma s)` and 1. So every step has `sigma_d = e^(gamma h)`. The drag goes with the kinetic part because
+/// that keeps the hypothesis of Runge-Kutta-Nyström schemes. Time goes with it too: a kick takes V at the time of the drifts
+/// before it.
+///
+/// Explicit, with [`stages`](SplittingScheme::stages) forces a step. Kicks (or drifts) that two steps share are one within
+/// [`advance`](Stepper::advance), so that ten steps at once and ten times one differ by rounding.
+///
+/// ```
+/// use contact_geom::{PhasePoint, systems::Pendulum};
+/// use discrete_herglotz::{Splitting, SplittingScheme, Stepper};
+/// let pendulum = Pendulum { gamma: -0.1 };
+/// let start = PhasePoint::new([1.0], [1.0], 0.0);
+/// let mut motion = Splitting::new(&pendulum, &SplittingScheme::BLANES_MOAN_6, 0.5, 0.0, start)?;
+/// assert!(motion.advance(200).is_ok());
+/// println!("q(100) = {}", motion.state().q[0]);
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Splitting<'a, L, const N: usize> {
+    form: Separable<&'a L, N>,
+    h: f64,
+    t0: f64,
+    gamma: f64,
+    taken: usize,
+    evaluations: u64,
+    motion: Motion<N>,
+    table: Table,
+    action: bool,
+    compensated: bool,
+}
+
+/// The stages of a step, in the lengths of this step and this drag.
+#[derive(Clone, Debug)]
+struct Table {
+    /// The kick that begins a step, with the force that the last one ended with.
+    opening: f64,
+    /// The drift that ends a step.
+    closing: Drift,
+    /// The stages of a step on its own.
+    single: Vec<Stage>,
+    /// Those of a step that is joined to its neighbour: to the next by the last kick, or to the last by the first drift.
+    joined: Vec<Stage>,
+    /// Whether steps begin with a kick.
+    kick_first: bool,
+}
+
+/// A drift and the kick that follows.
+#[derive(Clone, Copy, Debug)]
+struct Stage {
+    drift: Drift,
+    kick: f64,
+    /// The time of the kick after the step's start.
+    time: f64,
+}
+
+/// The flow of the kinetic part with the drag over a time s.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Drift {
+    /// `(e^(gamma s) - 1)/gamma`.
+    pub(super) length: f64,
+    /// `e^(gamma s) - 1`: a momentum that is multiplied by `e^(gamma s)` itself gathers the rounding of that factor.
+    pub(super) damping: f64,
+    /// The action of `p.M^-1 p`: `e^(gamma s) (e^(gamma s) - 1)/(2 gamma)`.
+    pub(super) lift: f64,
+}
+
+impl Drift {
+    pub(super) fn over(gamma: f64, s: f64) -> Self {
+        let damping = (gamma * s).exp_m1();
+        let length = if gamma == 0.0 { s } else { damping / gamma };
+        Drift { length, damping, lift: 0.5 * (1.0 + damping) * length }
+    }
+}
+
+/// A state, with the last kick's derivative and value.
+#[derive(Clone, Copy, Debug)]
+struct Motion<const N: usize> {
+    q: Sum<N>,
+    p: Sum<N>,
+    z: Sum<1>,
+    force: SVector<f64, N>,
+    value: f64,
+}
+
+impl<const N: usize> Motion<N> {
+    fn state(&self) -> PhasePoint<N> {
+        PhasePoint { q: self.q.value, p: self.p.value, z: self.z.value[0] }
+    }
+
+    fn is_finite(&self) -> bool {
+        Triple::from(self.state()).is_finite()
+    }
+}
+
+/// The steps between two looks whether the motion is finite.
+const CHUNK: usize = 256;
+
+impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
+    /// A splitting from the state `(q, p, z)` at time `t0`, with the action.
+    ///
+    /// # Errors
+    /// [`InputError::Step`] unless h is positive and finite; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
+    /// is not separable and affine in z; [`InputError::Hypothesis`] where gamma depends on time; [`InputError::Geometry`]
+    /// where the state is not finite or M singular; [`InputError::FirstStep`] where V is not defined at the start.
+    pub fn new(
+        lagrangian: &'a L,
+        scheme: &SplittingScheme,
+        h: f64,
+        t0: f64,
+        state: PhasePoint<N>,
+    ) -> Result<Self, InputError> {
+        let form = Separable::read(lagrangian, h, t0, &state)?;
+        let gamma = form.linear_drag(t0, &state)?;
+        let (value, force) = form.kick(t0, &state.q);
+        let motion = Motion {
+            q: Sum::new(state.q),
+            p: Sum::new(state.p),
+            z: Sum::new(SVector::<f64, 1>::new(state.z)),
+            force,
+            value,
+        };
+        if !(value.is_finite() && force.iter().all(|f| f.is_finite())) {
+            return Err(InputError::FirstStep(StepError::NonFinite));
+        }
+        let table = Table::new(scheme, gamma, h);
+        Ok(Splitting { form, h, t0, gamma, taken: 0, evaluations: 1, motion, table, action: true, compensated: false })
+    }
+
+    /// Without the action: z stays what it is at the start, and costs nothing.
+    pub fn without_action(self) -> Self {
+        Splitting { action: false, ..self }
+    }
+
+    /// With compensated sums (Kahan's): the rounding of each step is carried to the next, so that it no longer grows with
+    /// the number of steps. Worth its cost, about a tenth of the pendulum's time, on long runs near round-off.
+    pub fn compensated(self) -> Self {
+        Splitting { compensated: true, ..self }
+    }
+
+    /// The motion after some steps from another.
+    fn after(&self, from: Motion<N>, steps: usize) -> Motion<N> {
+        match (self.action, self.compensated) {
+            (false, false) => self.run::<false, false>(from, steps),
+            (false, true) => self.run::<false, true>(from, steps),
+            (true, false) => self.run::<true, false>(from, steps),
+            (true, true) => self.run::<true, true>(from, steps),
+        }
+    }
+
+    #[inline(never)]
+    fn run<const ACTION: bool, const COMPENSATED: bool>(&self, from: Motion<N>, steps: usize) -> Motion<N> {
+        let (mut m, table) = (from, &self.table);
+        // Steps that begin with a drift leave the first on its own, others the last.
+        let alone = if table.kick_first { steps - 1 } else { 0 };
+        if table.kick_first {
+            kick::<ACTION, COMPENSATED, N>(&mut m, table.opening);
+        }
+        for k in 0..steps {
+            let t = self.t0 + (self.taken + k) as f64 * self.h;
+            let stages = if k == alone { &table.single } else { &table.joined };
+            for stage in stages {
+                self.drift::<ACTION, COMPENSATED>(&mut m, &stage.drift);
+                (m.value, m.force) = self.form.kick(t + stage.time, &m.q.value);
+                kick::<ACTION, COMPENSATED, N>(&mut m, stage.kick);
+            }
+        }
+        if !table.kick_first {
+            self.drift::<ACTION, COMPENSATED>(&mut m, &table.closing);
+        }
+        m
+    }
+
+    #[inline(always)]
+    fn drift<const ACTION: bool, const COMPENSATED: bool>(&self, m: &mut Motion<N>, drift: &Drift) {
+        let p = m.p.value;
+        let v = self.form.velocity(&p);
+        if ACTION {
+            m.z.add::<COMPENSATED>(|_, z| drift.damping * z + drift.lift * p.dot(&v));
+        }
+        m.q.add::<COMPENSATED>(|i, _| drift.length * v[i]);
+        m.p.add::<COMPENSATED>(|_, p| drift.damping * p);
+    }
+}
+
+/// The flow of `-V` over a time s, with the force that the motion holds.
+#[inline(always)]
+fn kick<const ACTION: bool, const COMPENSATED: bool, const N: usize>(m: &mut Motion<N>, s: f64) {
+    let (value, force) = (m.value, m.force);
+    if ACTION {
+        m.z.add::<COMPENSATED>(|_, _| s * value);
+    }
+    m.p.add::<COMPENSATED>(|i, _| s * force[i]);
+}
+
+impl Table {
+    fn new(scheme: &SplittingScheme, gamma: f64, h: f64) -> Self {
+        let (drifts, kicks) = scheme.coefficients();
+        let stages = scheme.stages();
+        let kick_first = kicks[0] != 0.0;
+        let mut time = 0.0;
+        let single: Vec<Stage> = (0..stages)
+            .map(|i| {
+                time += drifts[i];
+                Stage { drift: Drift::over(gamma, drifts[i] * h), kick: kicks[i + 1] * h, time: time * h }
+            })
+            .collect();
+        let mut joined = single.clone();
+        if kick_first {
+            joined[stages - 1].kick = (kicks[stages] + kicks[0]) * h;
+        } else {
+            joined[0].drift = Drift::over(gamma, (drifts[stages] + drifts[0]) * h);
+        }
+        let closing = Drift::over(gamma, drifts[drifts.len() - 1] * h);
+        Table { opening: kicks[0] * h, closing, single, joined, kick_first }
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
+    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        let mut taken = 0;
+        while taken < steps {
+            let chunk = CHUNK.min(steps - taken);
+            let reached = self.after(self.motion, chunk);
+            if !reached.is_finite() {
+                return Err(self.up_to_the_last_finite(taken));
+            }
+            self.accept(reached, chunk);
+            taken += chunk;
+        }
+        Ok(())
+    }
+
+    fn state(&self) -> PhasePoint<N> {
+        self.motion.state()
+    }
+
+    fn time(&self) -> f64 {
+        self.t0 + self.taken as f64 * self.h
+    }
+
+    fn sigma(&self) -> f64 {
+        if self.taken == 0 { 1.0 } else { (self.gamma * self.h).exp() }
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> Splitting<'_, L, N> {
+    fn accept(&mut self, reached: Motion<N>, steps: usize) {
+        self.motion = reached;
+        self.taken += steps;
+        self.evaluations += (steps * self.table.single.len()) as u64;
+    }
+
+    /// Step by step up to the first that is not finite, somewhere in a chunk that is not.
+    fn up_to_the_last_finite(&mut self, mut taken: usize) -> Halt {
+        for _ in 0..CHUNK {
+            let reached = self.after(self.motion, 1);
+            if !reached.is_finite() {
+                break;
+            }
+            self.accept(reached, 1);
+            taken += 1;
+        }
+        Halt { taken, cause: StepError::NonFinite }
+    }
+}

@@ -1,0 +1,122 @@
+//! Lagrangians `v.Mv/2 - V(t, q) + f(z)`, as splittings read them.
+
+use crate::InputError;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Dual, Lagrangian, PhasePoint, VelocityPoint, linear};
+
+/// What is left of a false claim's derivative by the rounding of a true one, with some margin.
+const FALSE_CLAIM: f64 = 1e-9;
+
+/// A separable Lagrangian with its mass matrix, read once.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Separable<L, const N: usize> {
+    pub(crate) lagrangian: L,
+    pub(crate) mass: SMatrix<f64, N, N>,
+    /// `None` for the identity: a product with it would cost a third of a step of the oscillator.
+    inverse: Option<SMatrix<f64, N, N>>,
+}
+
+impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
+    /// Reads M, and verifies what the Lagrangian claims, at a state and beside it.
+    pub(crate) fn read(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
+        if N == 0 {
+            return Err(InputError::Dimension);
+        }
+        if !(h > 0.0 && h.is_finite()) {
+            return Err(InputError::Step { h });
+        }
+        crate::run::check_time(t)?;
+        state.check()?;
+        if !lagrangian.structure().separable {
+            return Err(InputError::Unclaimed { claim: "separable" });
+        }
+        for x in probes(state) {
+            let defects = lagrangian.structure().defects(&lagrangian, t, &x);
+            if let Some(defect) = defects.into_iter().find(|d| d.size.is_nan() || d.size > FALSE_CLAIM) {
+                return Err(InputError::FalseClaim { claim: defect.claim, size: defect.size });
+            }
+        }
+        let rest = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
+        let mass = lagrangian.hessian(t, &rest).vv;
+        // A term linear in v would pass for separable by its second derivatives.
+        let size = lagrangian.gradient(t, &rest).y.amax() / (1.0 + mass.amax());
+        if size.is_nan() || size > FALSE_CLAIM {
+            return Err(InputError::FalseClaim { claim: "separable", size });
+        }
+        let inverse = if mass == SMatrix::<f64, N, N>::identity() { None } else { Some(inverted(&mass)?) };
+        Ok(Separable { lagrangian, mass, inverse })
+    }
+
+    /// The constant rate gamma of a linear drag.
+    pub(crate) fn linear_drag(&self, t: f64, state: &PhasePoint<N>) -> Result<f64, InputError> {
+        let structure = self.lagrangian.structure();
+        if !(structure.z_affine || structure.z_free) {
+            return Err(InputError::Unclaimed { claim: "z_affine" });
+        }
+        let rest = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
+        if !structure.autonomous {
+            let still = VelocityPoint {
+                q: rest.q.map(Dual::constant),
+                v: rest.v.map(Dual::constant),
+                z: Dual::constant(rest.z),
+            };
+            for i in 0..3 {
+                let clock = Dual { re: t + without_symmetry(i), d: SVector::<f64, 1>::new(1.0) };
+                let gamma = self.lagrangian.gradient(clock, &still).z;
+                if gamma.d[0].is_nan() || gamma.d[0].abs() > FALSE_CLAIM * (1.0 + gamma.re.abs()) {
+                    return Err(InputError::Hypothesis { hypothesis: "a linear drag gamma z with constant gamma" });
+                }
+            }
+        }
+        Ok(self.lagrangian.gradient(t, &rest).z)
+    }
+
+    /// `L(t, q, 0, 0)`, which is `-V` up to a constant, and `L_q`. Duals carry the directions of `q` alone, so that the
+    /// compiler drops what velocity and action would add.
+    #[inline(always)]
+    pub(crate) fn kick(&self, t: f64, q: &SVector<f64, N>) -> (f64, SVector<f64, N>) {
+        let rest = VelocityPoint { q: *q, v: SVector::zeros(), z: 0.0 };
+        if let Some(gradient) = self.lagrangian.closed_gradient(t, &rest) {
+            return (self.lagrangian.value(t, q, &rest.v, 0.0), gradient.x);
+        }
+        let mut moving: SVector<Dual<f64, SVector<f64, N>>, N> = q.map(Dual::constant);
+        for i in 0..N {
+            moving[i].d[i] = 1.0;
+        }
+        let still: SVector<Dual<f64, SVector<f64, N>>, N> = rest.v.map(Dual::constant);
+        let l = self.lagrangian.value(Dual::constant(t), &moving, &still, Dual::constant(0.0));
+        (l.re, l.d)
+    }
+
+    /// `M^-1 p`.
+    #[inline(always)]
+    pub(crate) fn velocity(&self, p: &SVector<f64, N>) -> SVector<f64, N> {
+        match &self.inverse {
+            None => *p,
+            Some(inverse) => inverse * p,
+        }
+    }
+}
+
+/// The state's position, and one beside it where the state's own may be special; with generic velocities.
+fn probes<const N: usize>(state: &PhasePoint<N>) -> [VelocityPoint<N>; 2] {
+    let v = SVector::from_fn(|i, _| without_symmetry(i));
+    let beside =
+        SVector::from_fn(|i, _| state.q[i] * (1.0 + 0.01 * without_symmetry(i)) + 1e-3 * without_symmetry(N + i));
+    [VelocityPoint { q: state.q, v, z: state.z }, VelocityPoint { q: beside, v, z: state.z + without_symmetry(2 * N) }]
+}
+
+/// `M^-1`, column by column.
+fn inverted<const N: usize>(mass: &SMatrix<f64, N, N>) -> Result<SMatrix<f64, N, N>, InputError> {
+    let mut inverse = SMatrix::<f64, N, N>::identity();
+    for mut column in inverse.column_iter_mut() {
+        linear::solve(&mut mass.clone_owned(), &mut column)
+            .map_err(|e| e.of("the mass matrix L_vv", "take a regular Lagrangian"))?;
+    }
+    Ok(inverse)
+}
+
+/// Numbers between 0.3 and 1.3 without special relation.
+fn without_symmetry(i: usize) -> f64 {
+    0.3 + (((i + 1) * (i + 1)) as f64 * std::f64::consts::SQRT_2).fract()
+}

@@ -1,0 +1,112 @@
+//! The Strang splitting as a discrete Lagrangian.
+
+use super::linear_drag::Drift;
+use super::separable::Separable;
+use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
+
+/// The Strang splitting of `L = v.Mv/2 - V(t, q) + gamma z`, kick, drift, kick, as a discrete Lagrangian of order 2:
+/// with `d = (e^(gamma h) - 1)/gamma`,
+///
+/// `L_d = e^(gamma h) ((q1 - q0).M(q1 - q0)/(2d) - h/2 V(t, q0)) - h/2 V(t + h, q1) + (e^(gamma h) - 1) z0`.
+///
+/// So `sigma_d = e^(gamma h)` at every point, and the step is explicit: the drift alone joins the positions, which gives the
+/// momentum between the kicks. Symmetric; the second-order member of [`SplittingScheme`](crate::SplittingScheme), whose
+/// runs are a [`Splitting`](crate::Splitting)'s.
+///
+/// ```
+/// use contact_geom::{PhasePoint, systems::Pendulum};
+/// use discrete_herglotz::{FinalOnly, Flow, Strang};
+/// let pendulum = Pendulum { gamma: -0.1 };
+/// let start = PhasePoint::new([1.0], [1.0], 0.0);
+/// let ld = Strang::new(&pendulum, 0.1, 0.0, &start)?;
+/// let mut flow = Flow::new(&ld, 0.0, start)?;
+/// flow.run(100, &mut FinalOnly)?;
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Strang<L, const N: usize> {
+    form: Separable<L, N>,
+    h: f64,
+    sigma: f64,
+    forth: Drift,
+    back: Drift,
+}
+
+impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
+    /// That of a Lagrangian whose form is verified at a time and a state.
+    ///
+    /// # Errors
+    /// Those of [`Splitting::new`](crate::Splitting::new), but for the last.
+    pub fn new(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
+        let form = Separable::read(lagrangian, h, t, state)?;
+        let gamma = form.linear_drag(t, state)?;
+        let (forth, back) = (Drift::over(gamma, h), Drift::over(gamma, -h));
+        Ok(Strang { form, h, sigma: (gamma * h).exp(), forth, back })
+    }
+
+    /// Kick, drift, kick over a step from `t`, forward with `h > 0` or back with `h < 0`.
+    #[inline(always)]
+    fn step(&self, t: f64, from: &PhasePoint<N>, h: f64, drift: &Drift) -> Result<Transition<N>, StepError> {
+        let PhasePoint { mut q, mut p, mut z } = *from;
+        let (value, force) = self.form.kick(t, &q);
+        z += 0.5 * h * value;
+        p += force * (0.5 * h);
+        let v = self.form.velocity(&p);
+        z += drift.damping * z + drift.lift * p.dot(&v);
+        q += v * drift.length;
+        p += p * drift.damping;
+        let (value, force) = self.form.kick(t + h, &q);
+        z += 0.5 * h * value;
+        p += force * (0.5 * h);
+        let velocity = v * (drift.length / h);
+        Transition { end: PhasePoint { q, p, z }, velocity, sigma: self.sigma, iterations: 0 }.checked()
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
+    fn step_size(&self) -> f64 {
+        self.h
+    }
+
+    fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
+        let still = SVector::from_element(T::zero());
+        let kick =
+            |t: f64, q: &SVector<T, N>| self.form.lagrangian.value(T::from(t), q, &still, T::zero()) * (0.5 * self.h);
+        let moved = x.q1 - x.q0;
+        let mut square = T::zero();
+        for i in 0..N {
+            for j in 0..N {
+                square += moved[i] * moved[j] * self.form.mass[(i, j)];
+            }
+        }
+        let growth = self.forth.damping;
+        let before = square * (0.5 / self.forth.length) + kick(t, &x.q0);
+        Ok(before * (1.0 + growth) + kick(t + self.h, &x.q1) + x.z0 * growth)
+    }
+
+    /// Explicit; the guess and the solver are not needed.
+    #[inline(always)]
+    fn forward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        _guess: &SVector<f64, N>,
+        _solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        self.step(t, from, self.h, &self.forth)
+    }
+
+    /// The step with `-h`, by symmetry.
+    #[inline]
+    fn backward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        _guess: &SVector<f64, N>,
+        _solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        self.step(t + self.h, from, -self.h, &self.back)
+    }
+}
