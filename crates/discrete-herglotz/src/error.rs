@@ -12,6 +12,20 @@ pub enum InputError {
         /// The step that was passed.
         h: f64,
     },
+    /// The span of a scene is not a positive finite time.
+    #[error("the span of time is {span}; it must be positive and finite")]
+    Span {
+        /// The span that was passed.
+        span: f64,
+    },
+    /// A method does not reach a wanted accuracy.
+    #[error("the wanted relative error {wanted:e} is not reached ({reached:e} was); take a method of higher order, or ask for less")]
+    Accuracy {
+        /// The error that was asked for.
+        wanted: f64,
+        /// The smallest estimate of the pilot runs; infinite where none was made.
+        reached: f64,
+    },
     /// A collocation method has no such number of stages.
     #[error("{found} stages; contact Gauss collocation has from 1 to 16")]
     Stages {

@@ -35,6 +35,7 @@ mod path;
 mod quadrature;
 pub mod rules;
 mod run;
+mod scene;
 mod solver;
 mod splitting;
 pub mod statements;
@@ -60,10 +61,10 @@ pub use path::{DiscretePath, discrete_action};
 pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
 pub use rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
 pub use run::{Every, FinalOnly, Flow, Observer, Record, Step};
+pub use scene::{Integrator, Item, Outcome, Plan, Row, Scene, Steps, UnknownIntegrator, Wanted};
 pub use solver::{CROSSOVER, Solver};
 pub use splitting::{Splitting, SplittingScheme, Strang};
 pub use stepper::{Halt, Stepper};
-
 pub use verified::verified;
 
 pub use contact_geom;

@@ -1,7 +1,7 @@
 //! Runs: many steps of a discrete Hamiltonian flow, recording only what is asked for.
 
 use crate::legendre::{discrete_regularity, legendre_minus};
-use crate::{DiscreteLagrangian, InputError, Solver, Status, StepError};
+use crate::{DiscreteLagrangian, Halt, InputError, Solver, Status, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, GeometryError, PhasePoint};
 use std::ops::ControlFlow;
@@ -136,6 +136,9 @@ pub struct Flow<'a, D, const N: usize> {
     /// The mean velocities of the last steps, the latest first: the start of Newton's method is extrapolated from them.
     velocities: [SVector<f64, N>; 2],
     solver: Solver<N>,
+    /// `sigma_d` of the last step.
+    sigma: f64,
+    evaluations: u64,
 }
 
 impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
@@ -161,7 +164,7 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
             StepError::SigmaVanished { sigma } => InputError::Sigma { sigma },
             cause => InputError::FirstStep(cause),
         })?;
-        Ok(Flow { ld, t0, k: 0, state, velocities: [first.velocity; 2], solver })
+        Ok(Flow { ld, t0, k: 0, state, velocities: [first.velocity; 2], solver, sigma: 1.0, evaluations: 0 })
     }
 
     /// A flow from the two positions `q0, q1` and the action `z0`: its state at `t0` is `F-L_d (q0, q1, z0)`.
@@ -218,6 +221,9 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
         };
         self.velocities = [next.velocity, latest];
         self.state = next.end;
+        self.sigma = next.sigma;
+        // A second jet an iteration, and the jet that makes the next momentum.
+        self.evaluations += u64::from(next.iterations) + 1;
         Ok(step)
     }
 
@@ -259,6 +265,31 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
             None => self.t0 = t,
         }
         Ok(())
+    }
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<'_, D, N> {
+    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        for taken in 0..steps {
+            self.step().map_err(|cause| Halt { taken, cause })?;
+        }
+        Ok(())
+    }
+
+    fn state(&self) -> PhasePoint<N> {
+        self.state
+    }
+
+    fn time(&self) -> f64 {
+        Flow::time(self)
+    }
+
+    fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.evaluations
     }
 }
 

@@ -1,8 +1,8 @@
 //! What is measured: something that solves a problem, and has one number to trade time for accuracy.
 
 use crate::problems::Problem;
-use contact_geom::PhasePoint;
-use discrete_herglotz::{DiscreteLagrangian, Flow, Halt, InputError, StepError, Stepper};
+use contact_geom::{Lagrangian, VelocityPoint};
+use discrete_herglotz::{Halt, InputError, Integrator, Scene, Steps, Wanted};
 use std::time::Instant;
 use thiserror::Error;
 
@@ -18,7 +18,7 @@ pub enum Control {
 /// A method, set on one problem with or without the action.
 pub trait Candidate {
     /// The name in tables and arguments, in lower case with underscores.
-    fn name(&self) -> &'static str;
+    fn name(&self) -> &str;
 
     /// The order.
     fn order(&self) -> u32;
@@ -60,42 +60,33 @@ pub enum RunError {
     Peer(String),
 }
 
-/// Makes a plan for a time step.
-type Plan<P> = dyn Fn(f64) -> Result<P, InputError>;
-
-/// Sets a stepper with a plan on the start.
-type Start<P, const N: usize> = dyn for<'a> Fn(&'a P) -> Result<Box<dyn Stepper<N> + 'a>, InputError>;
-
-/// A method of the library that is driven as a [`Stepper`].
-struct Stepped<P, const N: usize> {
-    name: &'static str,
-    order: u32,
-    duration: f64,
+/// An integrator of the library on a problem's Lagrangian.
+struct OfLibrary<L: 'static, const N: usize> {
+    lagrangian: &'static L,
+    integrator: Integrator,
+    name: String,
+    problem: Problem,
     z: bool,
-    plan: Box<Plan<P>>,
-    start: Box<Start<P, N>>,
 }
 
-/// A candidate of two closures. The first makes, for a time step, what all runs with it share: a discrete Lagrangian, a table
-/// of coefficients; or just the time step, where there is nothing of the kind. The second sets a stepper with it on the
-/// problem's start. Neither is timed.
-pub fn stepped<P: 'static, const N: usize>(
-    (name, order): (&'static str, u32),
-    (problem, z): (&Problem, bool),
-    plan: impl Fn(f64) -> Result<P, InputError> + 'static,
-    start: impl for<'a> Fn(&'a P) -> Result<Box<dyn Stepper<N> + 'a>, InputError> + 'static,
+/// A candidate that runs an integrator of the library, by the plan of a scene. The plan is made before the clock starts, as the
+/// peers' solvers are.
+pub fn of_library<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &'static L,
+    integrator: Integrator,
+    problem: &Problem,
+    z: bool,
 ) -> Box<dyn Candidate> {
-    let duration = problem.duration;
-    Box::new(Stepped { name, order, duration, z, plan: Box::new(plan), start: Box::new(start) })
+    Box::new(OfLibrary { lagrangian, integrator, name: integrator.to_string(), problem: *problem, z })
 }
 
-impl<P, const N: usize> Candidate for Stepped<P, N> {
-    fn name(&self) -> &'static str {
-        self.name
+impl<L: Lagrangian<N>, const N: usize> Candidate for OfLibrary<L, N> {
+    fn name(&self) -> &str {
+        &self.name
     }
 
     fn order(&self) -> u32 {
-        self.order
+        self.integrator.order()
     }
 
     fn control(&self) -> Control {
@@ -103,62 +94,22 @@ impl<P, const N: usize> Candidate for Stepped<P, N> {
     }
 
     fn run(&self, h: f64) -> Result<Run, RunError> {
-        let plan = (self.plan)(h)?;
-        let mut stepper = (self.start)(&plan)?;
-        let steps = (self.duration / h).round();
+        let start = self.problem.phase_point::<N>();
+        // The momenta of the problems are velocities.
+        let scene = Scene::new(self.lagrangian, VelocityPoint { q: start.q, v: start.p, z: start.z }, self.problem.duration)
+            .by(self.integrator)
+            .steps(Steps::Size(h))
+            .wanting(Wanted { action: self.z, ..Wanted::default() });
+        let plan = scene.plan()?;
+        let mut stepper = plan.stepper()?;
         let clock = Instant::now();
-        stepper.advance(steps as usize).map_err(RunError::Halt)?;
+        stepper.advance(plan.count()).map_err(RunError::Halt)?;
         let seconds = clock.elapsed().as_secs_f64();
         let end = stepper.state();
         let mut state: Vec<f64> = end.q.iter().chain(end.p.iter()).copied().collect();
         if self.z {
             state.push(end.z);
         }
-        Ok(Run { state, steps: steps as u64, evaluations: stepper.evaluations(), seconds })
-    }
-}
-
-/// The flow of a discrete Lagrangian as a stepper.
-pub struct FlowStepper<'a, D, const N: usize> {
-    flow: Flow<'a, D, N>,
-    sigma: f64,
-    evaluations: u64,
-}
-
-impl<'a, D: DiscreteLagrangian<N>, const N: usize> FlowStepper<'a, D, N> {
-    /// A stepper from a state at t = 0.
-    ///
-    /// # Errors
-    /// Those of [`Flow::new`].
-    pub fn new(ld: &'a D, state: PhasePoint<N>) -> Result<Self, InputError> {
-        Ok(FlowStepper { flow: Flow::new(ld, 0.0, state)?, sigma: 1.0, evaluations: 0 })
-    }
-}
-
-impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for FlowStepper<'_, D, N> {
-    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
-        for taken in 0..steps {
-            let step = self.flow.step().map_err(|cause: StepError| Halt { taken, cause })?;
-            self.sigma = step.sigma;
-            // A second jet an iteration, and the jet that makes the next momentum.
-            self.evaluations += u64::from(step.iterations) + 1;
-        }
-        Ok(())
-    }
-
-    fn state(&self) -> PhasePoint<N> {
-        *self.flow.state()
-    }
-
-    fn time(&self) -> f64 {
-        self.flow.time()
-    }
-
-    fn sigma(&self) -> f64 {
-        self.sigma
-    }
-
-    fn evaluations(&self) -> u64 {
-        self.evaluations
+        Ok(Run { state, steps: plan.count() as u64, evaluations: stepper.evaluations(), seconds })
     }
 }

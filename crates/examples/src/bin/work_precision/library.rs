@@ -1,35 +1,44 @@
 //! The methods of the library, set on the problems.
 
-use crate::candidate::{Candidate, FlowStepper, stepped};
+use crate::candidate::{Candidate, of_library};
 use crate::problems::{KEPLER, OSCILLATOR, PENDULUM, Problem, QUADRATIC, System};
 use contact_geom::Lagrangian;
-use discrete_herglotz::Midpoint;
+use discrete_herglotz::Integrator;
 
-/// The methods of the library for a problem, with or without the action.
+/// The integrators of the library that apply to a problem, with or without the action. A flow of a discrete Lagrangian always
+/// has the action; without it, nobody looks.
 pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
     match problem.system {
-        System::Oscillator => general::<1>(OSCILLATOR, problem, z),
-        System::Pendulum => general::<1>(PENDULUM, problem, z),
-        System::Kepler => general::<2>(KEPLER, problem, z),
-        System::Quadratic => general::<1>(QUADRATIC, problem, z),
+        System::Oscillator => of(&OSCILLATOR, problem, z),
+        System::Pendulum => of(&PENDULUM, problem, z),
+        System::Kepler => of::<_, 2>(&KEPLER, problem, z),
+        System::Quadratic => of(&QUADRATIC, problem, z),
     }
 }
 
-/// The methods for any Lagrangian. A flow of a discrete Lagrangian always has the action; without it, nobody looks.
-fn general<const N: usize>(
-    lagrangian: impl Lagrangian<N> + Copy + 'static,
-    problem: &Problem,
-    z: bool,
-) -> Vec<Box<dyn Candidate>> {
-    let at = problem.phase_point::<N>();
-    let midpoint = stepped(
-        ("midpoint", 2),
-        (problem, z),
-        move |h| Midpoint::new::<N>(lagrangian, h),
-        move |ld| Ok(Box::new(FlowStepper::new(ld, at)?)),
-    );
-    vec![midpoint]
+fn of<L: Lagrangian<N>, const N: usize>(lagrangian: &'static L, problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
+    let applicable = |integrator: &Integrator| integrator.check(&lagrangian.structure()).is_ok();
+    let chosen = Integrator::all().into_iter().filter(applicable);
+    chosen.map(|integrator| of_library(lagrangian, integrator, problem, z)).collect()
 }
+
+/// The integrators that are measured where none is named: one or two of each kind and order.
+pub const DIAGRAMS: [&str; 14] = [
+    "midpoint",
+    "strang",
+    "yoshida_4",
+    "blanes_moan_6",
+    "kahan_li_8",
+    "blanes_casas_8",
+    "sofroniou_spaletta_10",
+    "midpoint_by_kahan_li_8",
+    "gauss_2",
+    "gauss_4",
+    "gauss_6",
+    "gauss_8",
+    "gauss_12",
+    "gauss_16",
+];
 
 #[cfg(test)]
 mod tests {

@@ -40,8 +40,8 @@ struct Arguments {
     /// The problems, separated by commas.
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "all")]
     problem: Vec<String>,
-    /// The methods, separated by commas.
-    #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "all")]
+    /// The methods, separated by commas; `all` for each that applies, `chosen` for one or two of each kind and the peers.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "chosen")]
     method: Vec<String>,
     /// With or without the action; both, if it is not said.
     #[arg(long)]
@@ -100,7 +100,11 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = Directory::create(&arguments.out)?;
     let chosen: Vec<Entry> = all
         .into_iter()
-        .filter(|entry| wanted(entry.problem, entry.z) && named(&arguments.method, entry.candidate.name()))
+        .filter(|entry| {
+            let shown = matches!(entry.origin, Origin::Peer) || library::DIAGRAMS.contains(&entry.candidate.name());
+            let chosen = shown && arguments.method.iter().any(|name| name == "chosen");
+            wanted(entry.problem, entry.z) && (chosen || named(&arguments.method, entry.candidate.name()))
+        })
         .collect();
     rows.extend(measure(&chosen, Effort { quick: arguments.quick }));
     row::sort(&mut rows);
@@ -133,9 +137,9 @@ fn entries() -> Vec<Entry> {
     variants().flat_map(of).collect()
 }
 
-/// Refuses names that are neither `all` nor known.
+/// Refuses names that are neither known nor stand for several.
 fn check_names(what: &'static str, names: &[String], known: &[&str]) -> Result<(), Failure> {
-    match names.iter().find(|name| *name != "all" && !known.contains(&name.as_str())) {
+    match names.iter().find(|name| !["all", "chosen"].contains(&name.as_str()) && !known.contains(&name.as_str())) {
         Some(name) => Err(Failure::Unknown { what, name: name.clone(), known: known.join(", ") }),
         None => Ok(()),
     }

@@ -10,8 +10,8 @@ const RUNS: usize = 7;
 /// Short runs are repeated until they took this many seconds together, or were that many.
 const REPEATS: (f64, usize) = (0.02, 200);
 
-/// The coarsest step tried, in time units: about a third of the problems' periods at least.
-const COARSEST: f64 = 4.0;
+/// The coarsest step tried, in time units: a period of the problems.
+const COARSEST: f64 = 6.5;
 
 /// The largest number of steps tried.
 const MOST_STEPS: f64 = 1e8;

@@ -100,7 +100,7 @@ impl<F, const D: usize> Adaptive<F, D> {
 struct DifferentialEquations<F, const D: usize>(Adaptive<F, D>);
 
 impl<F: Fn([f64; D]) -> [f64; D], const D: usize> Candidate for DifferentialEquations<F, D> {
-    fn name(&self) -> &'static str {
+    fn name(&self) -> &str {
         "differential_equations_dop853"
     }
 
@@ -135,7 +135,7 @@ impl<F: Fn([f64; D]) -> [f64; D], const D: usize> Candidate for DifferentialEqua
 struct OdeSolvers<F, const D: usize>(Adaptive<F, D>);
 
 impl<F: Fn([f64; D]) -> [f64; D] + Copy, const D: usize> Candidate for OdeSolvers<F, D> {
-    fn name(&self) -> &'static str {
+    fn name(&self) -> &str {
         "ode_solvers_dop853"
     }
 

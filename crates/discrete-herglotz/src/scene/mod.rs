@@ -1,0 +1,133 @@
+//! Scenes: what is to be computed, and nothing else.
+
+mod integrator;
+mod pilot;
+mod plan;
+
+pub use integrator::{Integrator, UnknownIntegrator};
+pub use plan::{Item, Outcome, Plan, Row};
+
+use crate::InputError;
+use contact_geom::{Lagrangian, Symmetry, VelocityPoint};
+
+/// The time step of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Steps {
+    /// Steps of this length, made a little shorter so that a whole number of them fills the span.
+    Size(f64),
+    /// This many steps.
+    Count(usize),
+    /// One length for the whole run, chosen by pilot runs so that the error of (q, p) at the end, relative to its size, is at
+    /// most this. The error is estimated from runs with h and h/2; their cost is a small multiple of the run's.
+    Accuracy(f64),
+}
+
+/// What is wanted of a scene beside its final (q, p).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanted<const N: usize> {
+    /// The action z. Where z does not act back on the motion, leaving it out saves its computation.
+    pub action: bool,
+    /// The conformal factor of the whole motion, the product of the `sigma_d`.
+    pub conformal_factor: bool,
+    /// Rows of the motion: the state after each so many steps.
+    pub rows: Option<usize>,
+    /// The momentum of this group in each row.
+    pub momentum: Option<Symmetry<N>>,
+}
+
+/// The final state with its action.
+impl<const N: usize> Default for Wanted<N> {
+    fn default() -> Self {
+        Wanted { action: true, conformal_factor: false, rows: None, momentum: None }
+    }
+}
+
+/// A system with its initial state, a method, a span of time and the outputs that are wanted.
+///
+/// From these and the declared structure of the Lagrangian (probed when the plan is made: a false claim is an error) a
+/// [`Plan`] takes the cheapest route, and says in words what will be computed and what not.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use discrete_herglotz::{Integrator, Scene, Steps, Wanted};
+///
+/// let pendulum = Pendulum { gamma: -0.01 };
+/// let scene = Scene::new(&pendulum, VelocityPoint::new([1.0], [1.0], 0.0), 1000.0)
+///     .by(Integrator::Gauss { stages: 16 })
+///     .steps(Steps::Accuracy(1e-9))
+///     .wanting(Wanted { action: false, ..Wanted::default() });
+/// let plan = scene.plan()?;
+/// println!("{plan}");
+/// let outcome = plan.run()?;
+/// println!("{}: q = {} after {} steps", outcome.status, outcome.q[0], outcome.steps);
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+#[derive(Debug)]
+pub struct Scene<'a, L, const N: usize> {
+    lagrangian: &'a L,
+    start: VelocityPoint<N>,
+    t0: f64,
+    span: f64,
+    integrator: Integrator,
+    steps: Steps,
+    wanted: Wanted<N>,
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
+    /// The motion of a Lagrangian from a point of TQ x R over a span of time: at first from t = 0, by contact Gauss
+    /// collocation with eight stages, to a relative error of 1e-9, for the final state with its action.
+    pub fn new(lagrangian: &'a L, start: VelocityPoint<N>, span: f64) -> Self {
+        Scene {
+            lagrangian,
+            start,
+            t0: 0.0,
+            span,
+            integrator: Integrator::Gauss { stages: 8 },
+            steps: Steps::Accuracy(1e-9),
+            wanted: Wanted::default(),
+        }
+    }
+
+    /// The same from another time.
+    pub fn from_time(self, t0: f64) -> Self {
+        Scene { t0, ..self }
+    }
+
+    /// The same by another method.
+    pub fn by(self, integrator: Integrator) -> Self {
+        Scene { integrator, ..self }
+    }
+
+    /// The same with other steps.
+    pub fn steps(self, steps: Steps) -> Self {
+        Scene { steps, ..self }
+    }
+
+    /// The same with other outputs.
+    pub fn wanting(self, wanted: Wanted<N>) -> Self {
+        Scene { wanted, ..self }
+    }
+
+    /// Checks everything, chooses the step and the route.
+    ///
+    /// # Errors
+    /// [`InputError`]: a span or step that is not positive and finite, a state that is not finite, a false or a missing claim of
+    /// structure, a method whose hypothesis the Lagrangian does not meet, an accuracy that the method does not reach.
+    pub fn plan(&self) -> Result<Plan<'a, L, N>, InputError> {
+        if !(self.span > 0.0 && self.span.is_finite()) {
+            return Err(InputError::Span { span: self.span });
+        }
+        if let Some(0) = self.wanted.rows {
+            return Err(InputError::Count { what: "the steps between two rows", least: 1, found: 0 });
+        }
+        let count = match self.steps {
+            Steps::Count(0) => return Err(InputError::Count { what: "the number of steps", least: 1, found: 0 }),
+            Steps::Count(count) => count,
+            Steps::Size(h) if !(h > 0.0 && h.is_finite()) => return Err(InputError::Step { h }),
+            // A step that fits the span up to rounding is not made shorter.
+            Steps::Size(h) => (self.span / h * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0) as usize,
+            Steps::Accuracy(error) => pilot::steps_for(self, error)?,
+        };
+        Plan::new(self, count)
+    }
+}

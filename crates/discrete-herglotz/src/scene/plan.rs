@@ -1,0 +1,303 @@
+//! The plan of a scene: the route, in code and in words.
+
+use super::{Integrator, Scene, Wanted};
+use crate::{
+    Composition, Discretised, Flow, Gauss, GaussRoute, InputError, Splitting, Status, Stepper, verified,
+};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, OneParameterGroup, PhasePoint, Structure, VelocityPoint, legendre};
+use std::fmt::{Display, Formatter};
+
+/// One line of a plan: something that could be computed, whether it is, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Item {
+    /// What it is about.
+    pub what: &'static str,
+    /// Whether it is computed.
+    pub computed: bool,
+    /// Why, or how.
+    pub why: String,
+}
+
+/// What all runs of a plan share.
+enum Engine<'a, L, const N: usize> {
+    Discrete(Discretised<&'a L, N>),
+    Gauss(Gauss<&'a L>),
+    /// Explicit: the coefficients are the stepper's.
+    Explicit,
+}
+
+/// A scene after its checks, with step and route chosen; made by [`Scene::plan`]. Printed, it says what will be computed and
+/// what is skipped.
+pub struct Plan<'a, L, const N: usize> {
+    lagrangian: &'a L,
+    start: PhasePoint<N>,
+    guess: SVector<f64, N>,
+    t0: f64,
+    h: f64,
+    count: usize,
+    integrator: Integrator,
+    wanted: Wanted<N>,
+    engine: Engine<'a, L, N>,
+    /// Whether `sigma_d` is the same in all steps.
+    constant_rate: bool,
+    /// Whether z can be left out.
+    z_decouples: bool,
+    items: Vec<Item>,
+}
+
+/// The state after some steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row<const N: usize> {
+    /// The time.
+    pub t: f64,
+    /// The position.
+    pub q: SVector<f64, N>,
+    /// The momentum.
+    pub p: SVector<f64, N>,
+    /// The action, where it is wanted.
+    pub z: Option<f64>,
+    /// The momentum of the group, where one was named.
+    pub momentum: Option<f64>,
+}
+
+/// What a run has led to. After bad luck it holds what was computed before.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome<const N: usize> {
+    /// How the run ended.
+    pub status: Status,
+    /// The steps taken.
+    pub steps: usize,
+    /// The time reached.
+    pub t: f64,
+    /// The position there.
+    pub q: SVector<f64, N>,
+    /// The momentum there.
+    pub p: SVector<f64, N>,
+    /// The action there, where it is wanted.
+    pub z: Option<f64>,
+    /// The conformal factor of the motion, where it is wanted.
+    pub conformal_factor: Option<f64>,
+    /// The rows, the start included; empty where none are wanted.
+    pub rows: Vec<Row<N>>,
+    /// The evaluations of forces or gradients.
+    pub evaluations: u64,
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
+    pub(super) fn new(scene: &Scene<'a, L, N>, count: usize) -> Result<Self, InputError> {
+        let Scene { lagrangian, start, t0, span, integrator, .. } = scene;
+        let lagrangian: &'a L = lagrangian;
+        PhasePoint { q: start.q, p: start.v, z: start.z }.check()?;
+        integrator.check(&lagrangian.structure())?;
+        let structure = verified(lagrangian, *t0, start)?;
+        let h = span / count as f64;
+        let engine = match integrator {
+            Integrator::Discrete(method) => Engine::Discrete(method.discretise(lagrangian, h)?),
+            Integrator::Gauss { stages } => Engine::Gauss(Gauss::new(lagrangian, *stages, h)?),
+            Integrator::Splitting(_) | Integrator::Composition(..) => Engine::Explicit,
+        };
+        let mut plan = Plan {
+            lagrangian,
+            start: legendre(lagrangian, *t0, start),
+            guess: start.v,
+            t0: *t0,
+            h,
+            count,
+            integrator: *integrator,
+            wanted: scene.wanted.clone(),
+            engine,
+            constant_rate: false,
+            z_decouples: false,
+            items: Vec::new(),
+        };
+        plan.explain(&structure, start)?;
+        Ok(plan)
+    }
+
+    /// The time step.
+    pub fn step_size(&self) -> f64 {
+        self.h
+    }
+
+    /// The number of steps.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// What is computed, and what is not.
+    pub fn items(&self) -> &[Item] {
+        &self.items
+    }
+
+    /// A stepper at the start, for those who drive it themselves.
+    ///
+    /// # Errors
+    /// Those of the method's start.
+    pub fn stepper(&self) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
+        let (t0, start, action) = (self.t0, self.start, self.wanted.action || !self.z_decouples);
+        Ok(match (&self.engine, &self.integrator) {
+            (Engine::Discrete(ld), _) => Box::new(Flow::with_guess(ld, t0, start, self.guess)?),
+            (Engine::Gauss(gauss), _) if action => Box::new(gauss.stepper(t0, start, self.guess)?),
+            (Engine::Gauss(gauss), _) => Box::new(gauss.stepper_without_action(t0, start, self.guess)?),
+            (Engine::Explicit, Integrator::Splitting(scheme)) => {
+                let splitting = Splitting::new(self.lagrangian, scheme, self.h, t0, start)?;
+                if action { Box::new(splitting) } else { Box::new(splitting.without_action()) }
+            }
+            (Engine::Explicit, Integrator::Composition(method, scheme)) => {
+                let rule = |h| method.discretise(self.lagrangian, h);
+                Box::new(Composition::new(rule, scheme, self.h, t0, start)?)
+            }
+            // `new` makes no other pairs.
+            (Engine::Explicit, _) => return Err(InputError::Dimension),
+        })
+    }
+
+    /// Runs the scene.
+    ///
+    /// # Errors
+    /// Those of [`stepper`](Self::stepper). Bad luck in mid-run is the outcome's status.
+    pub fn run(&self) -> Result<Outcome<N>, InputError> {
+        let mut stepper = self.stepper()?;
+        let Wanted { conformal_factor, rows: stride, .. } = &self.wanted;
+        // The logarithm of the product of the sigma_d; in single steps only where they differ.
+        let (mut log_factor, single) = (0.0, *conformal_factor && !self.constant_rate);
+        let mut rows = Vec::new();
+        if let Some(stride) = stride {
+            rows.reserve(self.count / stride + 2);
+            rows.push(self.row(&*stepper));
+        }
+        let (mut taken, mut status) = (0, Status::Completed);
+        while taken < self.count {
+            let next_row = stride.map_or(self.count, |stride| (taken / stride + 1) * stride);
+            let chunk = if single { 1 } else { next_row.min(self.count) - taken };
+            let (done, cause) = match stepper.advance(chunk) {
+                Ok(()) => (chunk, None),
+                Err(halt) => (halt.taken, Some(halt.cause)),
+            };
+            taken += done;
+            if *conformal_factor {
+                log_factor += done as f64 * stepper.sigma().ln();
+            }
+            if let Some(cause) = cause {
+                status = Status::Failed { step: taken, cause };
+                break;
+            }
+            if stride.is_some_and(|stride| taken % stride == 0 || taken == self.count) {
+                rows.push(self.row(&*stepper));
+            }
+        }
+        let end = self.row(&*stepper);
+        Ok(Outcome {
+            status,
+            steps: taken,
+            t: end.t,
+            q: end.q,
+            p: end.p,
+            z: end.z,
+            conformal_factor: conformal_factor.then(|| log_factor.exp()),
+            rows,
+            evaluations: stepper.evaluations(),
+        })
+    }
+
+    fn row(&self, stepper: &dyn Stepper<N>) -> Row<N> {
+        let PhasePoint { q, p, z } = stepper.state();
+        let momentum = self.wanted.momentum.as_ref().map(|group| group.momentum(&q, &p));
+        Row { t: stepper.time(), q, p, z: self.wanted.action.then_some(z), momentum }
+    }
+
+    /// Finds the route and puts it in words.
+    fn explain(&mut self, structure: &Structure, start: &VelocityPoint<N>) -> Result<(), InputError> {
+        let drag = structure.z_affine || structure.z_free;
+        let mut items = Vec::new();
+        let mut say = |what, computed, why: &str| items.push(Item { what, computed, why: why.into() });
+        let constant_gamma = drag && structure.autonomous;
+        let carried = "the flow of a discrete Lagrangian carries it";
+        match (&self.engine, &self.integrator) {
+            (Engine::Gauss(gauss), _) => {
+                let route = gauss.stepper(self.t0, self.start, start.v)?.route();
+                self.constant_rate = matches!(route, GaussRoute::Linear | GaussRoute::Condensed);
+                self.z_decouples = self.constant_rate;
+                match route {
+                    GaussRoute::Linear => {
+                        say("iteration", false, "L is quadratic: the step is one matrix, made once");
+                        say("forces", false, "the matrix holds them");
+                    }
+                    GaussRoute::Condensed => {
+                        say("iteration", true, "the accelerations of the stages alone, to round-off");
+                        say("mass matrix", false, "W is constant: inverted once");
+                        say("integrating factor", false, "gamma is constant: its stages are computed once");
+                        say(
+                            "Jacobian",
+                            false,
+                            "one factorisation for a linear force, renewed where the force's slope has changed",
+                        );
+                    }
+                    GaussRoute::ConstantMass | GaussRoute::General => {
+                        say("iteration", true, "velocities, actions and integrating factors of the stages, to round-off");
+                        let constant = route == GaussRoute::ConstantMass;
+                        let why = if constant { "W is constant: inverted once" } else { "at the stages, once a step" };
+                        say("mass matrix", !constant, why);
+                        say("Jacobian", false, "the iteration needs gradients alone");
+                    }
+                }
+                if route != GaussRoute::Linear {
+                    say("Newton's method", false, "only in steps whose iteration does not contract");
+                }
+            }
+            (Engine::Discrete(_), _) => {
+                say("Newton's method", true, "each step is implicit in q1");
+                say("Jacobian", true, "second derivatives of L at each iterate");
+            }
+            (_, Integrator::Composition(..)) => {
+                say("Newton's method", true, "each substep is implicit in q1");
+                say("Jacobian", true, "second derivatives of L at each iterate");
+            }
+            _ => {
+                self.constant_rate = constant_gamma;
+                self.z_decouples = drag;
+                say("Newton's method", false, "each step is explicit: forces only");
+                say("Jacobian", false, "no equation is solved");
+                say("shared kicks", false, "the last force of a step is the first of the next");
+            }
+        }
+        let implicit = matches!(self.integrator, Integrator::Discrete(_) | Integrator::Composition(..));
+        match (self.wanted.action, self.z_decouples) {
+            (true, _) => say("action z", true, "wanted"),
+            (false, true) => say("action z", false, "L = L0 + gamma z: it does not act back, and nobody wants it"),
+            (false, false) => say("action z", true, if implicit { carried } else { "it drives the motion" }),
+        }
+        let rate = match (self.wanted.conformal_factor, self.constant_rate) {
+            (false, true) => (false, "sigma_d is the same in every step, and nobody wants the product"),
+            (true, true) => (true, "wanted; sigma_d is the same in every step: a power at the end"),
+            (true, false) => (true, "wanted, and different in every step: a product along the run"),
+            (false, false) => (false, "the product is not wanted; each step checks that its own is positive"),
+        };
+        say("conformal factor", rate.0, rate.1);
+        let clock = if structure.autonomous { "L does not depend on it" } else { "L depends on it" };
+        say("time at the stages", !structure.autonomous, clock);
+        match self.wanted.rows {
+            None => say("rows", false, "only the final state is wanted"),
+            Some(stride) => say("rows", true, &format!("one in {stride} steps")),
+        }
+        let momentum = if self.wanted.momentum.is_some() { "in each row" } else { "no group is named" };
+        say("momentum", self.wanted.momentum.is_some(), momentum);
+        self.items = items;
+        Ok(())
+    }
+}
+
+impl<L, const N: usize> Display for Plan<'_, L, N> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let end = self.t0 + self.count as f64 * self.h;
+        writeln!(f, "{} steps of {} by {}, t = {} .. {end}", self.count, self.h, self.integrator, self.t0)?;
+        for (title, computed) in [("computed", true), ("skipped", false)] {
+            writeln!(f, "{title}:")?;
+            for item in self.items.iter().filter(|item| item.computed == computed) {
+                writeln!(f, "  {}: {}", item.what, item.why)?;
+            }
+        }
+        Ok(())
+    }
+}
