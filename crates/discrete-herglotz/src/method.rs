@@ -157,8 +157,14 @@ impl FromStr for Method {
 
 /// No method has this name.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no method {name:?}; the methods are {}", Method::ALL.iter().map(|m| m.name()).collect::<Vec<_>>().join(", "))]
+#[error("there is no method {name:?}; the methods are {}", names())]
 pub struct UnknownMethod {
     /// The name that was asked for.
     pub name: String,
+}
+
+/// The names of all methods, for an error message.
+fn names() -> String {
+    let names: Vec<_> = Method::ALL.iter().map(|method| method.name()).collect();
+    names.join(", ")
 }
