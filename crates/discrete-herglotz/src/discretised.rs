@@ -6,8 +6,8 @@ use contact_geom::{DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar, S
 
 /// The discrete Lagrangian that a [`Method`](crate::Method) chosen at run time makes from a Lagrangian.
 ///
-/// One type for all methods: code that is generic over discrete Lagrangians is compiled once for a Lagrangian, not once for each
-/// method.
+/// One type for all methods: code that is generic over discrete Lagrangians is compiled once for a Lagrangian, not once
+/// for each method.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Discretised<L, const N: usize> {

@@ -3,8 +3,8 @@
 //! A discrete Lagrangian `L_d(q0, q1, z0)` advances the action by `z1 = z0 + L_d`; the discrete Herglotz equations
 //! `D1 L_d(q1, q2, z1) + sigma_d D2 L_d(q0, q1, z0) = 0`, `sigma_d = 1 + Dz L_d`, advance the position. The flow on
 //! T\*Q x R is conformally contact by construction: it contracts the contact form, and every momentum of a symmetry, by
-//! exactly `sigma_d`. A [`Method`] makes discrete Lagrangians from Lagrangians, [`Flow`] runs them, [`statements`] checks the
-//! theory on them.
+//! exactly `sigma_d`. A [`Method`] makes discrete Lagrangians from Lagrangians, [`Flow`] runs them, [`statements`] checks
+//! the theory on them.
 //!
 //! ```
 //! use contact_geom::{PhasePoint, systems::DoublePendulum};

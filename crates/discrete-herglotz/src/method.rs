@@ -22,8 +22,8 @@ use thiserror::Error;
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 ///
-/// Where the method is known when the program is written, its own type ([`Midpoint`](crate::Midpoint) and so on) saves the
-/// choice in every step.
+/// Where the method is known when the program is written, its own type ([`Midpoint`](crate::Midpoint) and so on) saves
+/// the choice in every step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Method {
@@ -95,14 +95,14 @@ impl Method {
         self.facts().symmetric
     }
 
-    /// Whether the action at the end of a step is defined by an equation that contains it, where L depends on z; otherwise
-    /// it is an explicit function of `(q0, q1, z0)`.
+    /// Whether the action at the end of a step is defined by an equation that contains it, where L depends on z;
+    /// otherwise it is an explicit function of `(q0, q1, z0)`.
     pub fn implicit_in_z(self) -> bool {
         self.facts().implicit_in_z
     }
 
-    /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the motion itself. A quadrature
-    /// rule has a rational function of `h gamma` in its place: `1 + h gamma` where it is explicit in z.
+    /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the motion itself. A
+    /// quadrature rule has a rational function of `h gamma` in its place: `1 + h gamma` where it is explicit in z.
     pub fn exact_rate(self) -> bool {
         self.facts().exact_rate
     }
@@ -157,8 +157,14 @@ impl FromStr for Method {
 
 /// No method has this name.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no method {name:?}; the methods are {}", Method::ALL.iter().map(|m| m.name()).collect::<Vec<_>>().join(", "))]
+#[error("there is no method {name:?}; the methods are {}", names())]
 pub struct UnknownMethod {
     /// The name that was asked for.
     pub name: String,
+}
+
+/// The names of all methods, for an error message.
+fn names() -> String {
+    let names: Vec<_> = Method::ALL.iter().map(|method| method.name()).collect();
+    names.join(", ")
 }
