@@ -1,10 +1,9 @@
 //! Splittings where the drag is linear.
 
+use super::motion::{Motion, Progress};
 use super::separable::Separable;
-use super::sum::Sum;
-use crate::{Halt, InputError, SplittingScheme, StepError, Stepper};
-use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, Triple};
+use crate::{Halt, InputError, SplittingScheme, Stepper};
+use contact_geom::{Lagrangian, PhasePoint};
 
 /// A splitting at work on `L = v.Mv/2 - V(t, q) + gamma z`.
 ///
@@ -30,13 +29,8 @@ use contact_geom::{Lagrangian, PhasePoint, Triple};
 #[derive(Clone, Debug)]
 pub struct Splitting<'a, L, const N: usize> {
     form: Separable<&'a L, N>,
-    h: f64,
-    t0: f64,
-    gamma: f64,
-    taken: usize,
-    evaluations: u64,
-    motion: Motion<N>,
     table: Table,
+    progress: Progress<N>,
     action: bool,
     compensated: bool,
 }
@@ -54,6 +48,8 @@ struct Table {
     joined: Vec<Stage>,
     /// Whether steps begin with a kick.
     kick_first: bool,
+    /// `e^(gamma h)`.
+    sigma: f64,
 }
 
 /// A drift and the kick that follows.
@@ -84,29 +80,6 @@ impl Drift {
     }
 }
 
-/// A state, with the last kick's derivative and value.
-#[derive(Clone, Copy, Debug)]
-struct Motion<const N: usize> {
-    q: Sum<N>,
-    p: Sum<N>,
-    z: Sum<1>,
-    force: SVector<f64, N>,
-    value: f64,
-}
-
-impl<const N: usize> Motion<N> {
-    fn state(&self) -> PhasePoint<N> {
-        PhasePoint { q: self.q.value, p: self.p.value, z: self.z.value[0] }
-    }
-
-    fn is_finite(&self) -> bool {
-        Triple::from(self.state()).is_finite()
-    }
-}
-
-/// The steps between two looks whether the motion is finite.
-const CHUNK: usize = 256;
-
 impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
     /// A splitting from the state `(q, p, z)` at time `t0`, with the action.
     ///
@@ -123,19 +96,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
     ) -> Result<Self, InputError> {
         let form = Separable::read(lagrangian, h, t0, &state)?;
         let gamma = form.linear_drag(t0, &state)?;
-        let (value, force) = form.kick(t0, &state.q);
-        let motion = Motion {
-            q: Sum::new(state.q),
-            p: Sum::new(state.p),
-            z: Sum::new(SVector::<f64, 1>::new(state.z)),
-            force,
-            value,
-        };
-        if !(value.is_finite() && force.iter().all(|f| f.is_finite())) {
-            return Err(InputError::FirstStep(StepError::NonFinite));
-        }
+        let motion = Motion::new(state, form.first_kick(t0, &state.q, 0.0)?);
         let table = Table::new(scheme, gamma, h);
-        Ok(Splitting { form, h, t0, gamma, taken: 0, evaluations: 1, motion, table, action: true, compensated: false })
+        let progress = Progress { h, t0, taken: 0, forces: scheme.stages(), motion };
+        Ok(Splitting { form, table, progress, action: true, compensated: false })
     }
 
     /// Without the action: z stays what it is at the start, and costs nothing.
@@ -148,60 +112,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
     pub fn compensated(self) -> Self {
         Splitting { compensated: true, ..self }
     }
-
-    /// The motion after some steps from another.
-    fn after(&self, from: Motion<N>, steps: usize) -> Motion<N> {
-        match (self.action, self.compensated) {
-            (false, false) => self.run::<false, false>(from, steps),
-            (false, true) => self.run::<false, true>(from, steps),
-            (true, false) => self.run::<true, false>(from, steps),
-            (true, true) => self.run::<true, true>(from, steps),
-        }
-    }
-
-    #[inline(never)]
-    fn run<const ACTION: bool, const COMPENSATED: bool>(&self, from: Motion<N>, steps: usize) -> Motion<N> {
-        let (mut m, table) = (from, &self.table);
-        // Steps that begin with a drift leave the first on its own, others the last.
-        let alone = if table.kick_first { steps - 1 } else { 0 };
-        if table.kick_first {
-            kick::<ACTION, COMPENSATED, N>(&mut m, table.opening);
-        }
-        for k in 0..steps {
-            let t = self.t0 + (self.taken + k) as f64 * self.h;
-            let stages = if k == alone { &table.single } else { &table.joined };
-            for stage in stages {
-                self.drift::<ACTION, COMPENSATED>(&mut m, &stage.drift);
-                (m.value, m.force) = self.form.kick(t + stage.time, &m.q.value);
-                kick::<ACTION, COMPENSATED, N>(&mut m, stage.kick);
-            }
-        }
-        if !table.kick_first {
-            self.drift::<ACTION, COMPENSATED>(&mut m, &table.closing);
-        }
-        m
-    }
-
-    #[inline(always)]
-    fn drift<const ACTION: bool, const COMPENSATED: bool>(&self, m: &mut Motion<N>, drift: &Drift) {
-        let p = m.p.value;
-        let v = self.form.velocity(&p);
-        if ACTION {
-            m.z.add::<COMPENSATED>(|_, z| drift.damping * z + drift.lift * p.dot(&v));
-        }
-        m.q.add::<COMPENSATED>(|i, _| drift.length * v[i]);
-        m.p.add::<COMPENSATED>(|_, p| drift.damping * p);
-    }
-}
-
-/// The flow of `-V` over a time s, with the force that the motion holds.
-#[inline(always)]
-fn kick<const ACTION: bool, const COMPENSATED: bool, const N: usize>(m: &mut Motion<N>, s: f64) {
-    let (value, force) = (m.value, m.force);
-    if ACTION {
-        m.z.add::<COMPENSATED>(|_, _| s * value);
-    }
-    m.p.add::<COMPENSATED>(|i, _| s * force[i]);
 }
 
 impl Table {
@@ -223,59 +133,80 @@ impl Table {
             joined[0].drift = Drift::over(gamma, (drifts[stages] + drifts[0]) * h);
         }
         let closing = Drift::over(gamma, drifts[drifts.len() - 1] * h);
-        Table { opening: kicks[0] * h, closing, single, joined, kick_first }
+        Table { opening: kicks[0] * h, closing, single, joined, kick_first, sigma: (gamma * h).exp() }
     }
 }
 
 impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
-        let mut taken = 0;
-        while taken < steps {
-            let chunk = CHUNK.min(steps - taken);
-            let reached = self.after(self.motion, chunk);
-            if !reached.is_finite() {
-                return Err(self.up_to_the_last_finite(taken));
-            }
-            self.accept(reached, chunk);
-            taken += chunk;
+        let Splitting { form, table, progress, action, compensated, .. } = self;
+        match (*action, *compensated) {
+            (false, false) => progress.advance(steps, |at, n| run::<L, N, false, false>(form, table, at, n)),
+            (false, true) => progress.advance(steps, |at, n| run::<L, N, false, true>(form, table, at, n)),
+            (true, false) => progress.advance(steps, |at, n| run::<L, N, true, false>(form, table, at, n)),
+            (true, true) => progress.advance(steps, |at, n| run::<L, N, true, true>(form, table, at, n)),
         }
-        Ok(())
     }
 
     fn state(&self) -> PhasePoint<N> {
-        self.motion.state()
+        self.progress.motion.state()
     }
 
     fn time(&self) -> f64 {
-        self.t0 + self.taken as f64 * self.h
+        self.progress.time_after(0)
     }
 
     fn sigma(&self) -> f64 {
-        if self.taken == 0 { 1.0 } else { (self.gamma * self.h).exp() }
+        self.progress.motion.sigma
     }
 
     fn evaluations(&self) -> u64 {
-        self.evaluations
+        self.progress.evaluations()
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> Splitting<'_, L, N> {
-    fn accept(&mut self, reached: Motion<N>, steps: usize) {
-        self.motion = reached;
-        self.taken += steps;
-        self.evaluations += (steps * self.table.single.len()) as u64;
+/// The motion after some steps more.
+#[inline(never)]
+fn run<L: Lagrangian<N>, const N: usize, const ACTION: bool, const COMPENSATED: bool>(
+    form: &Separable<&L, N>,
+    table: &Table,
+    from: &Progress<N>,
+    steps: usize,
+) -> Motion<N> {
+    let mut m = from.motion;
+    // Steps that begin with a drift leave the first on its own, others the last.
+    let alone = if table.kick_first { steps - 1 } else { 0 };
+    if table.kick_first {
+        m.kick::<ACTION, COMPENSATED>(table.opening);
     }
-
-    /// Step by step up to the first that is not finite, somewhere in a chunk that is not.
-    fn up_to_the_last_finite(&mut self, mut taken: usize) -> Halt {
-        for _ in 0..CHUNK {
-            let reached = self.after(self.motion, 1);
-            if !reached.is_finite() {
-                break;
-            }
-            self.accept(reached, 1);
-            taken += 1;
+    for k in 0..steps {
+        let t = from.time_after(k);
+        let stages = if k == alone { &table.single } else { &table.joined };
+        for stage in stages {
+            drift::<L, N, ACTION, COMPENSATED>(form, &mut m, &stage.drift);
+            (m.value, m.force) = form.kick(t + stage.time, &m.q.value, 0.0);
+            m.kick::<ACTION, COMPENSATED>(stage.kick);
         }
-        Halt { taken, cause: StepError::NonFinite }
     }
+    if !table.kick_first {
+        drift::<L, N, ACTION, COMPENSATED>(form, &mut m, &table.closing);
+    }
+    m.sigma = table.sigma;
+    m
+}
+
+/// The flow of the kinetic part with the drag.
+#[inline(always)]
+fn drift<L: Lagrangian<N>, const N: usize, const ACTION: bool, const COMPENSATED: bool>(
+    form: &Separable<&L, N>,
+    m: &mut Motion<N>,
+    drift: &Drift,
+) {
+    let p = m.p.value;
+    let v = form.velocity(&p);
+    if ACTION {
+        m.z.add::<COMPENSATED>(|_, z| drift.damping * z + drift.lift * p.dot(&v));
+    }
+    m.q.add::<COMPENSATED>(|i, _| drift.length * v[i]);
+    m.p.add::<COMPENSATED>(|_, p| drift.damping * p);
 }

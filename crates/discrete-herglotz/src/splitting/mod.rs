@@ -1,15 +1,19 @@
 //! Splittings of contact flows, with exact rate.
 
+mod action_flow;
 mod linear_drag;
+mod motion;
+mod nonlinear_drag;
 #[cfg(test)]
 mod order_conditions;
 mod scheme;
 mod separable;
 mod strang;
-mod sum;
 #[cfg(test)]
 mod tests;
 
+pub use action_flow::{ActionFlow, ActionMap, Riccati, RiccatiMap};
 pub use linear_drag::Splitting;
+pub use nonlinear_drag::ActionSplitting;
 pub use scheme::SplittingScheme;
 pub use strang::Strang;

@@ -1,11 +1,11 @@
 //! Lagrangians `v.Mv/2 - V(t, q) + f(z)`, as splittings read them.
 
-use crate::InputError;
+use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Dual, Lagrangian, PhasePoint, VelocityPoint, linear};
 
 /// What is left of a false claim's derivative by the rounding of a true one, with some margin.
-const FALSE_CLAIM: f64 = 1e-9;
+pub(super) const FALSE_CLAIM: f64 = 1e-9;
 
 /// A separable Lagrangian with its mass matrix, read once.
 #[derive(Clone, Copy, Debug)]
@@ -53,39 +53,55 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
         if !(structure.z_affine || structure.z_free) {
             return Err(InputError::Unclaimed { claim: "z_affine" });
         }
-        let rest = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
-        if !structure.autonomous {
-            let still = VelocityPoint {
-                q: rest.q.map(Dual::constant),
-                v: rest.v.map(Dual::constant),
-                z: Dual::constant(rest.z),
-            };
-            for i in 0..3 {
-                let clock = Dual { re: t + without_symmetry(i), d: SVector::<f64, 1>::new(1.0) };
-                let gamma = self.lagrangian.gradient(clock, &still).z;
-                if gamma.d[0].is_nan() || gamma.d[0].abs() > FALSE_CLAIM * (1.0 + gamma.re.abs()) {
-                    return Err(InputError::Hypothesis { hypothesis: "a linear drag gamma z with constant gamma" });
-                }
-            }
-        }
-        Ok(self.lagrangian.gradient(t, &rest).z)
+        self.check_steady_drag(t, state)?;
+        Ok(self.lagrangian.gradient(t, &VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z }).z)
     }
 
-    /// `L(t, q, 0, 0)`, which is `-V` up to a constant, and `L_q`. Duals carry the directions of `q` alone, so that the
+    /// Verifies, at some times, that `L_z` does not depend on time.
+    pub(crate) fn check_steady_drag(&self, t: f64, state: &PhasePoint<N>) -> Result<(), InputError> {
+        if self.lagrangian.structure().autonomous {
+            return Ok(());
+        }
+        for i in 0..3 {
+            let still = VelocityPoint {
+                q: state.q.map(Dual::constant),
+                v: SVector::from_element(Dual::constant(0.0)),
+                z: Dual::constant(state.z),
+            };
+            let clock = Dual { re: t + without_symmetry(i), d: SVector::<f64, 1>::new(1.0) };
+            let rate = self.lagrangian.gradient(clock, &still).z;
+            if rate.d[0].is_nan() || rate.d[0].abs() > FALSE_CLAIM * (1.0 + rate.re.abs()) {
+                return Err(InputError::Hypothesis { hypothesis: "a drag L_z that does not depend on time" });
+            }
+        }
+        Ok(())
+    }
+
+    /// `L(t, q, 0, z)`, which is `-V` up to `f(z)`, and `L_q`. Duals carry the directions of `q` alone, so that the
     /// compiler drops what velocity and action would add.
     #[inline(always)]
-    pub(crate) fn kick(&self, t: f64, q: &SVector<f64, N>) -> (f64, SVector<f64, N>) {
-        let rest = VelocityPoint { q: *q, v: SVector::zeros(), z: 0.0 };
+    pub(crate) fn kick(&self, t: f64, q: &SVector<f64, N>, z: f64) -> (f64, SVector<f64, N>) {
+        let rest = VelocityPoint { q: *q, v: SVector::zeros(), z };
         if let Some(gradient) = self.lagrangian.closed_gradient(t, &rest) {
-            return (self.lagrangian.value(t, q, &rest.v, 0.0), gradient.x);
+            return (self.lagrangian.value(t, q, &rest.v, z), gradient.x);
         }
         let mut moving: SVector<Dual<f64, SVector<f64, N>>, N> = q.map(Dual::constant);
         for i in 0..N {
             moving[i].d[i] = 1.0;
         }
         let still: SVector<Dual<f64, SVector<f64, N>>, N> = rest.v.map(Dual::constant);
-        let l = self.lagrangian.value(Dual::constant(t), &moving, &still, Dual::constant(0.0));
+        let l = self.lagrangian.value(Dual::constant(t), &moving, &still, Dual::constant(z));
         (l.re, l.d)
+    }
+
+    /// The kick at a start.
+    ///
+    /// # Errors
+    /// [`InputError::FirstStep`] where it is not finite.
+    pub(crate) fn first_kick(&self, t: f64, q: &SVector<f64, N>, z: f64) -> Result<(f64, SVector<f64, N>), InputError> {
+        let (value, force) = self.kick(t, q, z);
+        let finite = value.is_finite() && force.iter().all(|f| f.is_finite());
+        if finite { Ok((value, force)) } else { Err(InputError::FirstStep(StepError::NonFinite)) }
     }
 
     /// `M^-1 p`.
@@ -117,6 +133,6 @@ fn inverted<const N: usize>(mass: &SMatrix<f64, N, N>) -> Result<SMatrix<f64, N,
 }
 
 /// Numbers between 0.3 and 1.3 without special relation.
-fn without_symmetry(i: usize) -> f64 {
+pub(super) fn without_symmetry(i: usize) -> f64 {
     0.3 + (((i + 1) * (i + 1)) as f64 * std::f64::consts::SQRT_2).fract()
 }

@@ -50,14 +50,14 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
     #[inline(always)]
     fn step(&self, t: f64, from: &PhasePoint<N>, h: f64, drift: &Drift) -> Result<Transition<N>, StepError> {
         let PhasePoint { mut q, mut p, mut z } = *from;
-        let (value, force) = self.form.kick(t, &q);
+        let (value, force) = self.form.kick(t, &q, 0.0);
         z += 0.5 * h * value;
         p += force * (0.5 * h);
         let v = self.form.velocity(&p);
         z += drift.damping * z + drift.lift * p.dot(&v);
         q += v * drift.length;
         p += p * drift.damping;
-        let (value, force) = self.form.kick(t + h, &q);
+        let (value, force) = self.form.kick(t + h, &q, 0.0);
         z += 0.5 * h * value;
         p += force * (0.5 * h);
         let velocity = v * (drift.length / h);

@@ -1,0 +1,144 @@
+//! Flows of the action's own part, `f(z)`.
+
+use super::separable::{FALSE_CLAIM, without_symmetry};
+use crate::InputError;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+
+/// The flow of `z' = f(z)`, `p' = f'(z) p`: the third part of a splitting where L is not affine in z.
+///
+/// It moves the action by `z -> phi_s(z)` and the momentum by `p -> phi_s'(z) p`, which is conformally contact with the
+/// factor `phi_s'(z)`; the derivative comes by automatic differentiation.
+///
+/// ```
+/// use contact_geom::Scalar;
+/// use discrete_herglotz::{ActionFlow, ActionMap};
+/// /// `f(z) = -k e^z`.
+/// struct Exponential { k: f64 }
+/// #[derive(Clone, Copy, Debug)]
+/// struct Over { ks: f64 }
+/// impl ActionFlow for Exponential {
+///     type Map = Over;
+///     fn rate<T: Scalar>(&self, z: T) -> T { -z.exp() * self.k }
+///     fn over(&self, s: f64) -> Over { Over { ks: self.k * s } }
+/// }
+/// impl ActionMap for Over {
+///     fn apply<T: Scalar>(&self, z: T) -> T { z - (z.exp() * self.ks).ln_1p() }
+/// }
+/// ```
+pub trait ActionFlow {
+    /// The map `phi_s`, with what it needs of s computed once.
+    type Map: ActionMap;
+
+    /// The rate `f(z)`.
+    fn rate<T: Scalar>(&self, z: T) -> T;
+
+    /// The map over a time s, of either sign.
+    fn over(&self, s: f64) -> Self::Map;
+}
+
+/// The map `phi_s` of an [`ActionFlow`].
+pub trait ActionMap: Copy + std::fmt::Debug {
+    /// `phi_s(z)`; not a number where the flow is not defined up to s.
+    fn apply<T: Scalar>(&self, z: T) -> T;
+}
+
+/// The flow of `f(z) = b z + c z^2`, a Riccati equation; a constant belongs to the potential. In closed form, with
+/// `d = (e^(b s) - 1)/b`: `phi_s(z) = e^(b s) z/(1 - c d z)`, as long as the denominator is positive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Riccati {
+    /// The linear rate.
+    pub b: f64,
+    /// The quadratic rate.
+    pub c: f64,
+}
+
+/// The map of [`Riccati`].
+#[derive(Clone, Copy, Debug)]
+pub struct RiccatiMap {
+    /// `e^(b s) - 1`.
+    growth: f64,
+    /// `c (e^(b s) - 1)/b`.
+    bend: f64,
+}
+
+impl ActionFlow for Riccati {
+    type Map = RiccatiMap;
+
+    #[inline(always)]
+    fn rate<T: Scalar>(&self, z: T) -> T {
+        z * (z * self.c + self.b)
+    }
+
+    fn over(&self, s: f64) -> RiccatiMap {
+        let growth = (self.b * s).exp_m1();
+        let length = if self.b == 0.0 { s } else { growth / self.b };
+        RiccatiMap { growth, bend: self.c * length }
+    }
+}
+
+impl ActionMap for RiccatiMap {
+    /// The change of z, not its end, over the denominator: a small step loses no digit.
+    #[inline(always)]
+    fn apply<T: Scalar>(&self, z: T) -> T {
+        let below = -(z * self.bend) + 1.0;
+        if below.re() <= 0.0 {
+            return T::from(f64::NAN);
+        }
+        z + z * (z * self.bend + self.growth) / below
+    }
+}
+
+impl Riccati {
+    /// Reads b and c off a Lagrangian, and verifies that `L_z = b + 2 c z`.
+    pub(super) fn of<const N: usize>(
+        lagrangian: &impl Lagrangian<N>,
+        t: f64,
+        state: &PhasePoint<N>,
+    ) -> Result<Self, InputError> {
+        let x = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
+        let c = 0.5 * lagrangian.hessian(t, &x).zz;
+        let flow = Riccati { b: lagrangian.gradient(t, &x).z - 2.0 * c * state.z, c };
+        let hypothesis = "f(z) to be a polynomial of degree two; pass the flow of another";
+        if is_rate_of(&flow, lagrangian, t, state) { Ok(flow) } else { Err(InputError::Hypothesis { hypothesis }) }
+    }
+}
+
+/// A value with its derivative.
+#[inline(always)]
+pub(super) fn with_slope(map: impl Fn(Dual<f64, SVector<f64, 1>>) -> Dual<f64, SVector<f64, 1>>, z: f64) -> (f64, f64) {
+    let image = map(Dual { re: z, d: SVector::<f64, 1>::new(1.0) });
+    (image.re, image.d[0])
+}
+
+/// Whether `f'(z) = L_z` at the state's action and others.
+pub(super) fn is_rate_of<const N: usize>(
+    flow: &impl ActionFlow,
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    state: &PhasePoint<N>,
+) -> bool {
+    beside(state.z).all(|z| {
+        let given = lagrangian.gradient(t, &VelocityPoint { q: state.q, v: SVector::zeros(), z }).z;
+        (with_slope(|z| flow.rate(z), z).1 - given).abs() <= FALSE_CLAIM * (1.0 + given.abs())
+    })
+}
+
+/// Whether the maps are the flow of the rate near an action: `phi_s' f = f o phi_s`, and `phi_s = z + s f` for small s, both
+/// signs, to the second order.
+pub(super) fn is_flow_of_its_rate(flow: &impl ActionFlow, z: f64) -> bool {
+    beside(z).all(|z| {
+        let (rate, slope) = with_slope(|z| flow.rate(z), z);
+        let s = 1e-4 / (1.0 + slope.abs());
+        let (end, stretch) = with_slope(|z| flow.over(s).apply(z), z);
+        let back = flow.over(-s).apply(z);
+        let size = 1.0 + rate.abs();
+        (stretch * rate - flow.rate(end)).abs() <= FALSE_CLAIM * size
+            && (end - back - 2.0 * s * rate).abs() <= 1e-6 * s * size
+    })
+}
+
+/// An action and some beside it.
+fn beside(z: f64) -> impl Iterator<Item = f64> {
+    [0.0, -0.1, 0.1].into_iter().enumerate().map(move |(i, d)| z + d * without_symmetry(i))
+}

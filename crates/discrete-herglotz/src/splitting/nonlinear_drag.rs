@@ -1,0 +1,174 @@
+//! Splittings where the drag is not linear in the action.
+
+use super::action_flow::{ActionFlow, ActionMap, Riccati, is_flow_of_its_rate, is_rate_of, with_slope};
+use super::motion::{Motion, Progress};
+use super::separable::Separable;
+use crate::{Halt, InputError, SplittingScheme, Stepper};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, PhasePoint};
+
+/// A splitting at work on `L = v.Mv/2 - V(t, q) + f(z)`, in three exact flows: the kinetic part `A`, the kick `B` of `-V`, and
+/// the flow `C` of f, an [`ActionFlow`]. A substep is the symmetric `C B A B C`, each but A over half its length; steps are
+/// compositions of it.
+///
+/// `sigma_d` is the product of the factors `phi'(z)` of C, exact for the step taken. The action is always computed: it drives
+/// the momentum. One force a substep; the C of two substeps is one.
+#[derive(Clone, Debug)]
+pub struct ActionSplitting<'a, L, F: ActionFlow, const N: usize> {
+    form: Separable<&'a L, N>,
+    table: Table<F::Map>,
+    progress: Progress<N>,
+    compensated: bool,
+}
+
+/// The substeps of a step.
+#[derive(Clone, Debug)]
+struct Table<C> {
+    stages: Vec<Stage<C>>,
+    /// The map that ends a step.
+    closing: C,
+    /// The action at which the potential is read, and f there.
+    rest: (f64, f64),
+}
+
+/// A map of the action, and the `B A B` that follows.
+#[derive(Clone, Copy, Debug)]
+struct Stage<C> {
+    action: C,
+    half: f64,
+    length: f64,
+    /// The time of the second kick after the step's start.
+    time: f64,
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> ActionSplitting<'a, L, Riccati, N> {
+    /// A splitting from the state `(q, p, z)` at time `t0`, where f is a polynomial of degree two, read off L.
+    ///
+    /// # Errors
+    /// Those of [`with_flow`](Self::with_flow); [`InputError::Hypothesis`] also where f is no such polynomial.
+    pub fn new(
+        lagrangian: &'a L,
+        scheme: &SplittingScheme,
+        h: f64,
+        t0: f64,
+        state: PhasePoint<N>,
+    ) -> Result<Self, InputError> {
+        let flow = Riccati::of(&Separable::read(lagrangian, h, t0, &state)?.lagrangian, t0, &state)?;
+        Self::with_flow(lagrangian, &flow, scheme, h, t0, state)
+    }
+}
+
+impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L, F, N> {
+    /// A splitting from the state `(q, p, z)` at time `t0`, with the flow of f.
+    ///
+    /// # Errors
+    /// [`InputError::Step`] unless h is positive and finite; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
+    /// is not separable; [`InputError::Hypothesis`] where `L_z` depends on time or is not `f'`, where the maps are not the
+    /// flow of f, and for a Runge-Kutta-Nyström scheme; [`InputError::Geometry`] where the state is not finite or M singular;
+    /// [`InputError::FirstStep`] where V is not defined at the start.
+    pub fn with_flow(
+        lagrangian: &'a L,
+        flow: &F,
+        scheme: &SplittingScheme,
+        h: f64,
+        t0: f64,
+        state: PhasePoint<N>,
+    ) -> Result<Self, InputError> {
+        let form = Separable::read(lagrangian, h, t0, &state)?;
+        form.check_steady_drag(t0, &state)?;
+        let Some(substeps) = scheme.substeps() else {
+            return Err(InputError::Hypothesis {
+                hypothesis: "a linear drag gamma z for a Runge-Kutta-Nyström scheme",
+            });
+        };
+        if !is_rate_of(flow, &lagrangian, t0, &state) {
+            return Err(InputError::Hypothesis { hypothesis: "an action flow whose rate f has f'(z) = L_z" });
+        }
+        if !is_flow_of_its_rate(flow, state.z) {
+            return Err(InputError::Hypothesis { hypothesis: "an action flow whose maps are the flow of its rate" });
+        }
+        let mut time = 0.0;
+        let mut before = 0.0;
+        let stages = substeps.iter().map(|g| {
+            time += g;
+            let action = flow.over(0.5 * (before + g) * h);
+            before = *g;
+            Stage { action, half: 0.5 * g * h, length: g * h, time: time * h }
+        });
+        let stages = stages.collect();
+        let table = Table { stages, closing: flow.over(0.5 * before * h), rest: (state.z, flow.rate(state.z)) };
+        let (value, force) = form.first_kick(t0, &state.q, state.z)?;
+        let motion = Motion::new(state, (value - table.rest.1, force));
+        let progress = Progress { h, t0, taken: 0, forces: scheme.stages(), motion };
+        Ok(ActionSplitting { form, table, progress, compensated: false })
+    }
+
+    /// With compensated sums (Kahan's), as [`Splitting::compensated`](crate::Splitting::compensated).
+    pub fn compensated(self) -> Self {
+        ActionSplitting { compensated: true, ..self }
+    }
+}
+
+impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplitting<'_, L, F, N> {
+    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        let ActionSplitting { form, table, progress, compensated } = self;
+        if *compensated {
+            progress.advance(steps, |at, n| run::<L, F::Map, N, true>(form, table, at, n))
+        } else {
+            progress.advance(steps, |at, n| run::<L, F::Map, N, false>(form, table, at, n))
+        }
+    }
+
+    fn state(&self) -> PhasePoint<N> {
+        self.progress.motion.state()
+    }
+
+    fn time(&self) -> f64 {
+        self.progress.time_after(0)
+    }
+
+    fn sigma(&self) -> f64 {
+        self.progress.motion.sigma
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.progress.evaluations()
+    }
+}
+
+/// The motion after some steps more.
+#[inline(never)]
+fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool>(
+    form: &Separable<&L, N>,
+    table: &Table<C>,
+    from: &Progress<N>,
+    steps: usize,
+) -> Motion<N> {
+    let (mut m, (z, constant)) = (from.motion, table.rest);
+    for k in 0..steps {
+        let t = from.time_after(k);
+        m.sigma = 1.0;
+        for stage in &table.stages {
+            apply::<C, N, COMPENSATED>(&mut m, &stage.action);
+            m.kick::<true, COMPENSATED>(stage.half);
+            let p = m.p.value;
+            let v: SVector<f64, N> = form.velocity(&p);
+            m.z.add::<COMPENSATED>(|_, _| stage.half * p.dot(&v));
+            m.q.add::<COMPENSATED>(|i, _| stage.length * v[i]);
+            (m.value, m.force) = form.kick(t + stage.time, &m.q.value, z);
+            m.value -= constant;
+            m.kick::<true, COMPENSATED>(stage.half);
+        }
+        apply::<C, N, COMPENSATED>(&mut m, &table.closing);
+    }
+    m
+}
+
+/// The flow of f, and its factor.
+#[inline(always)]
+fn apply<C: ActionMap, const N: usize, const COMPENSATED: bool>(m: &mut Motion<N>, map: &C) {
+    let (end, slope) = with_slope(|z| map.apply(z), m.z.value[0]);
+    m.z.add::<COMPENSATED>(|_, z| end - z);
+    m.p.add::<COMPENSATED>(|_, p| (slope - 1.0) * p);
+    m.sigma *= slope;
+}
