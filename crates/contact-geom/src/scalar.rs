@@ -144,6 +144,12 @@ impl Scalar for f64 {
     fn sin_cos(self) -> (Self, Self) {
         f64::sin_cos(self)
     }
+    /// Two calls with nothing shared: where one of the results is not used, as the versine in a force, its call is dropped.
+    #[inline(always)]
+    fn sin_versine(self) -> (Self, Self) {
+        let half = f64::sin(0.5 * self);
+        (f64::sin(self), 2.0 * half * half)
+    }
     #[inline]
     fn sin(self) -> Self {
         f64::sin(self)

@@ -108,6 +108,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
         Scene { wanted, ..self }
     }
 
+    /// The outputs that are wanted.
+    pub fn wanted(&self) -> &Wanted<N> {
+        &self.wanted
+    }
+
     /// Checks everything, chooses the step and the route.
     ///
     /// # Errors

@@ -1,0 +1,170 @@
+//! Steps of contact Gauss collocation: the catalogue's Lagrangians by automatic differentiation, the same with their gradients
+//! written out, one defined as a user would, and a loop written by hand.
+
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::{DoublePendulum, Kepler, Pendulum, QuadraticInZ, System};
+use contact_geom::{Lagrangian, Scalar, Structure, Triple, VelocityPoint, legendre};
+use criterion::{Criterion, criterion_group, criterion_main};
+use discrete_herglotz::{Gauss, Stepper};
+use std::hint::black_box;
+
+/// The steps of a sample: short, so that the motion does not leave the start's neighbourhood.
+const STEPS: usize = 100;
+
+/// A user's pendulum, as in the documentation: nothing but the value.
+struct Users {
+    gamma: f64,
+}
+
+impl Lagrangian<1> for Users {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 + q[0].cos() + z * self.gamma
+    }
+}
+
+/// The pendulum with its gradient.
+struct WrittenPendulum(Pendulum);
+
+impl Lagrangian<1> for WrittenPendulum {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        self.0.value(t, q, v, z)
+    }
+    #[inline(always)]
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<Triple<1, T>> {
+        Some(Triple { x: SVector::from([-x.q[0].sin()]), y: x.v, z: T::from(self.0.gamma) })
+    }
+    fn structure(&self) -> Structure {
+        self.0.structure()
+    }
+}
+
+/// Kepler's problem with its gradient.
+struct WrittenKepler(Kepler<2>);
+
+impl Lagrangian<2> for WrittenKepler {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        self.0.value(t, q, v, z)
+    }
+    #[inline(always)]
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<2, T>) -> Option<Triple<2, T>> {
+        let square = x.q[0] * x.q[0] + x.q[1] * x.q[1];
+        let pull = -(square * square.sqrt()).recip() * self.0.mu;
+        Some(Triple { x: SVector::from([x.q[0] * pull, x.q[1] * pull]), y: x.v, z: T::from(self.0.gamma) })
+    }
+    fn structure(&self) -> Structure {
+        self.0.structure()
+    }
+}
+
+/// The oscillator with drag c z, with its gradient.
+struct WrittenQuadratic(QuadraticInZ);
+
+impl Lagrangian<1> for WrittenQuadratic {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        self.0.value(t, q, v, z)
+    }
+    #[inline(always)]
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<Triple<1, T>> {
+        Some(Triple { x: -x.q, y: x.v, z: x.z * -self.0.c })
+    }
+    fn structure(&self) -> Structure {
+        self.0.structure()
+    }
+}
+
+/// A hundred steps from a start.
+fn measure<L: Lagrangian<N>, const N: usize>(
+    c: &mut Criterion,
+    (group, name): (&str, &str),
+    lagrangian: &L,
+    start: &VelocityPoint<N>,
+    (stages, h): (usize, f64),
+) {
+    let Ok(gauss) = Gauss::new(lagrangian, stages, h) else { return };
+    let state = legendre(lagrangian, 0.0, start);
+    let mut group = c.benchmark_group(format!("{group}_gauss_{stages}"));
+    group.bench_function(name, |b| {
+        b.iter_batched_ref(
+            || gauss.stepper(0.0, state, start.v).ok(),
+            |stepper| black_box(stepper.as_mut().map(|s| s.advance(STEPS))),
+            criterion::BatchSize::SmallInput,
+        );
+    });
+    group.finish();
+}
+
+/// The pendulum by Gauss' method with four stages, written as one would: fixed-point iteration of the accelerations from the last
+/// step's, to round-off, with z; 16-digit coefficients.
+fn by_hand(gamma: f64, start: [f64; 3], h: f64) -> [f64; 3] {
+    const A: [[f64; 4]; 4] = [
+        [0.086963711284363464, -0.026604180084998793, 0.012627462689404725, -0.0035551496857956832],
+        [0.18811811749986807, 0.16303628871563654, -0.027880428602470895, 0.0067355005945381555],
+        [0.16719192197418877, 0.35395300603374397, 0.16303628871563654, -0.014190694931141143],
+        [0.17748257225452261, 0.31344511474186835, 0.35267675751627186, 0.086963711284363464],
+    ];
+    const B: [f64; 4] = [0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693];
+    let [mut q, mut v, mut z] = start;
+    let mut a = [-q.sin() + gamma * v; 4];
+    for _ in 0..STEPS {
+        let (mut vs, mut zs) = ([v; 4], [z; 4]);
+        for _ in 0..60 {
+            let mut change = 0.0f64;
+            for i in 0..4 {
+                vs[i] = v + h * (0..4).map(|j| A[i][j] * a[j]).sum::<f64>();
+            }
+            for i in 0..4 {
+                let x = q + h * (0..4).map(|j| A[i][j] * vs[j]).sum::<f64>();
+                let next = -x.sin() + gamma * vs[i];
+                change = change.max((next - a[i]).abs());
+                a[i] = next;
+            }
+            if change <= 1e-16 {
+                break;
+            }
+        }
+        let l = |i: usize, z: f64, vs: &[f64; 4]| {
+            let x = q + h * (0..4).map(|j| A[i][j] * vs[j]).sum::<f64>();
+            0.5 * vs[i] * vs[i] - 1.0 + x.cos() + gamma * z
+        };
+        for _ in 0..8 {
+            let ls: [f64; 4] = std::array::from_fn(|i| l(i, zs[i], &vs));
+            zs = std::array::from_fn(|i| z + h * (0..4).map(|j| A[i][j] * ls[j]).sum::<f64>());
+        }
+        z += h * (0..4).map(|j| B[j] * l(j, zs[j], &vs)).sum::<f64>();
+        q += h * (0..4).map(|j| B[j] * vs[j]).sum::<f64>();
+        v += h * (0..4).map(|j| B[j] * a[j]).sum::<f64>();
+    }
+    [q, v, z]
+}
+
+fn steps(c: &mut Criterion) {
+    let swing = VelocityPoint::new([1.0], [1.0], 0.0);
+    let pendulum = Pendulum { gamma: -0.01 };
+    for stages in [4, 8, 16] {
+        let size = (stages, [0.25, 1.0, 2.5][stages / 8]);
+        measure(c, ("pendulum", "derived"), &pendulum, &swing, size);
+        measure(c, ("pendulum", "written"), &WrittenPendulum(pendulum), &swing, size);
+        measure(c, ("pendulum", "users"), &Users { gamma: -0.01 }, &swing, size);
+    }
+    let mut group = c.benchmark_group("pendulum_gauss_4");
+    group.bench_function("by_hand", |b| b.iter(|| by_hand(black_box(-0.01), [1.0, 1.0, 0.0], 0.25)));
+    group.finish();
+    let kepler = Kepler::<2> { mu: 1.0, gamma: -1e-4 };
+    let square = QuadraticInZ { c: 0.1 };
+    let circle = VelocityPoint::new([1.0], [0.0], 1.0);
+    for (stages, h) in [(8, 0.2), (16, 0.5)] {
+        measure(c, ("kepler", "derived"), &kepler, &kepler.initial(), (stages, h));
+        measure(c, ("kepler", "written"), &WrittenKepler(kepler), &kepler.initial(), (stages, h));
+        measure(c, ("quadratic", "derived"), &square, &circle, (stages, 4.0 * h));
+        measure(c, ("quadratic", "written"), &WrittenQuadratic(square), &circle, (stages, 4.0 * h));
+    }
+    let double = DoublePendulum::default();
+    measure(c, ("double_pendulum", "derived"), &double, &double.initial(), (8, 0.2));
+}
+
+criterion_group!(benches, steps);
+criterion_main!(benches);
