@@ -24,6 +24,7 @@ mod composition;
 mod discrete_lagrangian;
 mod discretised;
 mod error;
+mod events;
 mod flow;
 mod gauss;
 mod lanes;
@@ -48,8 +49,9 @@ pub use composition::Composition;
 pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};
 pub use discretised::Discretised;
 pub use error::{InputError, Status, StepError};
+pub use events::{Crossing, Direction, Event, EventRun, EventStatus, run_with_events};
 pub use flow::{HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian};
-pub use gauss::{Gauss, GaussRoute, GaussStepper};
+pub use gauss::{DenseStep, Gauss, GaussRoute, GaussStepper};
 pub use legendre::{
     DiscreteRegularity, discrete_regularity, legendre_minus, legendre_minus_inverse, legendre_plus,
     legendre_plus_inverse, sigma_d,

@@ -13,6 +13,8 @@ use std::array::from_fn;
 /// `v1 = v0 + grow v0 + end_v.a`, `z1 = z0 + grow z0 + end_v.(L - gamma z)`, `sigma_d = 1 + grow`.
 pub(super) struct Condensed {
     pub s: usize,
+    pub h: f64,
+    pub gamma: f64,
     /// `B`: from the accelerations to the positions.
     pub b: [Exact; MOST],
     /// `u`.
@@ -85,6 +87,8 @@ impl Condensed {
         let pair = |x: Quad| [x.0, x.1];
         Ok(Condensed {
             s,
+            h,
+            gamma,
             b,
             u,
             d: StageMap::from_exact(&velocity, s),

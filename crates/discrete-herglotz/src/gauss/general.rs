@@ -1,7 +1,7 @@
 //! Steps of contact Gauss collocation for every regular Lagrangian.
 
 use super::coefficients::{Coefficients, MOST};
-use super::separable::Compensated;
+use super::separable::{Compensated, add, finite};
 use super::stages::{StageMap, Stages, Weights, blocks, padded};
 use super::sweeps::{Progress, Sweeps};
 use crate::lanes::Lanes;
@@ -93,16 +93,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
             warm: false,
             evaluations: 0,
         };
-        general.restart(state, v);
+        general.restart(state, v, 0.0);
         general
     }
 
-    /// Goes on from another state with its velocity, without what was carried.
-    pub fn restart(&mut self, state: &PhasePoint<N>, v: &SVector<f64, N>) {
+    /// Goes on from another state with its velocity, without what was carried; `fallen` belongs to the step that led there.
+    pub fn restart(&mut self, state: &PhasePoint<N>, v: &SVector<f64, N>, fallen: f64) {
         self.q = std::array::from_fn(|i| state.q[i].into());
         self.p = std::array::from_fn(|i| state.p[i].into());
         self.z = state.z.into();
         self.v = std::array::from_fn(|i| Stages([v[i]; MOST]));
+        self.fallen = fallen;
         self.warm = false;
     }
 
@@ -219,13 +220,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
         let mut sweeps = Sweeps::default();
         // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
         loop {
-            let change = if cold { f64::INFINITY } else { self.sweep::<S>() };
+            let (change, spread) = if cold { (f64::INFINITY, 1.0) } else { self.sweep::<S>() };
             self.evaluate::<S>(t);
             if cold {
                 cold = false;
                 continue;
             }
-            match sweeps.judge(change, 1.0) {
+            match sweeps.judge(change, spread) {
                 Progress::Going => {}
                 Progress::Done => return self.finish::<S>(),
                 refused => return refused,
@@ -234,9 +235,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
     }
 
     /// New velocities, positions, actions and factors of the stages; returns the largest change, each in units of the
-    /// largest of its kind.
+    /// largest of its kind, and the spread of the factors: momenta are sums of terms with all of them, divided by one.
     #[inline(always)]
-    fn sweep<S: Simd>(&mut self) -> f64 {
+    fn sweep<S: Simd>(&mut self) -> (f64, f64) {
         let s = self.table.s;
         let m = blocks::<S>(s);
         let zero = Lanes::<S>::splat(0.0);
@@ -246,12 +247,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
             let p = Lanes::<S>::splat(self.p[d].value);
             self.table.a.apply(&self.force[d], s, &mut impulses[d], |_| p);
         }
-        let (mut dv, mut sv, mut dr) = (zero, zero, zero);
+        let one = Lanes::<S>::splat(1.0);
+        let (mut dv, mut sv, mut dr, mut sr, mut least) = (zero, zero, zero, one, one);
         for r in 0..m {
-            let rho = Lanes::<S>::splat(1.0) - falling.block(r);
+            let rho = one - falling.block(r);
             dr = dr.max((rho - self.rho.block(r)).abs());
             self.rho.set(r, rho);
             let inverse = rho.recip();
+            (sr, least) = (sr.max(rho.abs()), least.max(inverse.abs()));
             let excess =
                 SVector::<Lanes<S>, N>::from_fn(|d, _| impulses[d].block::<S>(r) * inverse - self.l_v[d].block(r));
             for i in 0..N {
@@ -277,26 +280,34 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
             sz = sz.max(z.abs());
         }
         let relative = |change: f64, size: f64| if change > 0.0 { change / size } else { change };
-        let change = relative(dv.largest(), sv.largest()).max(dr.largest());
+        let largest = sr.largest();
+        let change = relative(dv.largest(), sv.largest()).max(dr.largest() / largest);
         let of_action = relative(dz.largest(), sz.largest());
         // `f64::max` would hide a NaN.
-        if of_action > change || of_action.is_nan() { of_action } else { change }
+        let worst = if of_action > change || of_action.is_nan() { of_action } else { change };
+        (worst, largest * least.largest())
     }
 
     /// The end of the step from its stages.
     #[inline(always)]
     fn finish<S: Simd>(&mut self) -> Progress {
         let (b, s) = (&self.table.b, self.table.s);
-        let fallen = b.sum::<S>(&self.rate, s);
-        if !(fallen < 1.0) {
+        let (fallen, dz) = (b.sum::<S>(&self.rate, s), b.sum::<S>(&self.l, s));
+        if fallen >= 1.0 {
             return Progress::SigmaVanished { sigma: 1.0 / (1.0 - fallen) };
         }
+        let (mut dq, mut dp) = ([0.0; N], [0.0; N]);
         for d in 0..N {
-            self.q[d].add(b.sum::<S>(&self.v[d], s));
-            let p = self.p[d].value;
-            self.p[d].add((p * fallen + b.sum::<S>(&self.force[d], s)) / (1.0 - fallen));
+            dq[d] = b.sum::<S>(&self.v[d], s);
+            dp[d] = (self.p[d].value * fallen + b.sum::<S>(&self.force[d], s)) / (1.0 - fallen);
         }
-        self.z.add(b.sum::<S>(&self.l, s));
+        // The largest change over lanes may hide a NaN; one of `fallen` is in `dp`.
+        if !finite(&dq, &dp, dz) {
+            return Progress::NonFinite;
+        }
+        add(&mut self.q, &dq);
+        add(&mut self.p, &dp);
+        self.z.add(dz);
         self.fallen = fallen;
         self.warm = true;
         Progress::Done

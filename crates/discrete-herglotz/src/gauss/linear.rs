@@ -1,8 +1,10 @@
 //! Steps of contact Gauss collocation for a linear motion: one matrix, made once.
 
+use super::coefficients::MOST;
 use super::condensed::Condensed;
-use super::separable::Compensated;
+use super::separable::{Compensated, add, finite};
 use super::stages::solve_exactly;
+use super::sweeps::Progress;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Hessian, Lagrangian, VelocityPoint};
 use num_traits::{One, Zero};
@@ -52,6 +54,8 @@ pub(super) struct Linear<const N: usize> {
     shift_v: SVector<f64, N>,
     grow: [f64; 2],
     action: Option<Action<N>>,
+    /// The accelerations of the stages, row `i N + d`, as affine functions of (q0, v0): for dense output.
+    stages: Vec<Vec<f64>>,
     pub q: [Compensated; N],
     pub v: [Compensated; N],
     pub z: Compensated,
@@ -136,21 +140,18 @@ impl<const N: usize> Linear<N> {
             shift_v: SVector::from_fn(|d, _| sum(&exact.end_v, d, 2 * N).0),
             grow: table.grow,
             action,
+            stages: rows.iter().map(|row| row[s * N..].iter().map(|e| e.0).collect()).collect(),
             q: std::array::from_fn(|i| start.q[i].into()),
             v: std::array::from_fn(|i| start.v[i].into()),
             z: start.z.into(),
         })
     }
 
-    /// `sigma_d`.
-    pub fn sigma(&self) -> f64 {
-        1.0 + self.grow[0]
-    }
-
-    /// Takes one step.
+    /// Takes one step; where it is not finite the state is unchanged.
     #[inline(always)]
-    pub fn step(&mut self) {
+    pub fn step(&mut self) -> Progress {
         let (q, v) = (self.q.map(|q| q.value), self.v.map(|v| v.value));
+        let (mut dq, mut dv, mut dz) = ([0.0; N], [0.0; N], 0.0);
         if let Some(action) = &self.action {
             let mut change = action.constant + self.grow[0] * self.z.value;
             for i in 0..N {
@@ -161,13 +162,47 @@ impl<const N: usize> Linear<N> {
                 }
                 change += of_q * q[i] + of_v * v[i];
             }
-            self.z.add(change + self.grow[1] * self.z.value);
+            dz = change + self.grow[1] * self.z.value;
         }
         for i in 0..N {
             let ([a, a_tail], [b, b_tail]) = (self.qq.row(i, &q), self.qv.row(i, &v));
-            self.q[i].add((a_tail + b_tail + self.shift_q[i]) + (a + b));
+            dq[i] = (a_tail + b_tail + self.shift_q[i]) + (a + b);
             let ([a, a_tail], [b, b_tail]) = (self.vq.row(i, &q), self.vv.row(i, &v));
-            self.v[i].add((a_tail + b_tail + self.shift_v[i]) + (a + b));
+            dv[i] = (a_tail + b_tail + self.shift_v[i]) + (a + b);
         }
+        if !finite(&dq, &dv, dz) {
+            return Progress::NonFinite;
+        }
+        add(&mut self.q, &dq);
+        add(&mut self.v, &dv);
+        self.z.add(dz);
+        Progress::Done
+    }
+
+    /// Whether the action is computed.
+    pub fn wants_z(&self) -> bool {
+        self.action.is_some()
+    }
+
+    /// The accelerations of the stages of the step from a position and a velocity.
+    pub fn accelerations(&self, q: &[f64; N], v: &[f64; N]) -> [[f64; MOST]; N] {
+        let side = |k: usize| {
+            if k < N {
+                q[k]
+            } else if k < 2 * N {
+                v[k - N]
+            } else {
+                1.0
+            }
+        };
+        let s = self.stages.len() / N;
+        std::array::from_fn(|d| {
+            std::array::from_fn(|i| {
+                if i >= s {
+                    return 0.0;
+                }
+                self.stages[i * N + d].iter().enumerate().map(|(k, e)| e * side(k)).sum()
+            })
+        })
     }
 }

@@ -2,6 +2,7 @@
 
 mod coefficients;
 mod condensed;
+mod dense;
 mod general;
 mod linear;
 mod separable;
@@ -10,6 +11,7 @@ mod stages;
 mod stepper;
 mod sweeps;
 
+pub use dense::DenseStep;
 pub use stepper::{GaussRoute, GaussStepper};
 
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};

@@ -34,6 +34,18 @@ impl Compensated {
     }
 }
 
+/// Whether changes of positions, of velocities or momenta, and of the action are finite: a sum hides no NaN.
+#[inline(always)]
+pub(super) fn finite<const N: usize>(dq: &[f64; N], dy: &[f64; N], dz: f64) -> bool {
+    (0..N).fold(dz, |sum, d| sum + (dq[d] + dy[d])).is_finite()
+}
+
+/// Adds changes.
+#[inline(always)]
+pub(super) fn add<const N: usize>(x: &mut [Compensated; N], changes: &[f64; N]) {
+    x.iter_mut().zip(changes).for_each(|(x, change)| x.add(*change));
+}
+
 /// The state and the workspace of the condensed step.
 pub(super) struct Separable<'a, L, const N: usize> {
     pub lagrangian: &'a L,
@@ -150,12 +162,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
                 done => break done,
             }
         };
-        if outcome != Progress::Done {
-            self.warm = false;
+        let outcome = if outcome == Progress::Done { self.finish::<S>(t) } else { outcome };
+        self.warm = outcome == Progress::Done;
+        if !self.warm {
+            // What an iteration leaves that does not contract is worse than nothing.
+            self.rest = [Stages::ZERO; N];
             return outcome;
         }
-        self.finish::<S>(t);
-        self.warm = true;
         self.taken += 1;
         if self.taken == self.review {
             self.review *= 2;
@@ -166,21 +179,28 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
 
     /// The end of the step from its accelerations.
     #[inline(always)]
-    fn finish<S: Simd>(&mut self, t: f64) {
+    fn finish<S: Simd>(&mut self, t: f64) -> Progress {
         let (table, s) = (&self.table, self.table.s);
+        let (mut dq, mut dv, mut dz) = ([0.0; N], [0.0; N], 0.0);
         if self.wants_z {
             let grown = table.grow[0] * self.z.value + table.grow[1] * self.z.value;
-            let action = self.action::<S>(t);
-            self.z.add(grown + self.table.end_v.sum::<S>(&action, s));
+            dz = grown + table.end_v.sum::<S>(&self.action::<S>(t), s);
         }
-        let table = &self.table;
         for d in 0..N {
             let v = self.v[d].value;
             let moved = table.end_b.sum::<S>(&self.a[d], s) + table.end_u[1] * v;
-            self.q[d].add(moved + table.end_u[0] * v);
+            dq[d] = moved + table.end_u[0] * v;
             let pushed = table.end_v.sum::<S>(&self.a[d], s) + table.grow[1] * v;
-            self.v[d].add(pushed + table.grow[0] * v);
+            dv[d] = pushed + table.grow[0] * v;
         }
+        // The largest change over lanes may hide a NaN.
+        if !finite(&dq, &dv, dz) {
+            return Progress::NonFinite;
+        }
+        add(&mut self.q, &dq);
+        add(&mut self.v, &dv);
+        self.z.add(dz);
+        Progress::Done
     }
 
     /// `L - gamma z` at the stages.

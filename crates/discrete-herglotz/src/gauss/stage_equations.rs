@@ -52,6 +52,13 @@ impl<const N: usize> Unknowns<N, f64> {
         Unknowns { v: vec![*v; s], z: vec![z0; s], rho: vec![1.0; s], p0: *p0 }
     }
 
+    /// The largest factor over the smallest, the start's 1 included: momenta are sums of terms with all of them, divided by
+    /// one, and their round-off grows with this.
+    fn spread(&self) -> f64 {
+        let over = |f: &dyn Fn(f64) -> f64| self.rho.iter().fold(1.0, |m, r| larger(m, f(*r)));
+        over(&|r| r.abs()) * over(&|r| 1.0 / r.abs())
+    }
+
     /// The same over another scalar, without differentials.
     pub fn lifted<T: Scalar>(&self) -> Unknowns<N, T> {
         Unknowns {
@@ -233,7 +240,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
         see(dv, sv);
         see(dz, sz);
-        see(dr, 1.0);
+        see(dr, x.rho.iter().fold(1.0, |m, r| larger(m, r.extent())));
         see(dp, sp);
         worst
     }
@@ -262,7 +269,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                 return Err(StepError::NonFinite);
             }
             let predicted = before.is_finite() && last_correction(change, before, f64::EPSILON);
-            let stagnant = change >= 0.5 * before && change <= 1e3 * f64::EPSILON;
+            let stagnant = change >= 0.5 * before && change <= 1e3 * f64::EPSILON * x.spread();
             if change <= f64::EPSILON || predicted || stagnant {
                 return Ok(iterations);
             }

@@ -2,6 +2,7 @@
 
 use super::Gauss;
 use super::condensed::Condensed;
+use super::dense::{DenseStep, Solved, Start};
 use super::general::{General, Mass, Table};
 use super::linear::Linear;
 use super::separable::Separable;
@@ -28,9 +29,19 @@ pub enum GaussRoute {
 
 /// The state and the workspace of a route.
 enum Route<'a, L, const N: usize> {
-    Linear(Linear<N>),
+    Linear(Linear<N>, Condensed),
     Condensed(Separable<'a, L, N>),
     General(General<'a, L, N>),
+}
+
+/// How the last step was taken, for dense output.
+enum Last<const N: usize> {
+    /// There is none, or the next one failed and left nothing of it.
+    None,
+    /// By the route; the stages are in its workspace.
+    Route,
+    /// By Newton's method.
+    Newton(Unknowns<N, f64>),
 }
 
 /// Contact Gauss collocation at work: stages in the lanes of the processor's vector registers, each step's start extrapolated
@@ -43,7 +54,9 @@ pub struct GaussStepper<'a, L, const N: usize> {
     arch: Arch,
     t0: f64,
     k: usize,
-    sigma: f64,
+    /// The state at the start of the last step.
+    from: Start<N>,
+    last: Last<N>,
     newton: bool,
     newton_steps: u64,
 }
@@ -81,7 +94,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             let linear =
                 if structure.quadratic { Linear::new(lagrangian, &table, &inverse, t0, &start, wants_z) } else { None };
             match linear {
-                Some(linear) => Route::Linear(linear),
+                Some(linear) => Route::Linear(linear, table),
                 None => {
                     let left = table.preconditioned(0.0).ok_or(InputError::Step { h })?;
                     let inverse = (w != identity).then_some(inverse);
@@ -104,7 +117,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             arch: Arch::new(),
             t0,
             k: 0,
-            sigma: 1.0,
+            from: Start { q: [0.0; N], y: [0.0; N], z: 0.0 },
+            last: Last::None,
             newton: true,
             newton_steps: 0,
         })
@@ -119,7 +133,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     /// How the steps are computed.
     pub fn route(&self) -> GaussRoute {
         match &*self.route {
-            Route::Linear(_) => GaussRoute::Linear,
+            Route::Linear(..) => GaussRoute::Linear,
             Route::Condensed(_) => GaussRoute::Condensed,
             Route::General(General { mass: Mass::Constant(_), .. }) => GaussRoute::ConstantMass,
             Route::General(_) => GaussRoute::General,
@@ -131,6 +145,54 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         self.newton_steps
     }
 
+    /// The last step as a curve; `None` before the first, and after a step that could not be taken. It costs nothing where it
+    /// is not asked for.
+    pub fn dense(&self) -> Option<DenseStep<N>> {
+        let (s, h) = (self.products.s, self.products.h);
+        let t = self.t0 + self.k.checked_sub(1)? as f64 * h;
+        let condensed = |table: &Condensed, a, wants_z| {
+            let mass = self.mass.unwrap_or_else(SMatrix::identity);
+            Solved::from_accelerations(self.lagrangian, table, &mass, t, &self.from, a, wants_z)
+        };
+        let start = self.phase(&self.from);
+        let solved = match (&self.last, &*self.route) {
+            (Last::None, _) => return None,
+            (Last::Newton(x), _) => {
+                let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t };
+                let mut solved = Solved::from_gradients(&x.v, &x.rho, &equations.stages(&Given::Start(start), x));
+                if matches!(&*self.route, Route::Condensed(run) if !run.wants_z) {
+                    solved.l.fill(0.0);
+                }
+                solved
+            }
+            (Last::Route, Route::Linear(run, table)) => {
+                condensed(table, &run.accelerations(&self.from.q, &self.from.y), run.wants_z())
+            }
+            (Last::Route, Route::Condensed(run)) => condensed(&run.table, &run.a.map(|a| a.0), run.wants_z),
+            (Last::Route, Route::General(run)) => {
+                Solved { v: run.v.map(|v| v.0), force: run.force.map(|f| f.0), rate: run.rate.0, l: run.l.0 }
+            }
+        };
+        Some(DenseStep::new(s, t, h, start, &solved))
+    }
+
+    /// The state as the route holds it.
+    #[inline(always)]
+    fn values(&self) -> Start<N> {
+        let (q, y, z) = match &*self.route {
+            Route::Linear(run, _) => (&run.q, &run.v, run.z),
+            Route::Condensed(run) => (&run.q, &run.v, run.z),
+            Route::General(run) => (&run.q, &run.p, run.z),
+        };
+        Start { q: q.map(|q| q.value), y: y.map(|y| y.value), z: z.value }
+    }
+
+    /// With momenta for the velocities of the condensed routes.
+    fn phase(&self, x: &Start<N>) -> PhasePoint<N> {
+        let y = SVector::from(x.y);
+        PhasePoint { q: SVector::from(x.q), p: self.mass.map_or(y, |mass| mass * y), z: x.z }
+    }
+
     /// Takes a step by Newton's method.
     #[cold]
     #[inline(never)]
@@ -138,7 +200,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         if !self.newton {
             return Err(refused);
         }
-        let from = self.state();
+        let (values, from) = (self.values(), self.state());
         let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t };
         let given = Given::Start(from);
         let n = equations.size(&given);
@@ -146,26 +208,29 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let mut x = Unknowns::uniform(self.products.s, &v, &from.p, from.z);
         equations.solve(&given, &mut x, &mut DMatrix::zeros(n, n), &mut DVector::zeros(n))?;
         let end = equations.end(&given, &x);
-        let next = PhasePoint { q: end.q, p: end.p, z: from.z + end.action };
+        let mut next = PhasePoint { q: end.q, p: end.p, z: from.z + end.action };
         if !Triple::from(next).is_finite() {
             return Err(StepError::NonFinite);
         }
-        self.sigma = 1.0 / end.rho;
-        if !(end.rho > 0.0) {
-            return Err(StepError::SigmaVanished { sigma: self.sigma });
+        if !(end.rho > 0.0 && end.rho.is_finite()) {
+            return Err(StepError::SigmaVanished { sigma: 1.0 / end.rho });
+        }
+        let guess = x.v.last().copied().unwrap_or(v);
+        let v = velocity(self.lagrangian, t + self.products.h, &next, guess).map_err(|_| refused)?;
+        match &mut *self.route {
+            // Its steps are not refused but where they are not finite.
+            Route::Linear(..) => return Err(refused),
+            Route::Condensed(run) => {
+                if !run.wants_z {
+                    next.z = from.z;
+                }
+                run.restart(&next, &v);
+            }
+            Route::General(run) => run.restart(&next, &v, 1.0 - end.rho),
         }
         self.newton_steps += 1;
-        match &mut *self.route {
-            Route::Linear(_) => {}
-            Route::Condensed(run) => {
-                let v = x.v.last().copied().unwrap_or(v);
-                run.restart(&next, &velocity(self.lagrangian, t, &next, v).map_err(|_| refused)?);
-            }
-            Route::General(run) => {
-                let v = x.v.last().copied().unwrap_or(v);
-                run.restart(&next, &velocity(self.lagrangian, t, &next, v).map_err(|_| refused)?);
-            }
-        }
+        self.from = values;
+        self.last = Last::Newton(x);
         Ok(())
     }
 }
@@ -185,17 +250,16 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
         let (t0, h) = (run.t0, run.products.h);
         for taken in 0..steps {
             let t = t0 + run.k as f64 * h;
+            let from = run.values();
             let progress = match &mut *run.route {
-                Route::Linear(linear) => {
-                    linear.step();
-                    Progress::Done
-                }
+                Route::Linear(linear, _) => linear.step(),
                 Route::Condensed(condensed) => condensed.step::<S>(t),
                 Route::General(general) => general.step::<S>(t),
             };
             if progress != Progress::Done {
                 return Err((taken, progress));
             }
+            run.from = from;
             run.k += 1;
         }
         Ok(())
@@ -207,7 +271,12 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
         let mut done = 0;
         while done < steps {
             let outcome = self.arch.dispatch(Advance { run: self, steps: steps - done });
-            let Err((taken, progress)) = outcome else { break };
+            let Err((taken, progress)) = outcome else {
+                self.last = Last::Route;
+                break;
+            };
+            // The refused step has overwritten the stages of the one before.
+            self.last = Last::None;
             done += taken;
             let refused = match progress {
                 Progress::SigmaVanished { sigma } => {
@@ -220,30 +289,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             self.k += 1;
             done += 1;
         }
-        // A linear step is not looked at one by one.
-        if !Triple::from(self.state()).is_finite() {
-            return Err(Halt { taken: done, cause: StepError::NonFinite });
-        }
-        match &*self.route {
-            Route::Linear(run) => self.sigma = run.sigma(),
-            Route::Condensed(run) => self.sigma = 1.0 + run.table.grow[0],
-            Route::General(run) => self.sigma = 1.0 / (1.0 - run.fallen),
-        }
         Ok(())
     }
 
     fn state(&self) -> PhasePoint<N> {
-        let (q, y, z) = match &*self.route {
-            Route::Linear(run) => (&run.q, &run.v, run.z),
-            Route::Condensed(run) => (&run.q, &run.v, run.z),
-            Route::General(run) => (&run.q, &run.p, run.z),
-        };
-        let y = SVector::from_fn(|i, _| y[i].value);
-        let p = match &self.mass {
-            Some(mass) => mass * y,
-            None => y,
-        };
-        PhasePoint { q: SVector::from_fn(|i, _| q[i].value), p, z: z.value }
+        self.phase(&self.values())
     }
 
     fn time(&self) -> f64 {
@@ -251,12 +301,17 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     }
 
     fn sigma(&self) -> f64 {
-        self.sigma
+        match &*self.route {
+            _ if self.k == 0 => 1.0,
+            Route::Linear(_, table) => 1.0 + table.grow[0],
+            Route::Condensed(run) => 1.0 + run.table.grow[0],
+            Route::General(run) => 1.0 / (1.0 - run.fallen),
+        }
     }
 
     fn evaluations(&self) -> u64 {
         match &*self.route {
-            Route::Linear(_) => 0,
+            Route::Linear(..) => 0,
             Route::Condensed(run) => run.evaluations,
             Route::General(run) => run.evaluations,
         }

@@ -1,0 +1,198 @@
+//! Dense output of contact Gauss collocation: the collocation polynomial of the last step.
+
+use super::coefficients::{Coefficients, MOST};
+use super::condensed::Condensed;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Dual, Lagrangian, PhasePoint, Triple, linear};
+use std::array::from_fn;
+
+/// The state at the start of a step as a route holds it: momenta, or velocities in the condensed routes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start<const N: usize> {
+    pub q: [f64; N],
+    pub y: [f64; N],
+    pub z: f64,
+}
+
+/// The stages of a solved step: V, `rho L_q`, `rho L_z` and L, with 0 beyond the last stage.
+pub(super) struct Solved<const N: usize> {
+    pub v: [[f64; MOST]; N],
+    pub force: [[f64; MOST]; N],
+    pub rate: [f64; MOST],
+    pub l: [f64; MOST],
+}
+
+impl<const N: usize> Solved<N> {
+    pub const ZERO: Self = Solved { v: [[0.0; MOST]; N], force: [[0.0; MOST]; N], rate: [0.0; MOST], l: [0.0; MOST] };
+
+    /// From L with its gradient at the stages, their velocities and factors.
+    pub fn from_gradients(v: &[SVector<f64, N>], rho: &[f64], l: &[Dual<f64, Triple<N>>]) -> Self {
+        let mut solved = Self::ZERO;
+        for (i, ((v, rho), l)) in v.iter().zip(rho).zip(l).enumerate() {
+            for d in 0..N {
+                solved.v[d][i] = v[d];
+                solved.force[d][i] = rho * l.d.x[d];
+            }
+            solved.rate[i] = rho * l.d.z;
+            solved.l[i] = l.re;
+        }
+        solved
+    }
+    /// From the accelerations of a condensed step.
+    pub fn from_accelerations(
+        lagrangian: &impl Lagrangian<N>,
+        table: &Condensed,
+        mass: &SMatrix<f64, N, N>,
+        t: f64,
+        start: &Start<N>,
+        a: &[[f64; MOST]; N],
+        wants_z: bool,
+    ) -> Self {
+        let (s, exact, mut solved) = (table.s, &table.exact, Self::ZERO);
+        let sum = |row: &[qd::Quad; MOST], a: &[f64; MOST]| (0..s).fold(0.0, |sum, j| sum + row[j].0 * a[j]);
+        for i in 0..s {
+            let rho = 1.0 / exact.inverse_rho[i].0;
+            let q = SVector::from_fn(|d, _| start.q[d] + table.u[i].0 * start.y[d] + sum(&table.b[i], &a[d]));
+            let v = SVector::from_fn(|d, _| start.y[d] / rho + sum(&exact.d[i], &a[d]));
+            let force = mass * SVector::from_fn(|d, _| rho * a[d][i]);
+            for d in 0..N {
+                solved.v[d][i] = v[d];
+                solved.force[d][i] = force[d];
+            }
+            solved.rate[i] = rho * table.gamma;
+            solved.l[i] = lagrangian.value(t + table.times.0[i], &q, &v, 0.0);
+        }
+        if !wants_z {
+            solved.l = [0.0; MOST];
+        } else if table.gamma != 0.0 {
+            // The actions of the stages: Z = z0 + hA (L - gamma z) + gamma hA Z.
+            let g = Coefficients::of(s);
+            let entry = |i: usize, j: usize| if i < s && j < s { table.h * g.a[i][j].0 } else { 0.0 };
+            let mut left =
+                SMatrix::<f64, MOST, MOST>::from_fn(|i, j| f64::from(u8::from(i == j)) - table.gamma * entry(i, j));
+            let mut z =
+                SVector::<f64, MOST>::from_fn(|i, _| start.z + (0..s).fold(0.0, |z, j| z + entry(i, j) * solved.l[j]));
+            match linear::solve(&mut left, &mut z) {
+                Ok(_) => (0..s).for_each(|i| solved.l[i] += table.gamma * z[i]),
+                // The pole of the collocation polynomial of z: the step has an end, and nothing between.
+                Err(_) => solved.l = [f64::NAN; MOST],
+            }
+        }
+        solved
+    }
+}
+
+/// A step as a curve: the collocation polynomial of [`GaussStepper`](super::GaussStepper), with `tau` from 0 to h
+///
+/// `q(tau) = q0 + int V`, `z(tau) = z0 + int L`, `rho(tau) = 1 - int rho L_z`, `p(tau) = (p0 + int rho L_q) / rho(tau)`,
+///
+/// where V, L, `rho L_z` and `rho L_q` are the polynomials of degree `s - 1` through the stages.
+///
+/// At its ends it is the states of the run to round-off, which have order 2s; between them its order is s. So the curve of
+/// a run is continuous, and its velocity jumps from step to step by `O(h^s)`. Where the stepper was told that nobody wants
+/// the action and z decouples, z stays what it was at the start.
+#[derive(Clone, Copy, Debug)]
+pub struct DenseStep<const N: usize> {
+    s: usize,
+    t: f64,
+    h: f64,
+    start: PhasePoint<N>,
+    v: [Series; N],
+    force: [Series; N],
+    rate: Series,
+    l: Series,
+}
+
+impl<const N: usize> DenseStep<N> {
+    pub(super) fn new(s: usize, t: f64, h: f64, start: PhasePoint<N>, solved: &Solved<N>) -> Self {
+        let series = |values: &[f64; MOST]| Series::through(values, s);
+        DenseStep {
+            s,
+            t,
+            h,
+            start,
+            v: from_fn(|d| series(&solved.v[d])),
+            force: from_fn(|d| series(&solved.force[d])),
+            rate: series(&solved.rate),
+            l: series(&solved.l),
+        }
+    }
+
+    /// The times of the step's start and end.
+    pub fn span(&self) -> (f64, f64) {
+        (self.t, self.t + self.h)
+    }
+
+    /// The state at a time of the [`span`](Self::span); beyond it the polynomials are continued.
+    pub fn at(&self, t: f64) -> PhasePoint<N> {
+        self.at_fraction((t - self.t) / self.h)
+    }
+
+    /// The velocity `dq/dt` of the curve at a time: a polynomial of degree `s - 1`, the stages' velocities at their times.
+    pub fn velocity(&self, t: f64) -> SVector<f64, N> {
+        let p = legendre(self.s, 2.0 * ((t - self.t) / self.h) - 1.0);
+        SVector::from_fn(|d, _| self.v[d].value(&p, self.s))
+    }
+
+    /// The number of stages.
+    pub(crate) fn stages(&self) -> usize {
+        self.s
+    }
+
+    /// The time at a fraction of the step.
+    pub(crate) fn time(&self, fraction: f64) -> f64 {
+        self.t + fraction * self.h
+    }
+
+    /// The state at a fraction of the step.
+    pub(crate) fn at_fraction(&self, fraction: f64) -> PhasePoint<N> {
+        let p = legendre(self.s, 2.0 * fraction - 1.0);
+        let integral = |series: &Series| self.h * series.integral(&p, fraction, self.s);
+        let rho = 1.0 - integral(&self.rate);
+        PhasePoint {
+            q: SVector::from_fn(|d, _| self.start.q[d] + integral(&self.v[d])),
+            p: SVector::from_fn(|d, _| (self.start.p[d] + integral(&self.force[d])) / rho),
+            z: self.start.z + integral(&self.l),
+        }
+    }
+}
+
+/// The coefficients of a polynomial on `[0, 1]` in the Legendre polynomials of `2 x - 1`.
+#[derive(Clone, Copy, Debug)]
+struct Series([f64; MOST]);
+
+impl Series {
+    /// The polynomial through values at the nodes: Gauss' weights integrate its products with the Legendre polynomials exactly.
+    fn through(values: &[f64; MOST], s: usize) -> Self {
+        let g = Coefficients::of(s);
+        let mut c = [0.0; MOST];
+        for j in 0..s {
+            let p = legendre(s, 2.0 * g.c[j].0 - 1.0);
+            for (k, c) in c.iter_mut().enumerate().take(s) {
+                *c += (2 * k + 1) as f64 * g.b[j].0 * p[k] * values[j];
+            }
+        }
+        Series(c)
+    }
+
+    fn value(&self, p: &[f64; MOST + 1], s: usize) -> f64 {
+        (0..s).fold(0.0, |sum, k| sum + self.0[k] * p[k])
+    }
+
+    /// The integral from 0 to a fraction of `[0, 1]`: `(2k + 1) P_k` is the derivative of `P_(k+1) - P_(k-1)`.
+    fn integral(&self, p: &[f64; MOST + 1], fraction: f64, s: usize) -> f64 {
+        let rest = (1..s).fold(0.0, |sum, k| sum + self.0[k] * (p[k + 1] - p[k - 1]) / (2 * k + 1) as f64);
+        self.0[0] * fraction + 0.5 * rest
+    }
+}
+
+/// The Legendre polynomials `P_0(x) .. P_s(x)`.
+fn legendre(s: usize, x: f64) -> [f64; MOST + 1] {
+    let mut p = [1.0; MOST + 1];
+    p[1] = x;
+    for k in 1..s {
+        let n = k as f64;
+        p[k + 1] = ((2.0 * n + 1.0) * x * p[k] - n * p[k - 1]) / (n + 1.0);
+    }
+    p
+}
