@@ -103,8 +103,8 @@ fn by_hand<P: Problem<D>, const D: usize, const S: usize, const ACTION: bool>(
         for i in 0..S {
             if ACTION {
                 let mut square = 0.0;
-                for k in 0..D {
-                    square += p[k] * p[k];
+                for p in p {
+                    square += p * p;
                 }
                 z += damping[i] * z + lift[i] * square;
             }
