@@ -53,7 +53,9 @@ pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
 pub use rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
 pub use run::{Every, FinalOnly, Flow, Observer, Record, Step};
 pub use solver::{CROSSOVER, Solver};
-pub use splitting::{ActionFlow, ActionMap, ActionSplitting, Riccati, RiccatiMap, Splitting, SplittingScheme, Strang};
+pub use splitting::{
+    ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, RiccatiMap, Splitting, SplittingScheme, Strang,
+};
 pub use stepper::{Halt, Stepper};
 
 pub use contact_geom;

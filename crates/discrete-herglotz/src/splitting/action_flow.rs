@@ -111,8 +111,24 @@ pub(super) fn with_slope(map: impl Fn(Dual<f64, SVector<f64, 1>>) -> Dual<f64, S
     (image.re, image.d[0])
 }
 
+/// Refuses a flow that is not that of the Lagrangian's f.
+pub(super) fn check_flow<const N: usize>(
+    flow: &impl ActionFlow,
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    state: &PhasePoint<N>,
+) -> Result<(), InputError> {
+    if !is_rate_of(flow, lagrangian, t, state) {
+        return Err(InputError::Hypothesis { hypothesis: "an action flow whose rate f has f'(z) = L_z" });
+    }
+    if !is_flow_of_its_rate(flow, state.z) {
+        return Err(InputError::Hypothesis { hypothesis: "an action flow whose maps are the flow of its rate" });
+    }
+    Ok(())
+}
+
 /// Whether `f'(z) = L_z` at the state's action and others.
-pub(super) fn is_rate_of<const N: usize>(
+fn is_rate_of<const N: usize>(
     flow: &impl ActionFlow,
     lagrangian: &impl Lagrangian<N>,
     t: f64,

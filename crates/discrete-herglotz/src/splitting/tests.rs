@@ -1,6 +1,6 @@
 //! Splittings against an independent reference, and against what the theory says of them.
 
-use super::{ActionFlow, ActionMap, ActionSplitting, Riccati, Splitting, SplittingScheme, Strang};
+use super::{ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, Splitting, SplittingScheme, Strang};
 use crate::{Composition, DiscreteLagrangian, Halt, InputError, Midpoint, Solver, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, Duffing, Kepler, Pendulum, QuadraticInZ};
@@ -233,6 +233,8 @@ fn strang_is_the_flow_of_its_value() -> Outcome {
         assert_step_is_of_value(&Strang::new(Pendulum { gamma: -0.3 }, h, 0.7, &one)?, one)?;
         assert_step_is_of_value(&Strang::new(Duffing { gamma: 0.0, ..Duffing::forced() }, h, 0.7, &one)?, one)?;
         assert_step_is_of_value(&Strang::new(&Inertia, h, 0.7, &two)?, two)?;
+        assert_step_is_of_value(&ActionStrang::new(QuadraticInZ { c: 0.4 }, h, 0.7, &one)?, one)?;
+        assert_step_is_of_value(&ActionStrang::new(&Curved, h, 0.7, &one)?, one)?;
     }
     Ok(())
 }
