@@ -145,12 +145,13 @@ fn is_rate_of<const N: usize>(
 pub(super) fn is_flow_of_its_rate(flow: &impl ActionFlow, z: f64) -> bool {
     beside(z).all(|z| {
         let (rate, slope) = with_slope(|z| flow.rate(z), z);
-        let s = 1e-4 / (1.0 + slope.abs());
-        let (end, stretch) = with_slope(|z| flow.over(s).apply(z), z);
-        let back = flow.over(-s).apply(z);
+        let scale = 1.0 / (1.0 + slope.abs());
+        let (end, stretch) = with_slope(|z| flow.over(0.1 * scale).apply(z), z);
+        let s = 1e-4 * scale;
+        let change = flow.over(s).apply(z) - flow.over(-s).apply(z);
         let size = 1.0 + rate.abs();
         (stretch * rate - flow.rate(end)).abs() <= FALSE_CLAIM * size
-            && (end - back - 2.0 * s * rate).abs() <= 1e-6 * s * size
+            && (change - 2.0 * s * rate).abs() <= 1e-6 * s * size
     })
 }
 

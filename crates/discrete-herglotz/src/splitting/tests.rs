@@ -289,6 +289,28 @@ impl ActionFlow for Wrong {
     }
 }
 
+/// Euler's step in place of the flow: right for small times alone.
+struct Euler;
+
+#[derive(Clone, Copy, Debug)]
+struct EulerMap(f64);
+
+impl ActionFlow for Euler {
+    type Map = EulerMap;
+    fn rate<T: Scalar>(&self, z: T) -> T {
+        z * z * -0.2
+    }
+    fn over(&self, s: f64) -> EulerMap {
+        EulerMap(s)
+    }
+}
+
+impl ActionMap for EulerMap {
+    fn apply<T: Scalar>(&self, z: T) -> T {
+        z + Euler.rate(z) * self.0
+    }
+}
+
 /// Each hypothesis that is not met is refused by name.
 #[test]
 fn what_does_not_fit_is_refused() {
@@ -334,6 +356,8 @@ fn what_does_not_fit_is_refused() {
     assert_eq!(with(-0.2, -0.2), None);
     assert!(matches!(with(-0.3, -0.3), Some(InputError::Hypothesis { .. })));
     assert!(matches!(with(-0.2, -0.3), Some(InputError::Hypothesis { .. })));
+    let euler = ActionSplitting::with_flow(&quadratic, &Euler, scheme, 0.1, 0.0, start).err();
+    assert!(matches!(euler, Some(InputError::Hypothesis { .. })));
 }
 
 /// A motion that leaves every bound halts at its last finite state, in mid-chunk too, and stays there.
