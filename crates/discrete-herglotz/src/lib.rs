@@ -65,7 +65,9 @@ pub use rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
 pub use run::{Every, FinalOnly, Flow, Observer, Record, Step};
 pub use scene::{Integrator, Item, Outcome, Plan, Row, Scene, Steps, UnknownIntegrator, Wanted};
 pub use solver::{CROSSOVER, Solver};
-pub use splitting::{ActionFlow, ActionMap, ActionSplitting, Riccati, RiccatiMap, Splitting, SplittingScheme, Strang};
+pub use splitting::{
+    ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, RiccatiMap, Splitting, SplittingScheme, Strang,
+};
 pub use stepper::{Halt, Stepper};
 pub use verified::verified;
 

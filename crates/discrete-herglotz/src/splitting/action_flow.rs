@@ -111,8 +111,24 @@ pub(super) fn with_slope(map: impl Fn(Dual<f64, SVector<f64, 1>>) -> Dual<f64, S
     (image.re, image.d[0])
 }
 
+/// Refuses a flow that is not that of the Lagrangian's f.
+pub(super) fn check_flow<const N: usize>(
+    flow: &impl ActionFlow,
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    state: &PhasePoint<N>,
+) -> Result<(), InputError> {
+    if !is_rate_of(flow, lagrangian, t, state) {
+        return Err(InputError::Hypothesis { hypothesis: "an action flow whose rate f has f'(z) = L_z" });
+    }
+    if !is_flow_of_its_rate(flow, state.z) {
+        return Err(InputError::Hypothesis { hypothesis: "an action flow whose maps are the flow of its rate" });
+    }
+    Ok(())
+}
+
 /// Whether `f'(z) = L_z` at the state's action and others.
-pub(super) fn is_rate_of<const N: usize>(
+fn is_rate_of<const N: usize>(
     flow: &impl ActionFlow,
     lagrangian: &impl Lagrangian<N>,
     t: f64,
@@ -129,12 +145,13 @@ pub(super) fn is_rate_of<const N: usize>(
 pub(super) fn is_flow_of_its_rate(flow: &impl ActionFlow, z: f64) -> bool {
     beside(z).all(|z| {
         let (rate, slope) = with_slope(|z| flow.rate(z), z);
-        let s = 1e-4 / (1.0 + slope.abs());
-        let (end, stretch) = with_slope(|z| flow.over(s).apply(z), z);
-        let back = flow.over(-s).apply(z);
+        let scale = 1.0 / (1.0 + slope.abs());
+        let (end, stretch) = with_slope(|z| flow.over(0.1 * scale).apply(z), z);
+        let s = 1e-4 * scale;
+        let change = flow.over(s).apply(z) - flow.over(-s).apply(z);
         let size = 1.0 + rate.abs();
         (stretch * rate - flow.rate(end)).abs() <= FALSE_CLAIM * size
-            && (end - back - 2.0 * s * rate).abs() <= 1e-6 * s * size
+            && (change - 2.0 * s * rate).abs() <= 1e-6 * s * size
     })
 }
 

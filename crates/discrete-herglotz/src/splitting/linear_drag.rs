@@ -175,17 +175,20 @@ fn run<L: Lagrangian<N>, const N: usize, const ACTION: bool, const COMPENSATED: 
 ) -> Motion<N> {
     let mut m = from.motion;
     // Steps that begin with a drift leave the first on its own, others the last.
-    let alone = if table.kick_first { steps - 1 } else { 0 };
-    if table.kick_first {
+    let (first, last) = if table.kick_first {
         m.kick::<ACTION, COMPENSATED>(table.opening);
-    }
-    for k in 0..steps {
-        let t = from.time_after(k);
-        let stages = if k == alone { &table.single } else { &table.joined };
-        for stage in stages {
-            drift::<L, N, ACTION, COMPENSATED>(form, &mut m, &stage.drift);
-            (m.value, m.force) = form.kick(t + stage.time, &m.q.value, 0.0);
-            m.kick::<ACTION, COMPENSATED>(stage.kick);
+        ((&table.joined, 0..steps - 1), (&table.single, steps - 1..steps))
+    } else {
+        ((&table.single, 0..1), (&table.joined, 1..steps))
+    };
+    for (stages, range) in [first, last] {
+        for k in range {
+            let t = from.time_after(k);
+            for stage in stages {
+                drift::<L, N, ACTION, COMPENSATED>(form, &mut m, &stage.drift);
+                (m.value, m.force) = form.kick(t + stage.time, &m.q.value, 0.0);
+                m.kick::<ACTION, COMPENSATED>(stage.kick);
+            }
         }
     }
     if !table.kick_first {

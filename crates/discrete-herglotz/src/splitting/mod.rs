@@ -1,6 +1,7 @@
 //! Splittings of contact flows, with exact rate.
 
 mod action_flow;
+mod action_strang;
 mod linear_drag;
 mod motion;
 mod nonlinear_drag;
@@ -13,6 +14,7 @@ mod strang;
 mod tests;
 
 pub use action_flow::{ActionFlow, ActionMap, Riccati, RiccatiMap};
+pub use action_strang::ActionStrang;
 pub use linear_drag::Splitting;
 pub use nonlinear_drag::ActionSplitting;
 pub use scheme::SplittingScheme;

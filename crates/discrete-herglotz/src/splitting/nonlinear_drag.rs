@@ -1,6 +1,6 @@
 //! Splittings where the drag is not linear in the action.
 
-use super::action_flow::{ActionFlow, ActionMap, Riccati, is_flow_of_its_rate, is_rate_of, with_slope};
+use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::motion::{Motion, Progress};
 use super::separable::Separable;
 use crate::{Halt, InputError, SplittingScheme, Stepper};
@@ -81,12 +81,7 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
                 hypothesis: "a linear drag gamma z for a Runge-Kutta-Nyström scheme",
             });
         };
-        if !is_rate_of(flow, &lagrangian, t0, &state) {
-            return Err(InputError::Hypothesis { hypothesis: "an action flow whose rate f has f'(z) = L_z" });
-        }
-        if !is_flow_of_its_rate(flow, state.z) {
-            return Err(InputError::Hypothesis { hypothesis: "an action flow whose maps are the flow of its rate" });
-        }
+        check_flow(flow, &lagrangian, t0, &state)?;
         let mut time = 0.0;
         let mut before = 0.0;
         let stages = substeps.iter().map(|g| {

@@ -1,5 +1,8 @@
 //! The table of splitting schemes: coefficients, orders, sources.
 
+// More digits than a double holds, so that the next rounding is this one.
+#![allow(clippy::excessive_precision)]
+
 use Coefficients::{Composition, Nystrom};
 
 /// A symmetric splitting of a flow into kicks and drifts: `kick k_0, drift d_1, kick k_1, ..., drift d_n, kick k_n`, each a

@@ -2,7 +2,7 @@
 
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, PhasePoint, VelocityPoint, linear};
+use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint, linear};
 
 /// What is left of a false claim's derivative by the rounding of a true one, with some margin.
 pub(super) const FALSE_CLAIM: f64 = 1e-9;
@@ -11,7 +11,7 @@ pub(super) const FALSE_CLAIM: f64 = 1e-9;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Separable<L, const N: usize> {
     pub(crate) lagrangian: L,
-    pub(crate) mass: SMatrix<f64, N, N>,
+    mass: SMatrix<f64, N, N>,
     /// `None` for the identity: a product with it would cost a third of a step of the oscillator.
     inverse: Option<SMatrix<f64, N, N>>,
 }
@@ -102,6 +102,17 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
         let (value, force) = self.kick(t, q, z);
         let finite = value.is_finite() && force.iter().all(|f| f.is_finite());
         if finite { Ok((value, force)) } else { Err(InputError::FirstStep(StepError::NonFinite)) }
+    }
+
+    /// `v.Mv`.
+    pub(crate) fn twice_kinetic<T: Scalar>(&self, v: &SVector<T, N>) -> T {
+        let mut sum = T::zero();
+        for i in 0..N {
+            for j in 0..N {
+                sum += v[i] * v[j] * self.mass[(i, j)];
+            }
+        }
+        sum
     }
 
     /// `M^-1 p`.

@@ -74,13 +74,7 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
         let still = SVector::from_element(T::zero());
         let kick =
             |t: f64, q: &SVector<T, N>| self.form.lagrangian.value(T::from(t), q, &still, T::zero()) * (0.5 * self.h);
-        let moved = x.q1 - x.q0;
-        let mut square = T::zero();
-        for i in 0..N {
-            for j in 0..N {
-                square += moved[i] * moved[j] * self.form.mass[(i, j)];
-            }
-        }
+        let square = self.form.twice_kinetic(&(x.q1 - x.q0));
         let growth = self.forth.damping;
         let before = square * (0.5 / self.forth.length) + kick(t, &x.q0);
         Ok(before * (1.0 + growth) + kick(t + self.h, &x.q1) + x.z0 * growth)

@@ -1,0 +1,109 @@
+//! The Strang splitting of a drag that is not linear, as a discrete Lagrangian.
+
+use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
+use super::separable::Separable;
+use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
+
+/// The substep `C B A B C` of [`ActionSplitting`](crate::ActionSplitting) as a discrete Lagrangian of order 2: with the flow
+/// `phi` of `f(z)` over half a step,
+///
+/// `z0 + L_d = phi(phi(z0) + (q1 - q0).M(q1 - q0)/(2h) - h/2 V(t, q0) - h/2 V(t + h, q1))`.
+///
+/// Symmetric and explicit; `sigma_d` is the product of the two factors `phi'`.
+#[derive(Clone, Copy, Debug)]
+pub struct ActionStrang<L, F: ActionFlow, const N: usize> {
+    form: Separable<L, N>,
+    h: f64,
+    forth: F::Map,
+    back: F::Map,
+    /// The action at which the potential is read, and f there.
+    rest: (f64, f64),
+}
+
+impl<L: Lagrangian<N>, const N: usize> ActionStrang<L, Riccati, N> {
+    /// That of a Lagrangian whose f is a polynomial of degree two, read off and verified at a time and a state.
+    ///
+    /// # Errors
+    /// Those of [`ActionSplitting::new`](crate::ActionSplitting::new), but for the last.
+    pub fn new(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
+        let form = Separable::read(lagrangian, h, t, state)?;
+        let flow = Riccati::of(&form.lagrangian, t, state)?;
+        Self::of(form, &flow, h, t, state)
+    }
+}
+
+impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionStrang<L, F, N> {
+    /// That of a Lagrangian with the flow of its f, verified at a time and a state.
+    ///
+    /// # Errors
+    /// Those of [`ActionSplitting::with_flow`](crate::ActionSplitting::with_flow), but for the last.
+    pub fn with_flow(lagrangian: L, flow: &F, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
+        Self::of(Separable::read(lagrangian, h, t, state)?, flow, h, t, state)
+    }
+
+    fn of(form: Separable<L, N>, flow: &F, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
+        form.check_steady_drag(t, state)?;
+        check_flow(flow, &form.lagrangian, t, state)?;
+        let (forth, back) = (flow.over(0.5 * h), flow.over(-0.5 * h));
+        Ok(ActionStrang { form, h, forth, back, rest: (state.z, flow.rate(state.z)) })
+    }
+
+    /// One step from `t`, forward with `h > 0` or back with `h < 0`; its factor is that of the map.
+    #[inline(always)]
+    fn step(&self, t: f64, from: &PhasePoint<N>, h: f64, map: &F::Map) -> (PhasePoint<N>, SVector<f64, N>, f64) {
+        let (z, first) = with_slope(|z| map.apply(z), from.z);
+        let (value, force) = self.form.kick(t, &from.q, self.rest.0);
+        let p = from.p * first + force * (0.5 * h);
+        let v = self.form.velocity(&p);
+        let q = from.q + v * h;
+        let (next, pull) = self.form.kick(t + h, &q, self.rest.0);
+        let z = z + 0.5 * h * (p.dot(&v) + (value - self.rest.1) + (next - self.rest.1));
+        let (z, second) = with_slope(|z| map.apply(z), z);
+        (PhasePoint { q, p: (p + pull * (0.5 * h)) * second, z }, v, first * second)
+    }
+}
+
+impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> DiscreteLagrangian<N> for ActionStrang<L, F, N> {
+    fn step_size(&self) -> f64 {
+        self.h
+    }
+
+    fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
+        let (rest, constant) = self.rest;
+        let still = SVector::from_element(T::zero());
+        let kick = |t: f64, q: &SVector<T, N>| {
+            (self.form.lagrangian.value(T::from(t), q, &still, T::from(rest)) - constant) * (0.5 * self.h)
+        };
+        let kinetic = self.form.twice_kinetic(&(x.q1 - x.q0)) * (0.5 / self.h);
+        let z = self.forth.apply(x.z0) + kinetic + kick(t, &x.q0) + kick(t + self.h, &x.q1);
+        Ok(self.forth.apply(z) - x.z0)
+    }
+
+    /// Explicit; the guess and the solver are not needed.
+    #[inline(always)]
+    fn forward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        _guess: &SVector<f64, N>,
+        _solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        let (end, velocity, sigma) = self.step(t, from, self.h, &self.forth);
+        Transition { end, velocity, sigma, iterations: 0 }.checked()
+    }
+
+    /// The step with `-h`, by symmetry.
+    #[inline]
+    fn backward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        _guess: &SVector<f64, N>,
+        _solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        let (end, velocity, factor) = self.step(t + self.h, from, -self.h, &self.back);
+        Transition { end, velocity, sigma: 1.0 / factor, iterations: 0 }.checked()
+    }
+}
