@@ -220,13 +220,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
         let mut sweeps = Sweeps::default();
         // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
         loop {
-            let (change, spread) = if cold { (f64::INFINITY, 1.0) } else { self.sweep::<S>() };
+            let change = if cold { f64::INFINITY } else { self.sweep::<S>() };
             self.evaluate::<S>(t);
             if cold {
                 cold = false;
                 continue;
             }
-            match sweeps.judge(change, spread) {
+            match sweeps.judge(change, 1.0) {
                 Progress::Going => {}
                 Progress::Done => return self.finish::<S>(),
                 refused => return refused,
@@ -235,9 +235,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
     }
 
     /// New velocities, positions, actions and factors of the stages; returns the largest change, each in units of the
-    /// largest of its kind, and the spread of the factors: momenta are sums of terms with all of them, divided by one.
+    /// largest of its kind.
     #[inline(always)]
-    fn sweep<S: Simd>(&mut self) -> (f64, f64) {
+    fn sweep<S: Simd>(&mut self) -> f64 {
         let s = self.table.s;
         let m = blocks::<S>(s);
         let zero = Lanes::<S>::splat(0.0);
@@ -248,13 +248,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
             self.table.a.apply(&self.force[d], s, &mut impulses[d], |_| p);
         }
         let one = Lanes::<S>::splat(1.0);
-        let (mut dv, mut sv, mut dr, mut sr, mut least) = (zero, zero, zero, one, one);
+        let (mut dv, mut sv, mut dr, mut sr) = (zero, zero, zero, one);
         for r in 0..m {
             let rho = one - falling.block(r);
             dr = dr.max((rho - self.rho.block(r)).abs());
             self.rho.set(r, rho);
             let inverse = rho.recip();
-            (sr, least) = (sr.max(rho.abs()), least.max(inverse.abs()));
+            sr = sr.max(rho.abs());
             let excess =
                 SVector::<Lanes<S>, N>::from_fn(|d, _| impulses[d].block::<S>(r) * inverse - self.l_v[d].block(r));
             for i in 0..N {
@@ -280,12 +280,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
             sz = sz.max(z.abs());
         }
         let relative = |change: f64, size: f64| if change > 0.0 { change / size } else { change };
-        let largest = sr.largest();
-        let change = relative(dv.largest(), sv.largest()).max(dr.largest() / largest);
+        let change = relative(dv.largest(), sv.largest()).max(dr.largest() / sr.largest());
         let of_action = relative(dz.largest(), sz.largest());
         // `f64::max` would hide a NaN.
-        let worst = if of_action > change || of_action.is_nan() { of_action } else { change };
-        (worst, largest * least.largest())
+        if of_action > change || of_action.is_nan() { of_action } else { change }
     }
 
     /// The end of the step from its stages.

@@ -2,9 +2,9 @@
 
 use super::coefficients::MOST;
 use super::condensed::Condensed;
-use super::separable::{Compensated, add, finite};
+use super::dense::Start;
+use super::separable::Compensated;
 use super::stages::solve_exactly;
-use super::sweeps::Progress;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Hessian, Lagrangian, VelocityPoint};
 use num_traits::{One, Zero};
@@ -147,11 +147,43 @@ impl<const N: usize> Linear<N> {
         })
     }
 
-    /// Takes one step; where it is not finite the state is unchanged.
+    /// Takes steps until one is not finite; the state is then that before it. Returns how many, and where the last one began.
+    ///
+    /// Only a run that leaves the finite numbers is looked at step by step, again from its start.
     #[inline(always)]
-    pub fn step(&mut self) -> Progress {
+    pub fn advance(&mut self, steps: usize) -> (usize, Start<N>) {
+        let start = (self.q, self.v, self.z);
+        (1..steps).for_each(|_| self.step());
+        let last = self.start();
+        self.step();
+        if self.is_finite() {
+            return (steps, last);
+        }
+        (self.q, self.v, self.z) = start;
+        let mut taken = 0;
+        loop {
+            let before = (self.q, self.v, self.z);
+            self.step();
+            if !self.is_finite() {
+                (self.q, self.v, self.z) = before;
+                return (taken, self.start());
+            }
+            taken += 1;
+        }
+    }
+
+    fn start(&self) -> Start<N> {
+        Start { q: self.q.map(|q| q.value), y: self.v.map(|v| v.value), z: self.z.value }
+    }
+
+    fn is_finite(&self) -> bool {
+        self.q.iter().chain(&self.v).chain([&self.z]).all(|x| x.value.is_finite())
+    }
+
+    /// Takes one step.
+    #[inline(always)]
+    fn step(&mut self) {
         let (q, v) = (self.q.map(|q| q.value), self.v.map(|v| v.value));
-        let (mut dq, mut dv, mut dz) = ([0.0; N], [0.0; N], 0.0);
         if let Some(action) = &self.action {
             let mut change = action.constant + self.grow[0] * self.z.value;
             for i in 0..N {
@@ -162,21 +194,14 @@ impl<const N: usize> Linear<N> {
                 }
                 change += of_q * q[i] + of_v * v[i];
             }
-            dz = change + self.grow[1] * self.z.value;
+            self.z.add(change + self.grow[1] * self.z.value);
         }
         for i in 0..N {
             let ([a, a_tail], [b, b_tail]) = (self.qq.row(i, &q), self.qv.row(i, &v));
-            dq[i] = (a_tail + b_tail + self.shift_q[i]) + (a + b);
+            self.q[i].add((a_tail + b_tail + self.shift_q[i]) + (a + b));
             let ([a, a_tail], [b, b_tail]) = (self.vq.row(i, &q), self.vv.row(i, &v));
-            dv[i] = (a_tail + b_tail + self.shift_v[i]) + (a + b);
+            self.v[i].add((a_tail + b_tail + self.shift_v[i]) + (a + b));
         }
-        if !finite(&dq, &dv, dz) {
-            return Progress::NonFinite;
-        }
-        add(&mut self.q, &dq);
-        add(&mut self.v, &dv);
-        self.z.add(dz);
-        Progress::Done
     }
 
     /// Whether the action is computed.

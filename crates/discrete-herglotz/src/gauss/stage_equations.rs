@@ -269,7 +269,9 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                 return Err(StepError::NonFinite);
             }
             let predicted = before.is_finite() && last_correction(change, before, f64::EPSILON);
-            let stagnant = change >= 0.5 * before && change <= 1e3 * f64::EPSILON * x.spread();
+            // With half of the digits at the least.
+            let near = (1e3 * f64::EPSILON * x.spread()).min(f64::EPSILON.sqrt());
+            let stagnant = change >= 0.5 * before && change <= near;
             if change <= f64::EPSILON || predicted || stagnant {
                 return Ok(iterations);
             }
