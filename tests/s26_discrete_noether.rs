@@ -26,7 +26,7 @@ fn along_a_run() {
     fn run<const N: usize, S: System<N>>(system: &S, h: f64) {
         let start: PhasePoint<N> = legendre(system, 0.0, &system.initial());
         for method in Method::applicable(&system.structure()) {
-            let ld = method.discretise(system, h);
+            let ld = method.discretise(system, h, 0.0, &start);
             assert!(ld.is_ok());
             let Ok(ld) = ld else { continue };
             for group in system.symmetries() {

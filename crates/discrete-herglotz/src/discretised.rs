@@ -1,14 +1,17 @@
 //! A discrete Lagrangian by any of the methods.
 
-use crate::{DiscreteLagrangian, LeftMidpoint, Midpoint, Rectangle, Solver, StepError, Transition, Trapezoidal};
+use crate::{
+    DiscreteLagrangian, Gauss, LeftMidpoint, Midpoint, Rectangle, Solver, StepError, Strang, Transition, Trapezoidal,
+};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet};
 
 /// The discrete Lagrangian that a [`Method`](crate::Method) chosen at run time makes from a Lagrangian.
 ///
 /// One type for all methods: code that is generic over discrete Lagrangians is compiled once for a Lagrangian, not once
-/// for each method.
-#[derive(Clone, Copy, Debug)]
+/// for each method. All but the Gauss methods step without an allocation; for these,
+/// [`Gauss::stepper`] has the fast steps.
+#[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Discretised<L, const N: usize> {
     /// By the rectangle rule.
@@ -19,6 +22,10 @@ pub enum Discretised<L, const N: usize> {
     Midpoint(Midpoint<L>),
     /// By the symmetric trapezoidal rule.
     Trapezoidal(Trapezoidal<L>),
+    /// By the Strang splitting.
+    Strang(Strang<L, N>),
+    /// By contact Gauss collocation; boxed for its tables of coefficients.
+    Gauss(Box<Gauss<L>>),
 }
 
 /// The same expression for each method.
@@ -29,6 +36,11 @@ macro_rules! each {
             Discretised::LeftMidpoint($ld) => $result,
             Discretised::Midpoint($ld) => $result,
             Discretised::Trapezoidal($ld) => $result,
+            Discretised::Strang($ld) => $result,
+            Discretised::Gauss(boxed) => {
+                let $ld = &**boxed;
+                $result
+            }
         }
     };
 }

@@ -1,8 +1,8 @@
 //! The table of methods: what is known of each, and a discrete Lagrangian by any of them, chosen at run time.
 
 use crate::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
-use crate::{Discretised, InputError, Node, Quadrature, Rule};
-use contact_geom::{Lagrangian, Structure};
+use crate::{Discretised, Gauss, InputError, Node, Quadrature, Rule, Strang};
+use contact_geom::{Lagrangian, PhasePoint, Structure};
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 use thiserror::Error;
@@ -10,15 +10,16 @@ use thiserror::Error;
 /// A method that makes a discrete Lagrangian from a Lagrangian and a time step.
 ///
 /// ```
-/// use contact_geom::{Lagrangian, systems::Pendulum};
+/// use contact_geom::{Lagrangian, PhasePoint, systems::Pendulum};
 /// use discrete_herglotz::{DiscreteLagrangian, Method};
 ///
-/// let system = Pendulum::default();
+/// let (system, start) = (Pendulum::default(), PhasePoint::new([1.0], [0.5], 0.0));
 /// for method in Method::applicable(&system.structure()) {
-///     let ld = method.discretise(&system, 0.1)?;
+///     let ld = method.discretise(&system, 0.1, 0.0, &start)?;
 ///     println!("{method} of order {}, h = {}", method.order(), ld.step_size());
 /// }
 /// assert_eq!("midpoint".parse(), Ok(Method::Midpoint));
+/// assert_eq!("gauss_8".parse(), Ok(Method::Gauss { stages: 8 }));
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 ///
@@ -35,7 +36,20 @@ pub enum Method {
     Midpoint,
     /// The symmetric trapezoidal rule, [`TrapezoidalRule`].
     Trapezoidal,
+    /// The Strang splitting, [`Strang`].
+    Strang,
+    /// Contact Gauss collocation, [`Gauss`].
+    Gauss {
+        /// The number of stages, from 1 to 16.
+        stages: u8,
+    },
 }
+
+/// The names of the Gauss methods by the number of stages, less one.
+const GAUSS: [&str; Gauss::<()>::STAGES] = [
+    "gauss_1", "gauss_2", "gauss_3", "gauss_4", "gauss_5", "gauss_6", "gauss_7", "gauss_8", "gauss_9", "gauss_10",
+    "gauss_11", "gauss_12", "gauss_13", "gauss_14", "gauss_15", "gauss_16",
+];
 
 /// What is known of a method.
 struct Facts {
@@ -62,11 +76,23 @@ impl Facts {
 }
 
 impl Method {
-    /// Every method. What holds for all of them is tested by walking this table.
-    pub const ALL: &'static [Method] =
+    /// The quadrature rules, which take every regular Lagrangian.
+    pub const RULES: &'static [Method] =
         &[Method::Rectangle, Method::LeftMidpoint, Method::Midpoint, Method::Trapezoidal];
 
-    /// The methods whose hypothesis a Lagrangian of this structure meets.
+    /// Every method, of the Gauss methods those with 2 and 3 stages. What holds for all of them is tested by walking this
+    /// table.
+    pub const ALL: &'static [Method] = &[
+        Method::Rectangle,
+        Method::LeftMidpoint,
+        Method::Midpoint,
+        Method::Trapezoidal,
+        Method::Strang,
+        Method::Gauss { stages: 2 },
+        Method::Gauss { stages: 3 },
+    ];
+
+    /// The methods of [`ALL`](Self::ALL) whose hypothesis a Lagrangian of this structure meets.
     pub fn applicable(structure: &Structure) -> impl Iterator<Item = Method> {
         Self::ALL.iter().copied().filter(|method| method.check(structure).is_ok())
     }
@@ -77,6 +103,18 @@ impl Method {
             Method::LeftMidpoint => Facts::of_rule::<LeftMidpointRule>(),
             Method::Midpoint => Facts::of_rule::<MidpointRule>(),
             Method::Trapezoidal => Facts::of_rule::<TrapezoidalRule>(),
+            Method::Strang => {
+                Facts { name: "strang", order: 2, symmetric: true, implicit_in_z: false, exact_rate: true }
+            }
+            Method::Gauss { stages } => Facts {
+                // No discrete Lagrangian is made with another number of stages.
+                name: GAUSS.get(usize::from(stages).wrapping_sub(1)).copied().unwrap_or("gauss"),
+                order: 2 * u32::from(stages),
+                symmetric: true,
+                implicit_in_z: true,
+                // Rational too: a diagonal Pade approximant of the exponential.
+                exact_rate: false,
+            },
         }
     }
 
@@ -102,38 +140,58 @@ impl Method {
     }
 
     /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the motion itself. A
-    /// quadrature rule has a rational function of `h gamma` in its place: `1 + h gamma` where it is explicit in z.
+    /// quadrature rule has a rational function of `h gamma` in its place, `1 + h gamma` where it is explicit in z, and a
+    /// Gauss method the diagonal Pade approximant of the exponential.
     pub fn exact_rate(self) -> bool {
         self.facts().exact_rate
     }
 
-    /// Whether a Lagrangian of this structure meets the method's hypothesis. The quadrature rules take every regular
-    /// Lagrangian.
+    /// Whether the claims of this structure are all that the method needs. The quadrature rules and the Gauss methods take
+    /// every regular Lagrangian; the Strang splitting one that is separable, with a linear drag of constant rate.
     ///
     /// # Errors
-    /// [`InputError::Unclaimed`] with the claim that is missing.
-    pub fn check(self, _structure: &Structure) -> Result<(), InputError> {
+    /// [`InputError::Unclaimed`] with the claim that is missing, [`InputError::Stages`] for a Gauss method that does not
+    /// exist.
+    pub fn check(self, structure: &Structure) -> Result<(), InputError> {
+        let Structure { separable, z_free, z_affine, autonomous, .. } = *structure;
         match self {
             Method::Rectangle | Method::LeftMidpoint | Method::Midpoint | Method::Trapezoidal => Ok(()),
+            Method::Strang if !separable => Err(InputError::Unclaimed { claim: "separable" }),
+            Method::Strang if z_free => Ok(()),
+            Method::Strang if !z_affine => Err(InputError::Unclaimed { claim: "z_affine" }),
+            Method::Strang if !autonomous => Err(InputError::Unclaimed { claim: "autonomous" }),
+            Method::Strang => Ok(()),
+            Method::Gauss { stages } if GAUSS.get(usize::from(stages).wrapping_sub(1)).is_none() => {
+                Err(InputError::Stages { found: stages.into() })
+            }
+            Method::Gauss { .. } => Ok(()),
         }
     }
 
-    /// The discrete Lagrangian of this method for a Lagrangian, or a reference to one, with the time step `h`.
+    /// The discrete Lagrangian of this method for a Lagrangian, or a reference to one, with the time step `h`. The form of
+    /// the Lagrangian is verified at a time and a state, and its constants are read there, by the methods that rest on it;
+    /// of the state they take position and action. Others leave both alone.
+    ///
+    /// The Strang splitting also takes a Lagrangian that depends on time, if the rate of its drag does not: that is no claim
+    /// of a [`Structure`], and is verified here.
     ///
     /// # Errors
-    /// [`InputError::Step`] unless `h` is positive and finite, [`InputError::Dimension`] if `N = 0`, and those of
-    /// [`check`](Self::check).
+    /// Those of the method's constructor: [`InputError::Step`] unless `h` is positive and finite,
+    /// [`InputError::Dimension`] if `N = 0`, [`InputError::Stages`], and those of [`Strang::new`].
     pub fn discretise<const N: usize, L: Lagrangian<N>>(
         self,
         lagrangian: L,
         h: f64,
+        t: f64,
+        state: &PhasePoint<N>,
     ) -> Result<Discretised<L, N>, InputError> {
-        self.check(&lagrangian.structure())?;
         Ok(match self {
             Method::Rectangle => Discretised::Rectangle(Quadrature::new(lagrangian, h)?),
             Method::LeftMidpoint => Discretised::LeftMidpoint(Quadrature::new(lagrangian, h)?),
             Method::Midpoint => Discretised::Midpoint(Quadrature::new(lagrangian, h)?),
             Method::Trapezoidal => Discretised::Trapezoidal(Quadrature::new(lagrangian, h)?),
+            Method::Strang => Discretised::Strang(Strang::new(lagrangian, h, t, state)?),
+            Method::Gauss { stages } => Discretised::Gauss(Box::new(Gauss::new(lagrangian, stages.into(), h)?)),
         })
     }
 }
@@ -145,25 +203,26 @@ impl Display for Method {
     }
 }
 
-/// From the [`name`](Method::name).
+/// From the [`name`](Method::name), `gauss_1` to `gauss_16` included.
 impl FromStr for Method {
     type Err = UnknownMethod;
 
     fn from_str(name: &str) -> Result<Self, UnknownMethod> {
-        let named = Self::ALL.iter().find(|method| method.name() == name);
-        named.copied().ok_or_else(|| UnknownMethod { name: name.into() })
+        let gauss = (1..).zip(GAUSS).map(|(stages, _)| Method::Gauss { stages });
+        let named = Self::ALL.iter().copied().chain(gauss).find(|method| method.name() == name);
+        named.ok_or_else(|| UnknownMethod { name: name.into() })
     }
 }
 
 /// No method has this name.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no method {name:?}; the methods are {}", names())]
+#[error("there is no method {name:?}; the methods are {}, and gauss_1 to gauss_16", names())]
 pub struct UnknownMethod {
     /// The name that was asked for.
     pub name: String,
 }
 
-/// The names of all methods, for an error message.
+/// The names of the table, for an error message.
 fn names() -> String {
     let names: Vec<_> = Method::ALL.iter().map(|method| method.name()).collect();
     names.join(", ")

@@ -41,6 +41,7 @@ use stage_equations::{Given, Products, StageEquations, Unknowns};
 /// println!("t = {}: {:?}", run.time(), run.state());
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
+#[derive(Clone, Debug)]
 pub struct Gauss<L> {
     lagrangian: L,
     forward: Products,

@@ -6,6 +6,7 @@ use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, linear, seed};
 
 /// The products of the coefficients with a step, which may be negative.
+#[derive(Clone, Debug)]
 pub(super) struct Products {
     pub s: usize,
     pub h: f64,

@@ -88,12 +88,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
     pub(super) fn new(scene: &Scene<'a, L, N>, count: usize) -> Result<Self, InputError> {
         let Scene { lagrangian, start, t0, span, integrator, .. } = scene;
         let lagrangian: &'a L = lagrangian;
-        PhasePoint { q: start.q, p: start.v, z: start.z }.check()?;
+        let state = PhasePoint { q: start.q, p: start.v, z: start.z };
+        state.check()?;
         integrator.check(&lagrangian.structure())?;
         let structure = verified(lagrangian, *t0, start)?;
         let h = span / count as f64;
         let engine = match integrator {
-            Integrator::Discrete(method) => Engine::Discrete(method.discretise(lagrangian, h)?),
+            Integrator::Discrete(method) => Engine::Discrete(method.discretise(lagrangian, h, *t0, &state)?),
             Integrator::Gauss { stages } => Engine::Gauss(Gauss::new(lagrangian, *stages, h)?),
             Integrator::Splitting(_) | Integrator::Composition(..) => Engine::Explicit,
         };
@@ -145,7 +146,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 if action { Box::new(splitting) } else { Box::new(splitting.without_action()) }
             }
             (Engine::Explicit, Integrator::Composition(method, scheme)) => {
-                let rule = |h| method.discretise(self.lagrangian, h);
+                let rule = |h| method.discretise(self.lagrangian, h, t0, &start);
                 Box::new(Composition::new(rule, scheme, self.h, t0, start)?)
             }
             // `new` makes no other pairs.

@@ -4,7 +4,7 @@ use crate::statements::STEPS;
 use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::System;
-use contact_geom::{DiscretePoint, GeometryError, VelocityPoint};
+use contact_geom::{DiscretePoint, GeometryError, VelocityPoint, legendre};
 use discrete_herglotz::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
 use discrete_herglotz::statements::{STATEMENTS, residual};
 use discrete_herglotz::{DiscreteLagrangian, DiscretePath, InputError, Method, Quadrature, Rule, derived_jet};
@@ -44,7 +44,8 @@ fn points<const N: usize, S: System<N>>(system: &S, h: f64) -> Vec<(f64, Discret
 /// The statements of section 3 that hold for every discrete Lagrangian.
 fn with_method<const N: usize, S: System<N>>(method: Method, system: &S, h: f64, checks: &mut Checks) {
     let subject = |statement| Subject::discrete(statement, system.name(), method.name(), h);
-    let ld = match method.discretise(system, h) {
+    let t0 = system.initial_time();
+    let ld = match method.discretise(system, h, t0, &legendre(system, t0, &system.initial())) {
         Ok(ld) => ld,
         Err(error) => return checks.record(&subject(STATEMENTS[0]), Err(error)),
     };
