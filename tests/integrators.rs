@@ -2,6 +2,8 @@
 
 #![allow(missing_docs)]
 
+// The theorems use the rest of it.
+#[allow(dead_code, unused_imports)]
 mod common;
 
 mod scenes;

@@ -23,7 +23,7 @@ pub enum Integrator {
 }
 
 impl Integrator {
-    /// Every integrator by one name: discrete Lagrangians, Gauss methods, splittings, and the compositions of the symmetric midpoint
+    /// Every integrator by one name: quadrature rules, Gauss methods, splittings, and the compositions of the symmetric midpoint
     /// rule.
     pub fn all() -> Vec<Integrator> {
         let discrete = Method::RULES.iter().copied().map(Integrator::Discrete);
@@ -55,7 +55,8 @@ impl Integrator {
             }
             Integrator::Gauss { .. } => Ok(()),
             Integrator::Splitting(_) if !structure.separable => Err(InputError::Unclaimed { claim: "separable" }),
-            Integrator::Splitting(_) if !(structure.z_affine || structure.z_free) => {
+            // The third flow, that of f(z), leaves the hypothesis of Runge-Kutta-Nyström methods.
+            Integrator::Splitting(scheme) if scheme.is_nystrom() && !(structure.z_affine || structure.z_free) => {
                 Err(InputError::Unclaimed { claim: "z_affine" })
             }
             Integrator::Splitting(_) => Ok(()),

@@ -2,7 +2,7 @@
 
 use super::{Integrator, Scene, Wanted};
 use crate::{
-    Composition, Discretised, Flow, Gauss, GaussRoute, InputError, Splitting, Status, Stepper, verified,
+    ActionSplitting, Composition, Discretised, Flow, Gauss, GaussRoute, InputError, Splitting, Status, Stepper, verified,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, OneParameterGroup, PhasePoint, Structure, VelocityPoint, legendre};
@@ -141,6 +141,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             (Engine::Discrete(ld), _) => Box::new(Flow::with_guess(ld, t0, start, self.guess)?),
             (Engine::Gauss(gauss), _) if action => Box::new(gauss.stepper(t0, start, self.guess)?),
             (Engine::Gauss(gauss), _) => Box::new(gauss.stepper_without_action(t0, start, self.guess)?),
+            (Engine::Explicit, Integrator::Splitting(scheme)) if !self.z_decouples => {
+                Box::new(ActionSplitting::new(self.lagrangian, scheme, self.h, t0, start)?)
+            }
             (Engine::Explicit, Integrator::Splitting(scheme)) => {
                 let splitting = Splitting::new(self.lagrangian, scheme, self.h, t0, start)?;
                 if action { Box::new(splitting) } else { Box::new(splitting.without_action()) }
@@ -214,7 +217,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         let mut items = Vec::new();
         let mut say = |what, computed, why: &str| items.push(Item { what, computed, why: why.into() });
         let constant_gamma = drag && structure.autonomous;
-        let carried = "the flow of a discrete Lagrangian carries it";
         match (&self.engine, &self.integrator) {
             (Engine::Gauss(gauss), _) => {
                 let route = gauss.stepper(self.t0, self.start, start.v)?.route();
@@ -267,7 +269,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         match (self.wanted.action, self.z_decouples) {
             (true, _) => say("action z", true, "wanted"),
             (false, true) => say("action z", false, "L = L0 + gamma z: it does not act back, and nobody wants it"),
-            (false, false) => say("action z", true, if implicit { carried } else { "it drives the motion" }),
+            (false, false) if implicit => say("action z", true, "the flow of a discrete Lagrangian carries it"),
+            (false, false) if drag => say("action z", true, "the stages of this route carry it"),
+            (false, false) => say("action z", true, "it drives the motion"),
         }
         let rate = match (self.wanted.conformal_factor, self.constant_rate) {
             (false, true) => (false, "sigma_d is the same in every step, and nobody wants the product"),
