@@ -46,7 +46,7 @@ fn measure<const N: usize, S: System<N>>(system: &S) {
         let counts = match method.order() {
             1 | 2 => [64, 128, 256, 512],
             4 => [8, 16, 32, 64],
-            _ => [10, 14, 18, 24],
+            _ => [12, 16, 20, 24],
         };
         let runs: Vec<_> = counts
             .into_iter()
