@@ -30,6 +30,11 @@ fn every_method_on_every_system() {
                     ("F+", orders.legendre_plus, r),
                     ("flow", orders.flow, r + 1.0),
                 ] {
+                    // The drift of the splitting is the motion of a free particle.
+                    if method == Method::Strang && system.name() == "free_particle" {
+                        assert_eq!(found.order, f64::INFINITY, "{name}, {what}");
+                        continue;
+                    }
                     assert!(
                         found.fitted.len() >= 4,
                         "{name}, {what}: only {} steps above round-off",

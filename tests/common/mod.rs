@@ -51,11 +51,7 @@ pub fn bounded(residual: f64, bound: f64) -> Result<(), String> {
 }
 
 /// A residual as a check: an error of the library is a failure too.
-fn check(
-    residual: Result<Option<f64>, impl std::fmt::Display>,
-    bound: f64,
-    applies: &mut bool,
-) -> Result<(), String> {
+fn check(residual: Result<Option<f64>, impl std::fmt::Display>, bound: f64, applies: &mut bool) -> Result<(), String> {
     match residual {
         Err(e) => Err(e.to_string()),
         Ok(Some(r)) => {
