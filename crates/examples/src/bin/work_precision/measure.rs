@@ -32,7 +32,7 @@ pub struct Effort {
 impl Effort {
     /// A run that takes longer, in seconds, is the last of its sweep.
     fn bound(self) -> f64 {
-        if self.quick { 0.05 } else { 0.3 }
+        if self.quick { 0.02 } else { 0.05 }
     }
 
     /// The factors between successive powers of two of numbers of steps.
