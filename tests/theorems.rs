@@ -3,11 +3,13 @@
 mod common;
 
 mod bad_input;
+mod dense_output;
 mod derivatives;
 mod exact_composition;
 mod exact_is_discrete;
 mod exact_motion;
 mod exact_series;
+mod gauss;
 mod methods;
 mod orders;
 mod s01_contact_condition;

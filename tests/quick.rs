@@ -1,0 +1,5 @@
+//! q
+#![allow(dead_code, unused)]
+mod common;
+mod dense_output;
+mod gauss;
