@@ -6,4 +6,8 @@
 #[allow(dead_code, unused_imports)]
 mod common;
 
+mod conformal_steppers;
+mod dense_output;
+mod gauss;
+mod gauss_catalogue;
 mod scenes;

@@ -1,9 +1,10 @@
-//! A step of a small system allocates nothing, with any method, however the derivatives are found; nor does the exact discrete
+//! A step of a small system allocates nothing, with any method, however the derivatives are found; nor do those of contact Gauss
+//! collocation, nor does the exact discrete
 //! Lagrangian with its derivatives.
 
-use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, System};
+use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{PhasePoint, legendre};
-use discrete_herglotz::{DiscreteLagrangian, FinalOnly, Flow, Method, Status};
+use discrete_herglotz::{DiscreteLagrangian, FinalOnly, Flow, Gauss, GaussRoute, Method, Status, Stepper};
 use exact_lagrangian::{ContactExponential, ExactLagrangian, Route};
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
@@ -63,6 +64,28 @@ fn steps() {
     run(&Pendulum::default());
     run(&DoublePendulum::default());
     run(&Kepler::<3>::default());
+}
+
+/// The steps of contact Gauss collocation by each of its routes, with the extrapolated starts and the new slopes of a thousand
+/// steps. Those that Newton's method takes allocate, and none of these is.
+#[test]
+fn collocation() {
+    fn run<const N: usize, S: System<N>>(system: &S, h: f64, expected: GaussRoute) {
+        let start: PhasePoint<N> = legendre(system, 0.0, &system.initial());
+        let gauss = Gauss::new(system, 8, h);
+        let stepper = gauss.as_ref().map(|gauss| gauss.stepper(0.0, start, system.initial().v));
+        assert!(matches!(stepper, Ok(Ok(_))), "{}", system.name());
+        let Ok(Ok(mut stepper)) = stepper else { return };
+        let mut outcome = Ok(());
+        let count = allocations(|| outcome = stepper.advance(1000));
+        let found = (outcome, count, stepper.route(), stepper.newton_steps());
+        assert_eq!(found, (Ok(()), 0, expected, 0), "{}", system.name());
+    }
+    run(&HarmonicOscillator::default(), 0.1, GaussRoute::Linear);
+    run(&Pendulum::default(), 0.1, GaussRoute::Condensed);
+    run(&Kepler::<3>::default(), 0.05, GaussRoute::Condensed);
+    run(&QuadraticInZ::default(), 0.1, GaussRoute::ConstantMass);
+    run(&DoublePendulum::default(), 0.02, GaussRoute::General);
 }
 
 /// The exact discrete Lagrangian, its jets and steps, by each route to the motion between two points.

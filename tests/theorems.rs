@@ -3,7 +3,6 @@
 mod common;
 
 mod bad_input;
-mod conformal_steppers;
 mod derivatives;
 mod exact_composition;
 mod exact_is_discrete;

@@ -1,6 +1,7 @@
 //! Contact Gauss collocation condensed to the positions, for constant mass and constant rate of the conformal factor.
 
 use super::coefficients::{Coefficients, MOST};
+use super::compensated::Twofold;
 use super::stages::{Exact, StageMap, Stages, Weights, padded, solve_exactly};
 use crate::InputError;
 use num_traits::{One, Zero};
@@ -25,13 +26,13 @@ pub(super) struct Condensed {
     pub inverse_rho: Stages,
     /// The times of the stages after the step's start.
     pub times: Stages,
-    /// `end_u`, head and tail.
-    pub end_u: [f64; 2],
+    /// `end_u`.
+    pub end_u: Twofold,
     pub end_b: Weights,
     /// The same in double-double precision, and `D`, `1 / rho`, `end_u`, `grow` and `end_v` likewise.
     pub exact: Box<ExactEnd>,
-    /// `sigma_d - 1`, head and tail.
-    pub grow: [f64; 2],
+    /// `sigma_d - 1`.
+    pub grow: Twofold,
     pub end_v: Weights,
     /// From the stages of one step to those of the next.
     pub ahead: StageMap,
@@ -84,7 +85,6 @@ impl Condensed {
             grow: fallen / end_rho,
             end_v: from_fn(|j| if j < s { step * g.b[j] * rho[j] / end_rho } else { zero }),
         };
-        let pair = |x: Quad| [x.0, x.1];
         Ok(Condensed {
             s,
             h,
@@ -94,9 +94,9 @@ impl Condensed {
             d: StageMap::from_exact(&velocity, s),
             inverse_rho: padded(&exact.inverse_rho, s),
             times: padded(&g.c.map(|c| c * step), s),
-            end_u: pair(exact.end_u),
+            end_u: exact.end_u.into(),
             end_b: Weights::new(&exact.end_b),
-            grow: pair(exact.grow),
+            grow: exact.grow.into(),
             end_v: Weights::new(&exact.end_v),
             ahead: StageMap::new(&g.ahead, s),
             exact: Box::new(exact),

@@ -1,7 +1,7 @@
 //! Steps of contact Gauss collocation for every regular Lagrangian.
 
 use super::coefficients::{Coefficients, MOST};
-use super::separable::{Compensated, add, finite};
+use super::compensated::{Compensated, Twofold, add, finite};
 use super::stages::{StageMap, Stages, Weights, blocks, padded};
 use super::sweeps::{Progress, Sweeps};
 use crate::lanes::Lanes;
@@ -291,13 +291,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
     fn finish<S: Simd>(&mut self) -> Progress {
         let (b, s) = (&self.table.b, self.table.s);
         let (fallen, dz) = (b.sum::<S>(&self.rate, s), b.sum::<S>(&self.l, s));
-        if fallen >= 1.0 {
-            return Progress::SigmaVanished { sigma: 1.0 / (1.0 - fallen) };
+        if fallen.head >= 1.0 {
+            return Progress::SigmaVanished { sigma: 1.0 / (1.0 - fallen.head) };
         }
-        let (mut dq, mut dp) = ([0.0; N], [0.0; N]);
+        let sigma = 1.0 / (1.0 - fallen.head);
+        let (mut dq, mut dp) = ([Twofold::default(); N], [Twofold::default(); N]);
         for d in 0..N {
             dq[d] = b.sum::<S>(&self.v[d], s);
-            dp[d] = (self.p[d].value * fallen + b.sum::<S>(&self.force[d], s)) / (1.0 - fallen);
+            // (p fallen + force) / (1 - fallen), to first order in the tails.
+            let pushed = fallen * self.p[d].value + b.sum::<S>(&self.force[d], s);
+            let head = pushed.head / (1.0 - fallen.head);
+            dp[d] = Twofold { head, tail: (pushed.tail + fallen.tail * head) * sigma };
         }
         // The largest change over lanes may hide a NaN; one of `fallen` is in `dp`.
         if !finite(&dq, &dp, dz) {
@@ -306,7 +310,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
         add(&mut self.q, &dq);
         add(&mut self.p, &dp);
         self.z.add(dz);
-        self.fallen = fallen;
+        self.fallen = fallen.head;
         self.warm = true;
         Progress::Done
     }

@@ -1,38 +1,15 @@
 //! Steps of contact Gauss collocation for a linear motion: one matrix, made once.
 
 use super::coefficients::MOST;
+use super::compensated::{Compensated, Twofold};
 use super::condensed::Condensed;
 use super::dense::Start;
-use super::separable::Compensated;
 use super::stages::solve_exactly;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Hessian, Lagrangian, VelocityPoint};
 use num_traits::{One, Zero};
 use qd::Quad;
-
-/// A matrix with the part that one double leaves out: in a product that is repeated in every step the rounding of the
-/// entries adds up, that of the product does not.
-#[derive(Clone, Copy)]
-struct Twofold<const N: usize> {
-    head: SMatrix<f64, N, N>,
-    tail: SMatrix<f64, N, N>,
-}
-
-impl<const N: usize> Twofold<N> {
-    fn from_fn(f: impl Fn(usize, usize) -> Quad) -> Self {
-        Twofold { head: SMatrix::from_fn(|i, j| f(i, j).0), tail: SMatrix::from_fn(|i, j| f(i, j).1) }
-    }
-
-    #[inline(always)]
-    fn row(&self, i: usize, x: &[f64; N]) -> [f64; 2] {
-        let (mut head, mut tail) = (0.0, 0.0);
-        for j in 0..N {
-            head += self.head[(i, j)] * x[j];
-            tail += self.tail[(i, j)] * x[j];
-        }
-        [head, tail]
-    }
-}
+use std::array::from_fn;
 
 /// The change of the action, a polynomial of degree two in (q, v), beside `grow z`.
 struct Action<const N: usize> {
@@ -46,13 +23,13 @@ struct Action<const N: usize> {
 
 /// The state of a linear motion and the affine map that advances it, as changes: `q1 - q0`, `v1 - v0`.
 pub(super) struct Linear<const N: usize> {
-    qq: Twofold<N>,
-    qv: Twofold<N>,
-    vq: Twofold<N>,
-    vv: Twofold<N>,
-    shift_q: SVector<f64, N>,
-    shift_v: SVector<f64, N>,
-    grow: [f64; 2],
+    qq: [[Twofold; N]; N],
+    qv: [[Twofold; N]; N],
+    vq: [[Twofold; N]; N],
+    vv: [[Twofold; N]; N],
+    shift_q: [Twofold; N],
+    shift_v: [Twofold; N],
+    grow: Twofold,
     action: Option<Action<N>>,
     /// The accelerations of the stages, row `i N + d`, as affine functions of (q0, v0): for dense output.
     stages: Vec<Vec<f64>>,
@@ -131,18 +108,19 @@ impl<const N: usize> Linear<N> {
                 constant: form(2 * N, 2 * N),
             }
         });
+        let entries = |f: &dyn Fn(usize, usize) -> Quad| from_fn(|d| from_fn(|e| f(d, e).into()));
         Some(Linear {
-            qq: Twofold::from_fn(|d, e| sum(&exact.end_b, d, e)),
-            qv: Twofold::from_fn(|d, e| unit(d, e, exact.end_u) + sum(&exact.end_b, d, N + e)),
-            vq: Twofold::from_fn(|d, e| sum(&exact.end_v, d, e)),
-            vv: Twofold::from_fn(|d, e| unit(d, e, exact.grow) + sum(&exact.end_v, d, N + e)),
-            shift_q: SVector::from_fn(|d, _| sum(&exact.end_b, d, 2 * N).0),
-            shift_v: SVector::from_fn(|d, _| sum(&exact.end_v, d, 2 * N).0),
+            qq: entries(&|d, e| sum(&exact.end_b, d, e)),
+            qv: entries(&|d, e| unit(d, e, exact.end_u) + sum(&exact.end_b, d, N + e)),
+            vq: entries(&|d, e| sum(&exact.end_v, d, e)),
+            vv: entries(&|d, e| unit(d, e, exact.grow) + sum(&exact.end_v, d, N + e)),
+            shift_q: from_fn(|d| sum(&exact.end_b, d, 2 * N).into()),
+            shift_v: from_fn(|d| sum(&exact.end_v, d, 2 * N).into()),
             grow: table.grow,
             action,
             stages: rows.iter().map(|row| row[s * N..].iter().map(|e| e.0).collect()).collect(),
-            q: std::array::from_fn(|i| start.q[i].into()),
-            v: std::array::from_fn(|i| start.v[i].into()),
+            q: from_fn(|i| start.q[i].into()),
+            v: from_fn(|i| start.v[i].into()),
             z: start.z.into(),
         })
     }
@@ -183,9 +161,10 @@ impl<const N: usize> Linear<N> {
     /// Takes one step.
     #[inline(always)]
     fn step(&mut self) {
-        let (q, v) = (self.q.map(|q| q.value), self.v.map(|v| v.value));
+        let (q, v) = (self.q, self.v);
         if let Some(action) = &self.action {
-            let mut change = action.constant + self.grow[0] * self.z.value;
+            let (q, v) = (q.map(|q| q.value), v.map(|v| v.value));
+            let mut change = action.constant;
             for i in 0..N {
                 let (mut of_q, mut of_v) = (action.q[i], action.v[i]);
                 for j in 0..N {
@@ -194,13 +173,14 @@ impl<const N: usize> Linear<N> {
                 }
                 change += of_q * q[i] + of_v * v[i];
             }
-            self.z.add(change + self.grow[1] * self.z.value);
+            self.z.add(Twofold { head: change, tail: 0.0 } + self.grow * self.z.value);
         }
         for i in 0..N {
-            let ([a, a_tail], [b, b_tail]) = (self.qq.row(i, &q), self.qv.row(i, &v));
-            self.q[i].add((a_tail + b_tail + self.shift_q[i]) + (a + b));
-            let ([a, a_tail], [b, b_tail]) = (self.vq.row(i, &q), self.vv.row(i, &v));
-            self.v[i].add((a_tail + b_tail + self.shift_v[i]) + (a + b));
+            let row = |of_q: &[Twofold; N], of_v: &[Twofold; N], shift: Twofold| {
+                (0..N).fold(shift, |sum, j| sum.plus(of_q[j].times(q[j]).plus(of_v[j].times(v[j]))))
+            };
+            self.q[i].add(row(&self.qq[i], &self.qv[i], self.shift_q[i]));
+            self.v[i].add(row(&self.vq[i], &self.vv[i], self.shift_v[i]));
         }
     }
 
@@ -221,8 +201,8 @@ impl<const N: usize> Linear<N> {
             }
         };
         let s = self.stages.len() / N;
-        std::array::from_fn(|d| {
-            std::array::from_fn(|i| {
+        from_fn(|d| {
+            from_fn(|i| {
                 if i >= s {
                     return 0.0;
                 }

@@ -1,6 +1,7 @@
 //! Contact Gauss collocation.
 
 mod coefficients;
+mod compensated;
 mod condensed;
 mod dense;
 mod general;

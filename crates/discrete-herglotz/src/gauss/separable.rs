@@ -1,5 +1,6 @@
 //! Steps of contact Gauss collocation for `L = v.Mv/2 - V(t, q) + gamma z`.
 
+use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
 use super::stages::{Stages, blocks};
 use super::sweeps::{Progress, Sweeps};
@@ -7,44 +8,6 @@ use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Dual, Lagrangian, PhasePoint, VelocityPoint};
 use pulp::Simd;
-
-/// A number with the part that its last digit leaves out, so that a sum of small changes loses nothing.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Compensated {
-    pub value: f64,
-    rest: f64,
-}
-
-impl From<f64> for Compensated {
-    fn from(value: f64) -> Self {
-        Compensated { value, rest: 0.0 }
-    }
-}
-
-impl Compensated {
-    /// Adds a change that is smaller than the value, or not by much larger.
-    #[inline(always)]
-    pub fn add(&mut self, change: f64) {
-        let change = change + self.rest;
-        let sum = self.value + change;
-        // Knuth's exact difference, since the change may be the larger.
-        let virtual_change = sum - self.value;
-        self.rest = (self.value - (sum - virtual_change)) + (change - virtual_change);
-        self.value = sum;
-    }
-}
-
-/// Whether changes of positions, of velocities or momenta, and of the action are finite: a sum hides no NaN.
-#[inline(always)]
-pub(super) fn finite<const N: usize>(dq: &[f64; N], dy: &[f64; N], dz: f64) -> bool {
-    (0..N).fold(dz, |sum, d| sum + (dq[d] + dy[d])).is_finite()
-}
-
-/// Adds changes.
-#[inline(always)]
-pub(super) fn add<const N: usize>(x: &mut [Compensated; N], changes: &[f64; N]) {
-    x.iter_mut().zip(changes).for_each(|(x, change)| x.add(*change));
-}
 
 /// The state and the workspace of the condensed step.
 pub(super) struct Separable<'a, L, const N: usize> {
@@ -181,17 +144,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
     #[inline(always)]
     fn finish<S: Simd>(&mut self, t: f64) -> Progress {
         let (table, s) = (&self.table, self.table.s);
-        let (mut dq, mut dv, mut dz) = ([0.0; N], [0.0; N], 0.0);
+        let (mut dq, mut dv, mut dz) = ([Twofold::default(); N], [Twofold::default(); N], Twofold::default());
         if self.wants_z {
-            let grown = table.grow[0] * self.z.value + table.grow[1] * self.z.value;
-            dz = grown + table.end_v.sum::<S>(&self.action::<S>(t), s);
+            dz = table.grow * self.z.value + table.end_v.sum::<S>(&self.action::<S>(t), s);
         }
         for d in 0..N {
             let v = self.v[d].value;
-            let moved = table.end_b.sum::<S>(&self.a[d], s) + table.end_u[1] * v;
-            dq[d] = moved + table.end_u[0] * v;
-            let pushed = table.end_v.sum::<S>(&self.a[d], s) + table.grow[1] * v;
-            dv[d] = pushed + table.grow[0] * v;
+            dq[d] = table.end_b.sum::<S>(&self.a[d], s) + table.end_u * v;
+            dv[d] = table.end_v.sum::<S>(&self.a[d], s) + table.grow * v;
         }
         // The largest change over lanes may hide a NaN.
         if !finite(&dq, &dv, dz) {

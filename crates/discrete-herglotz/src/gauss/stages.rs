@@ -1,6 +1,7 @@
 //! Values at the stages of a collocation step, and linear maps between them, in vector lanes.
 
 use super::coefficients::MOST;
+use super::compensated::Twofold;
 use crate::lanes::Lanes;
 use pulp::Simd;
 use qd::Quad;
@@ -54,14 +55,14 @@ impl Weights {
 
     /// The weighted sum over the stages.
     #[inline(always)]
-    pub fn sum<S: Simd>(&self, x: &Stages, s: usize) -> f64 {
+    pub fn sum<S: Simd>(&self, x: &Stages, s: usize) -> Twofold {
         let mut head = Lanes::<S>::splat(0.0);
         let mut tail = Lanes::<S>::splat(0.0);
         for r in 0..blocks::<S>(s) {
             head = self.head.block(r).mul_add(x.block(r), head);
             tail = self.tail.block(r).mul_add(x.block(r), tail);
         }
-        (head + tail).sum()
+        Twofold { head: head.sum(), tail: tail.sum() }
     }
 }
 

@@ -311,8 +311,8 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     fn sigma(&self) -> f64 {
         match &*self.route {
             _ if self.k == 0 => 1.0,
-            Route::Linear(_, table) => 1.0 + table.grow[0],
-            Route::Condensed(run) => 1.0 + run.table.grow[0],
+            Route::Linear(_, table) => 1.0 + table.grow.head,
+            Route::Condensed(run) => 1.0 + run.table.grow.head,
             Route::General(run) => 1.0 / (1.0 - run.fallen),
         }
     }

@@ -1,0 +1,162 @@
+//! Dense output of contact Gauss collocation, and events along it.
+
+use crate::gauss::{Claims, cut};
+use contact_geom::systems::{HarmonicOscillator, Pendulum, QuadraticInZ};
+use contact_geom::{Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
+use discrete_herglotz::{
+    Direction, Event, EventRun, EventStatus, Gauss, GaussRoute, InputError, Stepper, run_with_events,
+};
+
+/// By each route one curve, and of order s between the nodes: halving the step divides the largest error by `2^(s+1)`, the local
+/// order of the polynomial of degree s.
+#[test]
+fn curves_have_the_order_of_the_stages() {
+    let system = HarmonicOscillator { gamma: -0.5 };
+    let x = VelocityPoint::new([1.0], [0.5], 0.3);
+    let exact = |t: f64| legendre(&system, t, &system.solution(t, &x));
+    for s in 1..=6 {
+        let mut all = Vec::new();
+        for route in [GaussRoute::Linear, GaussRoute::Condensed, GaussRoute::ConstantMass, GaussRoute::General] {
+            let errors = [0.4, 0.2].map(|h| {
+                let claims = Claims(system, cut(&system, route));
+                let gauss = Gauss::new(&claims, s, h);
+                let stepper = gauss.as_ref().map(|g| g.stepper(0.0, legendre(&system, 0.0, &x), x.v));
+                let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
+                let mut worst = [0.0f64; 3];
+                assert_eq!(stepper.advance(1), Ok(()));
+                let Some(curve) = stepper.dense() else { panic!("no curve") };
+                for k in 0..=20 {
+                    let t = h * f64::from(k) / 20.0;
+                    let (a, b) = (curve.at(t), exact(t));
+                    all.push((k, h, a));
+                    let off = [(a.q - b.q).amax(), (a.p - b.p).amax(), (a.z - b.z).abs()];
+                    worst = std::array::from_fn(|i| worst[i].max(off[i]));
+                }
+                worst
+            });
+            for i in 0..3 {
+                let observed = (errors[0][i] / errors[1][i]).log2();
+                assert!((observed - (s + 1) as f64).abs() <= 0.35, "s = {s} {route:?} component {i}: {observed}");
+            }
+        }
+        let count = all.len() / 4;
+        for (k, x) in all.iter().enumerate() {
+            let off = Triple::from(x.2).minus(all[k % count].2.into()).amax();
+            assert!(off <= 1e-14, "s = {s}: routes differ by {off:e}");
+        }
+    }
+}
+
+/// A run with events of a system from its natural start.
+fn events<const N: usize, L: Lagrangian<N>>(
+    system: &L,
+    x: VelocityPoint<N>,
+    (s, h, steps): (usize, f64, usize),
+    events: &mut [Event<'_, N>],
+) -> EventRun<N> {
+    let gauss = Gauss::new(system, s, h);
+    let stepper = gauss.as_ref().map(|g| g.stepper(0.0, legendre(system, 0.0, &x), x.v));
+    let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
+    let run = run_with_events(&mut stepper, steps, events);
+    let Ok(run) = run else { panic!("{run:?}") };
+    run
+}
+
+/// The zeros of a damped oscillation are where the closed form has them, by direction, and the states are those there; to
+/// 1e-13, since 16 stages leave less.
+#[test]
+fn crossings_are_those_of_the_closed_form() {
+    let system = HarmonicOscillator { gamma: -0.1 };
+    let x = VelocityPoint::new([1.0], [0.0], 0.0);
+    let run = events(
+        &system,
+        x,
+        (16, 0.7, 30),
+        &mut [
+            Event::new(|_, x: &PhasePoint<1>| x.q[0]),
+            Event::new(|_, x: &PhasePoint<1>| x.q[0]).in_direction(Direction::Rising),
+            Event::new(|_, x: &PhasePoint<1>| x.q[0]).in_direction(Direction::Falling),
+        ],
+    );
+    assert_eq!((run.status, run.t), (EventStatus::Completed, 30.0 * 0.7));
+    let of = |event: usize| run.crossings.iter().filter(|c| c.event == event).collect::<Vec<_>>();
+    // q = e^(a t) (cos w t - (a/w) sin w t) vanishes where tan w t = w/a, a < 0.
+    let a = 0.5 * system.gamma;
+    let w = (1.0 - a * a).sqrt();
+    let expected = |k: usize| (k as f64 * std::f64::consts::PI + (w.atan2(a))) / w;
+    assert_eq!((of(0).len(), of(1).len(), of(2).len()), (6, 3, 3));
+    for (k, c) in of(0).iter().enumerate() {
+        assert!((c.t - expected(k)).abs() <= 1e-13 * expected(k), "{k}: {} {}", c.t, expected(k));
+        let there = legendre(&system, c.t, &system.solution(c.t, &x));
+        let off = Triple::from(c.state).minus(there.into()).amax();
+        assert!(off <= 1e-13, "{k}: {off:e}");
+        // Falling first.
+        assert_eq!(c.t, of(if k % 2 == 0 { 2 } else { 1 })[k / 2].t);
+    }
+    assert!(run.crossings.is_sorted_by(|a, b| a.t <= b.t));
+}
+
+/// Two changes of sign within one step are both seen; a terminal event ends the run at its state; later ones are not recorded;
+/// and what vanishes at the start is no change of sign.
+#[test]
+fn events_within_one_step() {
+    let system = HarmonicOscillator { gamma: -0.1 };
+    let x = VelocityPoint::new([1.0], [0.0], 0.0);
+    // q > -0.8 but for a short time around the first turning point, within one step.
+    let dip = || Event::new(|_, x: &PhasePoint<1>| x.q[0] + 0.8);
+    let run = events(&system, x, (16, 5.0, 1), &mut [dip()]);
+    assert_eq!(run.crossings.len(), 2, "{run:?}");
+    let turn = Event::new(|_, x: &PhasePoint<1>| x.p[0]).terminal();
+    let run = events(&system, x, (16, 5.0, 3), &mut [dip(), turn]);
+    assert_eq!(run.status, EventStatus::Terminated { event: 1 });
+    assert_eq!(run.crossings.iter().map(|c| c.event).collect::<Vec<_>>(), [0, 1]);
+    let turning = std::f64::consts::PI / (1.0f64 - 0.0025).sqrt();
+    assert!((run.t - turning).abs() <= 1e-11, "{} {turning}", run.t);
+    assert_eq!(run.crossings.last().map(|c| (c.t, c.state)), Some((run.t, run.state)));
+}
+
+/// A function that vanishes exactly at the end of a step, or part, changes its sign there and once.
+#[test]
+fn a_zero_at_a_node_is_one_crossing() {
+    let x = VelocityPoint::new([1.0], [0.0], 0.0);
+    let run = events(&Pendulum::default(), x, (4, 0.5, 6), &mut [Event::new(|t, _: &PhasePoint<1>| t - 1.0)]);
+    assert_eq!(run.crossings.iter().map(|c| c.t).collect::<Vec<_>>(), [1.0]);
+    // It touches and does not cross.
+    let run = events(&Pendulum::default(), x, (4, 0.5, 6), &mut [Event::new(|t, _: &PhasePoint<1>| (t - 1.0).powi(2))]);
+    assert_eq!(run.crossings, []);
+}
+
+/// A function that is not finite ends the run with its time; what was found before is kept. So does a step that fails.
+#[test]
+fn bad_luck_is_a_status() {
+    let x = VelocityPoint::new([1.0], [0.0], 1.0);
+    let mut all = [
+        Event::new(|_, x: &PhasePoint<1>| x.q[0]),
+        Event::new(|t, _: &PhasePoint<1>| if t > 2.0 { f64::NAN } else { 1.0 }),
+    ];
+    let run = events(&QuadraticInZ { c: 0.1 }, x, (5, 0.3, 20), &mut all);
+    assert!(matches!(run.status, EventStatus::Undefined { event: 1, t } if t > 2.0 && t < 2.1), "{:?}", run.status);
+    assert_eq!(run.crossings.len(), 1);
+    assert!(run.t <= 2.0);
+    let gauss = Gauss::new(Pendulum::default(), 4, 0.1);
+    let stepper = gauss.as_ref().map(|g| g.stepper(0.0, PhasePoint::new([1.0], [0.0], 0.0), [0.0].into()));
+    let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
+    let refused = run_with_events(&mut stepper, 0, &mut []);
+    assert!(matches!(refused, Err(InputError::Count { found: 0, .. })), "{refused:?}");
+}
+
+/// Where nobody wants the action, z stays what it was, and the rest of the curve is the same.
+#[test]
+fn without_action() {
+    let system = Pendulum { gamma: -0.1 };
+    let start = PhasePoint::new([1.0], [0.5], 0.25);
+    let gauss = Gauss::new(system, 6, 0.3);
+    let Ok(gauss) = &gauss else { panic!("no method") };
+    let both = (gauss.stepper(0.0, start, [0.5].into()), gauss.stepper_without_action(0.0, start, [0.5].into()));
+    let (Ok(mut with), Ok(mut without)) = both else { panic!("no stepper") };
+    assert!(with.advance(2).is_ok() && without.advance(2).is_ok());
+    let (Some(a), Some(b)) = (with.dense(), without.dense()) else { panic!("no curve") };
+    for t in [0.3, 0.37, 0.6] {
+        assert_eq!((a.at(t).q, a.at(t).p, b.at(t).z), (b.at(t).q, b.at(t).p, 0.25));
+    }
+}
