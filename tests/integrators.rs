@@ -4,4 +4,5 @@
 
 mod common;
 
+mod clocked;
 mod scenes;
