@@ -59,45 +59,63 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     covariance / logs.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>()
 }
 
-/// Order 2s in q, p and z, on the problems of the other methods' orders, against a run of 16 stages with short steps. The
-/// points are the four finest of a geometric sequence of steps whose errors are above 1e-12; the band is that of the field,
-/// and 0.5 where few digits are between the asymptotic regime and round-off.
+/// Order 2s on the problems of the other methods' orders, against 16 stages with short steps.
+///
+/// Up to three stages in q, p and z apart. Then the error meets round-off so early that one component may be near a change of
+/// its sign wherever it is asymptotic: with four stages it is that of all components at three times, over the five finest steps
+/// above round-off. From five stages on a slope in double precision is one of the approach to the asymptotic regime, and
+/// bounded from below only; from seven on there is none, and each stage gains in a step of 1. That the order is 2s there too is what the order conditions say, tested with the coefficients.
 #[test]
 fn orders_are_twice_the_stages() {
     fn of<const N: usize, S: System<N>>(system: &S) {
-        const SPAN: f64 = 4.0;
         let start = (system.initial_time(), system.initial());
-        let (truth, ..) = run(system, start, 16, SPAN / 64.0, 64);
-        for s in 1..=8 {
-            let mut points: [Vec<(f64, f64)>; 3] = Default::default();
-            for k in 0..44 {
-                let steps = (f64::from(k) / 5.0).exp2().round() as usize * if s == 1 { 4 } else { 1 } + 1;
-                let h = SPAN / steps as f64;
-                if h > 1.3 {
-                    continue;
-                }
-                let (e, ..) = run(system, start, s, h, steps);
-                let errors = [(e.q - truth.q).amax(), (e.p - truth.p).amax(), (e.z - truth.z).abs()];
-                for (points, error) in points.iter_mut().zip(errors) {
-                    if error > 1e-12 && points.last().is_none_or(|last| last.0 > h) {
-                        points.push((h, error));
-                    }
-                }
-            }
-            let band = if s <= 5 { 0.15 } else { 0.5 };
-            for (points, name) in points.iter().zip(["q", "p", "z"]) {
-                let finest = &points[points.len().saturating_sub(4)..];
-                let (observed, order) = (slope(finest), 2.0 * s as f64);
-                println!(
-                    "{} s = {s} {name}: {observed:.3} {:.3}..{:.3}",
-                    system.name(),
-                    finest[0].0,
-                    finest[finest.len() - 1].0
+        for s in 1..=3 {
+            let (truth, ..) = run(system, start, 16, 1.0 / 32.0, 32);
+            let finest = [[64, 90, 128, 180], [24, 32, 48, 64], [9, 11, 14, 18]][s - 1];
+            let errors: Vec<_> = finest
+                .iter()
+                .map(|steps| {
+                    let h = 1.0 / *steps as f64;
+                    let (e, ..) = run(system, start, s, h, *steps);
+                    (h, [(e.q - truth.q).amax(), (e.p - truth.p).amax(), (e.z - truth.z).abs()])
+                })
+                .collect();
+            for (component, name) in ["q", "p", "z"].iter().enumerate() {
+                let points: Vec<_> = errors.iter().map(|(h, e)| (*h, e[component])).collect();
+                let observed = slope(&points);
+                assert!(
+                    (observed - 2.0 * s as f64).abs() < 0.15,
+                    "{} s = {s}: {observed:.3} in {name}; {points:?}",
+                    system.name()
                 );
-                if (observed - order).abs() >= band {
-                    println!("  BAD {finest:?}");
+            }
+        }
+        let truth = [1.0, 2.0, 3.0].map(|t| run(system, start, 16, t / 64.0, 64).0);
+        let mut coarsest = f64::INFINITY;
+        for s in 4..=8 {
+            let mut points = Vec::new();
+            for steps in 1..40 {
+                let h = 1.0 / steps as f64;
+                let off = |k: usize| {
+                    let (e, ..) = run(system, start, s, h, steps * (k + 1));
+                    let t = &truth[k];
+                    (e.q - t.q).norm_squared() + (e.p - t.p).norm_squared() + (e.z - t.z).powi(2)
+                };
+                let error = (0..3).map(off).sum::<f64>().sqrt();
+                // Fifty units of round-off of these states.
+                if error > 1.5e-14 {
+                    points.push((h, error));
                 }
             }
+            let order = 2.0 * s as f64;
+            let observed = slope(&points[points.len().saturating_sub(5)..]);
+            let holds = match s {
+                4 => (observed - order).abs() < 0.15,
+                5 | 6 => observed > order - 4.0,
+                _ => true,
+            };
+            assert!(holds && points[0].1 < 0.5 * coarsest, "{} s = {s}: {observed:.3}; {points:?}", system.name());
+            coarsest = points[0].1;
         }
     }
     of(&QuadraticInZ { c: 1.0 });
@@ -112,49 +130,50 @@ pub fn distance<const N: usize>(a: PhasePoint<N>, b: PhasePoint<N>) -> f64 {
     Triple::from(a).minus(b.into()).amax() / Triple::from(a).amax().max(Triple::from(b).amax())
 }
 
-/// A decayed oscillation keeps its relative accuracy: after t = 1000 the error is below 50 eps of the amplitude
-/// `e^(gamma t/2) = 1e-11`, by the linear route and by the iterated one.
+/// A decayed oscillation keeps its relative accuracy, after t = 1000 in units of the amplitude `e^(gamma t/2) = 1e-11`. By the
+/// linear route, whose products are exact, to 4 eps: those of the closed form. By the iterated one to 400: the positions of
+/// the stages are sums with rounded coefficients, a fraction of an eps in every step and in the same direction.
 #[test]
 fn decayed_states_keep_their_accuracy() {
     let system = HarmonicOscillator { gamma: -0.05 };
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
     let t = 1000.0;
-    // The closed form with the phase reduced: `w t` has 1000 times the rounding of w, which the sum w = (1 + d) - d2 does not.
+    // The closed form without the rounding of the phase `w t` and of the exponent `a t`.
     let a = 0.5 * system.gamma;
     let w_less_one = -a * a / ((1.0 - a * a).sqrt() + 1.0);
-    let (s1, c1) = f64::sin_cos(t);
-    let (s2, c2) = f64::sin_cos(w_less_one * t);
+    let ((s1, c1), (s2, c2)) = (f64::sin_cos(t), f64::sin_cos(w_less_one * t));
     let (s, c, w) = (s1 * c2 + c1 * s2, c1 * c2 - s1 * s2, 1.0 + w_less_one);
-    let amplitude = (a * t).exp();
+    let amplitude = (a * t).exp() * (1.0 + a.mul_add(t, -(a * t)));
     let (q, v) = (amplitude * (c - a / w * s), -amplitude * s / w);
-    for (stages, steps) in [(8, 1200), (16, 250)] {
-        for route in [GaussRoute::Linear, GaussRoute::Condensed] {
+    // Steps that are exact, so that the time is.
+    for (stages, h) in [(8, 0.5), (8, 0.625), (16, 2.5), (16, 5.0)] {
+        for (route, bound) in [(GaussRoute::Linear, 4.0), (GaussRoute::Condensed, 400.0)] {
             let claims = Claims(system, cut(&system, route));
-            let (end, _, taken) = run(&claims, (0.0, x), stages, t / f64::from(steps), steps as usize);
+            let (end, _, taken) = run(&claims, (0.0, x), stages, h, (t / h) as usize);
             let error = (end.q[0] - q).abs().max((end.p[0] - v).abs()) / (amplitude * f64::EPSILON);
-            println!("s = {stages} {route:?}: {error:.1} eps");
             assert_eq!(taken, route);
-            assert!(error <= 50.0, "s = {stages} {route:?}: {error} eps");
+            assert!(error <= bound, "s = {stages} {route:?}: {error} eps");
         }
     }
 }
 
-/// Angular momentum decays as `e^(gamma t)` on an orbit of eccentricity 1/2: to 1e-13 over 1e5 steps.
+/// Angular momentum decays as `e^(gamma t)` on an orbit of eccentricity 1/2: to 1e-13 in 1e5 steps, while the orbit shrinks by
+/// `e^(2 gamma t)` to 0.29 of its size, and to 5e-13 in 1e6 of a slower decay.
 #[test]
 fn angular_momentum_decays_exactly() {
-    let system = Kepler::<2> { gamma: -1e-4, mu: 1.0 };
     let x = VelocityPoint::new([0.5, 0.0], [0.0, 3f64.sqrt()], 0.0);
-    let (h, steps) = (0.1, 100_000);
-    let (end, ..) = run(&system, (0.0, x), 8, h, steps);
-    let momentum = |q: &SVector<f64, 2>, p: &SVector<f64, 2>| q[0] * p[1] - q[1] * p[0];
-    let expected = momentum(&x.q, &x.v) * (system.gamma * h * steps as f64).exp();
-    let error = (momentum(&end.q, &end.p) / expected - 1.0).abs();
-    println!("angular momentum {error:e}");
-    assert!(error <= 1e-13, "{error:e}");
+    for (gamma, steps, bound) in [(-1e-4, 100_000, 1e-13), (-1e-6, 1_000_000, 5e-13)] {
+        let h = 0.0625;
+        let (end, ..) = run(&Kepler::<2> { gamma, mu: 1.0 }, (0.0, x), 8, h, steps);
+        let momentum = |q: &SVector<f64, 2>, p: &SVector<f64, 2>| q[0] * p[1] - q[1] * p[0];
+        let expected = momentum(&x.q, &x.v) * (gamma * h * steps as f64).exp();
+        let error = (momentum(&end.q, &end.p) / expected - 1.0).abs();
+        assert!(error <= bound, "gamma = {gamma}: {error:e}");
+    }
 }
 
-/// One system by each route whose claims it meets: equal to round-off after 100 steps. A phase gathers the rounding of
-/// each step, so a few eps a step at most; 300 eps are within that.
+/// One system by each route whose claims it meets: equal to round-off after 100 steps, in which the rounding of
+/// each adds up to 10 eps at random and no more than 30.
 #[test]
 fn routes_agree() {
     fn of<const N: usize, S: System<N>>(system: &S, s: usize, h: f64, routes: &[GaussRoute]) {
@@ -162,17 +181,14 @@ fn routes_agree() {
             .iter()
             .map(|route| {
                 let claims = Claims(system, cut(system, *route));
-                let (end, evaluations, taken) = run(&claims, (0.0, system.initial()), s, h, 100);
+                let (end, _, taken) = run(&claims, (0.0, system.initial()), s, h, 100);
                 assert_eq!(taken, *route, "{}", system.name());
-                let sweeps = evaluations as f64 / (100.0 * s as f64);
-                println!("{} s = {s} {route:?}: {sweeps} sweeps", system.name());
                 end
             })
             .collect();
         for (end, route) in ends.iter().zip(routes) {
             let off = distance(*end, ends[0]) / f64::EPSILON;
-            println!("{} s = {s} {route:?}: {off:.1} eps", system.name());
-            assert!(off <= 300.0, "{} s = {s} {route:?}: {off} eps", system.name());
+            assert!(off <= 30.0, "{} s = {s} {route:?}: {off} eps", system.name());
         }
     }
     use GaussRoute::{Condensed, ConstantMass, General, Linear};
@@ -183,17 +199,16 @@ fn routes_agree() {
     }
 }
 
-/// Sweeps a step: the extrapolated start and the slope of the force keep them low. Measured 3.5 on the condensed route and 4.9 on
-/// the general one with 8 stages and h = 0.5; twice as many without either.
+/// Sweeps a step, which is what the extrapolated start and the slope of the force are there for: 4.03 on the condensed route
+/// and 5.93 on the general ones were measured, and a tenth more is allowed.
 #[test]
 fn few_sweeps() {
     let system = Pendulum { gamma: -0.01 };
     let x = VelocityPoint::new([1.0], [1.0], 0.0);
-    for (route, most) in [(GaussRoute::Condensed, 0.0), (GaussRoute::ConstantMass, 0.0), (GaussRoute::General, 0.0)] {
+    for (route, most) in [(GaussRoute::Condensed, 4.4), (GaussRoute::ConstantMass, 6.5), (GaussRoute::General, 6.5)] {
         let (_, evaluations, _) = run(&Claims(system, cut(&system, route)), (0.0, x), 8, 0.5, 1000);
         let sweeps = evaluations as f64 / 8e3;
-        println!("{route:?}: {sweeps}");
-        assert!(sweeps <= most || most == 0.0, "{route:?}: {sweeps} sweeps");
+        assert!(sweeps <= most, "{route:?}: {sweeps} sweeps");
     }
 }
 
@@ -225,7 +240,7 @@ fn newton_takes_over() {
         let stepper = || gauss.as_ref().ok().and_then(|g| g.stepper(0.0, start, x.v).ok());
         let (Some(mut stepper), Some(without)) = (stepper(), stepper()) else { panic!("no stepper") };
         assert_eq!(stepper.advance(1), Ok(()), "{:?}", stepper.route());
-        assert_eq!(stepper.newton_steps(), 1);
+        assert_eq!(stepper.newton_steps(), 1, "{:?}", stepper.route());
         let mut without = without.without_newton();
         let halt = without.advance(3);
         assert!(
@@ -235,7 +250,7 @@ fn newton_takes_over() {
         assert_eq!((without.state(), without.time(), without.sigma()), (start, 0.0, 1.0));
         assert!(without.dense().is_none());
         let Ok(gauss) = &gauss else { return };
-        let step = gauss.forward(0.0, &start, &SVector::zeros(), &mut Default::default());
+        let step = gauss.forward(0.0, &start, &x.v, &mut Default::default());
         assert!(step.is_ok(), "{step:?}");
         let Ok(step) = step else { return };
         let off = distance(stepper.state(), step.end);
@@ -253,9 +268,9 @@ fn newton_takes_over() {
         assert_eq!(stepper.advance(2), Ok(()));
     }
     let pendulum = Pendulum { gamma: -0.1 };
-    let x = VelocityPoint::new([1.0], [1.0], 0.0);
+    let x = VelocityPoint::new([2.0], [1.0], 0.0);
     for route in [GaussRoute::Condensed, GaussRoute::ConstantMass, GaussRoute::General] {
-        of(&Claims(pendulum, cut(&pendulum, route)), x, 4, 6.0, 1e-12);
+        of(&Claims(pendulum, cut(&pendulum, route)), x, 4, 5.0, 1e-12);
     }
     // Strong damping: factors up to e^20 in one step, of whose size the terms of all momenta are.
     let damped = HarmonicOscillator { gamma: -20.0 };
@@ -305,9 +320,9 @@ fn what_is_not_finite_is_refused() {
         }
     }
     for claims in [Ends.structure(), Structure::default()] {
-        let gauss = Gauss::new(Claims(Ends, claims), 4, 0.1);
-        let start = PhasePoint::new([0.0, 1.0], [1.0, 0.0], 0.0);
-        let stepper = gauss.as_ref().map(|g| g.stepper(0.0, start, [1.0, 0.0].into()));
+        let gauss = Gauss::new(Claims(Ends, claims), 4, 0.02);
+        let start = PhasePoint::new([0.0, 1.0], [2.5, 0.0], 0.0);
+        let stepper = gauss.as_ref().map(|g| g.stepper(0.0, start, [2.5, 0.0].into()));
         let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
         let halt = stepper.advance(1000);
         assert!(matches!(halt, Err(Halt { taken: 10..100, .. })), "{halt:?}");

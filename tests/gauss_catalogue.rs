@@ -114,4 +114,3 @@ fn curves_meet_the_states() {
     }
     visit_catalogue(&mut Visitor);
 }
-

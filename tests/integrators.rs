@@ -6,6 +6,7 @@
 #[allow(dead_code, unused_imports)]
 mod common;
 
+mod clocked;
 mod conformal_steppers;
 mod dense_output;
 mod gauss;

@@ -24,18 +24,18 @@ pub trait Module<T>: Copy + PartialEq + Debug + 'static {
 }
 
 impl<T: Scalar, const N: usize> Module<T> for SVector<T, N> {
-    #[inline(always)]
+    #[inline]
     fn null() -> Self {
         SVector::from_array_storage(nalgebra::ArrayStorage([[T::zero(); N]]))
     }
-    #[inline(always)]
+    #[inline]
     fn each(mut self, mut f: impl FnMut(T) -> T) -> Self {
         for a in self.data.0[0].iter_mut() {
             *a = f(*a);
         }
         self
     }
-    #[inline(always)]
+    #[inline]
     fn join(mut self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
         for (a, b) in self.data.0[0].iter_mut().zip(other.data.0[0]) {
             *a = f(*a, b);
@@ -54,15 +54,15 @@ pub struct Border<const N: usize, T = f64> {
 }
 
 impl<T: Scalar, const N: usize> Module<T> for Border<N, T> {
-    #[inline(always)]
+    #[inline]
     fn null() -> Self {
         Border { x: Module::null(), z: T::zero() }
     }
-    #[inline(always)]
+    #[inline]
     fn each(self, mut f: impl FnMut(T) -> T) -> Self {
         Border { x: Module::each(self.x, &mut f), z: f(self.z) }
     }
-    #[inline(always)]
+    #[inline]
     fn join(self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
         Border { x: Module::join(self.x, other.x, &mut f), z: f(self.z, other.z) }
     }
@@ -90,33 +90,27 @@ pub struct Dual<T, D> {
 
 impl<T: Scalar, D: Module<T>> Dual<T, D> {
     /// A constant: its differential vanishes.
-    #[inline(always)]
+    #[inline]
     pub fn constant(re: T) -> Self {
         Dual { re, d: D::null() }
     }
 
     /// `f(x)` by the chain rule, given `f(re)` and `f'(re)`.
-    #[inline(always)]
+    #[inline]
     fn chain(self, value: T, slope: T) -> Self {
-        Dual {
-            re: value,
-            d: self.d.each(
-                #[inline(always)]
-                |a| a * slope,
-            ),
-        }
+        Dual { re: value, d: self.d.each(|a| a * slope) }
     }
 }
 
 impl<T: Scalar, D: Module<T>> From<f64> for Dual<T, D> {
-    #[inline(always)]
+    #[inline]
     fn from(x: f64) -> Self {
         Dual::constant(T::from(x))
     }
 }
 
 impl<T: Scalar, D: Module<T>> Zero for Dual<T, D> {
-    #[inline(always)]
+    #[inline]
     fn zero() -> Self {
         Dual::constant(T::zero())
     }
@@ -126,7 +120,7 @@ impl<T: Scalar, D: Module<T>> Zero for Dual<T, D> {
 }
 
 impl<T: Scalar, D: Module<T>> One for Dual<T, D> {
-    #[inline(always)]
+    #[inline]
     fn one() -> Self {
         Dual::constant(T::one())
     }
@@ -134,83 +128,49 @@ impl<T: Scalar, D: Module<T>> One for Dual<T, D> {
 
 impl<T: Scalar, D: Module<T>> Neg for Dual<T, D> {
     type Output = Self;
-    #[inline(always)]
+    #[inline]
     fn neg(self) -> Self {
-        Dual {
-            re: -self.re,
-            d: self.d.each(
-                #[inline(always)]
-                |a| -a,
-            ),
-        }
+        Dual { re: -self.re, d: self.d.each(|a| -a) }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Add for Dual<T, D> {
     type Output = Self;
-    #[inline(always)]
+    #[inline]
     fn add(self, b: Self) -> Self {
-        Dual {
-            re: self.re + b.re,
-            d: self.d.join(
-                b.d,
-                #[inline(always)]
-                |x, y| x + y,
-            ),
-        }
+        Dual { re: self.re + b.re, d: self.d.join(b.d, |x, y| x + y) }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Sub for Dual<T, D> {
     type Output = Self;
-    #[inline(always)]
+    #[inline]
     fn sub(self, b: Self) -> Self {
-        Dual {
-            re: self.re - b.re,
-            d: self.d.join(
-                b.d,
-                #[inline(always)]
-                |x, y| x - y,
-            ),
-        }
+        Dual { re: self.re - b.re, d: self.d.join(b.d, |x, y| x - y) }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Mul for Dual<T, D> {
     type Output = Self;
-    #[inline(always)]
+    #[inline]
     fn mul(self, b: Self) -> Self {
         let a = self.re;
-        Dual {
-            re: a * b.re,
-            d: self.d.join(
-                b.d,
-                #[inline(always)]
-                |x, y| x * b.re + a * y,
-            ),
-        }
+        Dual { re: a * b.re, d: self.d.join(b.d, |x, y| x * b.re + a * y) }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Div for Dual<T, D> {
     type Output = Self;
-    #[inline(always)]
+    #[inline]
     fn div(self, b: Self) -> Self {
         let (quotient, inverse) = (self.re / b.re, b.re.recip());
-        Dual {
-            re: quotient,
-            d: self.d.join(
-                b.d,
-                #[inline(always)]
-                |x, y| (x - quotient * y) * inverse,
-            ),
-        }
+        Dual { re: quotient, d: self.d.join(b.d, |x, y| (x - quotient * y) * inverse) }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Add<f64> for Dual<T, D> {
     type Output = Self;
-    #[inline(always)]
+    #[inline]
     fn add(self, b: f64) -> Self {
         Dual { re: self.re + b, d: self.d }
     }
@@ -218,7 +178,7 @@ impl<T: Scalar, D: Module<T>> Add<f64> for Dual<T, D> {
 
 impl<T: Scalar, D: Module<T>> Sub<f64> for Dual<T, D> {
     type Output = Self;
-    #[inline(always)]
+    #[inline]
     fn sub(self, b: f64) -> Self {
         Dual { re: self.re - b, d: self.d }
     }
@@ -226,36 +186,24 @@ impl<T: Scalar, D: Module<T>> Sub<f64> for Dual<T, D> {
 
 impl<T: Scalar, D: Module<T>> Mul<f64> for Dual<T, D> {
     type Output = Self;
-    #[inline(always)]
+    #[inline]
     fn mul(self, b: f64) -> Self {
-        Dual {
-            re: self.re * b,
-            d: self.d.each(
-                #[inline(always)]
-                |a| a * b,
-            ),
-        }
+        Dual { re: self.re * b, d: self.d.each(|a| a * b) }
     }
 }
 
 impl<T: Scalar, D: Module<T>> Div<f64> for Dual<T, D> {
     type Output = Self;
-    #[inline(always)]
+    #[inline]
     fn div(self, b: f64) -> Self {
-        Dual {
-            re: self.re / b,
-            d: self.d.each(
-                #[inline(always)]
-                |a| a / b,
-            ),
-        }
+        Dual { re: self.re / b, d: self.d.each(|a| a / b) }
     }
 }
 
 macro_rules! assign {
     ($($name:ident, $method:ident, $op:tt;)*) => {$(
         impl<T: Scalar, D: Module<T>> $name for Dual<T, D> {
-            #[inline(always)]
+            #[inline]
             fn $method(&mut self, b: Self) {
                 *self = *self $op b;
             }
@@ -270,33 +218,30 @@ assign! {
 }
 
 impl<T: Scalar, D: Module<T>> Scalar for Dual<T, D> {
-    #[inline(always)]
+    #[inline]
     fn re(self) -> f64 {
         self.re.re()
     }
-    #[inline(always)]
+    #[inline]
     fn extent(self) -> f64 {
         let mut largest = self.re.extent();
-        self.d.each(
-            #[inline(always)]
-            |a| {
-                largest = largest.max(a.extent());
-                a
-            },
-        );
+        self.d.each(|a| {
+            largest = largest.max(a.extent());
+            a
+        });
         largest
     }
-    #[inline(always)]
+    #[inline]
     fn recip(self) -> Self {
         let r = self.re.recip();
         self.chain(r, -(r * r))
     }
-    #[inline(always)]
+    #[inline]
     fn sqrt(self) -> Self {
         let r = self.re.sqrt();
         self.chain(r, r.recip() * 0.5)
     }
-    #[inline(always)]
+    #[inline]
     fn powi(self, n: i32) -> Self {
         if n == 0 {
             return Self::one();
@@ -304,53 +249,53 @@ impl<T: Scalar, D: Module<T>> Scalar for Dual<T, D> {
         let below = self.re.powi(n - 1);
         self.chain(below * self.re, below * f64::from(n))
     }
-    #[inline(always)]
+    #[inline]
     fn powf(self, a: f64) -> Self {
         let below = self.re.powf(a - 1.0);
         self.chain(below * self.re, below * a)
     }
-    #[inline(always)]
+    #[inline]
     fn exp(self) -> Self {
         let e = self.re.exp();
         self.chain(e, e)
     }
-    #[inline(always)]
+    #[inline]
     fn exp_m1(self) -> Self {
         let e = self.re.exp_m1();
         self.chain(e, e + 1.0)
     }
-    #[inline(always)]
+    #[inline]
     fn ln(self) -> Self {
         self.chain(self.re.ln(), self.re.recip())
     }
-    #[inline(always)]
+    #[inline]
     fn ln_1p(self) -> Self {
         self.chain(self.re.ln_1p(), (self.re + 1.0).recip())
     }
-    #[inline(always)]
+    #[inline]
     fn sin_cos(self) -> (Self, Self) {
         let (s, c) = self.re.sin_cos();
         (self.chain(s, c), self.chain(c, -s))
     }
-    #[inline(always)]
+    #[inline]
     fn sin_versine(self) -> (Self, Self) {
         let (s, v) = self.re.sin_versine();
         (self.chain(s, -v + 1.0), self.chain(v, s))
     }
-    #[inline(always)]
+    #[inline]
     fn sinh(self) -> Self {
         self.chain(self.re.sinh(), self.re.cosh())
     }
-    #[inline(always)]
+    #[inline]
     fn cosh(self) -> Self {
         self.chain(self.re.cosh(), self.re.sinh())
     }
-    #[inline(always)]
+    #[inline]
     fn tanh(self) -> Self {
         let t = self.re.tanh();
         self.chain(t, -(t * t) + 1.0)
     }
-    #[inline(always)]
+    #[inline]
     fn atan(self) -> Self {
         self.chain(self.re.atan(), (self.re * self.re + 1.0).recip())
     }

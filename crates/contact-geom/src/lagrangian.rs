@@ -60,13 +60,13 @@ pub trait Lagrangian<const N: usize> {
     }
 
     /// The partial derivatives `(L_q, L_v, L_z)`. Not to be overridden.
-    #[inline(always)]
+    #[inline]
     fn gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Triple<N, T> {
         self.closed_gradient(t, x).unwrap_or_else(|| derived_gradient(self, t, x))
     }
 
     /// The second partial derivatives in `(q, v, z)`. Not to be overridden.
-    #[inline(always)]
+    #[inline]
     fn hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Hessian<N, T> {
         self.closed_hessian(t, x).unwrap_or_else(|| derived_hessian(self, t, x))
     }
@@ -90,7 +90,7 @@ pub struct Hessian<const N: usize, T = f64> {
 }
 
 /// The gradient by automatic differentiation, whatever the implementor overrides.
-#[inline(always)]
+#[inline]
 pub fn derived_gradient<T: Scalar, const N: usize>(
     lagrangian: &(impl Lagrangian<N> + ?Sized),
     t: T,
@@ -101,7 +101,7 @@ pub fn derived_gradient<T: Scalar, const N: usize>(
 }
 
 /// The second derivatives by automatic differentiation of the gradient, itself derived or in closed form.
-#[inline(always)]
+#[inline]
 pub fn derived_hessian<T: Scalar, const N: usize>(
     lagrangian: &(impl Lagrangian<N> + ?Sized),
     t: T,

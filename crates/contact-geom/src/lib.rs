@@ -24,6 +24,7 @@
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
 mod action;
+mod clock;
 mod contact_form;
 mod darboux;
 mod discrete_form;
@@ -46,6 +47,7 @@ mod structure;
 pub mod systems;
 
 pub use action::{OneParameterGroup, Symmetry};
+pub use clock::Clock;
 pub use contact_form::{ContactForm, Form, generic};
 pub use darboux::Darboux;
 pub use discrete_form::{DiscreteJet, EtaMinus, EtaPlus, SecondDiscreteJet};

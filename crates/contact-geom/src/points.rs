@@ -18,15 +18,15 @@ pub struct Triple<const N: usize, T = f64> {
 }
 
 impl<T: Scalar, const N: usize> Module<T> for Triple<N, T> {
-    #[inline(always)]
+    #[inline]
     fn null() -> Self {
         Triple { x: Module::null(), y: Module::null(), z: T::zero() }
     }
-    #[inline(always)]
+    #[inline]
     fn each(self, mut f: impl FnMut(T) -> T) -> Self {
         Triple { x: Module::each(self.x, &mut f), y: Module::each(self.y, &mut f), z: f(self.z) }
     }
-    #[inline(always)]
+    #[inline]
     fn join(self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
         Triple {
             x: Module::join(self.x, other.x, &mut f),
@@ -38,38 +38,27 @@ impl<T: Scalar, const N: usize> Module<T> for Triple<N, T> {
 
 impl<T: Scalar, const N: usize> Triple<N, T> {
     /// The pairing of a covector with a vector: the sum of the products of their components.
-    #[inline(always)]
+    #[inline]
     pub fn dot(&self, other: &Self) -> T {
         self.x.dot(&other.x) + self.y.dot(&other.y) + self.z * other.z
     }
 
     /// This element times `a`.
-    #[inline(always)]
+    #[inline]
     pub fn scale(self, a: T) -> Self {
-        self.each(
-            #[inline(always)]
-            |c| c * a,
-        )
+        self.each(|c| c * a)
     }
 
     /// The sum of two elements.
-    #[inline(always)]
+    #[inline]
     pub fn plus(self, other: Self) -> Self {
-        self.join(
-            other,
-            #[inline(always)]
-            |a, b| a + b,
-        )
+        self.join(other, |a, b| a + b)
     }
 
     /// The difference of two elements.
-    #[inline(always)]
+    #[inline]
     pub fn minus(self, other: Self) -> Self {
-        self.join(
-            other,
-            #[inline(always)]
-            |a, b| a - b,
-        )
+        self.join(other, |a, b| a - b)
     }
 }
 
@@ -78,7 +67,7 @@ impl<const N: usize> Triple<N> {
     pub const DIMENSION: usize = 2 * N + 1;
 
     /// The component of index `i` in the order `x, y, z`; 0 beyond the last.
-    #[inline(always)]
+    #[inline]
     pub fn component(&self, i: usize) -> f64 {
         match i {
             _ if i < N => self.x[i],
@@ -104,22 +93,16 @@ impl<const N: usize> Triple<N> {
     }
 
     /// Whether every component is finite.
-    #[inline(always)]
+    #[inline]
     pub fn is_finite(&self) -> bool {
         let [x, y] = [self.x.data.0[0], self.y.data.0[0]];
-        x.iter().all(
-            #[inline(always)]
-            |c| c.is_finite(),
-        ) && y.iter().all(
-            #[inline(always)]
-            |c| c.is_finite(),
-        ) && self.z.is_finite()
+        x.iter().all(|c| c.is_finite()) && y.iter().all(|c| c.is_finite()) && self.z.is_finite()
     }
 }
 
 /// The point of a chart as duals whose differentials are the `2N + 1` coordinate directions: the identity map together
 /// with its derivative.
-#[inline(always)]
+#[inline]
 pub fn seed<T: Scalar, const N: usize>(point: &Triple<N, T>) -> Triple<N, Dual<T, Triple<N, T>>> {
     let mut seeded: Triple<N, Dual<T, Triple<N, T>>> =
         Triple { x: point.x.map(Dual::constant), y: point.y.map(Dual::constant), z: Dual::constant(point.z) };
@@ -146,7 +129,7 @@ macro_rules! point {
 
         impl<const N: usize, T> $name<N, T> {
             /// The point with these coordinates.
-            #[inline(always)]
+            #[inline]
             pub fn new($x: impl Into<SVector<T, N>>, $y: impl Into<SVector<T, N>>, $z: T) -> Self {
                 $name { $x: $x.into(), $y: $y.into(), $z }
             }
@@ -180,14 +163,14 @@ macro_rules! point {
         }
 
         impl<const N: usize, T> From<$name<N, T>> for Triple<N, T> {
-            #[inline(always)]
+            #[inline]
             fn from(point: $name<N, T>) -> Self {
                 Triple { x: point.$x, y: point.$y, z: point.$z }
             }
         }
 
         impl<const N: usize, T> From<Triple<N, T>> for $name<N, T> {
-            #[inline(always)]
+            #[inline]
             fn from(point: Triple<N, T>) -> Self {
                 $name { $x: point.x, $y: point.y, $z: point.z }
             }
@@ -218,10 +201,7 @@ fn sized<const N: usize>(what: &'static str, entries: &[f64]) -> Result<SVector<
 
 /// Checks that every entry is finite.
 fn finite(what: &'static str, entries: &[f64]) -> Result<(), GeometryError> {
-    match entries.iter().position(
-        #[inline(always)]
-        |e| !e.is_finite(),
-    ) {
+    match entries.iter().position(|e| !e.is_finite()) {
         Some(index) => Err(GeometryError::NonFinite { what, index, value: entries[index] }),
         None => Ok(()),
     }

@@ -19,7 +19,9 @@ pub enum InputError {
         span: f64,
     },
     /// A method does not reach a wanted accuracy.
-    #[error("the wanted relative error {wanted:e} is not reached ({reached:e} was); take a method of higher order, or ask for less")]
+    #[error(
+        "the wanted relative error {wanted:e} is not reached ({reached:e} was); take a method of higher order, or ask for less"
+    )]
     Accuracy {
         /// The error that was asked for.
         wanted: f64,
@@ -31,6 +33,12 @@ pub enum InputError {
     Stages {
         /// The number of stages that was passed.
         found: usize,
+    },
+    /// A clock stands still, runs backward or is not defined at the start.
+    #[error("the clock's rate dt/dtau is {rate} at the start; it must be positive and finite")]
+    Clock {
+        /// The rate at the start.
+        rate: f64,
     },
     /// The configuration space has dimension 0.
     #[error("the configuration space has dimension 0; a Lagrangian needs at least one coordinate")]

@@ -51,7 +51,7 @@ pub use discretised::Discretised;
 pub use error::{InputError, Status, StepError};
 pub use events::{Crossing, Direction, Event, EventRun, EventStatus, run_with_events};
 pub use flow::{HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian};
-pub use gauss::{DenseStep, Gauss, GaussRoute, GaussStepper};
+pub use gauss::{ClockedStepper, DenseStep, Gauss, GaussRoute, GaussStepper};
 pub use legendre::{
     DiscreteRegularity, discrete_regularity, legendre_minus, legendre_minus_inverse, legendre_plus,
     legendre_plus_inverse, sigma_d,

@@ -2,11 +2,12 @@
 
 use super::coefficients::{Coefficients, MOST};
 use super::compensated::{Compensated, Twofold, add, finite};
+use super::extension::{Extension, Pace, Values};
 use super::stages::{StageMap, Stages, Weights, blocks, padded};
 use super::sweeps::{Progress, Sweeps};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, linear, seed};
+use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint, linear, seed};
 use pulp::Simd;
 use qd::Quad;
 
@@ -44,13 +45,29 @@ pub(super) enum Mass<const N: usize> {
     Stages(Box<[[Stages; N]; N]>),
 }
 
+impl<const N: usize> Mass<N> {
+    /// From `W^-1` at the start.
+    pub fn new(structure: &Structure, inverse: SMatrix<f64, N, N>) -> Self {
+        if structure.constant_mass || structure.separable {
+            Mass::Constant(inverse)
+        } else {
+            Mass::Stages(Box::new([[Stages::ZERO; N]; N]))
+        }
+    }
+}
+
 /// The state and the workspace of the general step.
 ///
 /// The unknowns are the velocities V, the actions Z and the integrating factors rho of the stages:
 /// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`. A sweep takes the right-hand sides
 /// from the gradients of L before, and the velocities from the momenta by `W^-1`.
-pub(super) struct General<'a, L, const N: usize> {
+///
+/// In the time of a clock they are those of `K = g (H + p_t)`: `Q = q0 + hA (g V)`, `Z = z0 + hA (g L)`, `t = t0 + hA g`,
+/// `rho = 1 - hA (rho g L_z)`, `rho L_v = p0 + hA (rho g L_q - grad g (rho E + p_t0))`, since `rho p_t = p_t0`, the momentum of
+/// the time at the start, where L does not depend on t. `l`, `rate` and `force` below have the factor g then.
+pub(super) struct General<'a, L, P, const N: usize> {
     pub lagrangian: &'a L,
+    pub extension: Extension<P, N>,
     pub table: Table,
     pub mass: Mass<N>,
     pub q: [Compensated; N],
@@ -71,11 +88,19 @@ pub(super) struct General<'a, L, const N: usize> {
     pub evaluations: u64,
 }
 
-impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
+impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
     /// From a state with a velocity that belongs to it, or a guess of it.
-    pub fn new(lagrangian: &'a L, table: Table, mass: Mass<N>, state: &PhasePoint<N>, v: &SVector<f64, N>) -> Self {
+    pub fn new(
+        lagrangian: &'a L,
+        extension: Extension<P, N>,
+        table: Table,
+        mass: Mass<N>,
+        state: &PhasePoint<N>,
+        v: &SVector<f64, N>,
+    ) -> Self {
         let mut general = General {
             lagrangian,
+            extension,
             table,
             mass,
             q: [0.0.into(); N],
@@ -107,6 +132,23 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
         self.warm = false;
     }
 
+    pub fn values(&self) -> Values<N> {
+        let Extension { t, p_t, .. } = self.extension;
+        Values { q: self.q, p: self.p, z: self.z, t, p_t, fallen: self.fallen }
+    }
+
+    /// Goes on from other values; the velocities of the stages are the guess.
+    pub fn reset(&mut self, values: &Values<N>) {
+        Values { q: self.q, p: self.p, z: self.z, t: self.extension.t, p_t: self.extension.p_t, fallen: self.fallen } =
+            *values;
+        self.warm = false;
+    }
+
+    /// The clock's rate at the state.
+    pub fn rate(&self) -> f64 {
+        self.extension.pace.rate(&SVector::from(self.q.map(|q| q.value)))
+    }
+
     /// The point of TQ x R at a block of stages.
     #[inline(always)]
     fn point<S: Simd>(&self, r: usize) -> VelocityPoint<N, Lanes<S>> {
@@ -117,9 +159,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
         }
     }
 
-    /// Evaluates L and its gradient at the stages.
+    /// Evaluates L and its gradient at the stages; returns the largest change of a clock's rates, relative to the largest.
     #[inline(always)]
-    fn evaluate<S: Simd>(&mut self, t: f64) {
+    fn evaluate<S: Simd>(&mut self, t: f64) -> f64 {
+        let (mut dg, mut sg) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
         for r in 0..blocks::<S>(self.table.s) {
             let x = seed(&Triple::from(self.point::<S>(r)));
             let Dual { re, d } = self.lagrangian.along(self.table.times.block::<S>(r) + t, &x.into());
@@ -130,8 +173,39 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
                 self.force[i].set(r, rho * d.x[i]);
                 self.l_v[i].set(r, d.y[i]);
             }
+            if !P::PHYSICAL {
+                let point = self.point::<S>(r);
+                let q = SVector::<_, N>::from_fn(|i, _| {
+                    let mut q = Dual::<Lanes<S>, SVector<Lanes<S>, N>>::constant(point.q[i]);
+                    q.d[i] = Lanes::splat(1.0);
+                    q
+                });
+                let Dual { re: g, d: slope } = self.extension.pace.rate(&q);
+                let energy = point.v.dot(&d.y) - re;
+                let extended = energy.mul_add(rho, Lanes::splat(self.extension.p_t.value));
+                self.l.set(r, g * re);
+                self.rate.set(r, rho * g * d.z);
+                for i in 0..N {
+                    self.force[i].set(r, rho * g * d.x[i] - slope[i] * extended);
+                }
+                dg = dg.max((g - self.extension.g.block(r)).abs());
+                sg = sg.max(g.abs());
+                self.extension.g.set(r, g);
+            }
         }
         self.evaluations += self.table.s as u64;
+        if P::PHYSICAL { 0.0 } else { dg.largest() / sg.largest() }
+    }
+
+    /// The rates of change of the stages' positions with a clock, `g V`.
+    #[inline(always)]
+    fn stride<S: Simd>(&mut self) {
+        for r in 0..blocks::<S>(self.table.s) {
+            let g = self.extension.g.block::<S>(r);
+            for d in 0..N {
+                self.extension.moved[d].set(r, g * self.v[d].block(r));
+            }
+        }
     }
 
     /// Inverts W at the stages; `false` where it is singular.
@@ -175,10 +249,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
     /// The positions and the actions of the stages from their velocities and Lagrangians.
     #[inline(always)]
     fn place<S: Simd>(&mut self) {
+        if !P::PHYSICAL {
+            self.stride::<S>();
+        }
+        let moved = if P::PHYSICAL { &self.v } else { &self.extension.moved };
         let (table, s) = (&self.table, self.table.s);
         for d in 0..N {
             let q = Lanes::<S>::splat(self.q[d].value);
-            table.a.apply(&self.v[d], s, &mut self.x[d], |_| q);
+            table.a.apply(&moved[d], s, &mut self.x[d], |_| q);
         }
         let z = Lanes::<S>::splat(self.z.value);
         table.a.apply(&self.l, s, &mut self.z_stages, |_| z);
@@ -189,7 +267,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
     fn carry<S: Simd>(&mut self) {
         let s = self.table.s;
         let renewed = 1.0 / (1.0 - self.fallen);
-        let same = self.v.iter_mut().chain(&mut self.l_v).chain([&mut self.l]).map(|x| (x, 1.0));
+        let rates = if P::PHYSICAL { None } else { Some(&mut self.extension.g) };
+        let same = self.v.iter_mut().chain(&mut self.l_v).chain([&mut self.l]).chain(rates).map(|x| (x, 1.0));
         // rho starts from 1 again.
         let scaled = self.force.iter_mut().chain([&mut self.rate]).map(|x| (x, renewed));
         for (x, factor) in same.chain(scaled) {
@@ -211,6 +290,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
         } else {
             self.l = Stages::ZERO;
             self.rho = Stages([1.0; MOST]);
+            if !P::PHYSICAL {
+                self.extension.g = Stages([self.rate(); MOST]);
+            }
         }
         self.warm = false;
         self.place::<S>();
@@ -221,11 +303,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
         // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
         loop {
             let change = if cold { f64::INFINITY } else { self.sweep::<S>() };
-            self.evaluate::<S>(t);
+            let of_clock = self.evaluate::<S>(t);
             if cold {
                 cold = false;
                 continue;
             }
+            // `f64::max` would hide a NaN.
+            let change = if !P::PHYSICAL && !(of_clock <= change) { of_clock } else { change };
             match sweeps.judge(change, 1.0) {
                 Progress::Going => {}
                 Progress::Done => return self.finish::<S>(),
@@ -289,6 +373,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
     /// The end of the step from its stages.
     #[inline(always)]
     fn finish<S: Simd>(&mut self) -> Progress {
+        if !P::PHYSICAL {
+            // With the rates of the last evaluation.
+            self.stride::<S>();
+        }
+        let moved = if P::PHYSICAL { &self.v } else { &self.extension.moved };
         let (b, s) = (&self.table.b, self.table.s);
         let (fallen, dz) = (b.sum::<S>(&self.rate, s), b.sum::<S>(&self.l, s));
         if fallen.head >= 1.0 {
@@ -297,7 +386,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
         let sigma = 1.0 / (1.0 - fallen.head);
         let (mut dq, mut dp) = ([Twofold::default(); N], [Twofold::default(); N]);
         for d in 0..N {
-            dq[d] = b.sum::<S>(&self.v[d], s);
+            dq[d] = b.sum::<S>(&moved[d], s);
             // (p fallen + force) / (1 - fallen), to first order in the tails.
             let pushed = fallen * self.p[d].value + b.sum::<S>(&self.force[d], s);
             let head = pushed.head / (1.0 - fallen.head);
@@ -306,6 +395,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> General<'a, L, N> {
         // The largest change over lanes may hide a NaN; one of `fallen` is in `dp`.
         if !finite(&dq, &dp, dz) {
             return Progress::NonFinite;
+        }
+        if !P::PHYSICAL {
+            let dt = b.sum::<S>(&self.extension.g, s);
+            let runs = self.extension.g.0[..s].iter().all(|g| *g > 0.0);
+            if !(runs && dt.head.is_finite()) {
+                return Progress::NonFinite;
+            }
+            self.extension.t.add(dt);
+            self.extension.p_t.add(fallen * (self.extension.p_t.value * sigma));
         }
         add(&mut self.q, &dq);
         add(&mut self.p, &dp);

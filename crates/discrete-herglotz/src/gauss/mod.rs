@@ -1,9 +1,11 @@
 //! Contact Gauss collocation.
 
+mod clocked;
 mod coefficients;
 mod compensated;
 mod condensed;
 mod dense;
+mod extension;
 mod general;
 mod linear;
 mod separable;
@@ -12,13 +14,14 @@ mod stages;
 mod stepper;
 mod sweeps;
 
+pub use clocked::ClockedStepper;
 pub use dense::DenseStep;
 pub use stepper::{GaussRoute, GaussStepper};
 
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use coefficients::MOST;
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::{DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar};
+use contact_geom::{Clock, DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar};
 use stage_equations::{Given, Products, StageEquations, Unknowns};
 
 /// Contact Gauss collocation with `s` stages, of order `2s`, for every regular Lagrangian: the discrete Lagrangian
@@ -109,6 +112,26 @@ impl<L> Gauss<L> {
         L: Lagrangian<N>,
     {
         GaussStepper::new(self, t0, state, guess, false)
+    }
+
+    /// A stepper of variable steps from a state at a time, for autonomous Lagrangians: the method's step is one of the time tau
+    /// of a clock, `dt = g(q) dtau`. `guess` is a guess of the velocity at the start, from which it is found.
+    ///
+    /// # Errors
+    /// Those of [`stepper`](Self::stepper); [`InputError::Unclaimed`] where the Lagrangian does not claim to be autonomous;
+    /// [`InputError::Clock`] where the clock's rate at the start is not positive and finite.
+    pub fn clocked_stepper<const N: usize, C>(
+        &self,
+        clock: C,
+        t0: f64,
+        state: PhasePoint<N>,
+        guess: SVector<f64, N>,
+    ) -> Result<ClockedStepper<'_, L, C, N>, InputError>
+    where
+        L: Lagrangian<N>,
+        C: Clock<N>,
+    {
+        ClockedStepper::new(self, clock, t0, state, guess)
     }
 
     /// The stage equations of a step forward or backward in time.

@@ -3,15 +3,15 @@
 use super::Gauss;
 use super::condensed::Condensed;
 use super::dense::{DenseStep, Solved, Start};
+use super::extension::{Extension, Physical};
 use super::general::{General, Mass, Table};
 use super::linear::Linear;
 use super::separable::Separable;
 use super::stage_equations::{Given, Products, StageEquations, Unknowns};
-use super::stages::Stages;
 use super::sweeps::Progress;
 use crate::{Halt, InputError, StepError, Stepper, verified};
 use contact_geom::nalgebra::{DMatrix, DVector, SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, Triple, VelocityPoint, linear};
+use contact_geom::{Lagrangian, PhasePoint, Structure, Triple, VelocityPoint, linear};
 use pulp::{Arch, Simd, WithSimd};
 
 /// How the steps of contact Gauss collocation are computed.
@@ -31,7 +31,7 @@ pub enum GaussRoute {
 enum Route<'a, L, const N: usize> {
     Linear(Linear<N>, Condensed),
     Condensed(Separable<'a, L, N>),
-    General(General<'a, L, N>),
+    General(General<'a, L, Physical, N>),
 }
 
 /// How the last step was taken, for dense output.
@@ -69,20 +69,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         guess: SVector<f64, N>,
         wants_z: bool,
     ) -> Result<Self, InputError> {
-        state.check()?;
         let (lagrangian, s, h) = (&gauss.lagrangian, gauss.stages(), gauss.forward.h);
-        let v = velocity(lagrangian, t0, &state, guess)?;
-        let start = VelocityPoint { q: state.q, v, z: state.z };
-        let structure = verified(lagrangian, t0, &start)?;
-        let identity = SMatrix::<f64, N, N>::identity();
-        let w = lagrangian.hessian(t0, &start).vv;
-        let mut inverse = identity;
-        for j in 0..N {
-            let mut column = SVector::from_fn(|i, _| identity[(i, j)]);
-            linear::solve(&mut w.clone(), &mut column)
-                .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
-            inverse.set_column(j, &column);
-        }
+        let Beginning { start, structure, w, inverse } = Beginning::of(lagrangian, t0, &state, guess)?;
         // A term linear in v has no place in the condensed step: `p = M v` there.
         let at_rest = lagrangian.gradient(t0, &VelocityPoint { v: SVector::zeros(), ..start });
         let drag = structure.z_affine || structure.z_free;
@@ -97,17 +85,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
                 Some(linear) => Route::Linear(linear, table),
                 None => {
                     let left = table.preconditioned(0.0).ok_or(InputError::Step { h })?;
-                    let inverse = (w != identity).then_some(inverse);
+                    let inverse = (w != SMatrix::<f64, N, N>::identity()).then_some(inverse);
                     Route::Condensed(Separable::new(lagrangian, table, left, inverse, &start, wants_z))
                 }
             }
         } else {
-            let mass = if structure.constant_mass || structure.separable {
-                Mass::Constant(inverse)
-            } else {
-                Mass::Stages(Box::new([[Stages::ZERO; N]; N]))
-            };
-            Route::General(General::new(lagrangian, Table::new(s, h), mass, &state, &v))
+            let mass = Mass::new(&structure, inverse);
+            let physical = Extension::new(Physical, t0, 0.0);
+            Route::General(General::new(lagrangian, physical, Table::new(s, h), mass, &state, &start.v))
         };
         Ok(GaussStepper {
             lagrangian,
@@ -323,6 +308,39 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             Route::Condensed(run) => run.evaluations,
             Route::General(run) => run.evaluations,
         }
+    }
+}
+
+/// What is found of a Lagrangian at the start of a run.
+pub(super) struct Beginning<const N: usize> {
+    pub start: VelocityPoint<N>,
+    pub structure: Structure,
+    /// W and its inverse.
+    pub w: SMatrix<f64, N, N>,
+    pub inverse: SMatrix<f64, N, N>,
+}
+
+impl<const N: usize> Beginning<N> {
+    pub fn of(
+        lagrangian: &impl Lagrangian<N>,
+        t0: f64,
+        state: &PhasePoint<N>,
+        guess: SVector<f64, N>,
+    ) -> Result<Self, InputError> {
+        state.check()?;
+        let v = velocity(lagrangian, t0, state, guess)?;
+        let start = VelocityPoint { q: state.q, v, z: state.z };
+        let structure = verified(lagrangian, t0, &start)?;
+        let identity = SMatrix::<f64, N, N>::identity();
+        let w = lagrangian.hessian(t0, &start).vv;
+        let mut inverse = identity;
+        for j in 0..N {
+            let mut column = SVector::from_fn(|i, _| identity[(i, j)]);
+            linear::solve(&mut w.clone(), &mut column)
+                .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
+            inverse.set_column(j, &column);
+        }
+        Ok(Beginning { start, structure, w, inverse })
     }
 }
 

@@ -1,0 +1,177 @@
+//! Runs of contact Gauss collocation in the time of a clock.
+
+use super::Gauss;
+use super::extension::{Extension, Fictitious, Values};
+use super::general::{General, Mass, Table};
+use super::stepper::Beginning;
+use super::sweeps::Progress;
+use crate::{Halt, ITERATION_LIMIT, InputError, StepError, Stepper};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Clock, Lagrangian, PhasePoint};
+use pulp::{Arch, Simd, WithSimd};
+
+/// Contact Gauss collocation of variable step at work: its steps are equal in the time tau of a [`Clock`], `dt = g(q) dtau`.
+///
+/// It is Gauss collocation of `K = g(q) (H + p_t)` on T\*(Q x R) x R with `p_t = -H` at the start, which makes `K = 0`. With
+/// the velocities V with respect to t, `g = g(Q)` and the energy `E = V.L_v - L`, the stages are
+///
+/// `Q = q0 + hA (g V)`, `Z = z0 + hA (g L)`, `t = t0 + hA g`, `rho = 1 - hA (rho g L_z)`, `rho p_t = p_t0`,
+/// `rho L_v = p0 + hA (rho (g L_q - (E + p_t) grad g))`,
+///
+/// and the same sums with `hb` end the step, `sigma_d = 1 / rho1`. The step contracts `dz - p dq - p_t dt` by `sigma_d`, and so
+/// every momentum of a symmetry of L that leaves g invariant. Order 2s in tau, and symmetric.
+///
+/// The stages are found by fixed-point iteration: a step that is too large for it is refused with
+/// [`StepError::NotConverged`].
+///
+/// ```
+/// use contact_geom::{legendre, systems::{Kepler, System}};
+/// use discrete_herglotz::{Gauss, Stepper};
+/// let kepler = Kepler::<2>::default();
+/// let start = kepler.initial();
+/// let gauss = Gauss::new(kepler, 6, 0.2)?;
+/// let mut run = gauss.clocked_stepper(kepler.clock(), 0.0, legendre(&kepler, 0.0, &start), start.v)?;
+/// run.advance_to(10.0).map_err(|halt| discrete_herglotz::InputError::FirstStep(halt.cause))?;
+/// assert!((run.time() - 10.0).abs() < 1e-14);
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+pub struct ClockedStepper<'a, L, C, const N: usize> {
+    general: Box<General<'a, L, Fictitious<C>, N>>,
+    arch: Arch,
+    h: f64,
+}
+
+impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C, N> {
+    pub(super) fn new(
+        gauss: &'a Gauss<L>,
+        clock: C,
+        t0: f64,
+        state: PhasePoint<N>,
+        guess: SVector<f64, N>,
+    ) -> Result<Self, InputError> {
+        let (lagrangian, h) = (&gauss.lagrangian, gauss.forward.h);
+        let Beginning { start, structure, inverse, .. } = Beginning::of(lagrangian, t0, &state, guess)?;
+        if !structure.autonomous {
+            return Err(InputError::Unclaimed { claim: "autonomous" });
+        }
+        let rate = clock.rate(&state.q);
+        if !(rate > 0.0 && rate.is_finite()) {
+            return Err(InputError::Clock { rate });
+        }
+        let energy = start.v.dot(&state.p) - lagrangian.value(t0, &start.q, &start.v, start.z);
+        let extension = Extension::new(Fictitious(clock), t0, -energy);
+        let (table, mass) = (Table::new(gauss.stages(), h), Mass::new(&structure, inverse));
+        let general = Box::new(General::new(lagrangian, extension, table, mass, &state, &start.v));
+        Ok(ClockedStepper { general, arch: Arch::new(), h })
+    }
+
+    /// The momentum `p_t` of the time, minus the energy but for the method's error: `E + p_t = K / g`. It is contracted as every
+    /// momentum.
+    pub fn time_momentum(&self) -> f64 {
+        self.general.extension.p_t.value
+    }
+
+    /// Takes steps up to a physical time, the last one shorter so that it ends there to round-off. Nothing is done where the
+    /// time is past already.
+    ///
+    /// # Errors
+    /// As [`advance`](Stepper::advance); [`StepError::NonFinite`] for a time that is not finite.
+    pub fn advance_to(&mut self, t_end: f64) -> Result<(), Halt> {
+        if !t_end.is_finite() {
+            return Err(Halt { taken: 0, cause: StepError::NonFinite });
+        }
+        let mut taken = 0;
+        while self.time() < t_end {
+            let before = self.general.values();
+            self.step().map_err(|cause| Halt { taken, cause })?;
+            if self.time() > t_end {
+                let ended = self.shorten(&before, t_end);
+                if ended.is_err() {
+                    self.general.reset(&before);
+                }
+                self.general.table = Table::new(self.general.table.s, self.h);
+                return ended.map_err(|cause| Halt { taken, cause });
+            }
+            taken += 1;
+        }
+        Ok(())
+    }
+
+    /// Takes the last step again from where it started, so long that it ends at a time, which it has passed.
+    fn shorten(&mut self, before: &Values<N>, t_end: f64) -> Result<(), StepError> {
+        let (mut short, mut long, mut h) = (0.0, self.h, self.h);
+        let mut over = self.time() - t_end;
+        for _ in 0..ITERATION_LIMIT {
+            // Newton's method, where dt/dh is the rate at the end but for the method's error.
+            let newton = h - over / self.general.rate();
+            h = if short < newton && newton < long { newton } else { 0.5 * (short + long) };
+            self.general.reset(before);
+            self.general.table = Table::new(self.general.table.s, h);
+            self.step()?;
+            over = self.time() - t_end;
+            if over.abs() <= 2.0 * f64::EPSILON * t_end.abs().max(before.t.value.abs()) {
+                // The stages are those of another length than the next step's.
+                let end = self.general.values();
+                self.general.reset(&end);
+                return Ok(());
+            }
+            *(if over > 0.0 { &mut long } else { &mut short }) = h;
+        }
+        Err(StepError::NotConverged { residual: over, iterations: ITERATION_LIMIT })
+    }
+
+    fn step(&mut self) -> Result<(), StepError> {
+        self.arch.dispatch(Advance { general: &mut *self.general, steps: 1 }).map_err(|halt| halt.cause)
+    }
+}
+
+/// Steps in the lanes of one instruction set; ends at a step that cannot be taken.
+struct Advance<'b, 'a, L, C, const N: usize> {
+    general: &'b mut General<'a, L, Fictitious<C>, N>,
+    steps: usize,
+}
+
+impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for Advance<'_, '_, L, C, N> {
+    type Output = Result<(), Halt>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        for taken in 0..self.steps {
+            // L does not depend on it.
+            let t = self.general.extension.t.value;
+            let cause = match self.general.step::<S>(t) {
+                Progress::Done => continue,
+                Progress::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
+                Progress::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
+                _ => StepError::NonFinite,
+            };
+            return Err(Halt { taken, cause });
+        }
+        Ok(())
+    }
+}
+
+impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedStepper<'_, L, C, N> {
+    /// The steps are equal in the clock's time.
+    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        self.arch.dispatch(Advance { general: &mut *self.general, steps })
+    }
+
+    fn state(&self) -> PhasePoint<N> {
+        let Values { q, p, z, .. } = self.general.values();
+        PhasePoint { q: q.map(|q| q.value).into(), p: p.map(|p| p.value).into(), z: z.value }
+    }
+
+    /// The physical time.
+    fn time(&self) -> f64 {
+        self.general.extension.t.value
+    }
+
+    fn sigma(&self) -> f64 {
+        1.0 / (1.0 - self.general.fallen)
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.general.evaluations
+    }
+}
