@@ -1,5 +1,7 @@
 //! Contact Gauss collocation in the time of a clock.
 
+#![allow(clippy::unwrap_used)]
+
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, PerturbedKepler, Radial, System};
 use contact_geom::{Clock, PhasePoint, Scalar, VelocityPoint, legendre};

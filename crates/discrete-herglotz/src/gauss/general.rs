@@ -254,9 +254,9 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         }
         let moved = if P::PHYSICAL { &self.v } else { &self.extension.moved };
         let (table, s) = (&self.table, self.table.s);
-        for d in 0..N {
-            let q = Lanes::<S>::splat(self.q[d].value);
-            table.a.apply(&moved[d], s, &mut self.x[d], |_| q);
+        for ((q, moved), x) in self.q.iter().zip(moved).zip(&mut self.x) {
+            let q = Lanes::<S>::splat(q.value);
+            table.a.apply(moved, s, x, |_| q);
         }
         let z = Lanes::<S>::splat(self.z.value);
         table.a.apply(&self.l, s, &mut self.z_stages, |_| z);
@@ -309,7 +309,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
                 continue;
             }
             // `f64::max` would hide a NaN.
-            let change = if !P::PHYSICAL && !(of_clock <= change) { of_clock } else { change };
+            let change = if !P::PHYSICAL && (of_clock > change || of_clock.is_nan()) { of_clock } else { change };
             match sweeps.judge(change, 1.0) {
                 Progress::Going => {}
                 Progress::Done => return self.finish::<S>(),
