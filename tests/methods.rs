@@ -15,26 +15,9 @@ fn names() {
     for method in Method::ALL {
         assert_eq!(method.to_string().parse(), Ok(*method));
     }
-    for stages in 1..=16 {
-        assert_eq!(format!("gauss_{stages}").parse(), Ok(Method::Gauss { stages }));
-        assert_eq!(Method::Gauss { stages }.to_string(), format!("gauss_{stages}"));
-    }
-    assert!("gauss_0".parse::<Method>().is_err() && "gauss_17".parse::<Method>().is_err());
     let error = "simpson".parse::<Method>().err().map(|e| e.to_string()).unwrap_or_default();
     assert!(error.contains("simpson"));
     assert!(Method::ALL.iter().all(|method| error.contains(method.name())), "{error}");
-}
-
-/// No Gauss method has another number of stages than 1 to 16.
-#[test]
-fn stages() {
-    let (system, state) = (Pendulum::default(), PhasePoint::new([0.3], [0.4], 0.7));
-    for stages in [0, 17, 255] {
-        let method = Method::Gauss { stages };
-        let error = InputError::Stages { found: stages.into() };
-        assert_eq!(method.check(&system.structure()), Err(error));
-        assert_eq!(method.discretise(&system, 0.1, 0.0, &state).err(), Some(error));
-    }
 }
 
 /// The Strang splitting needs a separable Lagrangian and a constant rate; that of a Lagrangian that depends on time is

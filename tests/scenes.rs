@@ -6,9 +6,7 @@ use contact_geom::systems::{
     DoublePendulum, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, SystemVisitor,
 };
 use contact_geom::{Lagrangian, Scalar, Structure, Symmetry, VelocityPoint, legendre};
-use discrete_herglotz::{
-    InputError, Integrator, Method, Outcome, Plan, Scene, SplittingScheme, Status, Steps, Wanted,
-};
+use discrete_herglotz::{InputError, Integrator, Method, Outcome, Plan, Scene, SplittingScheme, Status, Steps, Wanted};
 
 /// A system that claims another structure.
 struct Claiming<S>(S, Structure);
@@ -93,8 +91,7 @@ fn what_is_left_out_changes_nothing() {
             scene.plan().and_then(|plan| plan.run())
         };
         let nothing = run(Wanted { action: false, ..Wanted::default() });
-        let all =
-            run(Wanted { action: true, conformal_factor: true, rows: Some(7), momentum: group });
+        let all = run(Wanted { action: true, conformal_factor: true, rows: Some(7), momentum: group });
         let (Ok(nothing), Ok(all)) = (nothing, all) else { panic!("{by}: a run was refused") };
         assert_eq!((nothing.status, all.status), (Status::Completed, Status::Completed), "{by}");
         let bound = if matches!(by, Integrator::Splitting(_)) { 1e-14 } else { 0.0 };
@@ -177,7 +174,12 @@ fn steps_from_an_error() {
     let pendulum = Pendulum { gamma: -0.05 };
     let truth = legendre(&pendulum, 20.0, &motion(&pendulum, 0.0, &start(), 20.0));
     let size = (truth.q.norm_squared() + truth.p.norm_squared()).sqrt();
-    for by in [gauss(2), gauss(6), Integrator::Splitting(SplittingScheme::BLANES_MOAN_6), Integrator::Discrete(Method::Midpoint)] {
+    for by in [
+        gauss(2),
+        gauss(6),
+        Integrator::Splitting(SplittingScheme::BLANES_MOAN_6),
+        Integrator::Discrete(Method::Midpoint),
+    ] {
         for wanted in [1e-3, 1e-6] {
             let scene = Scene::new(&pendulum, start(), 20.0).by(by).steps(Steps::Accuracy(wanted));
             let Ok(plan) = scene.plan() else { panic!("{by}: refused") };

@@ -113,7 +113,11 @@ fn lines() -> Result<Vec<Line>, InputError> {
     Ok(vec![
         line(("z", "pendulum, gauss_16"), &swing(sixteen, 2.5, &with_z), &swing(sixteen, 2.5, &none))?,
         line(("z", "pendulum, blanes_moan_6"), &swing(nystrom, 0.2, &with_z), &swing(nystrom, 0.2, &none))?,
-        line(("z", "Kepler, gauss_16"), &orbit(Wanted::default()), &orbit(Wanted { action: false, ..Wanted::default() }))?,
+        line(
+            ("z", "Kepler, gauss_16"),
+            &orbit(Wanted::default()),
+            &orbit(Wanted { action: false, ..Wanted::default() }),
+        )?,
         line(
             ("iteration (one matrix)", "oscillator, gauss_16"),
             &Scene::new(&unquadratic, start, 1000.0).by(sixteen).steps(Steps::Size(2.5)).wanting(none.clone()),
@@ -125,7 +129,11 @@ fn lines() -> Result<Vec<Line>, InputError> {
             &general(&plain),
             &Scene::new(&constant_mass, start, 1000.0).by(eight).steps(Steps::Size(1.0)).wanting(none.clone()),
         )?,
-        line(("Newton's method", "double pendulum, midpoint by composition or gauss_3"), &by(Integrator::Composition(discrete_herglotz::Method::Midpoint, SplittingScheme::YOSHIDA_6), 0.05), &by(Integrator::Gauss { stages: 3 }, 0.05))?,
+        line(
+            ("Newton's method", "double pendulum, midpoint by composition or gauss_3"),
+            &by(Integrator::Composition(discrete_herglotz::Method::Midpoint, SplittingScheme::YOSHIDA_6), 0.05),
+            &by(Integrator::Gauss { stages: 3 }, 0.05),
+        )?,
         line(("rows", "pendulum, blanes_moan_6"), &swing(nystrom, 0.2, &rows), &swing(nystrom, 0.2, &none))?,
         line(("conformal factor", "quadratic in z, gauss_8"), &decay(true), &decay(false))?,
     ])

@@ -1,7 +1,7 @@
 //! A discrete Lagrangian by any of the methods.
 
 use crate::{
-    DiscreteLagrangian, Gauss, LeftMidpoint, Midpoint, Rectangle, Solver, StepError, Strang, Transition, Trapezoidal,
+    DiscreteLagrangian, LeftMidpoint, Midpoint, Rectangle, Solver, StepError, Strang, Transition, Trapezoidal,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet};
@@ -9,8 +9,8 @@ use contact_geom::{DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar, S
 /// The discrete Lagrangian that a [`Method`](crate::Method) chosen at run time makes from a Lagrangian.
 ///
 /// One type for all methods: code that is generic over discrete Lagrangians is compiled once for a Lagrangian, not once
-/// for each method. All but the Gauss methods step without an allocation; for these,
-/// [`Gauss::stepper`] has the fast steps.
+/// for each method. [`Gauss`](crate::Gauss) is not among them: derivatives of its value, through the stages, would be
+/// compiled into every program that names this type.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Discretised<L, const N: usize> {
@@ -24,8 +24,6 @@ pub enum Discretised<L, const N: usize> {
     Trapezoidal(Trapezoidal<L>),
     /// By the Strang splitting.
     Strang(Strang<L, N>),
-    /// By contact Gauss collocation; boxed for its tables of coefficients.
-    Gauss(Box<Gauss<L>>),
 }
 
 /// The same expression for each method.
@@ -37,10 +35,6 @@ macro_rules! each {
             Discretised::Midpoint($ld) => $result,
             Discretised::Trapezoidal($ld) => $result,
             Discretised::Strang($ld) => $result,
-            Discretised::Gauss(boxed) => {
-                let $ld = &**boxed;
-                $result
-            }
         }
     };
 }

@@ -339,8 +339,8 @@ mod tests {
             vec![pulp::Scalar::new().vectorize(Evaluate(&arguments)), pulp::Arch::new().dispatch(Evaluate(&arguments))];
         #[cfg(target_arch = "x86_64")]
         {
-            sets.extend(pulp::x86::V3::try_new().map(|set| set.vectorize(Evaluate(&arguments))));
-            sets.extend(pulp::x86::V4::try_new().map(|set| set.vectorize(Evaluate(&arguments))));
+            sets.extend(pulp::x86::V3::try_new().map(|set| Simd::vectorize(set, Evaluate(&arguments))));
+            sets.extend(pulp::x86::V4::try_new().map(|set| Simd::vectorize(set, Evaluate(&arguments))));
         }
         let ulps = |a: f64, b: f64| (a - b).abs() / (b.abs().next_up() - b.abs());
         for set in sets {

@@ -1,7 +1,7 @@
 //! The table of methods: what is known of each, and a discrete Lagrangian by any of them, chosen at run time.
 
 use crate::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
-use crate::{Discretised, Gauss, InputError, Node, Quadrature, Rule, Strang};
+use crate::{Discretised, InputError, Node, Quadrature, Rule, Strang};
 use contact_geom::{Lagrangian, PhasePoint, Structure};
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
@@ -19,7 +19,6 @@ use thiserror::Error;
 ///     println!("{method} of order {}, h = {}", method.order(), ld.step_size());
 /// }
 /// assert_eq!("midpoint".parse(), Ok(Method::Midpoint));
-/// assert_eq!("gauss_8".parse(), Ok(Method::Gauss { stages: 8 }));
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 ///
@@ -38,18 +37,7 @@ pub enum Method {
     Trapezoidal,
     /// The Strang splitting, [`Strang`].
     Strang,
-    /// Contact Gauss collocation, [`Gauss`].
-    Gauss {
-        /// The number of stages, from 1 to 16.
-        stages: u8,
-    },
 }
-
-/// The names of the Gauss methods by the number of stages, less one.
-const GAUSS: [&str; Gauss::<()>::STAGES] = [
-    "gauss_1", "gauss_2", "gauss_3", "gauss_4", "gauss_5", "gauss_6", "gauss_7", "gauss_8", "gauss_9", "gauss_10",
-    "gauss_11", "gauss_12", "gauss_13", "gauss_14", "gauss_15", "gauss_16",
-];
 
 /// What is known of a method.
 struct Facts {
@@ -80,17 +68,10 @@ impl Method {
     pub const RULES: &'static [Method] =
         &[Method::Rectangle, Method::LeftMidpoint, Method::Midpoint, Method::Trapezoidal];
 
-    /// Every method, of the Gauss methods those with 2 and 3 stages. What holds for all of them is tested by walking this
+    /// Every method of this table. What holds for all of them is tested by walking this
     /// table.
-    pub const ALL: &'static [Method] = &[
-        Method::Rectangle,
-        Method::LeftMidpoint,
-        Method::Midpoint,
-        Method::Trapezoidal,
-        Method::Strang,
-        Method::Gauss { stages: 2 },
-        Method::Gauss { stages: 3 },
-    ];
+    pub const ALL: &'static [Method] =
+        &[Method::Rectangle, Method::LeftMidpoint, Method::Midpoint, Method::Trapezoidal, Method::Strang];
 
     /// The methods of [`ALL`](Self::ALL) whose hypothesis a Lagrangian of this structure meets.
     pub fn applicable(structure: &Structure) -> impl Iterator<Item = Method> {
@@ -106,15 +87,6 @@ impl Method {
             Method::Strang => {
                 Facts { name: "strang", order: 2, symmetric: true, implicit_in_z: false, exact_rate: true }
             }
-            Method::Gauss { stages } => Facts {
-                // No discrete Lagrangian is made with another number of stages.
-                name: GAUSS.get(usize::from(stages).wrapping_sub(1)).copied().unwrap_or("gauss"),
-                order: 2 * u32::from(stages),
-                symmetric: true,
-                implicit_in_z: true,
-                // Rational too: a diagonal Pade approximant of the exponential.
-                exact_rate: false,
-            },
         }
     }
 
@@ -140,18 +112,16 @@ impl Method {
     }
 
     /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the motion itself. A
-    /// quadrature rule has a rational function of `h gamma` in its place, `1 + h gamma` where it is explicit in z, and a
-    /// Gauss method the diagonal Pade approximant of the exponential.
+    /// quadrature rule has a rational function of `h gamma` in its place, `1 + h gamma` where it is explicit in z.
     pub fn exact_rate(self) -> bool {
         self.facts().exact_rate
     }
 
-    /// Whether the claims of this structure are all that the method needs. The quadrature rules and the Gauss methods take
+    /// Whether the claims of this structure are all that the method needs. The quadrature rules take
     /// every regular Lagrangian; the Strang splitting one that is separable, with a linear drag of constant rate.
     ///
     /// # Errors
-    /// [`InputError::Unclaimed`] with the claim that is missing, [`InputError::Stages`] for a Gauss method that does not
-    /// exist.
+    /// [`InputError::Unclaimed`] with the claim that is missing.
     pub fn check(self, structure: &Structure) -> Result<(), InputError> {
         let Structure { separable, z_free, z_affine, autonomous, .. } = *structure;
         match self {
@@ -161,10 +131,6 @@ impl Method {
             Method::Strang if !z_affine => Err(InputError::Unclaimed { claim: "z_affine" }),
             Method::Strang if !autonomous => Err(InputError::Unclaimed { claim: "autonomous" }),
             Method::Strang => Ok(()),
-            Method::Gauss { stages } if GAUSS.get(usize::from(stages).wrapping_sub(1)).is_none() => {
-                Err(InputError::Stages { found: stages.into() })
-            }
-            Method::Gauss { .. } => Ok(()),
         }
     }
 
@@ -177,7 +143,7 @@ impl Method {
     ///
     /// # Errors
     /// Those of the method's constructor: [`InputError::Step`] unless `h` is positive and finite,
-    /// [`InputError::Dimension`] if `N = 0`, [`InputError::Stages`], and those of [`Strang::new`].
+    /// [`InputError::Dimension`] if `N = 0`, and those of [`Strang::new`].
     pub fn discretise<const N: usize, L: Lagrangian<N>>(
         self,
         lagrangian: L,
@@ -191,7 +157,6 @@ impl Method {
             Method::Midpoint => Discretised::Midpoint(Quadrature::new(lagrangian, h)?),
             Method::Trapezoidal => Discretised::Trapezoidal(Quadrature::new(lagrangian, h)?),
             Method::Strang => Discretised::Strang(Strang::new(lagrangian, h, t, state)?),
-            Method::Gauss { stages } => Discretised::Gauss(Box::new(Gauss::new(lagrangian, stages.into(), h)?)),
         })
     }
 }
@@ -203,20 +168,19 @@ impl Display for Method {
     }
 }
 
-/// From the [`name`](Method::name), `gauss_1` to `gauss_16` included.
+/// From the [`name`](Method::name).
 impl FromStr for Method {
     type Err = UnknownMethod;
 
     fn from_str(name: &str) -> Result<Self, UnknownMethod> {
-        let gauss = (1..).zip(GAUSS).map(|(stages, _)| Method::Gauss { stages });
-        let named = Self::ALL.iter().copied().chain(gauss).find(|method| method.name() == name);
+        let named = Self::ALL.iter().copied().find(|method| method.name() == name);
         named.ok_or_else(|| UnknownMethod { name: name.into() })
     }
 }
 
 /// No method has this name.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no method {name:?}; the methods are {}, and gauss_1 to gauss_16", names())]
+#[error("there is no method {name:?}; the methods are {}", names())]
 pub struct UnknownMethod {
     /// The name that was asked for.
     pub name: String,

@@ -2,7 +2,8 @@
 
 use super::{Integrator, Scene, Wanted};
 use crate::{
-    ActionSplitting, Composition, Discretised, Flow, Gauss, GaussRoute, InputError, Splitting, Status, Stepper, verified,
+    ActionSplitting, Composition, Discretised, Flow, Gauss, GaussRoute, InputError, Splitting, Status, Stepper,
+    verified,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, OneParameterGroup, PhasePoint, Structure, VelocityPoint, legendre};
@@ -238,7 +239,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                         );
                     }
                     GaussRoute::ConstantMass | GaussRoute::General => {
-                        say("iteration", true, "velocities, actions and integrating factors of the stages, to round-off");
+                        say(
+                            "iteration",
+                            true,
+                            "velocities, actions and integrating factors of the stages, to round-off",
+                        );
                         let constant = route == GaussRoute::ConstantMass;
                         let why = if constant { "W is constant: inverted once" } else { "at the stages, once a step" };
                         say("mass matrix", !constant, why);

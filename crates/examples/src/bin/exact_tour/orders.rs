@@ -2,7 +2,7 @@
 
 use contact_examples::{Axis, Checks, Curve, Directory, Failure, Line, Panel, Subject, draw_row, fractions};
 use contact_geom::systems::{CoupledInZ, System, SystemVisitor, visit_catalogue};
-use contact_geom::{Lagrangian, VelocityPoint, legendre};
+use contact_geom::{VelocityPoint, legendre};
 use discrete_herglotz::Method;
 use exact_lagrangian::{ErrorOrders, ExactError, MeasuredOrder, error_orders};
 

@@ -96,10 +96,11 @@ impl<L: Lagrangian<N>, const N: usize> Candidate for OfLibrary<L, N> {
     fn run(&self, h: f64) -> Result<Run, RunError> {
         let start = self.problem.phase_point::<N>();
         // The momenta of the problems are velocities.
-        let scene = Scene::new(self.lagrangian, VelocityPoint { q: start.q, v: start.p, z: start.z }, self.problem.duration)
-            .by(self.integrator)
-            .steps(Steps::Size(h))
-            .wanting(Wanted { action: self.z, ..Wanted::default() });
+        let scene =
+            Scene::new(self.lagrangian, VelocityPoint { q: start.q, v: start.p, z: start.z }, self.problem.duration)
+                .by(self.integrator)
+                .steps(Steps::Size(h))
+                .wanting(Wanted { action: self.z, ..Wanted::default() });
         let plan = scene.plan()?;
         let mut stepper = plan.stepper()?;
         let clock = Instant::now();
