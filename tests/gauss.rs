@@ -71,7 +71,7 @@ fn orders_are_twice_the_stages() {
         let start = (system.initial_time(), system.initial());
         for s in 1..=3 {
             let (truth, ..) = run(system, start, 16, 1.0 / 32.0, 32);
-            let finest = [[64, 90, 128, 180], [24, 32, 48, 64], [9, 11, 14, 18]][s - 1];
+            let finest = [[64, 90, 128, 180], [24, 32, 48, 64], [12, 16, 20, 24]][s - 1];
             let errors: Vec<_> = finest
                 .iter()
                 .map(|steps| {

@@ -1,9 +1,9 @@
 //! Contact Gauss collocation on every system of the catalogue: its fast steps are those of Newton's method, its flow is
 //! conformally contact, and its curves meet the states.
 
-use crate::common::{around, on_some, step_from};
+use crate::common::{around, on_some, step_from, visit_kinds};
 use crate::gauss::distance;
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use contact_geom::systems::{System, SystemVisitor};
 use contact_geom::{Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{DiscreteLagrangian, Gauss, Stepper, statements};
 
@@ -46,7 +46,7 @@ fn the_stepper_takes_the_steps_of_newton() {
         }
         Ok(())
     }
-    visit_catalogue(&mut Visitor);
+    visit_kinds(&mut Visitor);
 }
 
 /// Statement 24, `Phi* eta = sigma_d eta`, and 23 on Q x Q x R, with two and three stages on every system: to 1e-12, and
@@ -73,7 +73,7 @@ fn the_flow_is_conformal() {
             }
         }
     }
-    visit_catalogue(&mut Visitor);
+    visit_kinds(&mut Visitor);
 }
 
 /// The curve of each step meets the states at its ends, on every system: to 100 eps, the sums of sixteen terms. Its velocity
@@ -112,5 +112,5 @@ fn curves_meet_the_states() {
             }
         }
     }
-    visit_catalogue(&mut Visitor);
+    visit_kinds(&mut Visitor);
 }

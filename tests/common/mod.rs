@@ -2,7 +2,10 @@
 
 pub mod oracle;
 
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use contact_geom::systems::{
+    CoupledPlane, DoublePendulum, Duffing, HarmonicOscillator, Kepler, QuadraticInZ, System, SystemVisitor,
+    visit_catalogue,
+};
 use contact_geom::{DiscretePoint, VelocityPoint, legendre, statements as continuous};
 use discrete_herglotz::{Discretised, InputError, Method, statements as discrete};
 use exact_lagrangian::{ExactError, statements as exact};
@@ -216,6 +219,17 @@ pub fn over_motions(statement: u32) {
         }
     }
     visit_catalogue(&mut OverMotions(Statement(statement)));
+}
+
+/// Visits one system of each kind of structure, for tests of integrators, which are long to compile: linear, separable, time
+/// dependent, nonlinear in z, with a mass matrix that depends on q, and on q, v and z.
+pub fn visit_kinds(visitor: &mut impl SystemVisitor) {
+    visitor.visit(&HarmonicOscillator::default());
+    visitor.visit(&Kepler::<2>::default());
+    visitor.visit(&Duffing::forced());
+    visitor.visit(&QuadraticInZ::default());
+    visitor.visit(&DoublePendulum::default());
+    visitor.visit(&CoupledPlane::default());
 }
 
 pub use contact_geom::systems::catalogue_size as systems;
