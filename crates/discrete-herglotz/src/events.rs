@@ -15,9 +15,12 @@ pub enum Direction {
     Both,
 }
 
+/// `g(t, state)`.
+type Function<'f, const N: usize> = dyn FnMut(f64, &PhasePoint<N>) -> f64 + 'f;
+
 /// A function `g(t, state)` whose changes of sign are to be found: a section of Poincare, a collision, a turning point.
 pub struct Event<'f, const N: usize> {
-    function: Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 'f>,
+    function: Box<Function<'f, N>>,
     direction: Direction,
     terminal: bool,
 }

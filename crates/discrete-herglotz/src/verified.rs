@@ -26,8 +26,7 @@ pub fn verified<const N: usize>(
     };
     for x in [start, &beside] {
         for defect in structure.defects(lagrangian, t, x) {
-            // Not `>`: that would let a NaN pass.
-            if !(defect.size <= PROBE) {
+            if defect.size.is_nan() || defect.size > PROBE {
                 return Err(InputError::FalseClaim { claim: defect.claim, size: defect.size });
             }
         }

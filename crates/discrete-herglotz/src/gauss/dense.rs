@@ -1,5 +1,8 @@
 //! Dense output of contact Gauss collocation: the collocation polynomial of the last step.
 
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
 use super::coefficients::{Coefficients, MOST};
 use super::condensed::Condensed;
 use contact_geom::nalgebra::{SMatrix, SVector};

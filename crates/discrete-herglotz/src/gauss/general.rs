@@ -1,5 +1,8 @@
 //! Steps of contact Gauss collocation for every regular Lagrangian.
 
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
 use super::coefficients::{Coefficients, MOST};
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::extension::{Extension, Pace, Values};

@@ -100,7 +100,7 @@ impl<const N: usize> Linear<N> {
                 })
             };
             Action {
-                qq: SMatrix::from_fn(|a, b| form(a, b)),
+                qq: SMatrix::from_fn(&form),
                 qv: SMatrix::from_fn(|a, b| 2.0 * form(a, N + b)),
                 vv: SMatrix::from_fn(|a, b| form(N + a, N + b)),
                 q: SVector::from_fn(|a, _| form(a, 2 * N)),

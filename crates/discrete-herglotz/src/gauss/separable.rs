@@ -1,5 +1,8 @@
 //! Steps of contact Gauss collocation for `L = v.Mv/2 - V(t, q) + gamma z`.
 
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
 use super::stages::{Stages, blocks};

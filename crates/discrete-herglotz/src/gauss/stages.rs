@@ -127,7 +127,7 @@ pub(super) fn solve_exactly(rows: &mut [Vec<Quad>]) -> bool {
         for (i, row) in rows.iter_mut().enumerate() {
             let factor = if i == k { Quad::from(1.0) - above[k].recip() } else { row[k] / above[k] };
             for (e, a) in row.iter_mut().zip(&above).skip(k) {
-                *e = *e - factor * *a;
+                *e -= factor * *a;
             }
         }
     }

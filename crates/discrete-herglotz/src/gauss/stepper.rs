@@ -28,6 +28,7 @@ pub enum GaussRoute {
 }
 
 /// The state and the workspace of a route.
+#[allow(clippy::large_enum_variant)] // One is made for a run, in a box.
 enum Route<'a, L, const N: usize> {
     Linear(Linear<N>, Condensed),
     Condensed(Separable<'a, L, N>),

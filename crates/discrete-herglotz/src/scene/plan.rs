@@ -23,7 +23,7 @@ pub struct Item {
 /// What all runs of a plan share.
 enum Engine<'a, L, const N: usize> {
     Discrete(Discretised<&'a L, N>),
-    Gauss(Gauss<&'a L>),
+    Gauss(Box<Gauss<&'a L>>),
     /// Explicit: the coefficients are the stepper's.
     Explicit,
 }
@@ -96,7 +96,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         let h = span / count as f64;
         let engine = match integrator {
             Integrator::Discrete(method) => Engine::Discrete(method.discretise(lagrangian, h, *t0, &state)?),
-            Integrator::Gauss { stages } => Engine::Gauss(Gauss::new(lagrangian, *stages, h)?),
+            Integrator::Gauss { stages } => Engine::Gauss(Box::new(Gauss::new(lagrangian, *stages, h)?)),
             Integrator::Splitting(_) | Integrator::Composition(..) => Engine::Explicit,
         };
         let mut plan = Plan {
