@@ -22,19 +22,15 @@ fn of<L: Lagrangian<N>, const N: usize>(lagrangian: &'static L, problem: &Proble
     chosen.map(|integrator| of_library(lagrangian, integrator, problem, z)).collect()
 }
 
-/// The integrators that are measured where none is named: one or two of each kind and order.
-pub const DIAGRAMS: [&str; 14] = [
+/// The integrators that are measured where none is named: one or two of each kind, as many as a diagram's legend holds.
+pub const DIAGRAMS: [&str; 10] = [
     "midpoint",
     "strang",
-    "yoshida_4",
     "blanes_moan_6",
     "kahan_li_8",
-    "blanes_casas_8",
     "sofroniou_spaletta_10",
     "midpoint_by_kahan_li_8",
-    "gauss_2",
     "gauss_4",
-    "gauss_6",
     "gauss_8",
     "gauss_12",
     "gauss_16",
