@@ -13,6 +13,9 @@ pub struct Structure {
     pub z_free: bool,
     /// `L = L0(t, q, v) + gamma(t) z`: the conformal factor depends on time alone.
     pub z_affine: bool,
+    /// `L_z` is one number, at all times too: the conformal factor is `e^(gamma (t - t0))`. Said by `z_affine` already where
+    /// L is autonomous.
+    pub constant_rate: bool,
     /// `L = v.Mv/2 - V(t, q) + f(t, z)` with constant M.
     pub separable: bool,
     /// L is a polynomial of degree two in (q, v), plus `gamma(t) z`: the motion is linear.
@@ -31,6 +34,16 @@ pub struct Defect {
 }
 
 impl Structure {
+    /// Whether the claims say that `L_z` is constant.
+    pub fn has_constant_rate(&self) -> bool {
+        self.constant_rate || self.z_free || (self.z_affine && self.autonomous)
+    }
+
+    /// Whether the claims say that z does not act on the motion but by a rate that depends on time alone: L is affine in z.
+    pub fn is_affine_in_z(&self) -> bool {
+        self.z_affine || self.z_free || self.constant_rate
+    }
+
     /// For each claim that is made, the size at one point of the derivatives that it says vanish.
     ///
     /// The claims concern derivatives up to the third: those of the Hessian are taken along one direction without special
@@ -76,7 +89,15 @@ impl Structure {
         });
         claim(self.z_free, "z_free", &|| lagrangian.gradient(t, x).z.abs());
         claim(self.z_affine, "z_affine", &|| mixed_z.max(h.zz.re.abs()));
-        claim(self.separable, "separable", &|| qv.max(mixed_z).max(vv_changes));
+        claim(self.constant_rate, "constant_rate", &|| {
+            lagrangian.gradient(clock, &still).z.d[0].abs().max(mixed_z).max(h.zz.re.abs())
+        });
+        claim(self.separable, "separable", &|| {
+            // A term linear in v, at this time or soon after.
+            let at_rest = VelocityPoint { v: SVector::from_element(Dual::constant(0.0)), ..still };
+            let linear = largest(&mut lagrangian.gradient(clock, &at_rest).y.iter().flat_map(|p| [p.re, p.d[0]]));
+            qv.max(mixed_z).max(vv_changes).max(linear)
+        });
         claim(self.quadratic, "quadratic", &|| quadratic_changes.max(mixed_z).max(h.zz.re.abs()));
         claim(self.constant_mass, "constant_mass", &|| vv_changes);
         defects

@@ -118,18 +118,15 @@ impl Method {
     }
 
     /// Whether the claims of this structure are all that the method needs. The quadrature rules take
-    /// every regular Lagrangian; the Strang splitting one that is separable, with a linear drag of constant rate.
+    /// every regular Lagrangian; the Strang splitting one that is separable, with a linear drag.
     ///
     /// # Errors
     /// [`InputError::Unclaimed`] with the claim that is missing.
     pub fn check(self, structure: &Structure) -> Result<(), InputError> {
-        let Structure { separable, z_free, z_affine, autonomous, .. } = *structure;
         match self {
             Method::Rectangle | Method::LeftMidpoint | Method::Midpoint | Method::Trapezoidal => Ok(()),
-            Method::Strang if !separable => Err(InputError::Unclaimed { claim: "separable" }),
-            Method::Strang if z_free => Ok(()),
-            Method::Strang if !z_affine => Err(InputError::Unclaimed { claim: "z_affine" }),
-            Method::Strang if !autonomous => Err(InputError::Unclaimed { claim: "autonomous" }),
+            Method::Strang if !structure.separable => Err(InputError::Unclaimed { claim: "separable" }),
+            Method::Strang if !structure.is_affine_in_z() => Err(InputError::Unclaimed { claim: "z_affine" }),
             Method::Strang => Ok(()),
         }
     }
@@ -137,9 +134,6 @@ impl Method {
     /// The discrete Lagrangian of this method for a Lagrangian, or a reference to one, with the time step `h`. The form of
     /// the Lagrangian is verified at a time and a state, and its constants are read there, by the methods that rest on it;
     /// of the state they take position and action. Others leave both alone.
-    ///
-    /// The Strang splitting also takes a Lagrangian that depends on time, if the rate of its drag does not: that is no claim
-    /// of a [`Structure`], and is verified here.
     ///
     /// # Errors
     /// Those of the method's constructor: [`InputError::Step`] unless `h` is positive and finite,

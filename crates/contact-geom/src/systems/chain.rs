@@ -72,6 +72,7 @@ impl<const N: usize> Lagrangian<N> for Chain<N> {
             separable: true,
             quadratic: self.beta == 0.0,
             constant_mass: true,
+            ..Structure::default()
         }
     }
 }

@@ -42,6 +42,7 @@ impl Lagrangian<2> for ChargedParticle {
             separable: self.b == 0.0,
             quadratic: true,
             constant_mass: true,
+            ..Structure::default()
         }
     }
 }

@@ -46,6 +46,7 @@ impl Lagrangian<1> for CoupledInZ {
             separable: constant,
             quadratic: false,
             constant_mass: constant,
+            ..Structure::default()
         }
     }
 }

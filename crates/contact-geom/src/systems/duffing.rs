@@ -55,6 +55,7 @@ impl Lagrangian<1> for Duffing {
             autonomous: self.force == 0.0 || self.omega == 0.0,
             z_free: self.gamma == 0.0,
             z_affine: true,
+            constant_rate: true,
             separable: true,
             quadratic: self.beta == 0.0,
             constant_mass: true,

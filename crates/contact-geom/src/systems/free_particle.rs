@@ -53,6 +53,7 @@ impl Lagrangian<1> for FreeParticle {
             separable: true,
             quadratic: true,
             constant_mass: true,
+            ..Structure::default()
         }
     }
 }

@@ -82,6 +82,7 @@ impl Lagrangian<1> for HarmonicOscillator {
             separable: true,
             quadratic: true,
             constant_mass: true,
+            ..Structure::default()
         }
     }
 }

@@ -37,6 +37,7 @@ impl Lagrangian<1> for QuadraticInZ {
             separable: true,
             quadratic: without_drag,
             constant_mass: true,
+            ..Structure::default()
         }
     }
 }

@@ -75,6 +75,7 @@ impl<const D: usize> Lagrangian<D> for UniformField<D> {
             separable: true,
             quadratic: true,
             constant_mass: true,
+            ..Structure::default()
         }
     }
 }

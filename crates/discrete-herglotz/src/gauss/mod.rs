@@ -1,7 +1,7 @@
 //! Contact Gauss collocation.
 
 mod clocked;
-mod coefficients;
+pub(crate) mod coefficients;
 mod compensated;
 mod condensed;
 mod dense;
@@ -20,9 +20,11 @@ pub use stepper::{GaussRoute, GaussStepper};
 
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use coefficients::MOST;
-use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::{Clock, DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar};
-use stage_equations::{Given, Products, StageEquations, Unknowns};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{
+    Clock, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed,
+};
+use stage_equations::{Given, Products, StageEquations, Workspace};
 
 /// Contact Gauss collocation with `s` stages, of order `2s`, for every regular Lagrangian: the discrete Lagrangian
 /// `L_d(q0, q1, z0) = z1 - z0` of the stage equations
@@ -153,10 +155,10 @@ impl<L> Gauss<L> {
     {
         let equations = self.equations(t, forward);
         let given = Given::Start(*from);
-        let n = equations.size(&given);
-        let mut x = Unknowns::uniform(self.stages(), guess, &from.p, from.z);
-        let iterations = equations.solve(&given, &mut x, &mut DMatrix::zeros(n, n), &mut DVector::zeros(n))?;
-        let end = equations.end(&given, &x);
+        let mut work = equations.workspace(&given);
+        let iterations = equations.solve(&given, guess, &from.p, &mut work)?;
+        let Workspace { x, l, .. } = &work;
+        let end = equations.end(&given, x, l);
         let velocity = (0..self.stages()).fold(SVector::zeros(), |sum, j| sum + x.v[j] * self.forward.weight(j));
         Transition {
             end: PhasePoint { q: end.q, p: end.p, z: from.z + end.action },
@@ -168,23 +170,18 @@ impl<L> Gauss<L> {
     }
 
     /// The stages between two points, without differentials.
-    fn between<const N: usize>(
-        &self,
-        t: f64,
-        x: &DiscretePoint<N>,
-    ) -> Result<(Given<N, f64>, Unknowns<N, f64>), StepError>
+    fn between<const N: usize>(&self, t: f64, x: &DiscretePoint<N>) -> Result<(Given<N, f64>, Workspace<N>), StepError>
     where
         L: Lagrangian<N>,
     {
         let equations = self.equations(t, true);
         let given = Given::Ends { q0: x.q0, q1: x.q1, z0: x.z0 };
-        let n = equations.size(&given);
         let u = (x.q1 - x.q0) / self.forward.h;
         let middle = contact_geom::VelocityPoint { q: (x.q0 + x.q1) * 0.5, v: u, z: x.z0 };
         let p = self.lagrangian.gradient(t + 0.5 * self.forward.h, &middle).y;
-        let mut stages = Unknowns::uniform(self.stages(), &u, &p, x.z0);
-        equations.solve(&given, &mut stages, &mut DMatrix::zeros(n, n), &mut DVector::zeros(n))?;
-        Ok((given, stages))
+        let mut work = equations.workspace(&given);
+        equations.solve(&given, &u, &p, &mut work)?;
+        Ok((given, work))
     }
 }
 
@@ -195,19 +192,38 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Gauss<L> {
 
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
         let point = DiscretePoint { q0: x.q0.map(|e| e.re()), q1: x.q1.map(|e| e.re()), z0: x.z0.re() };
-        let (plain, solution) = self.between(t, &point)?;
-        let equations = self.equations(t, true);
+        let (plain, mut work) = self.between(t, &point)?;
         let given = Given::Ends { q0: x.q0, q1: x.q1, z0: x.z0 };
-        let stages = equations.lift(&given, &plain, &solution)?;
-        Ok(equations.end(&given, &stages).action)
+        Ok(self.equations(t, true).lifted_end(&given, &plain, &mut work)?.action)
     }
 
     /// By the step itself: `D1 = -sigma_d p0`, `D2 = p1`.
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
-        let (given, stages) = self.between(t, x)?;
-        let end = self.equations(t, true).end(&given, &stages);
+        let (given, Workspace { x, l, .. }) = self.between(t, x)?;
+        let end = self.equations(t, true).end(&given, &x, &l);
         let sigma = 1.0 / end.rho;
-        Ok(DiscreteJet::new(end.action, stages.p0 * -sigma, end.p, (1.0 - end.rho) * sigma).with_sigma(sigma))
+        Ok(DiscreteJet::new(end.action, end.p0 * -sigma, end.p, (1.0 - end.rho) * sigma).with_sigma(sigma))
+    }
+
+    /// By the derivatives of the step, from one linear system: the nested duals of [`value`](Self::value) are not needed.
+    fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
+        let (plain, mut work) = self.between(t, x)?;
+        let x: DiscretePoint<N, Dual<f64, Triple<N>>> = seed(&Triple::from(*x)).into();
+        let given = Given::Ends { q0: x.q0, q1: x.q1, z0: x.z0 };
+        let end = self.equations(t, true).lifted_end(&given, &plain, &mut work)?;
+        let sigma = end.rho.recip();
+        let (d1, d2) = (end.p0.map(|p| -(p * sigma)), end.p);
+        let dz = ((-end.rho + 1.0) * sigma).re;
+        let first = DiscreteJet::new(end.action.re, d1.map(|d| d.re), d2.map(|d| d.re), dz).with_sigma(sigma.re);
+        Ok(SecondDiscreteJet {
+            first,
+            d11: SMatrix::from_fn(|i, j| d1[i].d.x[j]),
+            d12: SMatrix::from_fn(|i, j| d1[i].d.y[j]),
+            d22: SMatrix::from_fn(|i, j| d2[i].d.y[j]),
+            d1z: SVector::from_fn(|i, _| d1[i].d.z),
+            d2z: SVector::from_fn(|i, _| d2[i].d.z),
+            dzz: sigma.d.z,
+        })
     }
 
     fn forward(

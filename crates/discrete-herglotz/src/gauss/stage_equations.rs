@@ -49,8 +49,11 @@ pub(super) struct Unknowns<const N: usize, T> {
 
 impl<const N: usize> Unknowns<N, f64> {
     /// A motion of constant velocity.
-    pub fn uniform(s: usize, v: &SVector<f64, N>, p0: &SVector<f64, N>, z0: f64) -> Self {
-        Unknowns { v: vec![*v; s], z: vec![z0; s], rho: vec![1.0; s], p0: *p0 }
+    fn make_uniform(&mut self, v: &SVector<f64, N>, p0: &SVector<f64, N>, z0: f64) {
+        self.v.fill(*v);
+        self.z.fill(z0);
+        self.rho.fill(1.0);
+        self.p0 = *p0;
     }
 
     /// The largest factor over the smallest, the start's 1 included: momenta are sums of terms with all of them, divided by
@@ -71,14 +74,25 @@ impl<const N: usize> Unknowns<N, f64> {
     }
 }
 
-/// The end of a step.
+/// The end of a step, and the momentum at its start.
 pub(super) struct End<const N: usize, T> {
+    pub p0: SVector<T, N>,
     pub q: SVector<T, N>,
     pub p: SVector<T, N>,
     /// `z1 - z0`.
     pub action: T,
     /// `rho` at the end, `1 / sigma_d`.
     pub rho: T,
+}
+
+/// What Newton's method works in; made once for a run, so that no step allocates.
+pub(super) struct Workspace<const N: usize> {
+    /// The guess, then the solution.
+    pub x: Unknowns<N, f64>,
+    /// L and its gradient at the stages of the solution.
+    pub l: Vec<Dual<f64, Triple<N>>>,
+    jacobian: DMatrix<f64>,
+    residual: DVector<f64>,
 }
 
 /// The stage equations of a step.
@@ -101,12 +115,19 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     }
 
     /// L and its gradient at the stages.
-    pub fn stages<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>) -> Vec<Dual<T, Triple<N, T>>> {
-        let at = |i: usize| {
+    fn stages<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>, l: &mut Vec<Dual<T, Triple<N, T>>>) {
+        l.clear();
+        l.extend((0..self.products.s).map(|i| {
             let y = VelocityPoint { q: self.position(given, x, i), v: x.v[i], z: x.z[i] };
             self.lagrangian.along(T::from(self.t + self.products.c[i]), &seed(&Triple::from(y)).into())
-        };
-        (0..self.products.s).map(at).collect()
+        }));
+    }
+
+    /// The workspace for steps of this kind.
+    pub fn workspace(&self, given: &Given<N, f64>) -> Workspace<N> {
+        let (s, n) = (self.products.s, self.size(given));
+        let x = Unknowns { v: vec![SVector::zeros(); s], z: vec![0.0; s], rho: vec![1.0; s], p0: SVector::zeros() };
+        Workspace { x, l: Vec::with_capacity(s), jacobian: DMatrix::zeros(n, n), residual: DVector::zeros(n) }
     }
 
     /// The residuals: of the momenta, then of the actions, the factors, and the end position.
@@ -246,29 +267,33 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         worst
     }
 
-    /// Solves the stage equations by Newton's method from the guess in `x`; `jacobian` and `residual` are workspace of the
-    /// right size. Returns the iterations.
+    /// Solves the stage equations by Newton's method from a motion of constant velocity `v`, with the momentum `p0`. Returns
+    /// the iterations.
     ///
     /// # Errors
     /// [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`].
     pub fn solve(
         &self,
         given: &Given<N, f64>,
-        x: &mut Unknowns<N, f64>,
-        jacobian: &mut DMatrix<f64>,
-        residual: &mut DVector<f64>,
+        v: &SVector<f64, N>,
+        p0: &SVector<f64, N>,
+        work: &mut Workspace<N>,
     ) -> Result<u32, StepError> {
+        let Workspace { x, l, jacobian, residual } = work;
+        let (Given::Start(PhasePoint { z: z0, .. }) | Given::Ends { z0, .. }) = given;
+        x.make_uniform(v, p0, *z0);
+        self.stages(given, x, l);
         let ends = matches!(given, Given::Ends { .. });
         let mut before = f64::INFINITY;
         for iterations in 1..=ITERATION_LIMIT {
-            let l = self.stages(given, x);
-            self.residual(given, x, &l, residual);
-            self.jacobian(given, x, &l, jacobian);
+            self.residual(given, x, l, residual);
+            self.jacobian(given, x, l, jacobian);
             linear::solve(jacobian, residual).map_err(|e| StepError::Singular { pivot: e.pivot })?;
             let change = self.correct(x, residual, ends);
             if !change.is_finite() {
                 return Err(StepError::NonFinite);
             }
+            self.stages(given, x, l);
             let predicted = before.is_finite() && last_correction(change, before, f64::EPSILON);
             // With half of the digits at the least.
             let near = (1e3 * f64::EPSILON * x.spread()).min(f64::EPSILON.sqrt());
@@ -281,10 +306,9 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         Err(StepError::NotConverged { residual: before, iterations: ITERATION_LIMIT })
     }
 
-    /// The end of the step whose stages are solved.
-    pub fn end<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>) -> End<N, T> {
+    /// The end of the step whose stages are solved, from L and its gradient there.
+    pub fn end<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>, l: &[Dual<T, Triple<N, T>>]) -> End<N, T> {
         let Products { b, .. } = self.products;
-        let l = self.stages(given, x);
         let (q0, p0) = match given {
             Given::Start(state) => (state.q, state.p),
             Given::Ends { q0, .. } => (*q0, x.p0),
@@ -292,6 +316,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         let sum = |f: &dyn Fn(usize) -> T| (0..self.products.s).fold(T::zero(), |sum, j| sum + f(j) * b[j]);
         let rho = -sum(&|j| x.rho[j] * l[j].d.z) + 1.0;
         End {
+            p0,
             q: SVector::from_fn(|d, _| q0[d] + sum(&|j| x.v[j][d])),
             p: SVector::from_fn(|d, _| (p0[d] + sum(&|j| x.rho[j] * l[j].d.x[d])) / rho),
             action: sum(&|j| l[j].re),
@@ -299,33 +324,34 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
     }
 
-    /// The solution over a scalar with differentials, from that without: each correction by the inverse Jacobian settles one
-    /// more order of derivatives.
+    /// The end of the step over a scalar with differentials, from the solution without: each correction by the inverse Jacobian
+    /// settles one more order of derivatives.
     ///
     /// # Errors
     /// [`StepError::Singular`], [`StepError::NotConverged`].
-    pub fn lift<T: Scalar>(
+    pub fn lifted_end<T: Scalar>(
         &self,
         given: &Given<N, T>,
         plain: &Given<N, f64>,
-        solution: &Unknowns<N, f64>,
-    ) -> Result<Unknowns<N, T>, StepError> {
+        work: &mut Workspace<N>,
+    ) -> Result<End<N, T>, StepError> {
         let n = self.size(plain);
-        let mut jacobian = DMatrix::zeros(n, n);
-        self.jacobian(plain, solution, &self.stages(plain, solution), &mut jacobian);
-        let inverse = jacobian.try_inverse().ok_or(StepError::Singular { pivot: 0.0 })?;
-        let mut x = solution.lifted::<T>();
+        self.jacobian(plain, &work.x, &work.l, &mut work.jacobian);
+        let inverse = work.jacobian.clone().try_inverse().ok_or(StepError::Singular { pivot: 0.0 })?;
+        let (mut x, mut l) = (work.x.lifted::<T>(), Vec::new());
         let (mut residual, mut change) = (DVector::from_element(n, T::zero()), DVector::from_element(n, T::zero()));
         let mut before = f64::INFINITY;
         for _ in 0..ITERATION_LIMIT {
-            self.residual(given, &x, &self.stages(given, &x), &mut residual);
+            self.stages(given, &x, &mut l);
+            self.residual(given, &x, &l, &mut residual);
             for i in 0..n {
                 change[i] = (0..n).fold(T::zero(), |sum, j| sum + residual[j] * inverse[(i, j)]);
             }
             let size = self.correct(&mut x, &change, matches!(given, Given::Ends { .. }));
             // The iteration ends in finitely many steps but for round-off.
             if size <= f64::EPSILON || (size >= 0.5 * before && size <= 1e-10) {
-                return Ok(x);
+                self.stages(given, &x, &mut l);
+                return Ok(self.end(given, &x, &l));
             }
             before = size;
         }

@@ -7,10 +7,10 @@ use super::extension::{Extension, Physical};
 use super::general::{General, Mass, Table};
 use super::linear::Linear;
 use super::separable::Separable;
-use super::stage_equations::{Given, Products, StageEquations, Unknowns};
+use super::stage_equations::{Given, Products, StageEquations, Workspace};
 use super::sweeps::Progress;
 use crate::{Halt, InputError, StepError, Stepper, verified};
-use contact_geom::nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Structure, Triple, VelocityPoint, linear};
 use pulp::{Arch, Simd, WithSimd};
 
@@ -36,13 +36,13 @@ enum Route<'a, L, const N: usize> {
 }
 
 /// How the last step was taken, for dense output.
-enum Last<const N: usize> {
+enum Last {
     /// There is none, or the next one failed and left nothing of it.
     None,
     /// By the route; the stages are in its workspace.
     Route,
-    /// By Newton's method.
-    Newton(Unknowns<N, f64>),
+    /// By Newton's method; the stages are in its workspace.
+    Newton,
 }
 
 /// Contact Gauss collocation at work: stages in the lanes of the processor's vector registers, each step's start extrapolated
@@ -57,8 +57,10 @@ pub struct GaussStepper<'a, L, const N: usize> {
     k: usize,
     /// The state at the start of the last step.
     from: Start<N>,
-    last: Last<N>,
+    last: Last,
     newton: bool,
+    /// Made for the first step that needs it.
+    workspace: Option<Box<Workspace<N>>>,
     newton_steps: u64,
 }
 
@@ -72,16 +74,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     ) -> Result<Self, InputError> {
         let (lagrangian, s, h) = (&gauss.lagrangian, gauss.stages(), gauss.forward.h);
         let Beginning { start, structure, w, inverse } = Beginning::of(lagrangian, t0, &state, guess)?;
-        // A term linear in v has no place in the condensed step: `p = M v` there.
-        let at_rest = lagrangian.gradient(t0, &VelocityPoint { v: SVector::zeros(), ..start });
-        let drag = structure.z_affine || structure.z_free;
-        let condensed = structure.separable && structure.autonomous && drag && at_rest.y.amax() == 0.0;
+        let condensed = structure.separable && structure.has_constant_rate();
         let mut mass = None;
         let route = if condensed {
-            let table = Condensed::new(s, h, at_rest.z)?;
+            let table = Condensed::new(s, h, lagrangian.gradient(t0, &start).z)?;
             mass = Some(w);
-            let linear =
-                if structure.quadratic { Linear::new(lagrangian, &table, &inverse, t0, &start, wants_z) } else { None };
+            let linear = if structure.quadratic && structure.autonomous {
+                Linear::new(lagrangian, &table, &inverse, t0, &start, wants_z)
+            } else {
+                None
+            };
             match linear {
                 Some(linear) => Route::Linear(linear, table),
                 None => {
@@ -106,6 +108,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             from: Start { q: [0.0; N], y: [0.0; N], z: 0.0 },
             last: Last::None,
             newton: true,
+            workspace: None,
             newton_steps: 0,
         })
     }
@@ -143,10 +146,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let start = self.phase(&self.from);
         let solved = match (&self.last, &*self.route) {
             (Last::None, _) => return None,
-            (Last::Newton(x), _) => {
-                let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t };
-                let mut solved = Solved::from_gradients(&x.v, &x.rho, &equations.stages(&Given::Start(start), x));
-                if matches!(&*self.route, Route::Condensed(run) if !run.wants_z) {
+            (Last::Newton, route) => {
+                let Workspace { x, l, .. } = self.workspace.as_deref()?;
+                let mut solved = Solved::from_gradients(&x.v, &x.rho, l);
+                if matches!(route, Route::Condensed(run) if !run.wants_z) {
                     solved.l.fill(0.0);
                 }
                 solved
@@ -189,11 +192,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let (values, from) = (self.values(), self.state());
         let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t };
         let given = Given::Start(from);
-        let n = equations.size(&given);
         let v = velocity(self.lagrangian, t, &from, SVector::zeros()).map_err(|_| refused)?;
-        let mut x = Unknowns::uniform(self.products.s, &v, &from.p, from.z);
-        equations.solve(&given, &mut x, &mut DMatrix::zeros(n, n), &mut DVector::zeros(n))?;
-        let end = equations.end(&given, &x);
+        let work = self.workspace.get_or_insert_with(|| Box::new(equations.workspace(&given)));
+        equations.solve(&given, &v, &from.p, work)?;
+        let Workspace { x, l, .. } = &**work;
+        let end = equations.end(&given, x, l);
         let mut next = PhasePoint { q: end.q, p: end.p, z: from.z + end.action };
         if !Triple::from(next).is_finite() {
             return Err(StepError::NonFinite);
@@ -216,7 +219,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         }
         self.newton_steps += 1;
         self.from = values;
-        self.last = Last::Newton(x);
+        self.last = Last::Newton;
         Ok(())
     }
 }

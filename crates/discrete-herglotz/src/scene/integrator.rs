@@ -56,7 +56,7 @@ impl Integrator {
             Integrator::Gauss { .. } => Ok(()),
             Integrator::Splitting(_) if !structure.separable => Err(InputError::Unclaimed { claim: "separable" }),
             // The third flow, that of f(z), leaves the hypothesis of Runge-Kutta-Nyström methods.
-            Integrator::Splitting(scheme) if scheme.is_nystrom() && !(structure.z_affine || structure.z_free) => {
+            Integrator::Splitting(scheme) if scheme.is_nystrom() && !structure.is_affine_in_z() => {
                 Err(InputError::Unclaimed { claim: "z_affine" })
             }
             Integrator::Splitting(_) => Ok(()),

@@ -214,10 +214,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
 
     /// Finds the route and puts it in words.
     fn explain(&mut self, structure: &Structure, start: &VelocityPoint<N>) -> Result<(), InputError> {
-        let drag = structure.z_affine || structure.z_free;
+        let drag = structure.is_affine_in_z();
         let mut items = Vec::new();
         let mut say = |what, computed, why: &str| items.push(Item { what, computed, why: why.into() });
-        let constant_gamma = drag && structure.autonomous;
         match (&self.engine, &self.integrator) {
             (Engine::Gauss(gauss), _) => {
                 let route = gauss.stepper(self.t0, self.start, start.v)?.route();
@@ -263,7 +262,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 say("Jacobian", true, "second derivatives of L at each iterate");
             }
             _ => {
-                self.constant_rate = constant_gamma;
+                self.constant_rate = structure.has_constant_rate();
                 self.z_decouples = drag;
                 say("Newton's method", false, "each step is explicit: forces only");
                 say("Jacobian", false, "no equation is solved");

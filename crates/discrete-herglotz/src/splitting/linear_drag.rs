@@ -1,17 +1,21 @@
 //! Splittings where the drag is linear.
 
+use super::drag::{Drag, Drift};
 use super::motion::{Motion, Progress};
 use super::separable::Separable;
 use crate::{Halt, InputError, SplittingScheme, Stepper};
 use contact_geom::{Lagrangian, PhasePoint};
 
-/// A splitting at work on `L = v.Mv/2 - V(t, q) + gamma z`.
+/// A splitting at work on `L = v.Mv/2 - V(t, q) + gamma(t) z`.
 ///
 /// The flow of the kinetic part with the drag, over a time s, is `q += (e^(gamma s) - 1)/gamma M^-1 p`,
-/// `p = e^(gamma s) p`; that of `-V` is the kick `p += s L_q`; each is exact, with its action, and is a conformal contact
-/// map, of rate `e^(gamma s)` and 1. So every step has `sigma_d = e^(gamma h)`. The drag goes with the kinetic part because
-/// that keeps the hypothesis of Runge-Kutta-Nyström schemes. Time goes with it too: a kick takes V at the time of the drifts
-/// before it.
+/// `p = e^(gamma s) p` for a constant gamma; that of `-V` is the kick `p += s L_q`; each is exact, with its action, and is a
+/// conformal contact map, of rate `e^(gamma s)` and 1. So every step has `sigma_d = e^(gamma h)`. The drag goes with the
+/// kinetic part because that keeps the hypothesis of Runge-Kutta-Nyström schemes. Time goes with it too: a kick takes V at
+/// the time of the drifts before it.
+///
+/// Where L does not claim that its rate is constant, the rate of a drift is `e^g`, where g is the integral of `L_z` over it,
+/// and both integrals are taken by a Gauss formula of order 12; `sigma_d` is the product of these rates.
 ///
 /// Explicit, with [`stages`](SplittingScheme::stages) forces a step. Kicks (or drifts) that two steps share are one within
 /// [`advance`](Stepper::advance), so that ten steps at once and ten times one differ by rounding.
@@ -29,6 +33,7 @@ use contact_geom::{Lagrangian, PhasePoint};
 #[derive(Clone, Debug)]
 pub struct Splitting<'a, L, const N: usize> {
     form: Separable<&'a L, N>,
+    drag: Drag<N>,
     table: Table,
     progress: Progress<N>,
     action: bool,
@@ -40,44 +45,25 @@ pub struct Splitting<'a, L, const N: usize> {
 struct Table {
     /// The kick that begins a step, with the force that the last one ended with.
     opening: f64,
-    /// The drift that ends a step.
-    closing: Drift,
+    /// The drift that ends a step, with no kick.
+    closing: Stage,
     /// The stages of a step on its own.
     single: Vec<Stage>,
     /// Those of a step that is joined to its neighbour: to the next by the last kick, or to the last by the first drift.
     joined: Vec<Stage>,
     /// Whether steps begin with a kick.
     kick_first: bool,
-    /// `e^(gamma h)`.
-    sigma: f64,
 }
 
 /// A drift and the kick that follows.
 #[derive(Clone, Copy, Debug)]
 struct Stage {
     drift: Drift,
+    /// The length of the drift in time.
+    span: f64,
     kick: f64,
     /// The time of the kick after the step's start.
     time: f64,
-}
-
-/// The flow of the kinetic part with the drag over a time s.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Drift {
-    /// `(e^(gamma s) - 1)/gamma`.
-    pub(super) length: f64,
-    /// `e^(gamma s) - 1`: a momentum that is multiplied by `e^(gamma s)` itself gathers the rounding of that factor.
-    pub(super) damping: f64,
-    /// The action of `p.M^-1 p`: `e^(gamma s) (e^(gamma s) - 1)/(2 gamma)`.
-    pub(super) lift: f64,
-}
-
-impl Drift {
-    pub(super) fn over(gamma: f64, s: f64) -> Self {
-        let damping = (gamma * s).exp_m1();
-        let length = if gamma == 0.0 { s } else { damping / gamma };
-        Drift { length, damping, lift: 0.5 * (1.0 + damping) * length }
-    }
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
@@ -85,8 +71,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
     ///
     /// # Errors
     /// [`InputError::Step`] unless h is positive and finite; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
-    /// is not separable and affine in z; [`InputError::Hypothesis`] where gamma depends on time; [`InputError::Geometry`]
-    /// where the state is not finite or M singular; [`InputError::FirstStep`] where V is not defined at the start.
+    /// is not separable and affine in z; [`InputError::Geometry`] where the state is not finite or M singular;
+    /// [`InputError::FirstStep`] where V is not defined at the start.
     pub fn new(
         lagrangian: &'a L,
         scheme: &SplittingScheme,
@@ -95,11 +81,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         state: PhasePoint<N>,
     ) -> Result<Self, InputError> {
         let form = Separable::read(lagrangian, h, t0, &state)?;
-        let gamma = form.linear_drag(t0, &state)?;
+        let drag = Drag::of(&form, t0, &state)?;
         let motion = Motion::new(state, form.first_kick(t0, &state.q, 0.0)?);
-        let table = Table::new(scheme, gamma, h);
+        let table = Table::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
         let progress = Progress { h, t0, taken: 0, forces: scheme.stages(), motion };
-        Ok(Splitting { form, table, progress, action: true, compensated: false })
+        Ok(Splitting { form, drag, table, progress, action: true, compensated: false })
     }
 
     /// Without the action: z stays what it is at the start, and costs nothing.
@@ -115,36 +101,39 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
 }
 
 impl Table {
-    fn new(scheme: &SplittingScheme, gamma: f64, h: f64) -> Self {
+    /// Of a drag that depends on time the drifts are those from `t0`; each step makes its own.
+    fn new(scheme: &SplittingScheme, h: f64, drift: impl Fn(f64) -> Drift) -> Self {
         let (drifts, kicks) = scheme.coefficients();
         let stages = scheme.stages();
         let kick_first = kicks[0] != 0.0;
+        let stage = |span: f64, kick: f64, time: f64| Stage { drift: drift(span), span, kick, time };
         let mut time = 0.0;
         let single: Vec<Stage> = (0..stages)
             .map(|i| {
                 time += drifts[i];
-                Stage { drift: Drift::over(gamma, drifts[i] * h), kick: kicks[i + 1] * h, time: time * h }
+                stage(drifts[i] * h, kicks[i + 1] * h, time * h)
             })
             .collect();
         let mut joined = single.clone();
         if kick_first {
             joined[stages - 1].kick = (kicks[stages] + kicks[0]) * h;
         } else {
-            joined[0].drift = Drift::over(gamma, (drifts[stages] + drifts[0]) * h);
+            joined[0] = stage((drifts[stages] + drifts[0]) * h, joined[0].kick, joined[0].time);
         }
-        let closing = Drift::over(gamma, drifts[drifts.len() - 1] * h);
-        Table { opening: kicks[0] * h, closing, single, joined, kick_first, sigma: (gamma * h).exp() }
+        let closing = stage(drifts[drifts.len() - 1] * h, 0.0, h);
+        Table { opening: kicks[0] * h, closing, single, joined, kick_first }
     }
 }
 
 impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
-        let Splitting { form, table, progress, action, compensated, .. } = self;
+        let Splitting { form, drag, table, progress, action, compensated } = self;
+        let maps = Maps { form, drag, table };
         match (*action, *compensated) {
-            (false, false) => progress.advance(steps, |at, n| run::<L, N, false, false>(form, table, at, n)),
-            (false, true) => progress.advance(steps, |at, n| run::<L, N, false, true>(form, table, at, n)),
-            (true, false) => progress.advance(steps, |at, n| run::<L, N, true, false>(form, table, at, n)),
-            (true, true) => progress.advance(steps, |at, n| run::<L, N, true, true>(form, table, at, n)),
+            (false, false) => progress.advance(steps, |at, n| maps.run::<false, false>(at, n)),
+            (false, true) => progress.advance(steps, |at, n| maps.run::<false, true>(at, n)),
+            (true, false) => progress.advance(steps, |at, n| maps.run::<true, false>(at, n)),
+            (true, true) => progress.advance(steps, |at, n| maps.run::<true, true>(at, n)),
         }
     }
 
@@ -165,51 +154,68 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     }
 }
 
-/// The motion after some steps more.
-#[inline(never)]
-fn run<L: Lagrangian<N>, const N: usize, const ACTION: bool, const COMPENSATED: bool>(
-    form: &Separable<&L, N>,
-    table: &Table,
-    from: &Progress<N>,
-    steps: usize,
-) -> Motion<N> {
-    let mut m = from.motion;
-    // Steps that begin with a drift leave the first on its own, others the last.
-    let (first, last) = if table.kick_first {
-        m.kick::<ACTION, COMPENSATED>(table.opening);
-        ((&table.joined, 0..steps - 1), (&table.single, steps - 1..steps))
-    } else {
-        ((&table.single, 0..1), (&table.joined, 1..steps))
-    };
-    for (stages, range) in [first, last] {
-        for k in range {
-            let t = from.time_after(k);
-            for stage in stages {
-                drift::<L, N, ACTION, COMPENSATED>(form, &mut m, &stage.drift);
-                (m.value, m.force) = form.kick(t + stage.time, &m.q.value, 0.0);
-                m.kick::<ACTION, COMPENSATED>(stage.kick);
-            }
-        }
-    }
-    if !table.kick_first {
-        drift::<L, N, ACTION, COMPENSATED>(form, &mut m, &table.closing);
-    }
-    m.sigma = table.sigma;
-    m
+/// What a step consists of.
+struct Maps<'s, 'a, L, const N: usize> {
+    form: &'s Separable<&'a L, N>,
+    drag: &'s Drag<N>,
+    table: &'s Table,
 }
 
-/// The flow of the kinetic part with the drag.
-#[inline(always)]
-fn drift<L: Lagrangian<N>, const N: usize, const ACTION: bool, const COMPENSATED: bool>(
-    form: &Separable<&L, N>,
-    m: &mut Motion<N>,
-    drift: &Drift,
-) {
-    let p = m.p.value;
-    let v = form.velocity(&p);
-    if ACTION {
-        m.z.add::<COMPENSATED>(|_, z| drift.damping * z + drift.lift * p.dot(&v));
+impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
+    /// The motion after some steps more.
+    #[inline(never)]
+    fn run<const ACTION: bool, const COMPENSATED: bool>(&self, from: &Progress<N>, steps: usize) -> Motion<N> {
+        let Maps { form, drag, table } = self;
+        let mut m = from.motion;
+        // Steps that begin with a drift leave the first on its own, others the last.
+        let (first, last) = if table.kick_first {
+            m.kick::<ACTION, COMPENSATED>(table.opening);
+            ((&table.joined, 0..steps - 1), (&table.single, steps - 1..steps))
+        } else {
+            ((&table.single, 0..1), (&table.joined, 1..steps))
+        };
+        for (stages, range) in [first, last] {
+            for k in range {
+                let t = from.time_after(k);
+                for stage in stages {
+                    self.drift::<ACTION, COMPENSATED>(&mut m, t, stage);
+                    (m.value, m.force) = form.kick(t + stage.time, &m.q.value, 0.0);
+                    m.kick::<ACTION, COMPENSATED>(stage.kick);
+                }
+            }
+        }
+        let t = from.time_after(steps - 1);
+        if !table.kick_first {
+            self.drift::<ACTION, COMPENSATED>(&mut m, t, &table.closing);
+        }
+        m.sigma = match drag {
+            Drag::Constant(gamma) => (gamma * from.h).exp(),
+            Drag::Timed { .. } => {
+                let closing = if table.kick_first { None } else { Some(&table.closing) };
+                table.single.iter().chain(closing).map(|stage| 1.0 + self.drift_of(t, stage).damping).product()
+            }
+        };
+        m
     }
-    m.q.add::<COMPENSATED>(|i, _| drift.length * v[i]);
-    m.p.add::<COMPENSATED>(|_, p| drift.damping * p);
+
+    /// The drift of a stage of the step from the time t.
+    #[inline(always)]
+    fn drift_of(&self, t: f64, stage: &Stage) -> Drift {
+        match self.drag {
+            Drag::Constant(_) => stage.drift,
+            timed => timed.drift(&self.form.lagrangian, t + (stage.time - stage.span), stage.span),
+        }
+    }
+
+    #[inline(always)]
+    fn drift<const ACTION: bool, const COMPENSATED: bool>(&self, m: &mut Motion<N>, t: f64, stage: &Stage) {
+        let drift = self.drift_of(t, stage);
+        let p = m.p.value;
+        let v = self.form.velocity(&p);
+        if ACTION {
+            m.z.add::<COMPENSATED>(|_, z| drift.damping * z + drift.lift * p.dot(&v));
+        }
+        m.q.add::<COMPENSATED>(|i, _| drift.length * v[i]);
+        m.p.add::<COMPENSATED>(|_, p| drift.damping * p);
+    }
 }

@@ -2,6 +2,7 @@
 
 mod action_flow;
 mod action_strang;
+mod drag;
 mod linear_drag;
 mod motion;
 mod nonlinear_drag;

@@ -38,28 +38,14 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
         }
         let rest = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
         let mass = lagrangian.hessian(t, &rest).vv;
-        // A term linear in v would pass for separable by its second derivatives.
-        let size = lagrangian.gradient(t, &rest).y.amax() / (1.0 + mass.amax());
-        if size.is_nan() || size > FALSE_CLAIM {
-            return Err(InputError::FalseClaim { claim: "separable", size });
-        }
         let inverse = if mass == SMatrix::<f64, N, N>::identity() { None } else { Some(inverted(&mass)?) };
         Ok(Separable { lagrangian, mass, inverse })
     }
 
-    /// The constant rate gamma of a linear drag.
-    pub(crate) fn linear_drag(&self, t: f64, state: &PhasePoint<N>) -> Result<f64, InputError> {
-        let structure = self.lagrangian.structure();
-        if !(structure.z_affine || structure.z_free) {
-            return Err(InputError::Unclaimed { claim: "z_affine" });
-        }
-        self.check_steady_drag(t, state)?;
-        Ok(self.lagrangian.gradient(t, &VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z }).z)
-    }
-
     /// Verifies, at some times, that `L_z` does not depend on time.
     pub(crate) fn check_steady_drag(&self, t: f64, state: &PhasePoint<N>) -> Result<(), InputError> {
-        if self.lagrangian.structure().autonomous {
+        let structure = self.lagrangian.structure();
+        if structure.autonomous || structure.has_constant_rate() {
             return Ok(());
         }
         for i in 0..3 {

@@ -1,16 +1,17 @@
 //! The Strang splitting as a discrete Lagrangian.
 
-use super::linear_drag::Drift;
+use super::drag::{Drag, Drift};
 use super::separable::Separable;
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 
-/// The Strang splitting of `L = v.Mv/2 - V(t, q) + gamma z`, kick, drift, kick, as a discrete Lagrangian of order 2:
+/// The Strang splitting of `L = v.Mv/2 - V(t, q) + gamma(t) z`, kick, drift, kick, as a discrete Lagrangian of order 2:
 /// with `d = (e^(gamma h) - 1)/gamma`,
 ///
 /// `L_d = e^(gamma h) ((q1 - q0).M(q1 - q0)/(2d) - h/2 V(t, q0)) - h/2 V(t + h, q1) + (e^(gamma h) - 1) z0`.
 ///
+/// Where gamma depends on time, `gamma h` is its integral over the step, and d that of the exponential of the integral so far.
 /// So `sigma_d = e^(gamma h)` at every point, and the step is explicit: the drift alone joins the positions, which gives the
 /// momentum between the kicks. Symmetric; the second-order member of [`SplittingScheme`](crate::SplittingScheme), whose
 /// runs are a [`Splitting`](crate::Splitting)'s.
@@ -29,9 +30,9 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 pub struct Strang<L, const N: usize> {
     form: Separable<L, N>,
     h: f64,
-    sigma: f64,
-    forth: Drift,
-    back: Drift,
+    drag: Drag<N>,
+    /// Where the drag is constant, its drifts over h and -h.
+    steady: Option<(Drift, Drift)>,
 }
 
 impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
@@ -41,14 +42,26 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
     /// Those of [`Splitting::new`](crate::Splitting::new), but for the last.
     pub fn new(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
         let form = Separable::read(lagrangian, h, t, state)?;
-        let gamma = form.linear_drag(t, state)?;
-        let (forth, back) = (Drift::over(gamma, h), Drift::over(gamma, -h));
-        Ok(Strang { form, h, sigma: (gamma * h).exp(), forth, back })
+        let drag = Drag::of(&form, t, state)?;
+        let drift = |s| drag.drift(&form.lagrangian, t, s);
+        let steady = matches!(drag, Drag::Constant(_)).then(|| (drift(h), drift(-h)));
+        Ok(Strang { form, h, drag, steady })
     }
 
-    /// Kick, drift, kick over a step from `t`, forward with `h > 0` or back with `h < 0`.
+    /// The drift of a step from `t`, forward or back.
     #[inline(always)]
-    fn step(&self, t: f64, from: &PhasePoint<N>, h: f64, drift: &Drift) -> Result<Transition<N>, StepError> {
+    fn drift(&self, t: f64, forward: bool) -> Drift {
+        match &self.steady {
+            Some((forth, back)) => *if forward { forth } else { back },
+            None => self.drag.drift(&self.form.lagrangian, t, if forward { self.h } else { -self.h }),
+        }
+    }
+
+    /// Kick, drift, kick over a step from `t`, forward or back.
+    #[inline(always)]
+    fn step(&self, t: f64, from: &PhasePoint<N>, forward: bool) -> Result<Transition<N>, StepError> {
+        let h = if forward { self.h } else { -self.h };
+        let drift = self.drift(t, forward);
         let PhasePoint { mut q, mut p, mut z } = *from;
         let (value, force) = self.form.kick(t, &q, 0.0);
         z += 0.5 * h * value;
@@ -61,7 +74,8 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
         z += 0.5 * h * value;
         p += force * (0.5 * h);
         let velocity = v * (drift.length / h);
-        Transition { end: PhasePoint { q, p, z }, velocity, sigma: self.sigma, iterations: 0 }.checked()
+        let sigma = if forward { 1.0 + drift.damping } else { 1.0 / (1.0 + drift.damping) };
+        Transition { end: PhasePoint { q, p, z }, velocity, sigma, iterations: 0 }.checked()
     }
 }
 
@@ -75,8 +89,8 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
         let kick =
             |t: f64, q: &SVector<T, N>| self.form.lagrangian.value(T::from(t), q, &still, T::zero()) * (0.5 * self.h);
         let square = self.form.twice_kinetic(&(x.q1 - x.q0));
-        let growth = self.forth.damping;
-        let before = square * (0.5 / self.forth.length) + kick(t, &x.q0);
+        let Drift { damping: growth, length, .. } = self.drift(t, true);
+        let before = square * (0.5 / length) + kick(t, &x.q0);
         Ok(before * (1.0 + growth) + kick(t + self.h, &x.q1) + x.z0 * growth)
     }
 
@@ -89,7 +103,7 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
         _guess: &SVector<f64, N>,
         _solver: &mut Solver<N>,
     ) -> Result<Transition<N>, StepError> {
-        self.step(t, from, self.h, &self.forth)
+        self.step(t, from, true)
     }
 
     /// The step with `-h`, by symmetry.
@@ -101,6 +115,6 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
         _guess: &SVector<f64, N>,
         _solver: &mut Solver<N>,
     ) -> Result<Transition<N>, StepError> {
-        self.step(t + self.h, from, -self.h, &self.back)
+        self.step(t + self.h, from, false)
     }
 }

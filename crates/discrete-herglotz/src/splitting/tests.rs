@@ -3,7 +3,7 @@
 use super::{ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, Splitting, SplittingScheme, Strang};
 use crate::{Composition, DiscreteLagrangian, Halt, InputError, Midpoint, Solver, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{DoublePendulum, Duffing, Kepler, Pendulum, QuadraticInZ};
+use contact_geom::systems::{DoublePendulum, Duffing, Kepler, LaneEmden, Pendulum, QuadraticInZ};
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, Triple};
 
 /// The time that errors are measured after.
@@ -21,7 +21,7 @@ impl Lagrangian<2> for Inertia {
         kinetic - a.powi(4) * 0.5 - b * b * 0.7 - q[0] * q[1] * 0.2 - z * 0.15
     }
     fn structure(&self) -> Structure {
-        Structure { separable: true, z_affine: true, constant_mass: true, ..Structure::default() }
+        Structure { separable: true, z_affine: true, constant_rate: true, constant_mass: true, ..Structure::default() }
     }
 }
 
@@ -34,6 +34,18 @@ impl Lagrangian<1> for Curved {
     }
     fn structure(&self) -> Structure {
         Structure { separable: true, constant_mass: true, ..Structure::default() }
+    }
+}
+
+/// A pendulum of which the drag depends on time.
+struct Tides;
+
+impl Lagrangian<1> for Tides {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 + q[0].cos() * 2.0 - z * (t.sin() * 0.3 + 0.2)
+    }
+    fn structure(&self) -> Structure {
+        Structure { separable: true, z_affine: true, constant_mass: true, ..Structure::default() }
     }
 }
 
@@ -100,6 +112,9 @@ fn linear_drag_has_the_schemes_order() -> Outcome {
     assert_orders("forced", gentle(), by_midpoint(&forced, one)?, |scheme, h| {
         Ok(Splitting::new(&forced, scheme, h, 0.0, one)?.compensated())
     })?;
+    assert_orders("tides", gentle(), by_midpoint(&Tides, one)?, |scheme, h| {
+        Ok(Splitting::new(&Tides, scheme, h, 0.0, one)?.compensated())
+    })?;
     assert_orders("inertia", gentle(), by_midpoint(&Inertia, two)?, |scheme, h| {
         Ok(Splitting::new(&Inertia, scheme, h, 0.0, two)?.compensated())
     })
@@ -142,6 +157,31 @@ fn steps_are_what_they_say() -> Outcome {
         assert_eq!(at_once.sigma(), (forced.gamma * h).exp());
         assert_eq!(at_once.evaluations(), 1 + 10 * scheme.stages() as u64);
         assert!((at_once.time() - 1.5).abs() < 4.0 * f64::EPSILON);
+    }
+    Ok(())
+}
+
+/// The rate of a drag that depends on time is the exponential of its integral over each step, exact for the step that was
+/// taken; for Lane and Emden's `-2/t` it is `(t/(t + h))^2`. The quadrature leaves `(h/t)^13` of it.
+#[test]
+fn the_rate_of_a_drag_in_time_is_its_integral() -> Outcome {
+    let (system, h, t0) = (LaneEmden::default(), 0.05, 1.0);
+    let start = PhasePoint::new([0.8], [-0.2], 0.1);
+    for scheme in &SCHEMES {
+        let mut motion = Splitting::new(&system, scheme, h, t0, start)?;
+        let mut without_force = Splitting::new(&Tides, scheme, h, t0, PhasePoint::new([0.0], [0.0], 1.0))?;
+        let (mut factor, mut product) = (1.0, 1.0);
+        for k in 0..20 {
+            assert_eq!((motion.advance(1), without_force.advance(1)), (Ok(()), Ok(())));
+            let t = t0 + h * f64::from(k);
+            let exact = (t / (t + h)).powi(2);
+            assert!((motion.sigma() / exact - 1.0).abs() <= 1e-14, "{} {t}: {}", scheme.name(), motion.sigma());
+            factor *= motion.sigma();
+            product *= without_force.sigma();
+        }
+        assert!((factor * 4.0 - 1.0).abs() <= 1e-13, "{}: {factor}", scheme.name());
+        let integral = 0.2 * (20.0 * h) + 0.3 * (t0.cos() - (t0 + 20.0 * h).cos());
+        assert!((product / (-integral).exp() - 1.0).abs() <= 1e-14, "{}: {product}", scheme.name());
     }
     Ok(())
 }
@@ -234,6 +274,7 @@ fn strang_is_the_flow_of_its_value() -> Outcome {
         assert_step_is_of_value(&Strang::new(Pendulum { gamma: -0.3 }, h, 0.7, &one)?, one)?;
         assert_step_is_of_value(&Strang::new(Duffing { gamma: 0.0, ..Duffing::forced() }, h, 0.7, &one)?, one)?;
         assert_step_is_of_value(&Strang::new(&Inertia, h, 0.7, &two)?, two)?;
+        assert_step_is_of_value(&Strang::new(&Tides, h, 0.7, &one)?, one)?;
         assert_step_is_of_value(&ActionStrang::new(QuadraticInZ { c: 0.4 }, h, 0.7, &one)?, one)?;
         assert_step_is_of_value(&ActionStrang::new(&Curved, h, 0.7, &one)?, one)?;
     }
@@ -251,6 +292,14 @@ fn compositions_of_strang_are_splittings() -> Outcome {
         let apart = distance(composed.state(), split);
         assert!(apart < 200.0 * f64::EPSILON, "{}: {apart}", scheme.name());
         let rate = (composed.sigma() / (-0.15 * h).exp() - 1.0).abs();
+        assert!(rate < 70.0 * f64::EPSILON, "{}: {rate}", scheme.name());
+        let start = PhasePoint::new([0.8], [0.3], 0.2);
+        let mut composed = Composition::new(|h| Strang::new(&Tides, h, 0.0, &start), scheme, h, 0.3, start)?;
+        let mut split = Splitting::new(&Tides, scheme, h, 0.3, start)?;
+        assert_eq!((composed.advance(10), split.advance(10)), (Ok(()), Ok(())));
+        let apart = distance(composed.state(), split.state());
+        assert!(apart < 200.0 * f64::EPSILON, "{}: {apart}", scheme.name());
+        let rate = (composed.sigma() / split.sigma() - 1.0).abs();
         assert!(rate < 70.0 * f64::EPSILON, "{}: {rate}", scheme.name());
     }
     let refused =
@@ -338,7 +387,12 @@ fn what_does_not_fit_is_refused() {
         Structure { separable: true, z_affine: true, ..Structure::default() }
     }
     let linear = |l: &Rate, h: f64| Splitting::new(l, scheme, h, 0.0, start).err();
-    assert!(matches!(linear(&Rate(affine()), 0.1), Some(InputError::Hypothesis { .. })));
+    assert_eq!(linear(&Rate(affine()), 0.1), None);
+    let steady = Structure { constant_rate: true, ..affine() };
+    assert!(matches!(linear(&Rate(steady), 0.1), Some(InputError::FalseClaim { claim: "constant_rate", .. })));
+    let nonlinear = Structure { z_affine: false, ..affine() };
+    let in_time = ActionSplitting::new(&Rate(nonlinear), scheme, 0.1, 0.0, start).err();
+    assert!(matches!(in_time, Some(InputError::Hypothesis { .. })));
     assert_eq!(linear(&Rate(affine()), -0.1), Some(InputError::Step { h: -0.1 }));
     assert_eq!(linear(&Rate(Structure::default()), 0.1), Some(InputError::Unclaimed { claim: "separable" }));
     let lie = Structure { autonomous: true, ..affine() };
