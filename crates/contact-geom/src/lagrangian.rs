@@ -59,6 +59,33 @@ pub trait Lagrangian<const N: usize> {
         }
     }
 
+    /// The value with the partial derivatives `(L_q, L_v, L_z)`. Not to be overridden.
+    #[inline(always)]
+    fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Dual<T, Triple<N, T>> {
+        match self.closed_gradient(t, x) {
+            Some(d) => Dual { re: self.value(t, &x.q, &x.v, x.z), d },
+            None => {
+                let s = seed(&Triple::from(*x));
+                self.value(Dual::constant(t), &s.x, &s.y, s.z)
+            }
+        }
+    }
+
+    /// The value with the partial derivatives `L_q`, of which the others are no part: what a force needs. Not to be overridden.
+    #[inline(always)]
+    fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Dual<T, SVector<T, N>> {
+        match self.closed_gradient(t, x) {
+            Some(d) => Dual { re: self.value(t, &x.q, &x.v, x.z), d: d.x },
+            None => {
+                let mut q: SVector<Dual<T, SVector<T, N>>, N> = x.q.map(Dual::constant);
+                for i in 0..N {
+                    q[i].d[i] = T::one();
+                }
+                self.value(Dual::constant(t), &q, &x.v.map(Dual::constant), Dual::constant(x.z))
+            }
+        }
+    }
+
     /// The partial derivatives `(L_q, L_v, L_z)`. Not to be overridden.
     #[inline]
     fn gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Triple<N, T> {
@@ -142,12 +169,17 @@ pub fn check_closed_derivatives<const N: usize>(
     (gradient, hessian)
 }
 
-/// A Lagrangian without its closed derivatives.
-struct ValueOnly<'a, L>(&'a L);
+/// A Lagrangian without its closed derivatives: all are found by automatic differentiation, to see what they cost or gain.
+#[derive(Clone, Copy, Debug)]
+pub struct ValueOnly<L>(pub L);
 
-impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<'_, L> {
+impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<L> {
+    #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         self.0.value(t, q, v, z)
+    }
+    fn structure(&self) -> Structure {
+        self.0.structure()
     }
 }
 

@@ -62,7 +62,7 @@ pub use herglotz::{
     Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, Regularity, herglotz_field, herglotz_rates,
     legendre, legendre_jacobian, regularity,
 };
-pub use lagrangian::{Hessian, Lagrangian, check_closed_derivatives, derived_gradient, derived_hessian};
+pub use lagrangian::{Hessian, Lagrangian, ValueOnly, check_closed_derivatives, derived_gradient, derived_hessian};
 pub use lagrangian_form::LagrangianForm;
 pub use points::{DiscretePoint, PhasePoint, Triple, VelocityPoint, seed};
 pub use pullback::{Conformality, conformality, conformality_with_jacobian};

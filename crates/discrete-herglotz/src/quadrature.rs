@@ -159,8 +159,7 @@ impl<L, R: Rule> Quadrature<L, R> {
     where
         L: Lagrangian<N>,
     {
-        let s = contact_geom::seed(&Triple::from(*x));
-        let l = self.lagrangian.along(t, &s.into());
+        let l = self.lagrangian.with_gradient(t, x);
         (l.re, l.d)
     }
 

@@ -2,7 +2,7 @@
 
 use super::closed_form::{relative_exp_m1, relative_sin};
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint};
 use nalgebra::SVector;
 
 /// The harmonic oscillator with linear drag, `L = v^2/2 - q^2/2 + gamma z`. Dimensionless: time in units of the inverse
@@ -72,6 +72,11 @@ impl Lagrangian<1> for HarmonicOscillator {
     #[inline]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         (v[0] * v[0] - q[0] * q[0]) * 0.5 + z * self.gamma
+    }
+
+    #[inline(always)]
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<Triple<1, T>> {
+        Some(Triple { x: -x.q, y: x.v, z: T::from(self.gamma) })
     }
 
     fn structure(&self) -> Structure {

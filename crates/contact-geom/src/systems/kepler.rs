@@ -1,7 +1,7 @@
 //! Kepler's problem with drag, in any dimension.
 
 use super::{System, between};
-use crate::{Clock, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use crate::{Clock, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, Triple, VelocityPoint};
 use nalgebra::SVector;
 
 /// Kepler's problem with linear drag, `L = |v|^2/2 + mu/|q| + gamma z` in R^D. Dimensionless: lengths in units of the
@@ -27,6 +27,13 @@ impl<const D: usize> Lagrangian<D> for Kepler<D> {
     #[inline]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {
         v.dot(v) * 0.5 + attraction(self.mu, q) + z * self.gamma
+    }
+
+    #[inline(always)]
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<D, T>) -> Option<Triple<D, T>> {
+        let inverse = x.q.dot(&x.q).sqrt().recip();
+        let pull = inverse * inverse * inverse * -self.mu;
+        Some(Triple { x: x.q * pull, y: x.v, z: T::from(self.gamma) })
     }
 
     fn structure(&self) -> Structure {

@@ -1,7 +1,7 @@
 //! The damped pendulum.
 
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint};
 use nalgebra::SVector;
 
 /// The pendulum with linear drag, `L = v^2/2 - (1 - cos q) + gamma z`. Dimensionless: time in units of `sqrt(l/g)`, `q` the
@@ -24,6 +24,11 @@ impl Lagrangian<1> for Pendulum {
     #[inline]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         v[0] * v[0] * 0.5 - q[0].versine() + z * self.gamma
+    }
+
+    #[inline(always)]
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<Triple<1, T>> {
+        Some(Triple { x: SVector::from([-x.q[0].sin()]), y: x.v, z: T::from(self.gamma) })
     }
 
     fn structure(&self) -> Structure {

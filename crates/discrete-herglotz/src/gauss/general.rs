@@ -10,7 +10,7 @@ use super::stages::{StageMap, Stages, Weights, blocks, padded};
 use super::sweeps::{Progress, Sweeps};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint, linear, seed};
+use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, linear};
 use pulp::Simd;
 use qd::Quad;
 
@@ -167,8 +167,8 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
     fn evaluate<S: Simd>(&mut self, t: f64) -> f64 {
         let (mut dg, mut sg) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
         for r in 0..blocks::<S>(self.table.s) {
-            let x = seed(&Triple::from(self.point::<S>(r)));
-            let Dual { re, d } = self.lagrangian.along(self.table.times.block::<S>(r) + t, &x.into());
+            let at = self.table.times.block::<S>(r) + t;
+            let Dual { re, d } = self.lagrangian.with_gradient(at, &self.point::<S>(r));
             let rho = self.rho.block::<S>(r);
             self.l.set(r, re);
             self.rate.set(r, rho * d.z);

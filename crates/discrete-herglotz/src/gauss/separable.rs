@@ -9,7 +9,7 @@ use super::stages::{Stages, blocks};
 use super::sweeps::{Progress, Sweeps};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 use pulp::Simd;
 
 /// The state and the workspace of the condensed step.
@@ -76,15 +76,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
     #[inline(always)]
     fn accelerations<S: Simd>(&self, t: f64, r: usize) -> SVector<Lanes<S>, N> {
         let zero = Lanes::<S>::splat(0.0);
-        let mut x = VelocityPoint::<N, Dual<Lanes<S>, SVector<Lanes<S>, N>>> {
-            q: SVector::from_fn(|d, _| Dual::constant(self.x[d].block(r))),
-            v: SVector::from_fn(|_, _| Dual::constant(zero)),
-            z: Dual::constant(zero),
-        };
-        for d in 0..N {
-            x.q[d].d[d] = Lanes::splat(1.0);
-        }
-        let force = self.lagrangian.along(self.table.times.block::<S>(r) + t, &x).d;
+        let x =
+            VelocityPoint { q: SVector::from_fn(|d, _| self.x[d].block(r)), v: SVector::from_element(zero), z: zero };
+        let force = self.lagrangian.with_force(self.table.times.block::<S>(r) + t, &x).d;
         match &self.inverse_mass {
             None => force,
             Some(inverse) => SVector::from_fn(|i, _| (0..N).fold(zero, |sum, j| sum + force[j] * inverse[(i, j)])),

@@ -68,16 +68,8 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
     #[inline(always)]
     pub(crate) fn kick(&self, t: f64, q: &SVector<f64, N>, z: f64) -> (f64, SVector<f64, N>) {
         let rest = VelocityPoint { q: *q, v: SVector::zeros(), z };
-        if let Some(gradient) = self.lagrangian.closed_gradient(t, &rest) {
-            return (self.lagrangian.value(t, q, &rest.v, z), gradient.x);
-        }
-        let mut moving: SVector<Dual<f64, SVector<f64, N>>, N> = q.map(Dual::constant);
-        for i in 0..N {
-            moving[i].d[i] = 1.0;
-        }
-        let still: SVector<Dual<f64, SVector<f64, N>>, N> = rest.v.map(Dual::constant);
-        let l = self.lagrangian.value(Dual::constant(t), &moving, &still, Dual::constant(z));
-        (l.re, l.d)
+        let Dual { re, d } = self.lagrangian.with_force(t, &rest);
+        (re, d)
     }
 
     /// The kick at a start.
