@@ -2,8 +2,8 @@
 
 use crate::common::{on_random, within};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{Dual, Hessian, Lagrangian, Scalar, Triple, VelocityPoint, check_closed_derivatives};
+use contact_geom::systems::{Pendulum, System, SystemVisitor, visit_catalogue};
+use contact_geom::{Dual, Hessian, Lagrangian, Scalar, Triple, ValueOnly, VelocityPoint, check_closed_derivatives};
 use num_dual::HyperDual64;
 
 /// Every second derivative of every Lagrangian, and so every first, against hyper-dual numbers of another library.
@@ -112,5 +112,7 @@ fn closed_derivatives() {
     assert!(matches!(right, (Some(g), Some(h)) if g < 1e-15 && h < 1e-15), "{right:?}");
     let wrong = check_closed_derivatives(&Closed { error: 1e-3 }, 0.0, &x);
     assert!(matches!(wrong, (Some(g), Some(h)) if g > 1e-4 && h > 1e-4), "{wrong:?}");
-    assert_eq!(check_closed_derivatives(&contact_geom::systems::Pendulum::default(), 0.0, &x), (None, None));
+    let value_only = ValueOnly(Pendulum::default());
+    assert_eq!(check_closed_derivatives(&value_only, 0.0, &x), (None, None));
+    assert_eq!(value_only.gradient(0.0, &x), Pendulum::default().gradient(0.0, &x));
 }

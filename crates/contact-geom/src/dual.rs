@@ -3,70 +3,9 @@
 // The product and quotient rules mix operations: clippy takes that for a slip.
 #![allow(clippy::suspicious_arithmetic_impl)]
 
-use crate::Scalar;
-use nalgebra::SVector;
+use crate::{Module, Scalar};
 use num_traits::{One, Zero};
-use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
-
-/// The free module that a differential lives in: one component of `T` for each direction.
-///
-/// Its shape is chosen by what is wanted: [`SVector`] for `N` directions, [`Border`] for `N + 1`,
-/// [`Triple`](crate::Triple) for all `2N + 1` coordinates of a contact manifold. So no direction is carried that nobody
-/// asked for.
-pub trait Module<T>: Copy + PartialEq + Debug + 'static {
-    /// The differential of a constant.
-    fn null() -> Self;
-    /// Applies `f` to each component.
-    fn each(self, f: impl FnMut(T) -> T) -> Self;
-    /// Joins the components of two elements by `f`.
-    fn join(self, other: Self, f: impl FnMut(T, T) -> T) -> Self;
-}
-
-impl<T: Scalar, const N: usize> Module<T> for SVector<T, N> {
-    #[inline]
-    fn null() -> Self {
-        SVector::from_array_storage(nalgebra::ArrayStorage([[T::zero(); N]]))
-    }
-    #[inline]
-    fn each(mut self, mut f: impl FnMut(T) -> T) -> Self {
-        for a in self.data.0[0].iter_mut() {
-            *a = f(*a);
-        }
-        self
-    }
-    #[inline]
-    fn join(mut self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
-        for (a, b) in self.data.0[0].iter_mut().zip(other.data.0[0]) {
-            *a = f(*a, b);
-        }
-        self
-    }
-}
-
-/// `N` directions and one more: an element of `T^N x T`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Border<const N: usize, T = f64> {
-    /// The first `N` components.
-    pub x: SVector<T, N>,
-    /// The last component.
-    pub z: T,
-}
-
-impl<T: Scalar, const N: usize> Module<T> for Border<N, T> {
-    #[inline]
-    fn null() -> Self {
-        Border { x: Module::null(), z: T::zero() }
-    }
-    #[inline]
-    fn each(self, mut f: impl FnMut(T) -> T) -> Self {
-        Border { x: Module::each(self.x, &mut f), z: f(self.z) }
-    }
-    #[inline]
-    fn join(self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
-        Border { x: Module::join(self.x, other.x, &mut f), z: f(self.z, other.z) }
-    }
-}
 
 /// A dual number `re + d`: a value and its differential along the directions of the module `D`.
 ///
@@ -88,215 +27,246 @@ pub struct Dual<T, D> {
     pub d: D,
 }
 
-impl<T: Scalar, D: Module<T>> Dual<T, D> {
-    /// A constant: its differential vanishes.
-    #[inline]
-    pub fn constant(re: T) -> Self {
-        Dual { re, d: D::null() }
-    }
-
-    /// `f(x)` by the chain rule, given `f(re)` and `f'(re)`.
-    #[inline]
-    fn chain(self, value: T, slope: T) -> Self {
-        Dual { re: value, d: self.d.each(|a| a * slope) }
-    }
+/// The same number for kernels over vector registers: a [`Dual`] all of whose operations become part of the code that calls them.
+///
+/// A kernel finds its instruction set at run time, and what is not merged into it is compiled without that set, at twenty times
+/// the cost. Of nested duals, and of long programs in them, the merged code would be too long to compile; they are [`Dual`]s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KernelDual<T, D> {
+    /// The value.
+    pub re: T,
+    /// The differential: the derivative along each direction.
+    pub d: D,
 }
 
-impl<T: Scalar, D: Module<T>> From<f64> for Dual<T, D> {
-    #[inline]
-    fn from(x: f64) -> Self {
-        Dual::constant(T::from(x))
-    }
-}
+/// The arithmetic, with what the compiler is told of its functions.
+macro_rules! arithmetic {
+    ($Dual:ident, $inline:meta) => {
+        impl<T: Scalar, D: Module<T>> $Dual<T, D> {
+            /// A constant: its differential vanishes.
+            #[$inline]
+            pub fn constant(re: T) -> Self {
+                $Dual { re, d: D::null() }
+            }
 
-impl<T: Scalar, D: Module<T>> Zero for Dual<T, D> {
-    #[inline]
-    fn zero() -> Self {
-        Dual::constant(T::zero())
-    }
-    fn is_zero(&self) -> bool {
-        *self == Self::zero()
-    }
-}
-
-impl<T: Scalar, D: Module<T>> One for Dual<T, D> {
-    #[inline]
-    fn one() -> Self {
-        Dual::constant(T::one())
-    }
-}
-
-impl<T: Scalar, D: Module<T>> Neg for Dual<T, D> {
-    type Output = Self;
-    #[inline]
-    fn neg(self) -> Self {
-        Dual { re: -self.re, d: self.d.each(|a| -a) }
-    }
-}
-
-impl<T: Scalar, D: Module<T>> Add for Dual<T, D> {
-    type Output = Self;
-    #[inline]
-    fn add(self, b: Self) -> Self {
-        Dual { re: self.re + b.re, d: self.d.join(b.d, |x, y| x + y) }
-    }
-}
-
-impl<T: Scalar, D: Module<T>> Sub for Dual<T, D> {
-    type Output = Self;
-    #[inline]
-    fn sub(self, b: Self) -> Self {
-        Dual { re: self.re - b.re, d: self.d.join(b.d, |x, y| x - y) }
-    }
-}
-
-impl<T: Scalar, D: Module<T>> Mul for Dual<T, D> {
-    type Output = Self;
-    #[inline]
-    fn mul(self, b: Self) -> Self {
-        let a = self.re;
-        Dual { re: a * b.re, d: self.d.join(b.d, |x, y| x * b.re + a * y) }
-    }
-}
-
-impl<T: Scalar, D: Module<T>> Div for Dual<T, D> {
-    type Output = Self;
-    #[inline]
-    fn div(self, b: Self) -> Self {
-        let (quotient, inverse) = (self.re / b.re, b.re.recip());
-        Dual { re: quotient, d: self.d.join(b.d, |x, y| (x - quotient * y) * inverse) }
-    }
-}
-
-impl<T: Scalar, D: Module<T>> Add<f64> for Dual<T, D> {
-    type Output = Self;
-    #[inline]
-    fn add(self, b: f64) -> Self {
-        Dual { re: self.re + b, d: self.d }
-    }
-}
-
-impl<T: Scalar, D: Module<T>> Sub<f64> for Dual<T, D> {
-    type Output = Self;
-    #[inline]
-    fn sub(self, b: f64) -> Self {
-        Dual { re: self.re - b, d: self.d }
-    }
-}
-
-impl<T: Scalar, D: Module<T>> Mul<f64> for Dual<T, D> {
-    type Output = Self;
-    #[inline]
-    fn mul(self, b: f64) -> Self {
-        Dual { re: self.re * b, d: self.d.each(|a| a * b) }
-    }
-}
-
-impl<T: Scalar, D: Module<T>> Div<f64> for Dual<T, D> {
-    type Output = Self;
-    #[inline]
-    fn div(self, b: f64) -> Self {
-        Dual { re: self.re / b, d: self.d.each(|a| a / b) }
-    }
-}
-
-macro_rules! assign {
-    ($($name:ident, $method:ident, $op:tt;)*) => {$(
-        impl<T: Scalar, D: Module<T>> $name for Dual<T, D> {
-            #[inline]
-            fn $method(&mut self, b: Self) {
-                *self = *self $op b;
+            /// `f(x)` by the chain rule, given `f(re)` and `f'(re)`.
+            #[$inline]
+            fn chain(self, value: T, slope: T) -> Self {
+                $Dual { re: value, d: self.d.scaled(slope) }
             }
         }
-    )*};
-}
-assign! {
-    AddAssign, add_assign, +;
-    SubAssign, sub_assign, -;
-    MulAssign, mul_assign, *;
-    DivAssign, div_assign, /;
+
+        impl<T: Scalar, D: Module<T>> From<f64> for $Dual<T, D> {
+            #[$inline]
+            fn from(x: f64) -> Self {
+                $Dual::constant(T::from(x))
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> Zero for $Dual<T, D> {
+            #[$inline]
+            fn zero() -> Self {
+                $Dual::constant(T::zero())
+            }
+            fn is_zero(&self) -> bool {
+                *self == Self::zero()
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> One for $Dual<T, D> {
+            #[$inline]
+            fn one() -> Self {
+                $Dual::constant(T::one())
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> Neg for $Dual<T, D> {
+            type Output = Self;
+            #[$inline]
+            fn neg(self) -> Self {
+                $Dual { re: -self.re, d: self.d.each(|a| -a) }
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> Add for $Dual<T, D> {
+            type Output = Self;
+            #[$inline]
+            fn add(self, b: Self) -> Self {
+                $Dual { re: self.re + b.re, d: self.d.join(b.d, |x, y| x + y) }
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> Sub for $Dual<T, D> {
+            type Output = Self;
+            #[$inline]
+            fn sub(self, b: Self) -> Self {
+                $Dual { re: self.re - b.re, d: self.d.join(b.d, |x, y| x - y) }
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> Mul for $Dual<T, D> {
+            type Output = Self;
+            #[$inline]
+            fn mul(self, b: Self) -> Self {
+                let a = self.re;
+                $Dual { re: a * b.re, d: self.d.combined(b.re, b.d, a) }
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> Div for $Dual<T, D> {
+            type Output = Self;
+            #[$inline]
+            fn div(self, b: Self) -> Self {
+                let (quotient, inverse) = (self.re / b.re, b.re.recip());
+                $Dual { re: quotient, d: self.d.join(b.d, |x, y| (x - quotient * y) * inverse) }
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> Add<f64> for $Dual<T, D> {
+            type Output = Self;
+            #[$inline]
+            fn add(self, b: f64) -> Self {
+                $Dual { re: self.re + b, d: self.d }
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> Sub<f64> for $Dual<T, D> {
+            type Output = Self;
+            #[$inline]
+            fn sub(self, b: f64) -> Self {
+                $Dual { re: self.re - b, d: self.d }
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> Mul<f64> for $Dual<T, D> {
+            type Output = Self;
+            #[$inline]
+            fn mul(self, b: f64) -> Self {
+                $Dual { re: self.re * b, d: self.d.each(|a| a * b) }
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> Div<f64> for $Dual<T, D> {
+            type Output = Self;
+            #[$inline]
+            fn div(self, b: f64) -> Self {
+                $Dual { re: self.re / b, d: self.d.each(|a| a / b) }
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> AddAssign for $Dual<T, D> {
+            #[$inline]
+            fn add_assign(&mut self, b: Self) {
+                *self = *self + b;
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> SubAssign for $Dual<T, D> {
+            #[$inline]
+            fn sub_assign(&mut self, b: Self) {
+                *self = *self - b;
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> MulAssign for $Dual<T, D> {
+            #[$inline]
+            fn mul_assign(&mut self, b: Self) {
+                *self = *self * b;
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> DivAssign for $Dual<T, D> {
+            #[$inline]
+            fn div_assign(&mut self, b: Self) {
+                *self = *self / b;
+            }
+        }
+
+        impl<T: Scalar, D: Module<T>> Scalar for $Dual<T, D> {
+            #[$inline]
+            fn re(self) -> f64 {
+                self.re.re()
+            }
+            #[$inline]
+            fn extent(self) -> f64 {
+                let mut largest = self.re.extent();
+                self.d.each(|a| {
+                    largest = largest.max(a.extent());
+                    a
+                });
+                largest
+            }
+            #[$inline]
+            fn recip(self) -> Self {
+                let r = self.re.recip();
+                self.chain(r, -(r * r))
+            }
+            #[$inline]
+            fn sqrt(self) -> Self {
+                let r = self.re.sqrt();
+                self.chain(r, r.recip() * 0.5)
+            }
+            #[$inline]
+            fn powi(self, n: i32) -> Self {
+                if n == 0 {
+                    return Self::one();
+                }
+                let below = self.re.powi(n - 1);
+                self.chain(below * self.re, below * f64::from(n))
+            }
+            #[$inline]
+            fn powf(self, a: f64) -> Self {
+                let below = self.re.powf(a - 1.0);
+                self.chain(below * self.re, below * a)
+            }
+            #[$inline]
+            fn exp(self) -> Self {
+                let e = self.re.exp();
+                self.chain(e, e)
+            }
+            #[$inline]
+            fn exp_m1(self) -> Self {
+                let e = self.re.exp_m1();
+                self.chain(e, e + 1.0)
+            }
+            #[$inline]
+            fn ln(self) -> Self {
+                self.chain(self.re.ln(), self.re.recip())
+            }
+            #[$inline]
+            fn ln_1p(self) -> Self {
+                self.chain(self.re.ln_1p(), (self.re + 1.0).recip())
+            }
+            #[$inline]
+            fn sin_cos(self) -> (Self, Self) {
+                let (s, c) = self.re.sin_cos();
+                (self.chain(s, c), self.chain(c, -s))
+            }
+            #[$inline]
+            fn sin_versine(self) -> (Self, Self) {
+                let (s, v) = self.re.sin_versine();
+                (self.chain(s, -v + 1.0), self.chain(v, s))
+            }
+            #[$inline]
+            fn sinh(self) -> Self {
+                self.chain(self.re.sinh(), self.re.cosh())
+            }
+            #[$inline]
+            fn cosh(self) -> Self {
+                self.chain(self.re.cosh(), self.re.sinh())
+            }
+            #[$inline]
+            fn tanh(self) -> Self {
+                let t = self.re.tanh();
+                self.chain(t, -(t * t) + 1.0)
+            }
+            #[$inline]
+            fn atan(self) -> Self {
+                self.chain(self.re.atan(), (self.re * self.re + 1.0).recip())
+            }
+        }
+    };
 }
 
-impl<T: Scalar, D: Module<T>> Scalar for Dual<T, D> {
-    #[inline]
-    fn re(self) -> f64 {
-        self.re.re()
-    }
-    #[inline]
-    fn extent(self) -> f64 {
-        let mut largest = self.re.extent();
-        self.d.each(|a| {
-            largest = largest.max(a.extent());
-            a
-        });
-        largest
-    }
-    #[inline]
-    fn recip(self) -> Self {
-        let r = self.re.recip();
-        self.chain(r, -(r * r))
-    }
-    #[inline]
-    fn sqrt(self) -> Self {
-        let r = self.re.sqrt();
-        self.chain(r, r.recip() * 0.5)
-    }
-    #[inline]
-    fn powi(self, n: i32) -> Self {
-        if n == 0 {
-            return Self::one();
-        }
-        let below = self.re.powi(n - 1);
-        self.chain(below * self.re, below * f64::from(n))
-    }
-    #[inline]
-    fn powf(self, a: f64) -> Self {
-        let below = self.re.powf(a - 1.0);
-        self.chain(below * self.re, below * a)
-    }
-    #[inline]
-    fn exp(self) -> Self {
-        let e = self.re.exp();
-        self.chain(e, e)
-    }
-    #[inline]
-    fn exp_m1(self) -> Self {
-        let e = self.re.exp_m1();
-        self.chain(e, e + 1.0)
-    }
-    #[inline]
-    fn ln(self) -> Self {
-        self.chain(self.re.ln(), self.re.recip())
-    }
-    #[inline]
-    fn ln_1p(self) -> Self {
-        self.chain(self.re.ln_1p(), (self.re + 1.0).recip())
-    }
-    #[inline]
-    fn sin_cos(self) -> (Self, Self) {
-        let (s, c) = self.re.sin_cos();
-        (self.chain(s, c), self.chain(c, -s))
-    }
-    #[inline]
-    fn sin_versine(self) -> (Self, Self) {
-        let (s, v) = self.re.sin_versine();
-        (self.chain(s, -v + 1.0), self.chain(v, s))
-    }
-    #[inline]
-    fn sinh(self) -> Self {
-        self.chain(self.re.sinh(), self.re.cosh())
-    }
-    #[inline]
-    fn cosh(self) -> Self {
-        self.chain(self.re.cosh(), self.re.sinh())
-    }
-    #[inline]
-    fn tanh(self) -> Self {
-        let t = self.re.tanh();
-        self.chain(t, -(t * t) + 1.0)
-    }
-    #[inline]
-    fn atan(self) -> Self {
-        self.chain(self.re.atan(), (self.re * self.re + 1.0).recip())
-    }
-}
+arithmetic!(Dual, inline);
+arithmetic!(KernelDual, inline(always));

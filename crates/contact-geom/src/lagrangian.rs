@@ -1,8 +1,9 @@
 //! Lagrangians L(t, q, v, z) and their derivatives.
 
 use crate::points::seed;
-use crate::{Dual, Module, Scalar, Structure, Triple, VelocityPoint};
+use crate::{Dual, KernelDual, Module, Scalar, Structure, Triple, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
+use num_traits::One;
 
 /// A Lagrangian of Herglotz' variational principle, `L : R x TQ x R -> R`, written once as a generic function.
 ///
@@ -59,31 +60,62 @@ pub trait Lagrangian<const N: usize> {
         }
     }
 
-    /// The value with the partial derivatives `(L_q, L_v, L_z)`. Not to be overridden.
+    /// The value with the partial derivatives `(L_q, L_v, L_z)`, for kernels. Not to be overridden.
     #[inline(always)]
-    fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Dual<T, Triple<N, T>> {
-        match self.closed_gradient(t, x) {
-            Some(d) => Dual { re: self.value(t, &x.q, &x.v, x.z), d },
-            None => {
-                let s = seed(&Triple::from(*x));
-                self.value(Dual::constant(t), &s.x, &s.y, s.z)
-            }
+    fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, Triple<N, T>) {
+        if let Some(gradient) = self.closed_gradient(t, x) {
+            return (self.value(t, &x.q, &x.v, x.z), gradient);
         }
+        let mut q = still::<T, Triple<N, T>, N>(&x.q);
+        let mut v = still::<T, Triple<N, T>, N>(&x.v);
+        let mut z = KernelDual::<T, Triple<N, T>>::constant(x.z);
+        for i in 0..N {
+            q[i].d.x[i] = T::one();
+            v[i].d.y[i] = T::one();
+        }
+        z.d.z = T::one();
+        let l = self.value(KernelDual::constant(t), &q, &v, z);
+        (l.re, l.d)
     }
 
-    /// The value with the partial derivatives `L_q`, of which the others are no part: what a force needs. Not to be overridden.
+    /// The value with the partial derivatives `L_q` alone, for kernels: what a force needs. Not to be overridden.
     #[inline(always)]
-    fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Dual<T, SVector<T, N>> {
-        match self.closed_gradient(t, x) {
-            Some(d) => Dual { re: self.value(t, &x.q, &x.v, x.z), d: d.x },
-            None => {
-                let mut q: SVector<Dual<T, SVector<T, N>>, N> = x.q.map(Dual::constant);
-                for i in 0..N {
-                    q[i].d[i] = T::one();
-                }
-                self.value(Dual::constant(t), &q, &x.v.map(Dual::constant), Dual::constant(x.z))
-            }
+    fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>) {
+        if let Some(gradient) = self.closed_gradient(t, x) {
+            return (self.value(t, &x.q, &x.v, x.z), gradient.x);
         }
+        let mut q = still::<T, SVector<T, N>, N>(&x.q);
+        for i in 0..N {
+            q[i].d[i] = T::one();
+        }
+        let l = self.value(KernelDual::constant(t), &q, &still(&x.v), KernelDual::constant(x.z));
+        (l.re, l.d)
+    }
+
+    /// The matrix `W = L_vv` alone, for kernels. Not to be overridden.
+    #[inline(always)]
+    fn mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SMatrix<T, N, N> {
+        if let Some(hessian) = self.closed_hessian(t, x) {
+            return hessian.vv;
+        }
+        let mut y = VelocityPoint {
+            q: still::<T, SVector<T, N>, N>(&x.q),
+            v: still::<T, SVector<T, N>, N>(&x.v),
+            z: KernelDual::<T, SVector<T, N>>::constant(x.z),
+        };
+        for i in 0..N {
+            y.v[i].d[i] = T::one();
+        }
+        let time = KernelDual::constant(t);
+        if let Some(gradient) = self.closed_gradient(time, &y) {
+            return SMatrix::from_fn(|i, j| gradient.y[i].d[j]);
+        }
+        let mut v = still::<_, SVector<KernelDual<T, SVector<T, N>>, N>, N>(&y.v);
+        for i in 0..N {
+            v[i].d[i] = KernelDual::one();
+        }
+        let l = self.value(KernelDual::constant(time), &still(&y.q), &v, KernelDual::constant(y.z));
+        SMatrix::from_fn(|i, j| l.d[i].d[j])
     }
 
     /// The partial derivatives `(L_q, L_v, L_z)`. Not to be overridden.
@@ -97,6 +129,12 @@ pub trait Lagrangian<const N: usize> {
     fn hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Hessian<N, T> {
         self.closed_hessian(t, x).unwrap_or_else(|| derived_hessian(self, t, x))
     }
+}
+
+/// Coordinates that no direction moves.
+#[inline(always)]
+fn still<T: Scalar, D: Module<T>, const N: usize>(x: &SVector<T, N>) -> SVector<KernelDual<T, D>, N> {
+    SVector::from_array_storage(nalgebra::ArrayStorage([std::array::from_fn(|i| KernelDual::constant(x[i]))]))
 }
 
 /// The second partial derivatives of a Lagrangian in `(q, v, z)`; `W = vv` in the paper's notation.

@@ -36,6 +36,7 @@ mod herglotz;
 mod lagrangian;
 mod lagrangian_form;
 pub mod linear;
+mod module;
 #[cfg(feature = "num-dual")]
 mod num_dual;
 mod points;
@@ -51,7 +52,7 @@ pub use clock::Clock;
 pub use contact_form::{ContactForm, Form, generic};
 pub use darboux::Darboux;
 pub use discrete_form::{DiscreteJet, EtaMinus, EtaPlus, SecondDiscreteJet};
-pub use dual::{Border, Dual, Module};
+pub use dual::{Dual, KernelDual};
 pub use error::GeometryError;
 pub use hamiltonian::{
     DarbouxBracket, DarbouxField, InfinitesimalConformality, Quotient, conformal_factor_along, derivative_along,
@@ -64,6 +65,7 @@ pub use herglotz::{
 };
 pub use lagrangian::{Hessian, Lagrangian, ValueOnly, check_closed_derivatives, derived_gradient, derived_hessian};
 pub use lagrangian_form::LagrangianForm;
+pub use module::{Border, Module};
 pub use points::{DiscretePoint, PhasePoint, Triple, VelocityPoint, seed};
 pub use pullback::{Conformality, conformality, conformality_with_jacobian};
 pub use scalar::Scalar;

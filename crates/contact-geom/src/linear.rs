@@ -32,6 +32,18 @@ pub fn solve<T: Scalar, D: Dim>(
     a: &mut Matrix<T, D, D, impl StorageMut<T, D, D>>,
     b: &mut Matrix<T, D, U1, impl StorageMut<T, D>>,
 ) -> Result<T, SingularMatrix> {
+    solve_in_kernel(a, b)
+}
+
+/// The same as a part of the code that calls it, for kernels over vector registers; see [`KernelDual`](crate::KernelDual).
+///
+/// # Errors
+/// [`SingularMatrix`] where a pivot vanishes or is not finite.
+#[inline(always)]
+pub fn solve_in_kernel<T: Scalar, D: Dim>(
+    a: &mut Matrix<T, D, D, impl StorageMut<T, D, D>>,
+    b: &mut Matrix<T, D, U1, impl StorageMut<T, D>>,
+) -> Result<T, SingularMatrix> {
     let n = a.nrows();
     let mut determinant = T::one();
     for k in 0..n {

@@ -18,21 +18,30 @@ pub struct Triple<const N: usize, T = f64> {
 }
 
 impl<T: Scalar, const N: usize> Module<T> for Triple<N, T> {
-    #[inline]
+    #[inline(always)]
     fn null() -> Self {
         Triple { x: Module::null(), y: Module::null(), z: T::zero() }
     }
-    #[inline]
+    #[inline(always)]
     fn each(self, mut f: impl FnMut(T) -> T) -> Self {
         Triple { x: Module::each(self.x, &mut f), y: Module::each(self.y, &mut f), z: f(self.z) }
     }
-    #[inline]
+    #[inline(always)]
     fn join(self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
         Triple {
             x: Module::join(self.x, other.x, &mut f),
             y: Module::join(self.y, other.y, &mut f),
             z: f(self.z, other.z),
         }
+    }
+    #[inline(always)]
+    fn scaled(self, a: T) -> Self {
+        Triple { x: self.x.scaled(a), y: self.y.scaled(a), z: self.z * a }
+    }
+    #[inline(always)]
+    fn combined(self, a: T, other: Self, b: T) -> Self {
+        let (x, y) = (self.x.combined(a, other.x, b), self.y.combined(a, other.y, b));
+        Triple { x, y, z: self.z * a + b * other.z }
     }
 }
 

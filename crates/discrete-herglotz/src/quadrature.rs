@@ -159,8 +159,7 @@ impl<L, R: Rule> Quadrature<L, R> {
     where
         L: Lagrangian<N>,
     {
-        let l = self.lagrangian.with_gradient(t, x);
-        (l.re, l.d)
+        self.lagrangian.with_gradient(t, x)
     }
 
     /// The step equations of the rule (or of its adjoint, with `h` negative), linearised at a mean velocity and an end

@@ -44,7 +44,7 @@ impl<const N: usize> Chain<N> {
     }
 
     /// The potential energy of the bonds.
-    #[inline]
+    #[inline(always)]
     fn potential<T: Scalar>(&self, q: &SVector<T, N>) -> T {
         let bond = |r: T| {
             let square = r * r;
@@ -59,7 +59,7 @@ impl<const N: usize> Chain<N> {
 }
 
 impl<const N: usize> Lagrangian<N> for Chain<N> {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         v.dot(v) * 0.5 - self.potential(q) + z * self.gamma
     }

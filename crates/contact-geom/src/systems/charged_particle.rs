@@ -28,7 +28,7 @@ impl Default for ChargedParticle {
 }
 
 impl Lagrangian<2> for ChargedParticle {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
         let swept = q[0] * v[1] - q[1] * v[0];
         v.dot(v) * 0.5 + swept * (self.b * 0.5) - q.dot(q) * (self.k * 0.5) + z * self.gamma

@@ -29,7 +29,7 @@ impl Default for CoupledInZ {
 }
 
 impl Lagrangian<1> for CoupledInZ {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         let square = v[0] * v[0];
         let inertia = q[0].cos() * z.cos() * self.a + 1.0;

@@ -29,7 +29,7 @@ impl Default for CoupledPlane {
 }
 
 impl Lagrangian<2> for CoupledPlane {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
         let (x, y) = (q[0], q[1]);
         let kinetic = v[0] * v[0] * (x.cos() * self.a + 1.0) + v[1] * v[1] * (y.sin() * z.cos() * self.a + 1.0);

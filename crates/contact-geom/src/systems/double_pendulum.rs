@@ -35,7 +35,7 @@ impl DoublePendulum {
     }
 
     /// The potential energy, zero with both rods hanging.
-    #[inline]
+    #[inline(always)]
     fn potential<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
         let ([m1, m2], [l1, l2]) = (self.masses, self.lengths);
         q[0].versine() * ((m1 + m2) * l1) + q[1].versine() * (m2 * l2)
@@ -43,7 +43,7 @@ impl DoublePendulum {
 }
 
 impl Lagrangian<2> for DoublePendulum {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
         let (upper, lower, mixed) = self.inertia();
         let turning = v[0] * v[0] * (upper * 0.5) + v[1] * v[1] * (lower * 0.5);

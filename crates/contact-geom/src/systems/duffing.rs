@@ -37,7 +37,7 @@ impl Duffing {
     }
 
     /// The potential with the forcing: `V(t, q)`.
-    #[inline]
+    #[inline(always)]
     fn potential<T: Scalar>(&self, t: T, q: T) -> T {
         let square = q * q;
         square * (square * (self.beta * 0.25) + self.alpha * 0.5) - (t * self.omega).cos() * q * self.force
@@ -45,7 +45,7 @@ impl Duffing {
 }
 
 impl Lagrangian<1> for Duffing {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         v[0] * v[0] * 0.5 - self.potential(t, q[0]) + z * self.gamma
     }

@@ -40,7 +40,7 @@ impl FreeParticle {
 }
 
 impl Lagrangian<1> for FreeParticle {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         v[0] * v[0] * 0.5 + z * self.gamma
     }

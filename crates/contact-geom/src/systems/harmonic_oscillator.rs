@@ -69,7 +69,7 @@ impl HarmonicOscillator {
 }
 
 impl Lagrangian<1> for HarmonicOscillator {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         (v[0] * v[0] - q[0] * q[0]) * 0.5 + z * self.gamma
     }

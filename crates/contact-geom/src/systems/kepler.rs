@@ -24,7 +24,7 @@ impl<const D: usize> Default for Kepler<D> {
 }
 
 impl<const D: usize> Lagrangian<D> for Kepler<D> {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {
         v.dot(v) * 0.5 + attraction(self.mu, q) + z * self.gamma
     }
@@ -91,7 +91,7 @@ pub struct Radial {
 }
 
 impl<const D: usize> Clock<D> for Radial {
-    #[inline]
+    #[inline(always)]
     fn rate<T: Scalar>(&self, q: &SVector<T, D>) -> T {
         let (square, halves) = (q.dot(q), 2.0 * self.exponent);
         // Vector registers have roots and products, and no powers.
@@ -104,7 +104,7 @@ impl<const D: usize> Clock<D> for Radial {
 }
 
 /// The negative potential `mu / |q|`.
-#[inline]
+#[inline(always)]
 pub(super) fn attraction<T: Scalar, const D: usize>(mu: f64, q: &SVector<T, D>) -> T {
     q.dot(q).sqrt().recip() * mu
 }

@@ -79,14 +79,14 @@ impl LaneEmden {
     }
 
     /// The potential `q^(n+1) / (n+1)`.
-    #[inline]
+    #[inline(always)]
     fn potential<T: Scalar>(&self, q: T) -> T {
         q.powi(i32::from(self.n) + 1) / (f64::from(self.n) + 1.0)
     }
 }
 
 impl Lagrangian<1> for LaneEmden {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         v[0] * v[0] * 0.5 - self.potential(q[0]) - z / t * 2.0
     }

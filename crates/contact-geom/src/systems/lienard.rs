@@ -38,7 +38,7 @@ impl Lienard {
 }
 
 impl SmoothFunction<1> for Lienard {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, t: T, x: &Triple<1, T>) -> T {
         let (q, p, z) = (x.x[0], x.y[0], x.z);
         let forcing = (t * self.omega).cos() * self.amplitude;
@@ -47,7 +47,7 @@ impl SmoothFunction<1> for Lienard {
 }
 
 /// The polynomial with these coefficients, lowest first.
-#[inline]
+#[inline(always)]
 fn horner<T: Scalar>(coefficients: &[f64], q: T) -> T {
     coefficients.iter().rev().fold(T::zero(), |sum, c| sum * q + *c)
 }

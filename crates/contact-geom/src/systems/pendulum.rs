@@ -21,7 +21,7 @@ impl Default for Pendulum {
 }
 
 impl Lagrangian<1> for Pendulum {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         v[0] * v[0] * 0.5 - q[0].versine() + z * self.gamma
     }

@@ -29,7 +29,7 @@ impl Default for PerturbedKepler {
 }
 
 impl Lagrangian<2> for PerturbedKepler {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
         v.dot(v) * 0.5 + attraction(self.mu, q) + (t * self.theta).sin() * z * self.alpha
     }

@@ -23,7 +23,7 @@ impl Default for QuadraticInZ {
 }
 
 impl Lagrangian<1> for QuadraticInZ {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         (v[0] * v[0] - q[0] * q[0] - z * z * self.c) * 0.5
     }

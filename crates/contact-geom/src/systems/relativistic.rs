@@ -22,7 +22,7 @@ impl Default for Relativistic {
 }
 
 impl Lagrangian<1> for Relativistic {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         // As a product, 1 - v^2 keeps its digits near the speed of light.
         let proper = ((-v[0] + 1.0) * (v[0] + 1.0)).sqrt();

@@ -23,7 +23,7 @@ impl Default for SphericalPendulum {
 }
 
 impl Lagrangian<2> for SphericalPendulum {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
         let around = q[0].sin() * v[1];
         (v[0] * v[0] + around * around) * 0.5 - q[0].versine() + z * self.gamma

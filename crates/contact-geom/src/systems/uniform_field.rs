@@ -28,7 +28,7 @@ impl<const D: usize> Default for UniformField<D> {
 
 impl<const D: usize> UniformField<D> {
     /// `a . q`, the negative potential.
-    #[inline]
+    #[inline(always)]
     fn work<T: Scalar>(&self, q: &SVector<T, D>) -> T {
         self.field.iter().zip(q).fold(T::zero(), |sum, (a, q)| sum + *q * *a)
     }
@@ -62,7 +62,7 @@ impl<const D: usize> UniformField<D> {
 }
 
 impl<const D: usize> Lagrangian<D> for UniformField<D> {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {
         v.dot(v) * 0.5 + self.work(q) + z * self.gamma
     }

@@ -32,7 +32,7 @@ impl VanDerPol {
 }
 
 impl SmoothFunction<1> for VanDerPol {
-    #[inline]
+    #[inline(always)]
     fn value<T: Scalar>(&self, t: T, x: &Triple<1, T>) -> T {
         let (q, p, z) = (x.x[0], x.y[0], x.z);
         z * (p + (q * q - 1.0) * self.mu) + q - (t * self.omega).cos() * self.amplitude

@@ -10,7 +10,7 @@ use super::stages::{StageMap, Stages, Weights, blocks, padded};
 use super::sweeps::{Progress, Sweeps};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, linear};
+use contact_geom::{KernelDual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, linear};
 use pulp::Simd;
 use qd::Quad;
 
@@ -168,7 +168,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         let (mut dg, mut sg) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
         for r in 0..blocks::<S>(self.table.s) {
             let at = self.table.times.block::<S>(r) + t;
-            let Dual { re, d } = self.lagrangian.with_gradient(at, &self.point::<S>(r));
+            let (re, d) = self.lagrangian.with_gradient(at, &self.point::<S>(r));
             let rho = self.rho.block::<S>(r);
             self.l.set(r, re);
             self.rate.set(r, rho * d.z);
@@ -179,11 +179,11 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             if !P::PHYSICAL {
                 let point = self.point::<S>(r);
                 let q = SVector::<_, N>::from_fn(|i, _| {
-                    let mut q = Dual::<Lanes<S>, SVector<Lanes<S>, N>>::constant(point.q[i]);
+                    let mut q = KernelDual::<Lanes<S>, SVector<Lanes<S>, N>>::constant(point.q[i]);
                     q.d[i] = Lanes::splat(1.0);
                     q
                 });
-                let Dual { re: g, d: slope } = self.extension.pace.rate(&q);
+                let KernelDual { re: g, d: slope } = self.extension.pace.rate(&q);
                 let energy = point.v.dot(&d.y) - re;
                 let extended = energy.mul_add(rho, Lanes::splat(self.extension.p_t.value));
                 self.l.set(r, g * re);
@@ -219,23 +219,11 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         }
         let mut inverse: [[Stages; N]; N] = [[Stages::ZERO; N]; N];
         for r in 0..blocks::<S>(self.table.s) {
-            type Along<S, const N: usize> = Dual<Lanes<S>, SVector<Lanes<S>, N>>;
-            let x = self.point::<S>(r);
-            let still = Dual::<Along<S, N>, SVector<Along<S, N>, N>>::constant;
-            let mut y = VelocityPoint {
-                q: x.q.map(|q| still(Dual::constant(q))),
-                v: x.v.map(|v| still(Dual::constant(v))),
-                z: still(Dual::constant(x.z)),
-            };
-            for i in 0..N {
-                y.v[i].re.d[i] = Lanes::splat(1.0);
-                y.v[i].d[i] = Dual::constant(Lanes::splat(1.0));
-            }
-            let p = self.lagrangian.along(Dual::constant(self.table.times.block::<S>(r) + t), &y).d;
-            let w = SMatrix::<Lanes<S>, N, N>::from_fn(|i, j| p[i].d[j]);
+            let at = self.table.times.block::<S>(r) + t;
+            let w = self.lagrangian.mass_matrix(at, &self.point::<S>(r));
             for j in 0..N {
                 let mut column = SVector::<Lanes<S>, N>::from_fn(|i, _| Lanes::splat(if i == j { 1.0 } else { 0.0 }));
-                if linear::solve(&mut w.clone(), &mut column).is_err() {
+                if linear::solve_in_kernel(&mut w.clone(), &mut column).is_err() {
                     return false;
                 }
                 for i in 0..N {
@@ -345,13 +333,14 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             let excess =
                 SVector::<Lanes<S>, N>::from_fn(|d, _| impulses[d].block::<S>(r) * inverse - self.l_v[d].block(r));
             for i in 0..N {
-                let change = (0..N).fold(zero, |sum, j| {
+                let mut change = zero;
+                for j in 0..N {
                     let entry = match &self.mass {
                         Mass::Constant(w) => Lanes::splat(w[(i, j)]),
                         Mass::Stages(w) => w[i][j].block(r),
                     };
-                    entry.mul_add(excess[j], sum)
-                });
+                    change = entry.mul_add(excess[j], change);
+                }
                 let v = self.v[i].block::<S>(r) + change;
                 dv = dv.max(change.abs());
                 sv = sv.max(v.abs());

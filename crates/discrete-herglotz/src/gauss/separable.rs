@@ -78,10 +78,18 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         let zero = Lanes::<S>::splat(0.0);
         let x =
             VelocityPoint { q: SVector::from_fn(|d, _| self.x[d].block(r)), v: SVector::from_element(zero), z: zero };
-        let force = self.lagrangian.with_force(self.table.times.block::<S>(r) + t, &x).d;
+        let (_, force) = self.lagrangian.with_force(self.table.times.block::<S>(r) + t, &x);
         match &self.inverse_mass {
             None => force,
-            Some(inverse) => SVector::from_fn(|i, _| (0..N).fold(zero, |sum, j| sum + force[j] * inverse[(i, j)])),
+            Some(inverse) => {
+                let mut accelerations = SVector::from_element(zero);
+                for i in 0..N {
+                    for j in 0..N {
+                        accelerations[i] += force[j] * inverse[(i, j)];
+                    }
+                }
+                accelerations
+            }
         }
     }
 

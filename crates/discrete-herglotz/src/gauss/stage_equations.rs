@@ -3,7 +3,7 @@
 use super::coefficients::{Coefficients, MOST};
 use crate::{ITERATION_LIMIT, StepError, last_correction};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, linear};
+use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, linear, seed};
 
 /// The products of the coefficients with a step, which may be negative.
 #[derive(Clone, Debug)]
@@ -119,7 +119,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         l.clear();
         l.extend((0..self.products.s).map(|i| {
             let y = VelocityPoint { q: self.position(given, x, i), v: x.v[i], z: x.z[i] };
-            self.lagrangian.with_gradient(T::from(self.t + self.products.c[i]), &y)
+            self.lagrangian.along(T::from(self.t + self.products.c[i]), &seed(&Triple::from(y)).into())
         }));
     }
 

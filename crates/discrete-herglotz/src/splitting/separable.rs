@@ -68,8 +68,7 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
     #[inline(always)]
     pub(crate) fn kick(&self, t: f64, q: &SVector<f64, N>, z: f64) -> (f64, SVector<f64, N>) {
         let rest = VelocityPoint { q: *q, v: SVector::zeros(), z };
-        let Dual { re, d } = self.lagrangian.with_force(t, &rest);
-        (re, d)
+        self.lagrangian.with_force(t, &rest)
     }
 
     /// The kick at a start.

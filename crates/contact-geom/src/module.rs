@@ -1,0 +1,90 @@
+//! What a differential is an element of.
+
+use crate::Scalar;
+use nalgebra::SVector;
+use std::fmt::Debug;
+
+/// The free module that a differential lives in: one component of `T` for each direction.
+///
+/// Its shape is chosen by what is wanted: [`SVector`] for `N` directions, [`Border`] for `N + 1`,
+/// [`Triple`](crate::Triple) for all `2N + 1` coordinates of a contact manifold. So no direction is carried that nobody
+/// asked for.
+pub trait Module<T>: Copy + PartialEq + Debug + 'static {
+    /// The differential of a constant.
+    fn null() -> Self;
+    /// Applies `f` to each component.
+    fn each(self, f: impl FnMut(T) -> T) -> Self;
+    /// Joins the components of two elements by `f`.
+    fn join(self, other: Self, f: impl FnMut(T, T) -> T) -> Self;
+    /// `a self`.
+    fn scaled(self, a: T) -> Self;
+    /// `a self + b other`.
+    fn combined(self, a: T, other: Self, b: T) -> Self;
+}
+
+impl<T: Scalar, const N: usize> Module<T> for SVector<T, N> {
+    #[inline(always)]
+    fn null() -> Self {
+        SVector::from_array_storage(nalgebra::ArrayStorage([[T::zero(); N]]))
+    }
+    #[inline(always)]
+    fn each(mut self, mut f: impl FnMut(T) -> T) -> Self {
+        for a in self.data.0[0].iter_mut() {
+            *a = f(*a);
+        }
+        self
+    }
+    #[inline(always)]
+    fn join(mut self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
+        for (a, b) in self.data.0[0].iter_mut().zip(other.data.0[0]) {
+            *a = f(*a, b);
+        }
+        self
+    }
+    #[inline(always)]
+    fn scaled(mut self, a: T) -> Self {
+        for x in self.data.0[0].iter_mut() {
+            *x = *x * a;
+        }
+        self
+    }
+    #[inline(always)]
+    fn combined(mut self, a: T, other: Self, b: T) -> Self {
+        for (x, y) in self.data.0[0].iter_mut().zip(other.data.0[0]) {
+            *x = *x * a + b * y;
+        }
+        self
+    }
+}
+
+/// `N` directions and one more: an element of `T^N x T`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Border<const N: usize, T = f64> {
+    /// The first `N` components.
+    pub x: SVector<T, N>,
+    /// The last component.
+    pub z: T,
+}
+
+impl<T: Scalar, const N: usize> Module<T> for Border<N, T> {
+    #[inline(always)]
+    fn null() -> Self {
+        Border { x: Module::null(), z: T::zero() }
+    }
+    #[inline(always)]
+    fn each(self, mut f: impl FnMut(T) -> T) -> Self {
+        Border { x: Module::each(self.x, &mut f), z: f(self.z) }
+    }
+    #[inline(always)]
+    fn join(self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
+        Border { x: Module::join(self.x, other.x, &mut f), z: f(self.z, other.z) }
+    }
+    #[inline(always)]
+    fn scaled(self, a: T) -> Self {
+        Border { x: self.x.scaled(a), z: self.z * a }
+    }
+    #[inline(always)]
+    fn combined(self, a: T, other: Self, b: T) -> Self {
+        Border { x: self.x.combined(a, other.x, b), z: self.z * a + b * other.z }
+    }
+}
