@@ -166,6 +166,8 @@ fn plans_in_words() {
     let strang = Integrator::Splitting(SplittingScheme::STRANG);
     let scene = Scene::new(&pendulum, start(), 10.0).by(strang).steps(Steps::Count(10));
     assert!(scene.plan().is_ok_and(|plan| said(&plan, false).contains(&"Newton's method")));
+    let scene = Scene::new(&pendulum, start(), 10.0).by(Integrator::Discrete(Method::Strang)).steps(Steps::Count(10));
+    assert!(scene.plan().is_ok_and(|plan| said(&plan, false).contains(&"Newton's method")));
     let scene = Scene::new(&pendulum, start(), 10.0).by(Integrator::Discrete(Method::Midpoint)).steps(Steps::Count(10));
     assert!(scene.plan().is_ok_and(|plan| said(&plan, true).contains(&"Newton's method")));
 }

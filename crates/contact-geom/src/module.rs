@@ -44,7 +44,7 @@ impl<T: Scalar, const N: usize> Module<T> for SVector<T, N> {
     #[inline(always)]
     fn scaled(mut self, a: T) -> Self {
         for x in self.data.0[0].iter_mut() {
-            *x = *x * a;
+            *x *= a;
         }
         self
     }

@@ -2,7 +2,7 @@
 
 use super::{Integrator, Scene, Wanted};
 use crate::{
-    ActionSplitting, Composition, Discretised, Flow, Gauss, GaussRoute, InputError, Splitting, Status, Stepper,
+    ActionSplitting, Composition, Discretised, Flow, Gauss, GaussRoute, InputError, Method, Splitting, Status, Stepper,
     verified,
 };
 use contact_geom::nalgebra::SVector;
@@ -252,6 +252,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 if route != GaussRoute::Linear {
                     say("Newton's method", false, "only in steps whose iteration does not contract");
                 }
+            }
+            (_, Integrator::Discrete(Method::Strang) | Integrator::Composition(Method::Strang, _)) => {
+                self.constant_rate = structure.has_constant_rate();
+                say("Newton's method", false, "each step is explicit: forces only");
+                say("Jacobian", false, "no equation is solved");
             }
             (Engine::Discrete(_), _) => {
                 say("Newton's method", true, "each step is implicit in q1");
