@@ -11,6 +11,7 @@
 //!
 //! struct Pendulum { gamma: f64 }
 //! impl Lagrangian<1> for Pendulum {
+//!     #[inline(always)]
 //!     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
 //!         v[0] * v[0] * 0.5 + q[0].cos() + z * self.gamma
 //!     }
