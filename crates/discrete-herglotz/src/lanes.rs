@@ -13,7 +13,7 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 pub(crate) struct Lanes<S: Simd>(pub S::f64s);
 
 /// The token of an instruction set, out of nothing.
-#[allow(unsafe_code)]
+#[allow(unsafe_code)] // The trait has no other way to a token; why it is sound is said below.
 #[inline(always)]
 fn token<S: Simd>() -> S {
     const { assert!(size_of::<S>() == 0, "a token carries nothing") };

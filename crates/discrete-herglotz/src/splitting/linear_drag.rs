@@ -146,7 +146,9 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     }
 
     fn sigma(&self) -> f64 {
-        self.progress.motion.sigma
+        let Progress { taken, t0, h, .. } = self.progress;
+        let Some(before) = taken.checked_sub(1) else { return 1.0 };
+        Maps { form: &self.form, drag: &self.drag, table: &self.table }.sigma(t0 + before as f64 * h, h)
     }
 
     fn evaluations(&self) -> u64 {
@@ -180,7 +182,7 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
         from: &Progress<N>,
         steps: usize,
     ) -> Motion<N> {
-        let Maps { form, drag, table } = self;
+        let Maps { form, table, .. } = self;
         let mut m = from.motion;
         // Steps that begin with a drift leave the first on its own, others the last.
         let (first, last) = if table.kick_first {
@@ -199,18 +201,19 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
                 }
             }
         }
-        let t = from.time_after(steps - 1);
         if !table.kick_first {
-            self.drift::<ACTION, COMPENSATED, TIMED>(&mut m, t, &table.closing);
+            self.drift::<ACTION, COMPENSATED, TIMED>(&mut m, from.time_after(steps - 1), &table.closing);
         }
-        m.sigma = match drag {
-            Drag::Constant(gamma) => (gamma * from.h).exp(),
-            Drag::Timed { .. } => {
-                let closing = if table.kick_first { None } else { Some(&table.closing) };
-                table.single.iter().chain(closing).map(|stage| 1.0 + self.drift_of::<true>(t, stage).damping).product()
-            }
-        };
         m
+    }
+
+    /// `sigma_d` of the step from the time t. Found where it is asked for: of a drag in time it costs as much as the drifts.
+    fn sigma(&self, t: f64, h: f64) -> f64 {
+        if let Drag::Constant(gamma) = self.drag {
+            return (gamma * h).exp();
+        }
+        let closing = if self.table.kick_first { None } else { Some(&self.table.closing) };
+        self.table.single.iter().chain(closing).map(|stage| 1.0 + self.drift_of::<true>(t, stage).damping).product()
     }
 
     /// The drift of a stage of the step from the time t. A look at the drag in each stage would cost a fifth of a Strang step.
