@@ -36,6 +36,7 @@ mod hamiltonian;
 mod herglotz;
 mod lagrangian;
 mod lagrangian_form;
+mod largest;
 pub mod linear;
 mod module;
 #[cfg(feature = "num-dual")]
@@ -66,6 +67,7 @@ pub use herglotz::{
 };
 pub use lagrangian::{Hessian, Lagrangian, ValueOnly, check_closed_derivatives, derived_gradient, derived_hessian};
 pub use lagrangian_form::LagrangianForm;
+pub use largest::{larger, largest};
 pub use module::{Border, Module};
 pub use points::{DiscretePoint, PhasePoint, Triple, VelocityPoint, seed};
 pub use pullback::{Conformality, conformality, conformality_with_jacobian};

@@ -143,6 +143,26 @@ impl From<StepError> for GeometryError {
     }
 }
 
+/// A step whose ends do not fit each other by far more than the error of a step that resolves the motion: it may have crossed
+/// a pole, a wall or a centre of force without meeting it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Suspicion {
+    /// The first such step, counted from 0.
+    pub step: usize,
+    /// The misfit, in units of the largest that a step which resolves its motion can have: above one.
+    pub misfit: f64,
+}
+
+impl std::fmt::Display for Suspicion {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Suspicion { step, misfit } = self;
+        write!(
+            f,
+            "step {step} does not resolve the motion (misfit {misfit:.1e}); what follows may be wrong: take a smaller step"
+        )
+    }
+}
+
 /// How a run ended. All that was recorded before is kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Status {

@@ -1,6 +1,6 @@
 //! A method at work on one motion.
 
-use crate::StepError;
+use crate::{StepError, Suspicion};
 use contact_geom::PhasePoint;
 
 /// A method at work on one motion: its state, its workspace, and what it carries from one step to the next (guesses,
@@ -26,6 +26,11 @@ pub trait Stepper<const N: usize> {
 
     /// The evaluations of forces, or of gradients of L, since the start: one a point of R x TQ x R.
     fn evaluations(&self) -> u64;
+
+    /// The first step so far that cannot have resolved the motion, where one was seen.
+    fn suspicion(&self) -> Option<Suspicion> {
+        None
+    }
 }
 
 /// A run that ended before its last step.
