@@ -18,16 +18,37 @@ pub enum InputError {
         /// The span that was passed.
         span: f64,
     },
-    /// A method does not reach a wanted accuracy.
-    #[error(
-        "the wanted relative error {wanted:e} is not reached ({reached:e} was); take a method of higher order, or ask for less"
-    )]
+    /// A wanted error is not a positive finite number.
+    #[error("the wanted relative error is {wanted}; it must be positive and finite")]
+    Tolerance {
+        /// The error that was asked for.
+        wanted: f64,
+    },
+    /// A wanted accuracy is not reached.
+    #[error("the wanted relative error {wanted:e} is not reached (the best estimate was {reached:e}): {cause}")]
     Accuracy {
         /// The error that was asked for.
         wanted: f64,
         /// The smallest estimate of the pilot runs; infinite where none was made.
         reached: f64,
+        /// What stands in the way.
+        cause: Obstacle,
     },
+    /// There are too many of something to be counted, kept, or to be told apart.
+    #[error("{what} = {found:e}; at most {most:e} are possible: {remedy}")]
+    TooMany {
+        /// What is counted.
+        what: &'static str,
+        /// The number that was asked for.
+        found: f64,
+        /// The largest possible.
+        most: f64,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The Lagrangian has no finite value or derivative at the start.
+    #[error("the Lagrangian or one of its derivatives is not finite at the start; choose a start inside its domain")]
+    Undefined,
     /// A collocation method has no such number of stages.
     #[error("{found} stages; contact Gauss collocation has from 1 to 16")]
     Stages {
@@ -143,6 +164,47 @@ impl From<StepError> for GeometryError {
     }
 }
 
+/// What keeps a wanted accuracy from being reached.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum Obstacle {
+    /// Round-off: shorter steps do not better the result.
+    #[error("round-off of the motion is larger; ask for less")]
+    RoundOff,
+    /// Runs with different steps separate like those of different starts.
+    #[error(
+        "the motion is chaotic, and round-off grows beyond the wanted error after t = {t}; end the run there, or ask for less"
+    )]
+    Chaos {
+        /// The last time of a tenth of the span at which runs agree.
+        t: f64,
+    },
+    /// Runs approach each other, but more slowly than a smooth motion lets them.
+    #[error(
+        "runs converge only with order {order:.1}: the Lagrangian is not smooth along the motion, or the method's order is          low; ask for less, or take a method of higher order if the Lagrangian is smooth"
+    )]
+    Order {
+        /// The order that the last runs showed.
+        order: f64,
+    },
+    /// A step cannot be taken however short it is.
+    #[error("the motion cannot be followed beyond t = {t}: {cause}")]
+    Halted {
+        /// The time that is reached.
+        t: f64,
+        /// Why the next step fails.
+        cause: StepError,
+    },
+    /// What is near some time is too fast or too narrow for the steps that can be tried.
+    #[error("near t = {t} the motion is not resolved by any step that was tried; take a clock, or a shorter span")]
+    Unresolved {
+        /// The time.
+        t: f64,
+    },
+    /// The pilot runs would cost too much.
+    #[error("the steps that it needs are too many to be tried; take a method of higher order, a shorter span, or give a step")]
+    Budget,
+}
+
 /// A step whose ends do not fit each other by far more than the error of a step that resolves the motion: it may have crossed
 /// a pole, a wall or a centre of force without meeting it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -173,6 +235,15 @@ pub enum Status {
         /// The number of steps taken.
         step: usize,
     },
+    /// A claim of the Lagrangian's structure was found false at a state of the run: all that was computed may be wrong.
+    FalseClaim {
+        /// The number of steps taken.
+        step: usize,
+        /// The name of the claim, a field of [`Structure`](contact_geom::Structure).
+        claim: &'static str,
+        /// The size of what the claim says is zero; see [`Defect`](contact_geom::Defect).
+        size: f64,
+    },
     /// A step could not be taken; the state is that before it.
     Failed {
         /// The number of the step that failed, counted from 0.
@@ -187,6 +258,11 @@ impl std::fmt::Display for Status {
         match self {
             Status::Completed => write!(f, "completed"),
             Status::Stopped { step } => write!(f, "stopped by the observer after step {step}"),
+            Status::FalseClaim { step, claim, size } => write!(
+                f,
+                "unreliable: after step {step} the Lagrangian is not {claim}, as it claims (relative size {size:e}); correct \
+                 its structure and run again"
+            ),
             Status::Failed { step, cause } => write!(f, "failed in step {step}: {cause}"),
         }
     }

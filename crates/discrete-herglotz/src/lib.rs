@@ -48,7 +48,7 @@ mod verified;
 pub use composition::Composition;
 pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};
 pub use discretised::Discretised;
-pub use error::{InputError, Status, StepError, Suspicion};
+pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
 pub use events::{Crossing, Direction, Event, EventRun, EventStatus, run_with_events};
 pub use flow::{HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian};
 pub use gauss::{ClockedStepper, DenseStep, Gauss, GaussRoute, GaussStepper};

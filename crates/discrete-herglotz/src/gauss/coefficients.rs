@@ -42,6 +42,13 @@ impl Coefficients {
         TABLES[s.clamp(1, MOST) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MOST))))
     }
 
+    /// The weight of stage j in the coefficient of `P_k(2 x - 1)` of the polynomial through the stages: Gauss' weights integrate
+    /// its products with the Legendre polynomials exactly.
+    pub fn legendre_weight(&self, s: usize, j: usize, k: usize) -> f64 {
+        let at = legendre(s, self.c[j] + self.c[j] - Quad::one());
+        (2 * k + 1) as f64 * self.b[j].0 * at[k].0
+    }
+
     fn new(s: usize) -> Self {
         let (one, half, n) = (Quad::one(), Quad::from(0.5), Quad::from(s as f64));
         let nodes: [Quad; MOST] = from_fn(|i| {
@@ -81,9 +88,54 @@ impl Coefficients {
     }
 }
 
+/// The values at some points of `[0, 1]` of the polynomials of degree `s - 1` that are 1 at one node and 0 at the others, and
+/// their integrals from 0: `[i][j]` for point i and node j.
+pub(crate) fn lagrange_rows(s: usize, points: &[f64; MOST]) -> [[[f64; MOST]; MOST]; 2] {
+    let g = Coefficients::of(s);
+    let (one, half) = (Quad::one(), Quad::from(0.5));
+    let at: [_; MOST] = from_fn(|j| legendre(s, g.c[j] + g.c[j] - one));
+    let mut rows = [[[0.0; MOST]; MOST]; 2];
+    for (i, point) in points.iter().enumerate() {
+        let x = Quad::from(*point);
+        let p = legendre(s, x + x - one);
+        for j in 0..s {
+            let odd = |k: usize| Quad::from((2 * k + 1) as f64);
+            let value = (0..s).fold(Quad::zero(), |sum, k| sum + odd(k) * at[j][k] * p[k]);
+            let rest = (1..s).fold(Quad::zero(), |sum, k| sum + at[j][k] * (p[k + 1] - p[k - 1]));
+            rows[0][i][j] = (g.b[j] * value).0;
+            rows[1][i][j] = (g.b[j] * (x + half * rest)).0;
+        }
+    }
+    rows
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Polynomials of degree `s - 1` are those through the nodes, and their integrals exact, to round-off times the size of the entries.
+    #[test]
+    fn between_the_nodes() {
+        let points: [f64; MOST] = from_fn(|i| (0.37 + 0.618 * i as f64).fract());
+        for s in 1..=MOST {
+            let (g, [value, integral]) = (Coefficients::of(s), lagrange_rows(s, &points));
+            let degree = s as i32 - 1;
+            for (i, x) in points.iter().enumerate() {
+                let apply = |row: &[f64; MOST]| -> (f64, f64) {
+                    let terms = (0..s).map(|j| row[j] * g.c[j].0.powi(degree));
+                    (terms.clone().sum(), terms.map(f64::abs).sum())
+                };
+                let ((value, size), (integral, size_of)) = (apply(&value[i]), apply(&integral[i]));
+                assert!((value - x.powi(degree)).abs() <= 64.0 * f64::EPSILON * (size + 1.0), "s = {s}, {x}");
+                let exact = x.powi(s as i32) / s as f64;
+                assert!((integral - exact).abs() <= 64.0 * f64::EPSILON * (size_of + 1.0), "s = {s}, {x}");
+                // The last coefficient of x^(s-1) in P_(s-1)(2x - 1) is 1 over that of the highest power there.
+                let last: f64 = (0..s).map(|j| g.legendre_weight(s, j, s - 1) * g.c[j].0.powi(degree)).sum();
+                let central = (1..s).fold(1.0, |b, k| b * (s - 1 + k) as f64 / k as f64);
+                assert!((last * central - 1.0).abs() <= 1e-15 * central * s as f64, "s = {s}: {last}");
+            }
+        }
+    }
 
     /// Weights integrate all polynomials of degree `2s - 1`, rows of the matrix those of degree `s - 1`, and the matrix is
     /// symplectic, `b_i a_ij + b_j a_ji = b_i b_j`: all to double-double round-off, 1e-30 for a sum of up to sixteen terms.

@@ -8,6 +8,7 @@ mod dense;
 mod extension;
 mod general;
 mod linear;
+mod look;
 mod separable;
 mod stage_equations;
 mod stages;
@@ -16,6 +17,8 @@ mod sweeps;
 
 pub use clocked::ClockedStepper;
 pub use dense::DenseStep;
+pub(crate) use look::Look;
+pub(crate) use stepper::velocity;
 pub use stepper::{GaussRoute, GaussStepper};
 
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};

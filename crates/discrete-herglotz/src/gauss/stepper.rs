@@ -6,6 +6,7 @@ use super::dense::{DenseStep, Solved, Start};
 use super::extension::{Extension, Physical};
 use super::general::{General, Mass, Table};
 use super::linear::Linear;
+use super::look::{Compare, Curve, Look};
 use super::separable::Separable;
 use super::stage_equations::{Given, Products, StageEquations, Workspace};
 use super::sweeps::Progress;
@@ -165,6 +166,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         Some(DenseStep::new(s, t, h, start, &solved))
     }
 
+    /// A look at the last step between its nodes; `None` where there is no step, or none that was iterated.
+    pub(crate) fn look(&self) -> Option<Look> {
+        let curve = self.arch.dispatch(Stages { run: self })?;
+        Some(self.arch.dispatch(Compare { lagrangian: self.lagrangian, curve: &curve }))
+    }
+
     /// The state as the route holds it.
     #[inline(always)]
     fn values(&self) -> Start<N> {
@@ -221,6 +228,38 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         self.from = values;
         self.last = Last::Newton;
         Ok(())
+    }
+}
+
+/// The stages of the last step, for a look between them.
+struct Stages<'b, 'a, L, const N: usize> {
+    run: &'b GaussStepper<'a, L, N>,
+}
+
+impl<L: Lagrangian<N>, const N: usize> WithSimd for Stages<'_, '_, L, N> {
+    type Output = Option<Curve<N>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Option<Curve<N>> {
+        let GaussStepper { products, route, last, workspace, from, k, t0, .. } = self.run;
+        let start = self.run.phase(from);
+        let t = t0 + k.checked_sub(1)? as f64 * products.h;
+        let mut curve = Curve::new(products.s, t, products.h, &start);
+        match (last, &**route) {
+            (Last::None, _) | (Last::Route, Route::Linear(..)) => return None,
+            (Last::Newton, route) => {
+                let Workspace { x, l, .. } = workspace.as_deref()?;
+                let wants_z = !matches!(route, Route::Condensed(run) if !run.wants_z);
+                curve.of_gradients(&x.v, &x.rho, l, wants_z);
+            }
+            (Last::Route, Route::Condensed(run)) => {
+                curve.of_accelerations::<S>(&run.table, self.run.mass.as_ref(), &from.y, &run.a);
+            }
+            (Last::Route, Route::General(run)) => {
+                (curve.v, curve.force, curve.rate, curve.l) = (run.v, run.force, run.rate, Some(run.l));
+            }
+        }
+        Some(curve)
     }
 }
 
@@ -349,7 +388,7 @@ impl<const N: usize> Beginning<N> {
 }
 
 /// The velocity that belongs to a momentum, `L_v(t, q, v, z) = p`, by Newton's method.
-fn velocity<const N: usize>(
+pub(crate) fn velocity<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,
     state: &PhasePoint<N>,

@@ -1,66 +1,197 @@
-//! The step for a wanted error, by pilot runs.
+//! Pilot runs: a motion followed with some number of steps, seen at a few common times, and looked at between its steps.
 
-use super::{Plan, Scene, Wanted};
-use crate::{InputError, Status};
-use contact_geom::Lagrangian;
+use super::{Integrator, Plan, Scene};
+use crate::gauss::velocity;
+use crate::{Gauss, GaussStepper, Halt, InputError, StepError, Stepper, verified};
 use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 
-/// The pairs of runs that a search may take.
-const PAIRS: usize = 24;
+/// The evaluations of L that all pilot runs of a plan may take together: some seconds.
+pub(super) const BUDGET: u64 = 1 << 29;
 
-/// The steps of the longest pilot run.
-const MOST_STEPS: usize = 1 << 26;
+/// The misfit between the nodes beyond which a step does not resolve the motion: its momenta would be off by a twentieth.
+const RESOLVED: f64 = 0.05;
 
-/// The number of steps with which the error at the end of the span, relative to the size of (q, p), is at most `error`.
-///
-/// The error of a run with n steps is taken from one with 2n. The next n follows from the order, by a factor of at most
-/// eight, and of at least 5/4. The search ends where two pairs do not better the estimate by a half: that is round-off.
-pub(super) fn steps_for<L: Lagrangian<N>, const N: usize>(
-    scene: &Scene<'_, L, N>,
-    error: f64,
-) -> Result<usize, InputError> {
-    if !(error > 0.0 && error.is_finite()) {
-        return Err(InputError::Accuracy { wanted: error, reached: f64::INFINITY });
+/// How many times the expected misfit is more than a smooth motion has: something narrow lies between the nodes.
+const NARROW: f64 = 30.0;
+
+/// The steps between two looks at budget and progress.
+const CHUNK: usize = 1024;
+
+/// A motion at the ends of the `marks` equal parts of its span: (q, p).
+#[derive(Clone, Debug)]
+pub(super) struct Track<const N: usize>(pub Vec<[SVector<f64, N>; 2]>);
+
+/// A 2-norm that neither overflows nor underflows.
+fn norm<const N: usize>(x: &[SVector<f64, N>; 2]) -> f64 {
+    let size = contact_geom::largest(x.iter().flat_map(|x| x.iter().copied()));
+    if !(size > 0.0 && size.is_finite()) {
+        return size;
     }
-    let wanted = Wanted { action: false, ..Wanted::default() };
-    let pilot = Scene { wanted, ..*scene };
-    let run = |count: usize| -> Result<Option<[SVector<f64, N>; 2]>, InputError> {
-        // Bad luck, and a start that cannot be stepped from, call for shorter steps.
-        match Plan::new(&pilot, count).and_then(|plan| plan.run()) {
-            Ok(outcome) if outcome.status == Status::Completed => Ok(Some([outcome.q, outcome.p])),
-            Ok(_) | Err(InputError::Sigma { .. } | InputError::FirstStep(_)) => Ok(None),
-            Err(bad) => Err(bad),
-        }
-    };
-    let order = f64::from(scene.integrator.order());
-    let mut count = 4usize;
-    let mut coarse = run(count)?;
-    let (mut best, mut strikes) = (f64::INFINITY, 0);
-    for _ in 0..PAIRS {
-        let fine = run(2 * count)?;
-        let factor = match (&coarse, &fine) {
-            (Some(a), Some(b)) => {
-                let size = (b[0].norm_squared() + b[1].norm_squared()).sqrt();
-                let defect = ((a[0] - b[0]).norm_squared() + (a[1] - b[1]).norm_squared()).sqrt() / size;
-                if defect <= error {
-                    return Ok(count);
-                }
-                strikes = if defect < 0.5 * best { 0 } else { strikes + 1 };
-                best = best.min(defect);
-                if strikes == 2 {
-                    break;
-                }
-                // A margin of a tenth, since the order is that of short steps.
-                (1.1 * (defect / error).powf(1.0 / order)).clamp(1.25, 8.0)
-            }
-            _ => 2.0,
+    size * x.iter().map(|x| (x / size).norm_squared()).sum::<f64>().sqrt()
+}
+
+impl<const N: usize> Track<N> {
+    /// The distances of the states of two tracks at the times that both have, relative to the size of the second's at that time, or at
+    /// the end where that is larger. Not a number where a state is not.
+    pub fn distances(&self, of: &Self) -> Vec<f64> {
+        let marks = gcd(self.0.len(), of.0.len());
+        let at = |track: &Self, i: usize| track.0[(i + 1) * track.0.len() / marks - 1];
+        let last = of.0.last().map_or(0.0, norm);
+        let relative = |i: usize| {
+            let (a, b) = (at(self, i), at(of, i));
+            let (apart, size) = (norm(&[a[0] - b[0], a[1] - b[1]]), contact_geom::larger(norm(&b), last));
+            if apart == 0.0 { 0.0 } else { apart / size }
         };
-        let next = (count as f64 * factor).ceil() as usize;
-        if next > MOST_STEPS {
-            break;
-        }
-        coarse = if next == 2 * count { fine } else { run(next)? };
-        count = next;
+        (0..marks).map(relative).collect()
     }
-    Err(InputError::Accuracy { wanted: error, reached: best })
+
+    /// The largest of the [`distances`](Self::distances).
+    pub fn distance(&self, of: &Self) -> f64 {
+        contact_geom::largest(self.distances(of))
+    }
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+/// How a pilot run has ended.
+#[derive(Clone, Debug)]
+pub(super) enum Ending<const N: usize> {
+    /// At the end of the span.
+    Followed(Track<N>),
+    /// At a step that does not resolve the motion, after this part of the span.
+    Unresolved { part: f64 },
+    /// The same, where the misfit is that of something narrow.
+    Narrow { part: f64 },
+    /// At a step that could not be taken.
+    Halted { part: f64, cause: StepError },
+    /// No evaluations are left.
+    Exhausted,
+}
+
+/// Pilot runs of a scene, with what is left of their budget.
+pub(super) struct Pilots<'s, 'a, L, const N: usize> {
+    pub scene: &'s Scene<'a, L, N>,
+    pub left: u64,
+    /// The error that is wanted.
+    pub wanted: f64,
+}
+
+impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
+    /// Follows the motion by contact Gauss collocation, with a look at one in `stride` steps, for what is narrow too or not.
+    pub fn gauss(
+        &mut self,
+        stages: usize,
+        count: usize,
+        marks: usize,
+        stride: usize,
+        narrow: bool,
+    ) -> Result<Ending<N>, InputError> {
+        let Scene { lagrangian, start, t0, span, .. } = *self.scene;
+        let gauss = Gauss::new(lagrangian, stages, span / count as f64)?;
+        let state = contact_geom::legendre(lagrangian, t0, &start);
+        let mut stepper = match gauss.stepper_without_action(t0, state, start.v) {
+            Ok(stepper) => stepper,
+            Err(error) => return halted_at_the_start(error),
+        };
+        let floor = contact_geom::larger(0.1 * self.wanted, 1e-11);
+        let bad = |run: &GaussStepper<'_, &L, N>, part: f64| {
+            let look = run.look()?;
+            // Not `misfit > ..`: that would let a NaN pass.
+            if !(look.misfit <= RESOLVED) {
+                return Some(Ending::Unresolved { part });
+            }
+            (narrow && look.misfit > NARROW * look.expected + floor).then_some(Ending::Narrow { part })
+        };
+        let (mut track, mut taken, mut looks) = (Vec::with_capacity(marks), 0, 0);
+        let mut ending = None;
+        while taken < count && ending.is_none() {
+            let next_mark = count / marks * (track.len() + 1);
+            // The first steps are all looked at: what is far too long ends at once.
+            let steps = if taken < 4 { 1 } else { stride.min(next_mark - taken) };
+            let halt = stepper.advance(steps).err();
+            taken += halt.map_or(steps, |halt| halt.taken);
+            let part = taken as f64 / count as f64;
+            ending = match halt {
+                Some(Halt { cause, .. }) => Some(Ending::Halted { part, cause }),
+                None => bad(&stepper, part),
+            };
+            if taken == next_mark {
+                let x = stepper.state();
+                track.push([x.q, x.p]);
+            }
+            looks += 1;
+            let newton = stepper.newton_steps() * (stages * (N + 2)).pow(2) as u64;
+            if stepper.evaluations() + newton + looks * stages as u64 > self.left {
+                ending = Some(Ending::Exhausted);
+            }
+        }
+        let newton = stepper.newton_steps() * (stages * (N + 2)).pow(2) as u64;
+        self.left = self.left.saturating_sub(stepper.evaluations() + newton + looks * stages as u64);
+        if let Some(Ending::Narrow { part }) = ending {
+            self.check_claims(&stepper.state(), part)?;
+        }
+        Ok(ending.unwrap_or(Ending::Followed(Track(track))))
+    }
+
+    /// Follows the motion by the scene's own integrator.
+    pub fn own(&mut self, integrator: Integrator, count: usize, marks: usize) -> Result<Ending<N>, InputError> {
+        let plan = match Plan::new(&self.scene.bare(), integrator, count) {
+            Ok(plan) => plan,
+            Err(error) => return halted_at_the_start(error),
+        };
+        let mut stepper = match plan.stepper() {
+            Ok(stepper) => stepper,
+            Err(error) => return halted_at_the_start(error),
+        };
+        let price = match integrator {
+            Integrator::Gauss { .. } => 1,
+            Integrator::Splitting(_) => 4,
+            // Newton's method takes second derivatives.
+            Integrator::Discrete(_) | Integrator::Composition(..) => 32,
+        };
+        let (mut track, mut taken) = (Vec::with_capacity(marks), 0);
+        let mut ending = None;
+        while taken < count && ending.is_none() {
+            let next_mark = count / marks * (track.len() + 1);
+            let steps = CHUNK.min(next_mark - taken);
+            let halt = stepper.advance(steps).err();
+            taken += halt.map_or(steps, |halt| halt.taken);
+            ending = halt.map(|Halt { cause, .. }| Ending::Halted { part: taken as f64 / count as f64, cause });
+            if taken == next_mark {
+                let x = stepper.state();
+                track.push([x.q, x.p]);
+            }
+            if stepper.evaluations().saturating_mul(price) > self.left {
+                ending = Some(Ending::Exhausted);
+            }
+        }
+        self.left = self.left.saturating_sub(stepper.evaluations().saturating_mul(price));
+        Ok(ending.unwrap_or(Ending::Followed(Track(track))))
+    }
+
+    /// The claims of L at a state of a pilot, after a part of the span.
+    ///
+    /// # Errors
+    /// [`InputError::FalseClaim`].
+    fn check_claims(&self, state: &PhasePoint<N>, part: f64) -> Result<(), InputError> {
+        let Scene { lagrangian, start, t0, span, .. } = *self.scene;
+        let t = t0 + part * span;
+        match velocity(lagrangian, t, state, start.v) {
+            Ok(v) => verified(lagrangian, t, &VelocityPoint { q: state.q, v, z: state.z }).map(drop),
+            // No velocity belongs to where a pilot has gone astray to.
+            Err(_) => Ok(()),
+        }
+    }
+}
+
+/// Bad luck at the start calls for shorter steps; bad input ends the search.
+fn halted_at_the_start<const N: usize>(error: InputError) -> Result<Ending<N>, InputError> {
+    match error {
+        InputError::Sigma { sigma } => Ok(Ending::Halted { part: 0.0, cause: StepError::SigmaVanished { sigma } }),
+        InputError::FirstStep(cause) => Ok(Ending::Halted { part: 0.0, cause }),
+        bad => Err(bad),
+    }
 }

@@ -1,0 +1,225 @@
+//! A look between the nodes of a step: does its curve solve Herglotz' equations there?
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+use super::coefficients::{Coefficients, MOST, lagrange_rows};
+use super::condensed::Condensed;
+use super::stages::{StageMap, Stages, blocks};
+use crate::lanes::Lanes;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
+use pulp::{Simd, WithSimd};
+use std::sync::OnceLock;
+
+/// What a look at a step has found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Look {
+    /// The largest misfit of the curve: of `p' = L_q + L_z p` and `z' = L`, over the length of the step, and of `p = L_v`; relative to
+    /// the momenta and actions. Infinite where something is not finite.
+    pub misfit: f64,
+    /// The misfit that the last two coefficients of the step's polynomials let expect.
+    pub expected: f64,
+}
+
+/// A step as it was solved: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L.
+pub(super) struct Curve<const N: usize> {
+    pub s: usize,
+    pub t: f64,
+    pub h: f64,
+    pub q: [f64; N],
+    pub p: [f64; N],
+    pub z: f64,
+    pub v: [Stages; N],
+    pub force: [Stages; N],
+    pub rate: Stages,
+    /// `None` where the action is not computed.
+    pub l: Option<Stages>,
+}
+
+impl<const N: usize> Curve<N> {
+    /// With stages still to be filled in.
+    pub fn new(s: usize, t: f64, h: f64, start: &PhasePoint<N>) -> Self {
+        let zero = [Stages::ZERO; N];
+        Curve {
+            s,
+            t,
+            h,
+            q: start.q.into(),
+            p: start.p.into(),
+            z: start.z,
+            v: zero,
+            force: zero,
+            rate: Stages::ZERO,
+            l: None,
+        }
+    }
+
+    /// From L with its gradient at the stages, their velocities and factors.
+    pub fn of_gradients(
+        &mut self,
+        v: &[SVector<f64, N>],
+        rho: &[f64],
+        l: &[Dual<f64, Triple<N>>],
+        with_action: bool,
+    ) {
+        let mut action = Stages::ZERO;
+        for (i, ((v, rho), l)) in v.iter().zip(rho).zip(l).enumerate() {
+            for d in 0..N {
+                self.v[d].0[i] = v[d];
+                self.force[d].0[i] = rho * l.d.x[d];
+            }
+            self.rate.0[i] = rho * l.d.z;
+            action.0[i] = l.re;
+        }
+        self.l = with_action.then_some(action);
+    }
+
+    /// From the accelerations of a condensed step that began with the velocity v0.
+    #[inline(always)]
+    pub fn of_accelerations<S: Simd>(
+        &mut self,
+        table: &Condensed,
+        mass: Option<&SMatrix<f64, N, N>>,
+        v0: &[f64; N],
+        a: &[Stages; N],
+    ) {
+        for d in 0..N {
+            let v0 = Lanes::<S>::splat(v0[d]);
+            table.d.apply(&a[d], table.s, &mut self.v[d], |r| table.inverse_rho.block(r) * v0);
+        }
+        for r in 0..blocks::<S>(table.s) {
+            let rho = table.inverse_rho.block::<S>(r).recip();
+            self.rate.set(r, rho * table.gamma);
+            for i in 0..N {
+                let mut force = Lanes::<S>::splat(0.0);
+                for j in 0..N {
+                    let mass = mass.map_or(f64::from(u8::from(i == j)), |mass| mass[(i, j)]);
+                    force = a[j].block::<S>(r).mul_add(Lanes::splat(mass), force);
+                }
+                self.force[i].set(r, force * rho);
+            }
+        }
+    }
+}
+
+/// Maps from the stages to as many points between the nodes.
+struct Between {
+    /// The points, as fractions of the step.
+    points: Stages,
+    /// The values of the polynomial, and its integral from 0.
+    value: StageMap,
+    integral: StageMap,
+    /// Its last coefficients in Legendre polynomials.
+    last: [[f64; MOST]; 2],
+}
+
+impl Between {
+    /// For a number of stages from 1 to 16, made once.
+    fn of(s: usize) -> &'static Between {
+        static TABLES: [OnceLock<Box<Between>>; MOST] = [const { OnceLock::new() }; MOST];
+        let s = s.clamp(1, MOST);
+        TABLES[s - 1].get_or_init(|| Box::new(Self::new(s)))
+    }
+
+    fn new(s: usize) -> Self {
+        let g = Coefficients::of(s);
+        // The Gauss points of one stage fewer lie between those of s; one more beside the step's end, where curves are worst.
+        let inner = Coefficients::of(s.saturating_sub(1).max(1));
+        let end = 0.5 * (1.0 + g.c[s - 1].0);
+        let points = std::array::from_fn(|i| if i + 1 < s { inner.c[i].0 } else { end });
+        let [value, integral] = lagrange_rows(s, &points);
+        let last = std::array::from_fn(|i| {
+            // Of one stage there is no polynomial to expect anything of but its one value.
+            let k = (s - 1).saturating_sub(i);
+            std::array::from_fn(|j| if j < s { g.legendre_weight(s, j, k) } else { 0.0 })
+        });
+        Between { points: Stages(points), value: StageMap::new(&value, s), integral: StageMap::new(&integral, s), last }
+    }
+
+    /// The sizes of the last two coefficients together.
+    fn tail(&self, y: &Stages) -> f64 {
+        self.last.iter().map(|row| row.iter().zip(&y.0).map(|(w, y)| w * y).sum::<f64>().abs()).sum()
+    }
+}
+
+/// The look, in the lanes of an instruction set.
+pub(super) struct Compare<'a, L, const N: usize> {
+    pub lagrangian: &'a L,
+    pub curve: &'a Curve<N>,
+}
+
+impl<L: Lagrangian<N>, const N: usize> WithSimd for Compare<'_, L, N> {
+    type Output = Look;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Look {
+        let Compare { lagrangian, curve } = self;
+        let Curve { s, t, h, .. } = *curve;
+        let between = Between::of(s);
+        let zero = Lanes::<S>::splat(0.0);
+        let value = |y: &Stages, out: &mut Stages| between.value.apply(y, s, out, |_| zero);
+        let grown = |y: &Stages, from: f64, out: &mut Stages| {
+            between.integral.apply(y, s, out, |_| zero);
+            for r in 0..blocks::<S>(s) {
+                out.set(r, out.block::<S>(r) * h + from);
+            }
+        };
+        let (mut v, mut q, mut f, mut y) = ([Stages::ZERO; N], [Stages::ZERO; N], [Stages::ZERO; N], [Stages::ZERO; N]);
+        let (mut rate, mut fallen, mut l, mut z) = (Stages::ZERO, Stages::ZERO, Stages::ZERO, Stages([curve.z; MOST]));
+        for d in 0..N {
+            value(&curve.v[d], &mut v[d]);
+            grown(&curve.v[d], curve.q[d], &mut q[d]);
+            value(&curve.force[d], &mut f[d]);
+            grown(&curve.force[d], curve.p[d], &mut y[d]);
+        }
+        value(&curve.rate, &mut rate);
+        grown(&curve.rate, 0.0, &mut fallen);
+        if let Some(of_l) = &curve.l {
+            value(of_l, &mut l);
+            grown(of_l, curve.z, &mut z);
+        }
+        let (mut misfit, mut size, mut of_z, mut size_z, mut all) = (zero, zero, zero, zero, zero);
+        for r in 0..blocks::<S>(s) {
+            let x = VelocityPoint {
+                q: SVector::from_fn(|d, _| q[d].block::<S>(r)),
+                v: SVector::from_fn(|d, _| v[d].block::<S>(r)),
+                z: z.block::<S>(r),
+            };
+            let (value, g) = lagrangian.with_gradient(between.points.block::<S>(r) * h + t, &x);
+            let inverse = (Lanes::<S>::splat(1.0) - fallen.block::<S>(r)).recip();
+            let drag = (rate.block::<S>(r) * inverse - g.z) * h;
+            for d in 0..N {
+                let p = y[d].block::<S>(r) * inverse;
+                let force = f[d].block::<S>(r) * inverse * h;
+                let of_force = p.mul_add(drag, force - g.x[d] * h);
+                let of_momentum = p - g.y[d];
+                misfit = misfit.max(of_force.abs()).max(of_momentum.abs());
+                size = size.max(p.abs()).max(force.abs());
+                all += of_force * 0.0 + of_momentum * 0.0;
+            }
+            if curve.l.is_some() {
+                let misfit = (l.block::<S>(r) - value) * h;
+                of_z = of_z.max(misfit.abs());
+                size_z = size_z.max(z.block::<S>(r).abs()).max((value * h).abs());
+                all += misfit * 0.0;
+            }
+        }
+        // The largest over lanes may hide a NaN; a NaN or an infinity times 0 is not 0.
+        if all.sum() != 0.0 {
+            return Look { misfit: f64::INFINITY, expected: 0.0 };
+        }
+        let relative = |misfit: f64, size: f64| if misfit > 0.0 { misfit / size } else { 0.0 };
+        let (size, size_z) = (size.largest(), size_z.largest());
+        let fastest = v.iter().flat_map(|v| v.0).fold(0.0, |m: f64, v| if v.abs() > m { v.abs() } else { m });
+        let mut expected = between.tail(&curve.rate) * h;
+        for d in 0..N {
+            expected += relative(between.tail(&curve.force[d]) * h, size) + relative(between.tail(&curve.v[d]), fastest);
+        }
+        if let Some(of_l) = &curve.l {
+            expected += relative(between.tail(of_l) * h, size_z);
+        }
+        let misfit = relative(misfit.largest(), size) + relative(of_z.largest(), size_z);
+        Look { misfit, expected }
+    }
+}
