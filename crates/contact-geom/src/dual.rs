@@ -216,8 +216,12 @@ macro_rules! arithmetic {
             }
             #[$inline]
             fn powf(self, a: f64) -> Self {
-                let below = self.re.powf(a - 1.0);
-                self.chain(below * self.re, below * a)
+                // The value by itself: the power below is infinite at 0, and leaves the range of numbers before the value does.
+                match a {
+                    0.0 => Self::one(),
+                    1.0 => self,
+                    _ => self.chain(self.re.powf(a), self.re.powf(a - 1.0) * a),
+                }
             }
             #[$inline]
             fn exp(self) -> Self {

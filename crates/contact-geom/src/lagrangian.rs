@@ -10,7 +10,7 @@ use num_traits::One;
 /// The motion makes the end value of the action critical, where `zdot = L(t, q, qdot, z)`. In the field's signs a
 /// dissipative term is `gamma z` with `gamma < 0`. Every derivative is `value` on duals; a user who has a closed form
 /// overrides [`closed_gradient`](Self::closed_gradient), which vector fields, forms and steps then differentiate once less,
-/// or [`closed_hessian`](Self::closed_hessian), which W, forms and second jets then use. [`check_closed_derivatives`]
+/// or [`closed_hessian`](Self::closed_hessian), which W, forms and second jets then use. [`check_closed_derivatives`](crate::check_closed_derivatives)
 /// compares such a form with the derived one.
 ///
 /// Mark `value`, and the functions that it calls, `#[inline(always)]`: integrators evaluate them at several stages in one
@@ -185,30 +185,6 @@ pub fn derived_hessian<T: Scalar, const N: usize>(
         vz: SVector::from_fn(|i, _| g.y[i].d.z),
         zz: g.z.d.z,
     }
-}
-
-/// How far the closed derivatives that an implementor gives are from the derived ones at a point: the largest difference
-/// of the gradient and of the Hessian, each relative to one plus the largest entry. `None` where nothing is overridden.
-///
-/// A correct closed form gives a few units of round-off; call it in a test of your own, at several points.
-pub fn check_closed_derivatives<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
-    t: f64,
-    x: &VelocityPoint<N>,
-) -> (Option<f64>, Option<f64>) {
-    let gradient = lagrangian.closed_gradient(t, x).map(|closed| {
-        let derived = derived_gradient(lagrangian, t, x);
-        closed.minus(derived).amax() / (1.0 + derived.amax())
-    });
-    let hessian = lagrangian.closed_hessian(t, x).map(|c| {
-        // Derived from `value` alone, so that a wrong closed gradient cannot hide a wrong Hessian.
-        let d = derived_hessian(&ValueOnly(lagrangian), t, x);
-        let size =
-            1.0 + d.qq.amax().max(d.qv.amax()).max(d.vv.amax()).max(d.qz.amax()).max(d.vz.amax()).max(d.zz.abs());
-        let blocks = (c.qq - d.qq).amax().max((c.qv - d.qv).amax()).max((c.vv - d.vv).amax());
-        blocks.max((c.qz - d.qz).amax()).max((c.vz - d.vz).amax()).max((c.zz - d.zz).abs()) / size
-    });
-    (gradient, hessian)
 }
 
 /// A Lagrangian without its closed derivatives: all are found by automatic differentiation, to see what they cost or gain.

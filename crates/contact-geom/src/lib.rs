@@ -42,7 +42,9 @@ mod module;
 #[cfg(feature = "num-dual")]
 mod num_dual;
 mod points;
+mod probe;
 mod pullback;
+mod rounded;
 mod scalar;
 mod smooth;
 pub mod statements;
@@ -65,14 +67,15 @@ pub use herglotz::{
     Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, Regularity, herglotz_field, herglotz_rates,
     legendre, legendre_jacobian, regularity,
 };
-pub use lagrangian::{Hessian, Lagrangian, ValueOnly, check_closed_derivatives, derived_gradient, derived_hessian};
+pub use lagrangian::{Hessian, Lagrangian, ValueOnly, derived_gradient, derived_hessian};
 pub use lagrangian_form::LagrangianForm;
 pub use largest::{larger, largest};
 pub use module::{Border, Module};
 pub use points::{DiscretePoint, PhasePoint, Triple, VelocityPoint, seed};
+pub use probe::check_closed_derivatives;
 pub use pullback::{Conformality, conformality, conformality_with_jacobian};
 pub use scalar::Scalar;
 pub use smooth::{Smooth, SmoothFunction};
-pub use structure::{Defect, Structure};
+pub use structure::{Defect, Defects, Structure};
 
 pub use nalgebra;

@@ -1,7 +1,8 @@
 //! What is known of a Lagrangian's form, and how to see whether a claim holds.
 
-use crate::{Dual, Lagrangian, VelocityPoint};
-use nalgebra::SVector;
+use crate::probe::{Moving, Probe, entries};
+use crate::rounded::Rounded;
+use crate::{Lagrangian, VelocityPoint, larger, largest};
 
 /// The declared structure of a Lagrangian: claims that let a method skip work. A claim that is not made costs time only; a
 /// false one would cost the answer, so [`Structure::defects`] measures each at a point.
@@ -24,14 +25,18 @@ pub struct Structure {
     pub constant_mass: bool,
 }
 
-/// One claim of a [`Structure`] with the size of what it says is zero.
+/// One claim on a Lagrangian with the size of what it says is zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Defect {
-    /// The name of the claim.
+    /// The name of the claim: a field of [`Structure`], or `closed_gradient` or `closed_hessian`.
     pub claim: &'static str,
-    /// The largest derivative that the claim says vanishes, relative to one plus the size of the second derivatives.
+    /// The largest of the derivatives that the claim says vanish, each relative to the size of the terms that it is a sum of: a
+    /// few units of round-off where the claim holds, of the order of one where it does not, in whatever units.
     pub size: f64,
 }
+
+/// The claims that are made, each with its size.
+pub type Defects = std::iter::Flatten<std::array::IntoIter<Option<Defect>, 9>>;
 
 impl Structure {
     /// Whether the claims say that `L_z` is constant.
@@ -44,62 +49,69 @@ impl Structure {
         self.z_affine || self.z_free || self.constant_rate
     }
 
-    /// For each claim that is made, the size at one point of the derivatives that it says vanish.
+    /// For each claim that is made, the size at one point of the derivatives that it says vanish; and that closed derivatives,
+    /// where there are any, are those of the value. `None` where L or one of these derivatives is not finite: L is not defined
+    /// or not smooth there, and nothing is said of its claims.
     ///
-    /// The claims concern derivatives up to the third: those of the Hessian are taken along one direction without special
-    /// symmetry, which sees a dependence unless the point is itself special.
+    /// The claims concern derivatives up to the third, which are taken along directions without special symmetry: they see a
+    /// dependence unless the point is itself special. Rounding is told from a small number by the size of the terms that a
+    /// derivative is the sum of, which the numbers carry along; so the smallest dependence is seen that is not lost in the
+    /// rounding of L itself, and L times a constant gives the same sizes.
     pub fn defects<const N: usize>(
         &self,
         lagrangian: &impl Lagrangian<N>,
         t: f64,
         x: &VelocityPoint<N>,
-    ) -> Vec<Defect> {
-        type Line = SVector<f64, 1>;
-        let golden = 0.618_033_988_749_894_9;
-        let towards = |i: usize| Line::new(0.3 + ((i * i + 1) as f64 * golden).fract());
-        let moving = VelocityPoint::<N, Dual<f64, Line>> {
-            q: SVector::from_fn(|i, _| Dual { re: x.q[i], d: towards(i) }),
-            v: SVector::from_fn(|i, _| Dual { re: x.v[i], d: towards(N + i) }),
-            z: Dual { re: x.z, d: towards(2 * N) },
-        };
-        let still = VelocityPoint { q: x.q.map(Dual::constant), v: x.v.map(Dual::constant), z: Dual::constant(x.z) };
-        let clock = Dual { re: t, d: Line::new(1.0) };
+    ) -> Option<Defects> {
+        let (q, v, z) = (0, 1, 2);
+        let probe = Probe::new(t, x);
+        let l = probe.value(lagrangian);
+        if !l.re.re.re.value.is_finite() {
+            return None;
+        }
+        let worst = |sizes: &mut dyn Iterator<Item = Rounded>| largest(sizes.map(Rounded::relative));
+        // A first or second derivative with its changes along the line and in time.
+        let all = |second: [(usize, usize); 3]| worst(&mut second.into_iter().flat_map(|(i, j)| entries(&l.d[i].d[j])));
+        let changes = |i: usize, j: usize| l.d[i].d[j].d[0];
+        let in_time = |m: &Moving| m.d[1];
 
-        // `f64::max` would hide a NaN.
-        let worse = |m: f64, e: f64| if e.is_nan() { f64::INFINITY } else { m.max(e.abs()) };
-        let largest = |entries: &mut dyn Iterator<Item = f64>| entries.fold(0.0, worse);
-        let h = lagrangian.hessian(Dual::constant(t), &moving);
-        let mixed_z = largest(&mut h.qz.iter().chain(&h.vz).map(|e| e.re));
-        let scale = 1.0 + mixed_z.max(largest(&mut h.qq.iter().chain(&h.qv).chain(&h.vv).map(|e| e.re)));
-        let qv = largest(&mut h.qv.iter().map(|e| e.re));
-        let vv_changes = largest(&mut h.vv.iter().map(|e| e.d[0]));
-        let quadratic_changes = largest(&mut h.qq.iter().chain(&h.qv).map(|e| e.d[0])).max(vv_changes);
-
-        let mut defects = Vec::new();
-        let mut claim = |made: bool, claim: &'static str, size: &dyn Fn() -> f64| {
-            if made {
-                let size = if scale.is_finite() { size() / scale } else { f64::INFINITY };
-                defects.push(Defect { claim, size });
-            }
+        let affine = || all([(z, q), (z, v), (z, z)]);
+        let constant_mass = || worst(&mut [changes(v, v), in_time(&l.d[v].d[v])].into_iter());
+        let autonomous = || {
+            let value = &l.re.re;
+            let firsts = [q, v, z].map(|i| &l.re.d[i]);
+            let seconds = [q, v, z].map(|i| [q, v, z].map(|j| &l.d[i].d[j]));
+            worst(&mut [value].into_iter().chain(firsts).chain(seconds.into_iter().flatten()).map(in_time))
         };
-        claim(self.autonomous, "autonomous", &|| {
-            let drift = lagrangian.gradient(clock, &still);
-            let of_value = lagrangian.value(clock, &still.q, &still.v, still.z).d[0].abs();
-            largest(&mut drift.x.iter().chain(&drift.y).map(|e| e.d[0])).max(drift.z.d[0].abs()).max(of_value)
-        });
-        claim(self.z_free, "z_free", &|| lagrangian.gradient(t, x).z.abs());
-        claim(self.z_affine, "z_affine", &|| mixed_z.max(h.zz.re.abs()));
-        claim(self.constant_rate, "constant_rate", &|| {
-            lagrangian.gradient(clock, &still).z.d[0].abs().max(mixed_z).max(h.zz.re.abs())
-        });
-        claim(self.separable, "separable", &|| {
+        let separable = || {
             // A term linear in v, at this time or soon after.
-            let at_rest = VelocityPoint { v: SVector::from_element(Dual::constant(0.0)), ..still };
-            let linear = largest(&mut lagrangian.gradient(clock, &at_rest).y.iter().flat_map(|p| [p.re, p.d[0]]));
-            qv.max(mixed_z).max(vv_changes).max(linear)
-        });
-        claim(self.quadratic, "quadratic", &|| quadratic_changes.max(mixed_z).max(h.zz.re.abs()));
-        claim(self.constant_mass, "constant_mass", &|| vv_changes);
-        defects
+            let linear = probe.at_rest().value(lagrangian).re.d[v];
+            let linear = worst(&mut [linear.re, linear.d[1]].into_iter());
+            // At rest such a Lagrangian is defined where it is in motion.
+            let linear = if linear.is_nan() { f64::INFINITY } else { linear };
+            [constant_mass(), all([(q, v), (z, q), (z, v)])].into_iter().fold(linear, larger)
+        };
+        let made =
+            |made: bool, claim: &'static str, size: &dyn Fn() -> f64| made.then(|| Defect { claim, size: size() });
+        let of = |claim, size: Option<f64>| size.map(|size| Defect { claim, size });
+        let defects = [
+            made(self.autonomous, "autonomous", &autonomous),
+            made(self.z_free, "z_free", &|| larger(affine(), worst(&mut entries(&l.re.d[z]).into_iter()))),
+            made(self.z_affine, "z_affine", &affine),
+            made(self.constant_rate, "constant_rate", &|| larger(affine(), in_time(&l.re.d[z]).relative())),
+            made(self.separable, "separable", &separable),
+            made(self.quadratic, "quadratic", &|| {
+                let second = [(q, q), (q, v), (v, v)].into_iter().map(|(i, j)| changes(i, j));
+                larger(affine(), worst(&mut { second }))
+            }),
+            made(self.constant_mass, "constant_mass", &constant_mass),
+            of("closed_gradient", probe.closed_gradient(lagrangian, &l)),
+            of("closed_hessian", probe.closed_hessian(lagrangian, &l)),
+        ];
+        let smooth = !defects.iter().flatten().any(|d| d.size.is_nan());
+        smooth.then(|| defects.into_iter().flatten())
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,7 +7,7 @@ mod tests;
 use crate::exponential::singular_values;
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
-use contact_geom::{DiscretePoint, Lagrangian, Regularity, Scalar, VelocityPoint};
+use contact_geom::{DiscretePoint, GeometryError, Lagrangian, Regularity, Scalar, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, InputError, StepError};
 use evolution::Evolution;
 
@@ -63,8 +63,9 @@ struct Affine<const N: usize> {
     one: SVector<f64, N>,
 }
 
-/// What is left of a false claim's derivative by the rounding of a true one, with some margin.
-const FALSE_CLAIM: f64 = 1e-9;
+/// The bound on derivatives that a claim says vanish, relative to the size of their terms: some thousand units of round-off, for
+/// Lagrangians whose constants are themselves rounded.
+const FALSE_CLAIM: f64 = 1e-12;
 
 impl<const N: usize> QuadraticExact<N> {
     /// That of a Lagrangian that claims to be autonomous and quadratic in its [`structure`](Lagrangian::structure).
@@ -263,7 +264,7 @@ fn over_mass<const N: usize, const M: usize>(
     let Regularity { smallest, largest } = singular_values(&scaled);
     if smallest <= 4.0 * N as f64 * f64::EPSILON * largest {
         let pivot = smallest / largest;
-        return Err(contact_geom::GeometryError::Singular { what, pivot, remedy }.into());
+        return Err(GeometryError::Singular { what, pivot, remedy }.into());
     }
     inverse_times(w, b).map_err(|e| e.of(what, remedy).into())
 }
@@ -282,8 +283,9 @@ fn check_claims<const N: usize>(lagrangian: &impl Lagrangian<N>) -> Result<(), I
         v: SVector::from_fn(|i, _| generic(N + i)),
         z: generic(2 * N),
     };
-    // A defect that is not a number is one.
-    match structure.defects(lagrangian, 0.7, &x).into_iter().find(|d| d.size.is_nan() || d.size > FALSE_CLAIM) {
+    let mut defects =
+        structure.defects(lagrangian, 0.7, &x).ok_or(GeometryError::Undefined { what: "the Lagrangian" })?;
+    match defects.find(|d| d.size > FALSE_CLAIM) {
         Some(defect) => Err(InputError::FalseClaim { claim: defect.claim, size: defect.size }),
         None => Ok(()),
     }

@@ -1,8 +1,9 @@
 //! Lagrangians `v.Mv/2 - V(t, q) + f(z)`, as splittings read them.
 
+use crate::verified::PROBE;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint, linear};
+use contact_geom::{Defect, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint, linear};
 
 /// What is left of a false claim's derivative by the rounding of a true one, with some margin.
 pub(super) const FALSE_CLAIM: f64 = 1e-9;
@@ -31,9 +32,10 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
             return Err(InputError::Unclaimed { claim: "separable" });
         }
         for x in probes(state) {
-            let defects = lagrangian.structure().defects(&lagrangian, t, &x);
-            if let Some(defect) = defects.into_iter().find(|d| d.size.is_nan() || d.size > FALSE_CLAIM) {
-                return Err(InputError::FalseClaim { claim: defect.claim, size: defect.size });
+            // A state beside the given one may be outside of the domain.
+            let mut defects = lagrangian.structure().defects(&lagrangian, t, &x).into_iter().flatten();
+            if let Some(Defect { claim, size }) = defects.find(|d| d.size > PROBE) {
+                return Err(InputError::FalseClaim { claim, size });
             }
         }
         let rest = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };

@@ -1,0 +1,192 @@
+//! Numbers that know the size of the terms they came from.
+
+// The rules of error propagation mix operations: clippy takes that for a slip.
+#![allow(clippy::suspicious_arithmetic_impl)]
+
+use crate::Scalar;
+use num_traits::{One, Zero};
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+
+/// A number with the size of its terms: a running bound of its rounding error, in units of the machine's epsilon.
+///
+/// Of a sum that vanishes but for rounding, `value / size` is at most about epsilon; of one that does not cancel it is of the
+/// order of one. The quotient does not depend on any unit, so that it tells a zero from a small number whatever the scale.
+/// Constants are exact. (N. J. Higham, "Accuracy and Stability of Numerical Algorithms", section 3.3.)
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rounded {
+    pub value: f64,
+    pub size: f64,
+}
+
+impl Rounded {
+    /// The result of one more operation: what the operands' errors give, and one rounding. Below the normal numbers a
+    /// rounding is absolute.
+    #[inline]
+    fn new(value: f64, carried: f64) -> Self {
+        let rounding = if value == 0.0 { 0.0 } else { value.abs() + f64::MIN_POSITIVE };
+        Rounded { value, size: carried + rounding }
+    }
+
+    /// `f(x)` given its value and its slope. An exact argument carries nothing, however steep the function.
+    #[inline]
+    fn through(self, value: f64, slope: f64) -> Self {
+        Rounded::new(value, if self.size == 0.0 { 0.0 } else { slope.abs() * self.size })
+    }
+
+    /// The value relative to its terms; 0 for a zero of no terms, not a number where either is not finite.
+    pub fn relative(self) -> f64 {
+        if !(self.value.is_finite() && self.size.is_finite()) {
+            f64::NAN
+        } else if self.value == 0.0 {
+            0.0
+        } else {
+            self.value.abs() / self.size
+        }
+    }
+}
+
+impl From<f64> for Rounded {
+    #[inline]
+    fn from(value: f64) -> Self {
+        Rounded { value, size: 0.0 }
+    }
+}
+
+impl Zero for Rounded {
+    #[inline]
+    fn zero() -> Self {
+        0.0.into()
+    }
+    fn is_zero(&self) -> bool {
+        self.value == 0.0
+    }
+}
+
+impl One for Rounded {
+    #[inline]
+    fn one() -> Self {
+        1.0.into()
+    }
+}
+
+impl Neg for Rounded {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Rounded { value: -self.value, size: self.size }
+    }
+}
+
+impl Add for Rounded {
+    type Output = Self;
+    #[inline]
+    fn add(self, b: Self) -> Self {
+        Rounded::new(self.value + b.value, self.size + b.size)
+    }
+}
+
+impl Sub for Rounded {
+    type Output = Self;
+    #[inline]
+    fn sub(self, b: Self) -> Self {
+        Rounded::new(self.value - b.value, self.size + b.size)
+    }
+}
+
+impl Mul for Rounded {
+    type Output = Self;
+    #[inline]
+    fn mul(self, b: Self) -> Self {
+        Rounded::new(self.value * b.value, self.value.abs() * b.size + b.value.abs() * self.size)
+    }
+}
+
+impl Div for Rounded {
+    type Output = Self;
+    #[inline]
+    fn div(self, b: Self) -> Self {
+        let value = self.value / b.value;
+        Rounded::new(value, (self.size + value.abs() * b.size) / b.value.abs())
+    }
+}
+
+macro_rules! mixed {
+    ($($op:ident, $method:ident, $assign:ident, $assign_method:ident;)*) => {$(
+        impl $op<f64> for Rounded {
+            type Output = Self;
+            #[inline]
+            fn $method(self, b: f64) -> Self {
+                self.$method(Rounded::from(b))
+            }
+        }
+        impl $assign for Rounded {
+            #[inline]
+            fn $assign_method(&mut self, b: Self) {
+                *self = self.$method(b);
+            }
+        }
+    )*};
+}
+mixed! {
+    Add, add, AddAssign, add_assign;
+    Sub, sub, SubAssign, sub_assign;
+    Mul, mul, MulAssign, mul_assign;
+    Div, div, DivAssign, div_assign;
+}
+
+impl Scalar for Rounded {
+    fn re(self) -> f64 {
+        self.value
+    }
+    fn extent(self) -> f64 {
+        self.value.extent()
+    }
+    fn recip(self) -> Self {
+        let r = self.value.recip();
+        self.through(r, r * r)
+    }
+    fn sqrt(self) -> Self {
+        let r = self.value.sqrt();
+        self.through(r, 0.5 / r)
+    }
+    /// As many roundings as there may be products.
+    fn powi(self, n: i32) -> Self {
+        let (value, n_real) = (self.value.powi(n), f64::from(n));
+        let mut power = self.through(value, n_real * self.value.powi(n.saturating_sub(1)));
+        power.size += n_real.abs() * value.abs();
+        power
+    }
+    fn powf(self, a: f64) -> Self {
+        self.through(self.value.powf(a), a * self.value.powf(a - 1.0))
+    }
+    fn exp(self) -> Self {
+        let e = self.value.exp();
+        self.through(e, e)
+    }
+    fn exp_m1(self) -> Self {
+        self.through(self.value.exp_m1(), self.value.exp())
+    }
+    fn ln(self) -> Self {
+        self.through(self.value.ln(), self.value.recip())
+    }
+    fn ln_1p(self) -> Self {
+        self.through(self.value.ln_1p(), (1.0 + self.value).recip())
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        let (s, c) = self.value.sin_cos();
+        (self.through(s, c), self.through(c, s))
+    }
+    fn sinh(self) -> Self {
+        self.through(self.value.sinh(), self.value.cosh())
+    }
+    fn cosh(self) -> Self {
+        self.through(self.value.cosh(), self.value.sinh())
+    }
+    fn tanh(self) -> Self {
+        let t = self.value.tanh();
+        self.through(t, 1.0 - t * t)
+    }
+    fn atan(self) -> Self {
+        self.through(self.value.atan(), (1.0 + self.value * self.value).recip())
+    }
+}
