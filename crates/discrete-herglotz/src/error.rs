@@ -201,7 +201,9 @@ pub enum Obstacle {
         t: f64,
     },
     /// The pilot runs would cost too much.
-    #[error("the steps that it needs are too many to be tried; take a method of higher order, a shorter span, or give a step")]
+    #[error(
+        "the steps that it needs are too many to be tried; take a method of higher order, a shorter span, or give a step"
+    )]
     Budget,
 }
 

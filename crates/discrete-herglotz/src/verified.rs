@@ -1,7 +1,9 @@
 //! The declared structure of a Lagrangian, after a probe.
 
 use crate::InputError;
-use contact_geom::{Defect, GeometryError, Lagrangian, Structure, VelocityPoint};
+use crate::gauss::velocity;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Defect, GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
 /// The bound on derivatives that a claim says vanish, relative to the size of their terms: some thousand units of round-off, for
 /// Lagrangians whose constants are themselves rounded.
@@ -33,4 +35,42 @@ pub fn verified<const N: usize>(
         Some(Defect { claim, size }) => Err(InputError::FalseClaim { claim, size }),
         None => Ok(structure),
     }
+}
+
+/// The first claim that is false at a state `(q, p, z)` of a motion; `guess` is a guess of its velocity. `None` too where L is not
+/// defined, or no velocity belongs to the momentum: nothing is said there.
+pub(crate) fn refuted<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    state: &PhasePoint<N>,
+    guess: &SVector<f64, N>,
+) -> Option<Defect> {
+    let v = velocity(lagrangian, t, state, *guess).ok()?;
+    let x = VelocityPoint { q: state.q, v, z: state.z };
+    lagrangian.structure().defects(lagrangian, t, &x)?.find(|d| d.size > PROBE)
+}
+
+/// The times of a span at which claims are probed before a run, beside the start: claims on time are seen at any but special ones.
+const TIMES: usize = 16;
+
+/// Probes the claims at times of a whole span, at a start.
+///
+/// # Errors
+/// [`InputError::FalseClaim`] with the first claim that does not hold.
+pub(crate) fn verified_over<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t0: f64,
+    span: f64,
+    start: &VelocityPoint<N>,
+) -> Result<(), InputError> {
+    let structure = lagrangian.structure();
+    for i in 1..=TIMES {
+        // Fractions without a period, so that they do not meet the zeros of what is periodic.
+        let t = t0 + span * (i as f64 * 0.618_033_988_749_894_9).fract();
+        let defects = structure.defects(lagrangian, t, start).into_iter().flatten();
+        if let Some(Defect { claim, size }) = { defects }.find(|d| d.size > PROBE) {
+            return Err(InputError::FalseClaim { claim, size });
+        }
+    }
+    Ok(())
 }

@@ -92,18 +92,16 @@ impl Coefficients {
 /// their integrals from 0: `[i][j]` for point i and node j.
 pub(crate) fn lagrange_rows(s: usize, points: &[f64; MOST]) -> [[[f64; MOST]; MOST]; 2] {
     let g = Coefficients::of(s);
-    let (one, half) = (Quad::one(), Quad::from(0.5));
-    let at: [_; MOST] = from_fn(|j| legendre(s, g.c[j] + g.c[j] - one));
+    let polynomials = |x: f64| legendre(s, Quad::from(x)).map(|p| p.0);
+    let at: [_; MOST] = from_fn(|j| polynomials(2.0 * g.c[j].0 - 1.0));
     let mut rows = [[[0.0; MOST]; MOST]; 2];
-    for (i, point) in points.iter().enumerate() {
-        let x = Quad::from(*point);
-        let p = legendre(s, x + x - one);
+    for (i, x) in points.iter().enumerate() {
+        let p = polynomials(2.0 * x - 1.0);
         for j in 0..s {
-            let odd = |k: usize| Quad::from((2 * k + 1) as f64);
-            let value = (0..s).fold(Quad::zero(), |sum, k| sum + odd(k) * at[j][k] * p[k]);
-            let rest = (1..s).fold(Quad::zero(), |sum, k| sum + at[j][k] * (p[k + 1] - p[k - 1]));
-            rows[0][i][j] = (g.b[j] * value).0;
-            rows[1][i][j] = (g.b[j] * (x + half * rest)).0;
+            let value = (0..s).fold(0.0, |sum, k| sum + (2 * k + 1) as f64 * at[j][k] * p[k]);
+            let rest = (1..s).fold(0.0, |sum, k| sum + at[j][k] * (p[k + 1] - p[k - 1]));
+            rows[0][i][j] = g.b[j].0 * value;
+            rows[1][i][j] = g.b[j].0 * (x + 0.5 * rest);
         }
     }
     rows

@@ -56,13 +56,7 @@ impl<const N: usize> Curve<N> {
     }
 
     /// From L with its gradient at the stages, their velocities and factors.
-    pub fn of_gradients(
-        &mut self,
-        v: &[SVector<f64, N>],
-        rho: &[f64],
-        l: &[Dual<f64, Triple<N>>],
-        with_action: bool,
-    ) {
+    pub fn of_gradients(&mut self, v: &[SVector<f64, N>], rho: &[f64], l: &[Dual<f64, Triple<N>>], with_action: bool) {
         let mut action = Stages::ZERO;
         for (i, ((v, rho), l)) in v.iter().zip(rho).zip(l).enumerate() {
             for d in 0..N {
@@ -114,20 +108,29 @@ struct Between {
     last: [[f64; MOST]; 2],
 }
 
+/// The sets of points that there are.
+pub(crate) const SETS: usize = 16;
+
 impl Between {
-    /// For a number of stages from 1 to 16, made once.
-    fn of(s: usize) -> &'static Between {
-        static TABLES: [OnceLock<Box<Between>>; MOST] = [const { OnceLock::new() }; MOST];
-        let s = s.clamp(1, MOST);
-        TABLES[s - 1].get_or_init(|| Box::new(Self::new(s)))
+    /// One of the sets of points for a number of stages from 1 to 16, made once.
+    fn of(s: usize, set: usize) -> &'static Between {
+        static TABLES: [[OnceLock<Box<Between>>; SETS]; MOST] = [const { [const { OnceLock::new() }; SETS] }; MOST];
+        let (s, set) = (s.clamp(1, MOST), set.min(SETS - 1));
+        TABLES[s - 1][set].get_or_init(|| Box::new(Self::new(s, set)))
     }
 
-    fn new(s: usize) -> Self {
+    fn new(s: usize, set: usize) -> Self {
         let g = Coefficients::of(s);
-        // The Gauss points of one stage fewer lie between those of s; one more beside the step's end, where curves are worst.
+        let golden = 0.618_033_988_749_894_9;
+        // The Gauss points of one stage fewer lie between those of s; one more beside the step's end, where curves are worst. The
+        // other sets are equidistant, each moved so that all together leave the shortest gaps.
         let inner = Coefficients::of(s.saturating_sub(1).max(1));
         let end = 0.5 * (1.0 + g.c[s - 1].0);
-        let points = std::array::from_fn(|i| if i + 1 < s { inner.c[i].0 } else { end });
+        let points = std::array::from_fn(|i| match set {
+            0 if i + 1 < s => inner.c[i].0,
+            0 => end,
+            _ => (i.min(s - 1) as f64 + (set as f64 * golden).fract()) / s as f64,
+        });
         let [value, integral] = lagrange_rows(s, &points);
         let last = std::array::from_fn(|i| {
             // Of one stage there is no polynomial to expect anything of but its one value.
@@ -147,6 +150,7 @@ impl Between {
 pub(super) struct Compare<'a, L, const N: usize> {
     pub lagrangian: &'a L,
     pub curve: &'a Curve<N>,
+    pub set: usize,
 }
 
 impl<L: Lagrangian<N>, const N: usize> WithSimd for Compare<'_, L, N> {
@@ -154,9 +158,9 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Compare<'_, L, N> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Look {
-        let Compare { lagrangian, curve } = self;
+        let Compare { lagrangian, curve, set } = self;
         let Curve { s, t, h, .. } = *curve;
-        let between = Between::of(s);
+        let between = Between::of(s, set);
         let zero = Lanes::<S>::splat(0.0);
         let value = |y: &Stages, out: &mut Stages| between.value.apply(y, s, out, |_| zero);
         let grown = |y: &Stages, from: f64, out: &mut Stages| {
@@ -214,7 +218,8 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Compare<'_, L, N> {
         let fastest = v.iter().flat_map(|v| v.0).fold(0.0, |m: f64, v| if v.abs() > m { v.abs() } else { m });
         let mut expected = between.tail(&curve.rate) * h;
         for d in 0..N {
-            expected += relative(between.tail(&curve.force[d]) * h, size) + relative(between.tail(&curve.v[d]), fastest);
+            expected +=
+                relative(between.tail(&curve.force[d]) * h, size) + relative(between.tail(&curve.v[d]), fastest);
         }
         if let Some(of_l) = &curve.l {
             expected += relative(between.tail(of_l) * h, size_z);

@@ -17,7 +17,7 @@ mod sweeps;
 
 pub use clocked::ClockedStepper;
 pub use dense::DenseStep;
-pub(crate) use look::Look;
+pub(crate) use look::SETS;
 pub(crate) use stepper::velocity;
 pub use stepper::{GaussRoute, GaussStepper};
 

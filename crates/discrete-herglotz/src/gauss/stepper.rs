@@ -166,10 +166,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         Some(DenseStep::new(s, t, h, start, &solved))
     }
 
-    /// A look at the last step between its nodes; `None` where there is no step, or none that was iterated.
-    pub(crate) fn look(&self) -> Option<Look> {
+    /// A look at the last step between its nodes, at some sets of points: the worst of them. `None` where there is no step, or none
+    /// that was iterated.
+    pub(crate) fn look(&self, sets: usize) -> Option<Look> {
         let curve = self.arch.dispatch(Stages { run: self })?;
-        Some(self.arch.dispatch(Compare { lagrangian: self.lagrangian, curve: &curve }))
+        let at = |set| self.arch.dispatch(Compare { lagrangian: self.lagrangian, curve: &curve, set });
+        (0..sets).map(at).reduce(|a, b| if a.misfit >= b.misfit { a } else { b })
     }
 
     /// The state as the route holds it.

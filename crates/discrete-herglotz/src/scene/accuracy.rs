@@ -10,8 +10,8 @@ const ATTEMPTS: usize = 64;
 
 /// The refinements after which a step that still cannot be taken at the same time cannot be taken at all, and those after which
 /// something narrow that is still between the nodes is left to the comparison of runs.
-const HALTS: usize = 14;
-const NARROWS: usize = 4;
+const HALTS: usize = 24;
+const NARROWS: usize = 10;
 
 /// The stages of the reference for other methods.
 const REFERENCE: usize = 12;
@@ -24,8 +24,8 @@ const OWN: usize = 6;
 pub(super) struct Choice {
     pub integrator: Integrator,
     pub count: usize,
-    /// The error that the pilot runs found, or predict.
-    pub error: f64,
+    /// The error that the pilot runs found, or predict; `None` where the steps are given.
+    pub error: Option<f64>,
 }
 
 /// A motion that runs with k, 2k and 3k steps agree on.
@@ -71,7 +71,7 @@ pub(super) fn choose<L: Lagrangian<N>, const N: usize>(
         Integrator::Gauss { stages } if stages >= OWN => {
             let found = converge(&mut pilots, stages, wanted)?;
             let (count, error) = fewest(&mut pilots, stages, found)?;
-            Ok(Choice { integrator, count, error })
+            Ok(Choice { integrator, count, error: Some(error) })
         }
         _ => {
             let found = converge(&mut pilots, REFERENCE, wanted / 8.0)?;
@@ -204,8 +204,8 @@ fn fewest<L: Lagrangian<N>, const N: usize>(
     if coarse <= target {
         return Ok((k, coarse));
     }
-    // Between two runs whose errors are known and small, by the order that they show.
-    if coarse <= 1e-2 && fine < coarse {
+    // Between two runs whose errors are known and small, by the order that they show where it is nearly the method's.
+    if coarse <= 1e-2 && order >= stages as f64 {
         let longer = (1.03 * (coarse / target).powf(1.0 / order)).min(2.0);
         return Ok(((k as f64 * longer).ceil() as usize, target.max(fine)));
     }
@@ -232,7 +232,7 @@ fn by_reference<L: Lagrangian<N>, const N: usize>(
             Ending::Followed(track) => {
                 let error = track.distance(&found.truth);
                 if error <= 0.7 * wanted {
-                    enough = Some(Choice { integrator, count, error });
+                    enough = Some(Choice { integrator, count, error: Some(error) });
                     // Down, where an order says that much fewer steps will do.
                     let fewer = whole(count as f64 * (error / (0.5 * wanted)).powf(1.0 / order).max(1.0 / 16.0));
                     if error > 0.2 * wanted || fewer as f64 > 0.8 * count as f64 || strikes > 0 {
@@ -250,7 +250,11 @@ fn by_reference<L: Lagrangian<N>, const N: usize>(
                 if strikes == 4 {
                     break;
                 }
-                if error.is_finite() { (1.05 * (error / (0.5 * wanted)).powf(1.0 / order)).clamp(1.2, 32.0) } else { 2.0 }
+                if error.is_finite() {
+                    (1.05 * (error / (0.5 * wanted)).powf(1.0 / order)).clamp(1.2, 32.0)
+                } else {
+                    2.0
+                }
             }
             Ending::Halted { part, cause: halt } => {
                 if enough.is_some() {

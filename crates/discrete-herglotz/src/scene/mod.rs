@@ -1,5 +1,6 @@
 //! Scenes: what is to be computed, and nothing else.
 
+mod accuracy;
 mod integrator;
 mod pilot;
 mod plan;
@@ -8,7 +9,10 @@ pub use integrator::{Integrator, UnknownIntegrator};
 pub use plan::{Item, Outcome, Plan, Row};
 
 use crate::InputError;
-use contact_geom::{Lagrangian, Symmetry, VelocityPoint};
+use crate::run::check_time;
+use crate::verified::verified_over;
+use accuracy::Choice;
+use contact_geom::{Lagrangian, PhasePoint, Symmetry, VelocityPoint};
 
 /// The time step of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,8 +21,9 @@ pub enum Steps {
     Size(f64),
     /// This many steps.
     Count(usize),
-    /// One length for the whole run, chosen by pilot runs so that the error of (q, p) at the end, relative to its size, is at
-    /// most this. The error is estimated from runs with h and h/2; their cost is a small multiple of the run's.
+    /// One length for the whole run, chosen by pilot runs so that the error of (q, p), relative to its size at the time or at the end,
+    /// is at most this at every tenth of the span. The pilot runs cost a small multiple of the run; what is narrower than the
+    /// distance of their nodes, about the step divided by four times the stages, may go unseen.
     Accuracy(f64),
 }
 
@@ -68,21 +73,21 @@ pub struct Scene<'a, L, const N: usize> {
     start: VelocityPoint<N>,
     t0: f64,
     span: f64,
-    integrator: Integrator,
+    integrator: Option<Integrator>,
     steps: Steps,
     wanted: Wanted<N>,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
-    /// The motion of a Lagrangian from a point of TQ x R over a span of time: at first from t = 0, by contact Gauss
-    /// collocation with eight stages, to a relative error of 1e-9, for the final state with its action.
+    /// The motion of a Lagrangian from a point of TQ x R over a span of time: at first from t = 0, by an integrator that is chosen
+    /// for it, to a relative error of 1e-9, for the final state with its action.
     pub fn new(lagrangian: &'a L, start: VelocityPoint<N>, span: f64) -> Self {
         Scene {
             lagrangian,
             start,
             t0: 0.0,
             span,
-            integrator: Integrator::Gauss { stages: 8 },
+            integrator: None,
             steps: Steps::Accuracy(1e-9),
             wanted: Wanted::default(),
         }
@@ -93,9 +98,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
         Scene { t0, ..self }
     }
 
-    /// The same by another method.
+    /// The same by this integrator. Where none is named, it is contact Gauss collocation, with stages for the wanted accuracy, or
+    /// eight where steps are given.
     pub fn by(self, integrator: Integrator) -> Self {
-        Scene { integrator, ..self }
+        Scene { integrator: Some(integrator), ..self }
     }
 
     /// The same with other steps.
@@ -125,14 +131,63 @@ impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
         if let Some(0) = self.wanted.rows {
             return Err(InputError::Count { what: "the steps between two rows", least: 1, found: 0 });
         }
-        let count = match self.steps {
+        let structure = self.lagrangian.structure();
+        if let Some(integrator) = self.integrator {
+            integrator.check(&structure)?;
+        }
+        self.check_start()?;
+        verified_over(self.lagrangian, self.t0, self.span, &self.start)?;
+        let given = |count| Choice { integrator: self.integrator.unwrap_or(DEFAULT), count, error: None };
+        let choice = match self.steps {
             Steps::Count(0) => return Err(InputError::Count { what: "the number of steps", least: 1, found: 0 }),
-            Steps::Count(count) => count,
+            Steps::Count(count) => given(count),
             Steps::Size(h) if !(h > 0.0 && h.is_finite()) => return Err(InputError::Step { h }),
             // A step that fits the span up to rounding is not made shorter.
-            Steps::Size(h) => (self.span / h * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0) as usize,
-            Steps::Accuracy(error) => pilot::steps_for(self, error)?,
+            Steps::Size(h) => {
+                let count = (self.span / h * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0);
+                check_count(count)?;
+                given(count as usize)
+            }
+            Steps::Accuracy(error) => accuracy::choose(self, error)?,
         };
-        Plan::new(self, count)
+        check_count(choice.count as f64)?;
+        let plan = Plan::new(self, &choice)?;
+        plan.probe_first_steps()?;
+        Ok(plan)
     }
+
+    /// Refuses a start that is not finite, at which L is not defined, or not regular.
+    fn check_start(&self) -> Result<(), InputError> {
+        let Scene { lagrangian, start, t0, .. } = self;
+        check_time(*t0)?;
+        PhasePoint { q: start.q, p: start.v, z: start.z }.check()?;
+        if N == 0 {
+            return Err(InputError::Dimension);
+        }
+        let (g, w) = (lagrangian.gradient(*t0, start), lagrangian.hessian(*t0, start).vv);
+        let value = lagrangian.value(*t0, &start.q, &start.v, start.z);
+        if !(value.is_finite() && g.is_finite() && w.iter().all(|e| e.is_finite())) {
+            return Err(InputError::Undefined);
+        }
+        Ok(())
+    }
+
+    /// The same for the final (q, p) alone.
+    fn bare(&self) -> Self {
+        Scene { wanted: Wanted { action: false, ..Wanted::default() }, ..*self }
+    }
+}
+
+/// The integrator where none is named and steps are given.
+const DEFAULT: Integrator = Integrator::Gauss { stages: 8 };
+
+/// The largest number of steps: `t0 + k h` then still tells times a thousandth of a step apart.
+const MOST_STEPS: f64 = (1u64 << 42) as f64;
+
+fn check_count(count: f64) -> Result<(), InputError> {
+    if count <= MOST_STEPS {
+        return Ok(());
+    }
+    let remedy = "take longer steps, or a shorter span";
+    Err(InputError::TooMany { what: "the number of steps", found: count, most: MOST_STEPS, remedy })
 }

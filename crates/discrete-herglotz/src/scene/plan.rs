@@ -1,12 +1,14 @@
 //! The plan of a scene: the route, in code and in words.
 
+use super::accuracy::Choice;
 use super::{Integrator, Scene, Wanted};
+use crate::verified::{refuted, verified};
 use crate::{
     ActionSplitting, Composition, Discretised, Flow, Gauss, GaussRoute, InputError, Method, Splitting, Status, Stepper,
-    verified,
+    Suspicion,
 };
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, OneParameterGroup, PhasePoint, Structure, VelocityPoint, legendre};
+use contact_geom::{Defect, Lagrangian, OneParameterGroup, PhasePoint, Structure, VelocityPoint, legendre};
 use std::fmt::{Display, Formatter};
 
 /// One line of a plan: something that could be computed, whether it is, and why.
@@ -28,6 +30,20 @@ enum Engine<'a, L, const N: usize> {
     Explicit,
 }
 
+/// The steps that are tried, and probed, before a run.
+const FIRST_STEPS: usize = 64;
+
+/// The largest number of rows: a few gigabytes.
+const MOST_ROWS: usize = 1 << 26;
+
+/// The steps between two probes of the claims in long runs: so many that a probe costs less than one in a hundred.
+const PROBES: usize = 1 << 14;
+
+/// The step after which the claims are probed next: every power of two, and the multiples of [`PROBES`].
+fn next_probe(taken: usize) -> usize {
+    (taken + 1).checked_next_power_of_two().unwrap_or(usize::MAX).min((taken / PROBES + 1) * PROBES)
+}
+
 /// A scene after its checks, with step and route chosen; made by [`Scene::plan`]. Printed, it says what will be computed and
 /// what is skipped.
 pub struct Plan<'a, L, const N: usize> {
@@ -37,6 +53,7 @@ pub struct Plan<'a, L, const N: usize> {
     t0: f64,
     h: f64,
     count: usize,
+    error: Option<f64>,
     integrator: Integrator,
     wanted: Wanted<N>,
     engine: Engine<'a, L, N>,
@@ -67,6 +84,8 @@ pub struct Row<const N: usize> {
 pub struct Outcome<const N: usize> {
     /// How the run ended.
     pub status: Status,
+    /// The first step that cannot have resolved the motion, where one was seen: what follows it may be wrong.
+    pub suspicion: Option<Suspicion>,
     /// The steps taken.
     pub steps: usize,
     /// The time reached.
@@ -86,12 +105,12 @@ pub struct Outcome<const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
-    pub(super) fn new(scene: &Scene<'a, L, N>, count: usize) -> Result<Self, InputError> {
-        let Scene { lagrangian, start, t0, span, integrator, .. } = scene;
-        let lagrangian: &'a L = lagrangian;
+    /// A plan of a scene whose start has been checked.
+    pub(super) fn new(scene: &Scene<'a, L, N>, choice: &Choice) -> Result<Self, InputError> {
+        let Scene { lagrangian, start, t0, span, .. } = scene;
+        let Choice { integrator, count, error } = choice;
+        let (lagrangian, count): (&'a L, usize) = (lagrangian, *count);
         let state = PhasePoint { q: start.q, p: start.v, z: start.z };
-        state.check()?;
-        integrator.check(&lagrangian.structure())?;
         let structure = verified(lagrangian, *t0, start)?;
         let h = span / count as f64;
         let engine = match integrator {
@@ -106,6 +125,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             t0: *t0,
             h,
             count,
+            error: *error,
             integrator: *integrator,
             wanted: scene.wanted.clone(),
             engine,
@@ -125,6 +145,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
     /// The number of steps.
     pub fn count(&self) -> usize {
         self.count
+    }
+
+    /// The integrator: the scene's, or the one that was chosen.
+    pub fn integrator(&self) -> Integrator {
+        self.integrator
+    }
+
+    /// The error of (q, p) that the pilot runs found, or predict; `None` where no accuracy was asked for.
+    pub fn error(&self) -> Option<f64> {
+        self.error
     }
 
     /// What is computed, and what is not.
@@ -169,19 +199,23 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         let (mut log_factor, single) = (0.0, *conformal_factor && !self.constant_rate);
         let mut rows = Vec::new();
         if let Some(stride) = stride {
-            rows.reserve(self.count / stride + 2);
+            let count = self.count / stride + 2;
+            if count > MOST_ROWS || rows.try_reserve_exact(count).is_err() {
+                let (found, most, remedy) = (count as f64, MOST_ROWS as f64, "record fewer rows");
+                return Err(InputError::TooMany { what: "the number of rows", found, most, remedy });
+            }
             rows.push(self.row(&*stepper));
         }
         let (mut taken, mut status) = (0, Status::Completed);
         while taken < self.count {
             let next_row = stride.map_or(self.count, |stride| (taken / stride + 1) * stride);
-            let chunk = if single { 1 } else { next_row.min(self.count) - taken };
+            let chunk = if single { 1 } else { next_row.min(next_probe(taken)).min(self.count) - taken };
             let (done, cause) = match stepper.advance(chunk) {
                 Ok(()) => (chunk, None),
                 Err(halt) => (halt.taken, Some(halt.cause)),
             };
             taken += done;
-            if *conformal_factor {
+            if single {
                 log_factor += done as f64 * stepper.sigma().ln();
             }
             if let Some(cause) = cause {
@@ -191,10 +225,20 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             if stride.is_some_and(|stride| taken % stride == 0 || taken == self.count) {
                 rows.push(self.row(&*stepper));
             }
+            if taken == self.count || taken == next_probe(taken - 1) {
+                if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
+                    status = Status::FalseClaim { step: taken, claim, size };
+                    break;
+                }
+            }
+        }
+        if self.constant_rate {
+            log_factor = taken as f64 * stepper.sigma().ln();
         }
         let end = self.row(&*stepper);
         Ok(Outcome {
             status,
+            suspicion: stepper.suspicion(),
             steps: taken,
             t: end.t,
             q: end.q,
@@ -204,6 +248,31 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             rows,
             evaluations: stepper.evaluations(),
         })
+    }
+
+    /// The first claim that is false at the state of a stepper.
+    fn refuted(&self, stepper: &dyn Stepper<N>) -> Option<Defect> {
+        refuted(self.lagrangian, stepper.time(), &stepper.state(), &self.guess)
+    }
+
+    /// Probes the claims along the first steps.
+    ///
+    /// # Errors
+    /// [`InputError::FalseClaim`] with the first claim that does not hold.
+    pub(super) fn probe_first_steps(&self) -> Result<(), InputError> {
+        let mut stepper = self.stepper()?;
+        let mut taken = 0;
+        while taken < self.count.min(FIRST_STEPS) {
+            let steps = next_probe(taken).min(self.count) - taken;
+            if stepper.advance(steps).is_err() {
+                break;
+            }
+            taken += steps;
+            if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
+                return Err(InputError::FalseClaim { claim, size });
+            }
+        }
+        Ok(())
     }
 
     fn row(&self, stepper: &dyn Stepper<N>) -> Row<N> {
