@@ -8,6 +8,7 @@
 #[allow(dead_code, unused_imports)]
 mod common;
 
+mod accuracy;
 mod clocked;
 mod conformal_steppers;
 mod dense_output;

@@ -187,7 +187,9 @@ pub enum Obstacle {
         order: f64,
     },
     /// A step cannot be taken however short it is.
-    #[error("the motion cannot be followed beyond t = {t}: {cause}")]
+    #[error(
+        "the motion cannot be followed beyond t = {t}, however short the steps: end the span before it (the last attempt: {cause})"
+    )]
     Halted {
         /// The time that is reached.
         t: f64,

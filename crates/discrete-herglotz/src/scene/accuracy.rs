@@ -10,7 +10,7 @@ const ATTEMPTS: usize = 64;
 
 /// The refinements after which a step that still cannot be taken at the same time cannot be taken at all, and those after which
 /// something narrow that is still between the nodes is left to the comparison of runs.
-const HALTS: usize = 24;
+const HALTS: usize = 16;
 const NARROWS: usize = 10;
 
 /// The stages of the reference for other methods.
@@ -36,6 +36,8 @@ struct Converged<const N: usize> {
     /// The order that the two show.
     order: f64,
     truth: Track<N>,
+    /// Whether something narrow was met on the way.
+    narrow: bool,
 }
 
 /// The stages of Gauss collocation for an error, where no integrator is named: the more the smaller the error, since a stage in the
@@ -154,7 +156,7 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         // Where runs differ by their round-off only, they show no order.
         let settled = coarse <= 0.5 * wanted && fine <= 0.5 * wanted && order < 2.0;
         if agreed || settled {
-            return Ok(Converged { k, errors: [coarse, fine], order, truth: truth.clone() });
+            return Ok(Converged { k, errors: [coarse, fine], order, truth: truth.clone(), narrow: narrows > 0 });
         }
         strikes = if fine < 0.5 * best { 0 } else { strikes + 1 };
         best = best.min(fine);
@@ -176,11 +178,13 @@ fn converge<L: Lagrangian<N>, const N: usize>(
 /// What keeps runs from agreeing, by their distances along the motion and the order that they show.
 fn obstacle(distances: &[f64], order: f64, wanted: f64, t0: f64, span: f64) -> Obstacle {
     let (first, last) = (distances.first().copied().unwrap_or(0.0), distances.last().copied().unwrap_or(0.0));
-    if order < 0.5 && last > 1e-8 && last > 1e4 * first {
+    // The order that is left where runs differ by nothing but what they have rounded.
+    let noise = order < 2.0;
+    if noise && last > 1e-8 && last > 1e4 * first {
         let kept = distances.iter().take_while(|d| **d <= wanted).count();
         return Obstacle::Chaos { t: t0 + span * kept as f64 / distances.len() as f64 };
     }
-    if order < 0.5 && last < 1e-6 { Obstacle::RoundOff } else { Obstacle::Order { order } }
+    if noise && last < 1e-9 { Obstacle::RoundOff } else { Obstacle::Order { order } }
 }
 
 /// The fewest steps of a Gauss method that the converged runs allow, with the error that they predict.
@@ -189,7 +193,7 @@ fn fewest<L: Lagrangian<N>, const N: usize>(
     stages: usize,
     found: Converged<N>,
 ) -> Result<(usize, f64), InputError> {
-    let Converged { mut k, errors: [mut coarse, mut fine], mut order, truth } = found;
+    let Converged { mut k, errors: [mut coarse, mut fine], mut order, truth, narrow } = found;
     let target = 0.2 * pilots.wanted;
     // Far below what is wanted, fewer steps may do.
     while coarse <= 0.01 * target && k % 2 == 0 {
@@ -204,10 +208,14 @@ fn fewest<L: Lagrangian<N>, const N: usize>(
     if coarse <= target {
         return Ok((k, coarse));
     }
-    // Between two runs whose errors are known and small, by the order that they show where it is nearly the method's.
-    if coarse <= 1e-2 && order >= stages as f64 {
-        let longer = (1.03 * (coarse / target).powf(1.0 / order)).min(2.0);
-        return Ok(((k as f64 * longer).ceil() as usize, target.max(fine)));
+    // Between two runs whose errors are known and small, by the order that they show where it is nearly the method's; ten times as
+    // exactly, as errors of neighbouring steps may differ so much.
+    let predicted = 0.1 * target;
+    if coarse <= 1e-2 && order >= stages as f64 && !narrow {
+        let longer = (coarse / predicted).powf(1.0 / order);
+        if longer < 2.0 {
+            return Ok(((k as f64 * longer).ceil() as usize, predicted.max(fine)));
+        }
     }
     Ok((2 * k, fine))
 }

@@ -8,11 +8,12 @@ mod plan;
 pub use integrator::{Integrator, UnknownIntegrator};
 pub use plan::{Item, Outcome, Plan, Row};
 
-use crate::InputError;
 use crate::run::check_time;
 use crate::verified::verified_over;
+use crate::{InputError, StepError};
 use accuracy::Choice;
-use contact_geom::{Lagrangian, PhasePoint, Symmetry, VelocityPoint};
+use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::{Lagrangian, PhasePoint, Regularity, Symmetry, VelocityPoint, largest};
 
 /// The time step of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,7 +153,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
         };
         check_count(choice.count as f64)?;
         let plan = Plan::new(self, &choice)?;
-        plan.probe_first_steps()?;
+        // Pilot runs have looked already.
+        if plan.error().is_none() {
+            plan.probe_first_steps()?;
+        }
         Ok(plan)
     }
 
@@ -160,16 +164,24 @@ impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
     fn check_start(&self) -> Result<(), InputError> {
         let Scene { lagrangian, start, t0, .. } = self;
         check_time(*t0)?;
-        PhasePoint { q: start.q, p: start.v, z: start.z }.check()?;
         if N == 0 {
             return Err(InputError::Dimension);
         }
+        PhasePoint { q: start.q, p: start.v, z: start.z }.check()?;
         let (g, w) = (lagrangian.gradient(*t0, start), lagrangian.hessian(*t0, start).vv);
         let value = lagrangian.value(*t0, &start.q, &start.v, start.z);
         if !(value.is_finite() && g.is_finite() && w.iter().all(|e| e.is_finite())) {
             return Err(InputError::Undefined);
         }
-        Ok(())
+        // In units of the coordinates in which its rows are of size one: masses may differ by any factor.
+        let unit = SVector::<f64, N>::from_fn(|i, _| largest(w.row(i).iter().copied()).sqrt());
+        let scaled = DMatrix::from_fn(N, N, |i, j| w[(i, j)] / (unit[i] * unit[j]));
+        let Regularity { smallest, largest } = Regularity::of(scaled);
+        // A matrix of zeros has no such units, and counts as singular.
+        if smallest > 4.0 * N as f64 * f64::EPSILON * largest {
+            return Ok(());
+        }
+        Err(InputError::FirstStep(StepError::Singular { pivot: smallest }))
     }
 
     /// The same for the final (q, p) alone.

@@ -1,0 +1,277 @@
+//! Steps for a wanted error: kept at every tenth of the motion, or refused with the cause; and claims that are found false along it.
+
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, legendre};
+use discrete_herglotz::{InputError, Integrator, Obstacle, Scene, Status, StepError, Steps, Wanted};
+use exact_lagrangian::herglotz_flow;
+
+/// One type for all systems of this file, since each is compiled with every integrator: a mechanical system, and others that claim more
+/// than is true of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    /// The formula of [`Bench`].
+    Mechanical,
+    /// `v q - q^2/2 - z/10`: W vanishes.
+    Singular,
+    /// A rate that depends on time, and not to first order at t = 0.
+    Rate,
+    /// A force of the same kind.
+    Force,
+    /// Drag beyond q = 1.
+    Region,
+    /// A wall that is nothing near 0.
+    Wall,
+    /// A cubic potential, all of it scaled by 1e-12.
+    Small,
+}
+
+/// `v^2/2 - k q^2/2 - quartic q^4/4 + gamma z - c z^2 + q (force sin(omega t) + kick e^(-((t - at)/width)^2))`.
+#[derive(Clone, Copy)]
+struct Bench {
+    gamma: f64,
+    c: f64,
+    k: f64,
+    quartic: f64,
+    force: f64,
+    omega: f64,
+    kick: f64,
+    at: f64,
+    width: f64,
+    kind: Kind,
+    claims: Option<Structure>,
+}
+
+const FREE: Bench = Bench {
+    gamma: 0.0,
+    c: 0.0,
+    k: 0.0,
+    quartic: 0.0,
+    force: 0.0,
+    omega: 0.0,
+    kick: 0.0,
+    at: 0.0,
+    width: 1.0,
+    kind: Kind::Mechanical,
+    claims: None,
+};
+const OSCILLATOR: Bench = Bench { k: 1.0, ..FREE };
+const DUFFING: Bench = Bench { k: -1.0, quartic: 1.0, gamma: -0.25, ..FREE };
+
+impl Lagrangian<1> for Bench {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        let (square, u) = (q[0] * q[0], (t - self.at) * (1.0 / self.width));
+        let kinetic = v[0] * v[0] * 0.5;
+        match self.kind {
+            Kind::Mechanical => {
+                let force = (t * self.omega).sin() * self.force + (-(u * u)).exp() * self.kick;
+                let potential = square * (square * (0.25 * self.quartic) + 0.5 * self.k);
+                kinetic - potential + z * self.gamma - z * z * self.c + q[0] * force
+            }
+            Kind::Singular => v[0] * q[0] - square * 0.5 - z * 0.1,
+            Kind::Rate => kinetic - square * 0.5 - z * t.cos() * 0.3,
+            Kind::Force => kinetic - square * 0.5 + q[0] * (t * 0.7).cos() * 0.5,
+            Kind::Region => kinetic - z * ((q[0] - 1.0) * 20.0).tanh() * 0.1,
+            Kind::Wall => kinetic - square * 0.5 - (q[0] * (1.0 / 1.5)).powi(40),
+            Kind::Small => (kinetic - square * q[0] * 0.5) * 1e-12,
+        }
+    }
+    fn structure(&self) -> Structure {
+        if let Some(claims) = self.claims {
+            return claims;
+        }
+        let affine = self.c == 0.0;
+        Structure {
+            autonomous: self.force == 0.0 && self.kick == 0.0,
+            z_free: affine && self.gamma == 0.0,
+            z_affine: affine,
+            constant_rate: affine,
+            separable: true,
+            quadratic: affine && self.quartic == 0.0,
+            constant_mass: true,
+        }
+    }
+}
+
+/// (q, p) after a span by the exact flow.
+fn truth(system: &Bench, start: &VelocityPoint<1>, span: f64) -> [f64; 2] {
+    let end = herglotz_flow(system, 0.0, start, span).unwrap().end;
+    let end = legendre(system, span, &end);
+    [end.q[0], end.p[0]]
+}
+
+/// The error of a run in (q, p), relative to their size.
+fn error(scene: &Scene<'_, Bench, 1>, truth: [f64; 2]) -> Result<f64, InputError> {
+    let outcome = scene.plan()?.run()?;
+    assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
+    let size = truth[0].hypot(truth[1]);
+    Ok(if size == 0.0 {
+        outcome.q[0].hypot(outcome.p[0])
+    } else {
+        (outcome.q[0] - truth[0]).hypot(outcome.p[0] - truth[1]) / size
+    })
+}
+
+fn by(name: &str) -> Integrator {
+    name.parse().unwrap()
+}
+
+/// A step that resonates with the drive: runs of 4 and 8 steps see no force at all.
+#[test]
+fn steps_that_resonate_with_the_drive() {
+    let driven = Bench { gamma: -0.1, force: 1.0, omega: std::f64::consts::TAU, ..FREE };
+    let start = VelocityPoint::new([0.3], [0.0], 0.0);
+    let truth = truth(&driven, &start, 16.0);
+    for name in ["strang", "midpoint", "gauss_2", "gauss_8", "blanes_moan_6"] {
+        let scene = Scene::new(&driven, start, 16.0).by(by(name)).steps(Steps::Accuracy(1e-6));
+        let error = error(&scene, truth).unwrap();
+        assert!(error <= 1e-6, "{name}: {error:e}");
+    }
+}
+
+/// Steps that are a thousand times the period leave an oscillator where it was; spans of a thousand to a million periods.
+#[test]
+fn steps_far_beyond_the_period() {
+    let start = VelocityPoint::new([1.0], [0.0], 0.0);
+    for span in [1e3, 3.3e4, 1.7e6, 9.1e6] {
+        let (sin, cos) = f64::sin_cos(span);
+        for (scene, wanted) in [
+            (Scene::new(&OSCILLATOR, start, span).by(by("gauss_8")), 1e-2),
+            (Scene::new(&OSCILLATOR, start, span), 1e-7),
+        ] {
+            let error = error(&scene.steps(Steps::Accuracy(wanted)), [cos, -sin]).unwrap();
+            assert!(error <= wanted, "{span}: {error:e}");
+        }
+    }
+}
+
+/// A kick that is short beside the span is found, by methods of low and high order, down to a thousandth of it.
+#[test]
+fn short_kicks() {
+    let start = VelocityPoint::new([1.0], [0.0], 0.0);
+    for width in [1.0, 0.1, 0.016] {
+        let kicked = Bench { gamma: -0.1, kick: 1.0 / width, at: 7.3, width, ..OSCILLATOR };
+        // In three parts, so that the exact flow cannot miss the kick.
+        let (before, after) = (7.3 - 6.0 * width, 7.3 + 6.0 * width);
+        let mut x = start;
+        for (from, to) in [(0.0, before), (before, after), (after, 16.0)] {
+            x = herglotz_flow(&kicked, from, &x, to - from).unwrap().end;
+        }
+        for name in [None, Some("strang"), Some("gauss_3")] {
+            let scene = Scene::new(&kicked, start, 16.0).steps(Steps::Accuracy(1e-6));
+            let scene = if let Some(name) = name { scene.by(by(name)) } else { scene };
+            let error = error(&scene, [x.q[0], x.v[0]]).unwrap();
+            assert!(error <= 1e-6, "{width}, {name:?}: {error:e}");
+        }
+    }
+}
+
+/// Amplitudes near the smallest numbers, and a start at rest in an equilibrium.
+#[test]
+fn tiny_motions_and_none() {
+    let damped = Bench { gamma: -0.1, quartic: 1.0, ..OSCILLATOR };
+    for size in [1e-160, 1e-300, 0.0] {
+        let start = VelocityPoint::new([size], [0.0], 0.0);
+        // So small that the quartic term is nothing: the oscillator's closed form.
+        let w = (1.0f64 - 0.0025).sqrt();
+        let (sin, cos) = (10.0 * w).sin_cos();
+        let decay = size * (-0.5f64).exp();
+        let truth = [decay * (cos + 0.05 / w * sin), -decay * sin / w];
+        for scene in [Scene::new(&damped, start, 10.0), Scene::new(&damped, start, 10.0).by(by("strang"))] {
+            let error = error(&scene.steps(Steps::Accuracy(1e-6)), truth).unwrap();
+            assert!(error <= 1e-6, "{size:e}: {error:e}");
+        }
+    }
+}
+
+/// What cannot be reached is refused with its cause.
+#[test]
+fn causes() {
+    let start = VelocityPoint::new([1.0], [0.0], 0.0);
+    let refused = |scene: Scene<'_, Bench, 1>, wanted: f64| scene.steps(Steps::Accuracy(wanted)).plan().err();
+    let chaotic = Bench { gamma: -0.1, force: 0.35, omega: 1.4, ..DUFFING };
+    let cause = refused(Scene::new(&chaotic, start, 500.0), 1e-6);
+    let Some(InputError::Accuracy { cause: Obstacle::Chaos { t }, .. }) = cause else { panic!("{cause:?}") };
+    assert!(t < 500.0);
+    // Up to that time it is not refused, and right: the exact flow's own round-off grows there to no more than 1e-7.
+    let trusted = 0.5 * t;
+    let error =
+        error(&Scene::new(&chaotic, start, trusted).steps(Steps::Accuracy(1e-6)), truth(&chaotic, &start, trusted));
+    assert!(error.as_ref().is_ok_and(|e| *e <= 1e-6), "{trusted}: {error:?}");
+    // Blow-up of z in a finite time.
+    let pole = Bench { c: -1.0, ..FREE };
+    let cause = refused(Scene::new(&pole, VelocityPoint::new([0.0], [1.0], 1.0), 3.0), 1e-6);
+    let Some(InputError::Accuracy { cause: Obstacle::Halted { t, .. }, .. }) = cause else { panic!("{cause:?}") };
+    // v' = 2 z v and z' = v^2/2 + z^2: with w = z + v/sqrt(2) and u = z - v/sqrt(2), w' = w^2 and u' = u^2, so w has its pole at 1/w0.
+    let pole = 1.0 / (1.0 + 0.5f64.sqrt());
+    assert!((t - pole).abs() < 1e-3, "{t}, not {pole}");
+    let nan = Bench { gamma: f64::NAN, ..OSCILLATOR };
+    assert_eq!(refused(Scene::new(&nan, start, 10.0), 1e-6), Some(InputError::Undefined));
+    let singular = Bench { kind: Kind::Singular, claims: Some(Structure::default()), ..FREE };
+    let refused = refused(Scene::new(&singular, start, 10.0), 1e-6);
+    assert!(matches!(refused, Some(InputError::FirstStep(StepError::Singular { .. }))), "{refused:?}");
+}
+
+/// Claims that are true at the start and false elsewhere are found: before the run by times of the whole span and by its first steps, or
+/// in it, as a status; with steps that are given and with steps that are chosen.
+#[test]
+fn claims_are_probed_along_the_motion() {
+    let mechanical = Structure { separable: true, constant_mass: true, ..Structure::default() };
+    let at = |q: f64, v: f64| VelocityPoint::new([q], [v], 0.0);
+    let cases = [
+        (Kind::Rate, Structure { constant_rate: true, z_affine: true, ..mechanical }, at(1.0, 0.0), "constant_rate"),
+        (Kind::Force, Structure { autonomous: true, z_free: true, ..mechanical }, at(1.0, 0.0), "autonomous"),
+        (Kind::Region, Structure { z_affine: true, autonomous: true, ..mechanical }, at(-1.0, 0.5), "z_affine"),
+        (
+            "wall",
+            Structure { quadratic: true, autonomous: true, z_free: true, ..mechanical },
+            at(0.0, 1.5),
+            "quadratic",
+        ),
+        (
+            "small",
+            Structure { quadratic: true, autonomous: true, z_free: true, ..mechanical },
+            at(0.5, 0.1),
+            "quadratic",
+        ),
+    ];
+    for (kind, structure, start, claim) in cases {
+        let system = Bench { kind, claims: Some(structure), ..FREE };
+        for steps in [Steps::Count(400), Steps::Size(0.01), Steps::Accuracy(1e-6)] {
+            for integrator in ["gauss_6", "strang"] {
+                let scene = Scene::new(&system, start, 8.0).by(by(integrator)).steps(steps);
+                let found = match scene.plan().and_then(|plan| plan.run()) {
+                    Err(InputError::FalseClaim { claim, .. }) => Some(claim),
+                    Ok(outcome) => match outcome.status {
+                        Status::FalseClaim { claim, step, .. } => {
+                            assert!(step > 0 && step <= outcome.steps);
+                            Some(claim)
+                        }
+                        _ => None,
+                    },
+                    Err(_) => None,
+                };
+                assert!(found.is_some(), "{kind:?} by {integrator}, {steps:?}: not found");
+                let separable = kind == Kind::Region && found == Some("separable");
+                assert!(found == Some(claim) || separable, "{kind:?} by {integrator}: {found:?}");
+            }
+        }
+    }
+}
+
+/// The estimate of an error is that of the run, and what is wanted beside the final state does not change it.
+#[test]
+fn the_estimate_is_of_the_run() {
+    let start = VelocityPoint::new([1.5], [0.0], 0.0);
+    let truth = truth(&DUFFING, &start, 20.0);
+    for wanted in [1e-4, 1e-8] {
+        let scene = Scene::new(&DUFFING, start, 20.0).steps(Steps::Accuracy(wanted));
+        let plan = scene.plan().unwrap();
+        assert!(plan.error().is_some_and(|e| e <= wanted));
+        let all = Wanted { conformal_factor: true, rows: Some(3), ..Wanted::default() };
+        let with_all = Scene::new(&DUFFING, start, 20.0).steps(Steps::Accuracy(wanted)).wanting(all).plan().unwrap();
+        assert_eq!((plan.integrator(), plan.count()), (with_all.integrator(), with_all.count()));
+        assert_eq!(plan.run().unwrap().q, with_all.run().unwrap().q);
+        assert!(error(&scene, truth).unwrap() <= wanted);
+    }
+}
