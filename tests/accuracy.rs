@@ -223,13 +223,13 @@ fn claims_are_probed_along_the_motion() {
         (Kind::Force, Structure { autonomous: true, z_free: true, ..mechanical }, at(1.0, 0.0), "autonomous"),
         (Kind::Region, Structure { z_affine: true, autonomous: true, ..mechanical }, at(-1.0, 0.5), "z_affine"),
         (
-            "wall",
+            Kind::Wall,
             Structure { quadratic: true, autonomous: true, z_free: true, ..mechanical },
             at(0.0, 1.5),
             "quadratic",
         ),
         (
-            "small",
+            Kind::Small,
             Structure { quadratic: true, autonomous: true, z_free: true, ..mechanical },
             at(0.5, 0.1),
             "quadratic",
