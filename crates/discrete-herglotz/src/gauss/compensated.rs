@@ -28,7 +28,7 @@ impl Compensated {
 
 /// A sum with what its rounding takes away, by Knuth: either number may be the larger.
 #[inline(always)]
-fn exact_sum(a: f64, b: f64) -> (f64, f64) {
+pub(super) fn exact_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let of_b = sum - a;
     (sum, (a - (sum - of_b)) + (b - of_b))

@@ -36,19 +36,18 @@ impl<const N: usize, C: Clock<N>> Pace<N> for Fictitious<C> {
 }
 
 /// What the time of a clock adds to a step.
-pub(super) struct Extension<P, const N: usize> {
+pub(super) struct Extension<P> {
     pub pace: P,
     pub t: Compensated,
     /// The momentum of t.
     pub p_t: Compensated,
-    /// The rates g of the stages, and `g V`.
+    /// The rates g of the stages.
     pub g: Stages,
-    pub moved: [Stages; N],
 }
 
-impl<P, const N: usize> Extension<P, N> {
+impl<P> Extension<P> {
     pub fn new(pace: P, t: f64, p_t: f64) -> Self {
-        Extension { pace, t: t.into(), p_t: p_t.into(), g: Stages::ZERO, moved: [Stages::ZERO; N] }
+        Extension { pace, t: t.into(), p_t: p_t.into(), g: Stages::ZERO }
     }
 }
 

@@ -5,37 +5,65 @@
 
 use super::coefficients::{Coefficients, MOST};
 use super::compensated::{Compensated, Twofold, add, finite};
+use super::dense::Solved;
 use super::extension::{Extension, Pace, Values};
-use super::stages::{StageMap, Stages, Weights, blocks, padded};
+use super::stages::{StageMap, Stages, blocks, padded};
 use super::sweeps::{Progress, Sweeps};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{KernelDual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, linear};
 use pulp::Simd;
 use qd::Quad;
+use std::array::from_fn;
+use std::cmp::Ordering;
 
-/// The products of the coefficients with the step.
+/// The coefficients of a step: `h a_ij = m_ij h b_j`.
+///
+/// What multiplies in every step acts in the same direction in every step, and so the rounding of `h a_ij` and `h b_j` would make
+/// the energy drift. But the method is symplectic with any weights where `m_ij + m_ji = 1`, and this numbers of 53 digits
+/// can satisfy exactly: stages take `M (h b f)`, the end the sum of the same `h b f`. See Antonana, Makazaga and Murua,
+/// "Reducing and monitoring round-off error propagation for symplectic implicit Runge-Kutta schemes", Numer. Algorithms 76 (2017).
 pub(super) struct Table {
     pub s: usize,
-    /// `h A`.
-    pub a: StageMap,
-    /// `h b`.
-    pub b: Weights,
+    /// `M`.
+    pub m: StageMap,
+    /// `h b`, 0 beyond the last stage.
+    pub weights: Stages,
     /// The times of the stages after the step's start.
     pub times: Stages,
-    /// From the stages of one step to those of the next.
+    /// From the stages of one step to those of the next, and the same for what is multiplied with the weights.
     pub ahead: StageMap,
+    pub ahead_weighted: StageMap,
 }
 
 impl Table {
     pub fn new(s: usize, h: f64) -> Self {
         let (g, step) = (Coefficients::of(s), Quad::from(h));
+        let mut weights = from_fn(|j| if j < s { (step * g.b[j]).0 } else { 0.0 });
+        if s > 2 {
+            // The sum is h to the last digit of the smallest.
+            let inner = weights[1..s - 1].iter().fold(Quad::from(0.0), |sum, w| sum + Quad::from(*w));
+            weights[0] = (Quad::from(0.5) * (step - inner)).0;
+            weights[s - 1] = weights[0];
+        }
+        // From the transposed where it is the larger, about 1: the difference is exact.
+        let ratio = |i: usize, j: usize| (g.a[i][j] / g.b[j]).0;
+        let entry = |i: usize, j: usize| match i.cmp(&j) {
+            _ if i.max(j) >= s => 0.0,
+            Ordering::Less => 1.0 - ratio(j, i),
+            Ordering::Equal => 0.5,
+            Ordering::Greater => ratio(i, j),
+        };
+        let weighted = |i: usize, j: usize| {
+            if i.max(j) < s { g.b[i].0 * g.ahead[i][j] / g.b[j].0 } else { 0.0 }
+        };
         Table {
             s,
-            a: StageMap::from_exact(&g.a.map(|row| row.map(|e| step * e)), s),
-            b: Weights::new(&std::array::from_fn(|j| if j < s { step * g.b[j] } else { Quad::from(0.0) })),
+            m: StageMap::new(&from_fn(|i| from_fn(|j| entry(i, j))), s),
+            weights: Stages(weights),
             times: padded(&g.c.map(|c| step * c), s),
             ahead: StageMap::new(&g.ahead, s),
+            ahead_weighted: StageMap::new(&from_fn(|i| from_fn(|j| weighted(i, j))), s),
         }
     }
 }
@@ -67,22 +95,28 @@ impl<const N: usize> Mass<N> {
 ///
 /// In the time of a clock they are those of `K = g (H + p_t)`: `Q = q0 + hA (g V)`, `Z = z0 + hA (g L)`, `t = t0 + hA g`,
 /// `rho = 1 - hA (rho g L_z)`, `rho L_v = p0 + hA (rho g L_q - grad g (rho E + p_t0))`, since `rho p_t = p_t0`, the momentum of
-/// the time at the start, where L does not depend on t. `l`, `rate` and `force` below have the factor g then.
+/// the time at the start, where L does not depend on t.
+///
+/// A rate that is the same in every step is rounded the same in every step: so `1 - rho`, which is small where the rate is, is
+/// carried instead of rho, and enters by sums of which the rounding depends on the motion.
 pub(super) struct General<'a, L, P, const N: usize> {
     pub lagrangian: &'a L,
-    pub extension: Extension<P, N>,
+    pub extension: Extension<P>,
     pub table: Table,
     pub mass: Mass<N>,
     pub q: [Compensated; N],
     pub p: [Compensated; N],
     pub z: Compensated,
-    /// The stages: velocities, `L_v`, `rho L_q`, and `L`, `rho L_z`, rho, Z.
-    pub v: [Stages; N],
+    /// The stages: velocities and `L_v`.
+    v: [Stages; N],
     l_v: [Stages; N],
-    pub force: [Stages; N],
-    pub l: Stages,
-    pub rate: Stages,
-    rho: Stages,
+    /// With the weights `h b`, and g where there is a clock: V, `rho L_q`, L and `rho L_z`.
+    moved: [Stages; N],
+    force: [Stages; N],
+    l: Stages,
+    rate: Stages,
+    /// `1 - rho`.
+    falling: Stages,
     z_stages: Stages,
     x: [Stages; N],
     /// `1 - rho` at the end of the last step.
@@ -95,7 +129,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
     /// From a state with a velocity that belongs to it, or a guess of it.
     pub fn new(
         lagrangian: &'a L,
-        extension: Extension<P, N>,
+        extension: Extension<P>,
         table: Table,
         mass: Mass<N>,
         state: &PhasePoint<N>,
@@ -111,10 +145,11 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             z: 0.0.into(),
             v: [Stages::ZERO; N],
             l_v: [Stages::ZERO; N],
+            moved: [Stages::ZERO; N],
             force: [Stages::ZERO; N],
             l: Stages::ZERO,
             rate: Stages::ZERO,
-            rho: Stages::ZERO,
+            falling: Stages::ZERO,
             z_stages: Stages::ZERO,
             x: [Stages::ZERO; N],
             fallen: 0.0,
@@ -127,10 +162,10 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
 
     /// Goes on from another state with its velocity, without what was carried; `fallen` belongs to the step that led there.
     pub fn restart(&mut self, state: &PhasePoint<N>, v: &SVector<f64, N>, fallen: f64) {
-        self.q = std::array::from_fn(|i| state.q[i].into());
-        self.p = std::array::from_fn(|i| state.p[i].into());
+        self.q = from_fn(|i| state.q[i].into());
+        self.p = from_fn(|i| state.p[i].into());
         self.z = state.z.into();
-        self.v = std::array::from_fn(|i| Stages([v[i]; MOST]));
+        self.v = from_fn(|i| Stages([v[i]; MOST]));
         self.fallen = fallen;
         self.warm = false;
     }
@@ -169,13 +204,8 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         for r in 0..blocks::<S>(self.table.s) {
             let at = self.table.times.block::<S>(r) + t;
             let (re, d) = self.lagrangian.with_gradient(at, &self.point::<S>(r));
-            let rho = self.rho.block::<S>(r);
-            self.l.set(r, re);
-            self.rate.set(r, rho * d.z);
-            for i in 0..N {
-                self.force[i].set(r, rho * d.x[i]);
-                self.l_v[i].set(r, d.y[i]);
-            }
+            let (mut weight, falling) = (self.table.weights.block::<S>(r), -self.falling.block::<S>(r));
+            let mut of_clock = [Lanes::<S>::splat(0.0); N];
             if !P::PHYSICAL {
                 let point = self.point::<S>(r);
                 let q = SVector::<_, N>::from_fn(|i, _| {
@@ -185,28 +215,36 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
                 });
                 let KernelDual { re: g, d: slope } = self.extension.pace.rate(&q);
                 let energy = point.v.dot(&d.y) - re;
-                let extended = energy.mul_add(rho, Lanes::splat(self.extension.p_t.value));
-                self.l.set(r, g * re);
-                self.rate.set(r, rho * g * d.z);
-                for i in 0..N {
-                    self.force[i].set(r, rho * g * d.x[i] - slope[i] * extended);
-                }
+                let extended = energy.mul_add(falling, energy + self.extension.p_t.value);
+                of_clock = from_fn(|i| slope[i] * extended * -weight);
+                weight *= g;
                 dg = dg.max((g - self.extension.g.block(r)).abs());
                 sg = sg.max(g.abs());
                 self.extension.g.set(r, g);
+            }
+            self.l.set(r, weight * re);
+            self.rate.set(r, weight * d.z.mul_add(falling, d.z));
+            for i in 0..N {
+                let push = d.x[i].mul_add(falling, d.x[i]);
+                let force = if P::PHYSICAL { weight * push } else { push.mul_add(weight, of_clock[i]) };
+                self.force[i].set(r, force);
+                self.l_v[i].set(r, d.y[i]);
             }
         }
         self.evaluations += self.table.s as u64;
         if P::PHYSICAL { 0.0 } else { dg.largest() / sg.largest() }
     }
 
-    /// The rates of change of the stages' positions with a clock, `g V`.
+    /// What the velocities of the stages move the positions by.
     #[inline(always)]
     fn stride<S: Simd>(&mut self) {
         for r in 0..blocks::<S>(self.table.s) {
-            let g = self.extension.g.block::<S>(r);
+            let mut weight = self.table.weights.block::<S>(r);
+            if !P::PHYSICAL {
+                weight *= self.extension.g.block(r);
+            }
             for d in 0..N {
-                self.extension.moved[d].set(r, g * self.v[d].block(r));
+                self.moved[d].set(r, weight * self.v[d].block(r));
             }
         }
     }
@@ -240,17 +278,14 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
     /// The positions and the actions of the stages from their velocities and Lagrangians.
     #[inline(always)]
     fn place<S: Simd>(&mut self) {
-        if !P::PHYSICAL {
-            self.stride::<S>();
-        }
-        let moved = if P::PHYSICAL { &self.v } else { &self.extension.moved };
+        self.stride::<S>();
         let (table, s) = (&self.table, self.table.s);
-        for ((q, moved), x) in self.q.iter().zip(moved).zip(&mut self.x) {
+        for ((q, moved), x) in self.q.iter().zip(&self.moved).zip(&mut self.x) {
             let q = Lanes::<S>::splat(q.value);
-            table.a.apply(moved, s, x, |_| q);
+            table.m.apply(moved, s, x, |_| q);
         }
         let z = Lanes::<S>::splat(self.z.value);
-        table.a.apply(&self.l, s, &mut self.z_stages, |_| z);
+        table.m.apply(&self.l, s, &mut self.z_stages, |_| z);
     }
 
     /// The guesses of a step: the last one's polynomials carried on.
@@ -259,12 +294,16 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         let s = self.table.s;
         let renewed = 1.0 / (1.0 - self.fallen);
         let rates = if P::PHYSICAL { None } else { Some(&mut self.extension.g) };
-        let same = self.v.iter_mut().chain(&mut self.l_v).chain([&mut self.l]).chain(rates).map(|x| (x, 1.0));
+        let Table { ahead, ahead_weighted, .. } = &self.table;
+        for x in self.v.iter_mut().chain(&mut self.l_v).chain(rates) {
+            let before = *x;
+            ahead.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
+        }
         // rho starts from 1 again.
         let scaled = self.force.iter_mut().chain([&mut self.rate]).map(|x| (x, renewed));
-        for (x, factor) in same.chain(scaled) {
+        for (x, factor) in scaled.chain([(&mut self.l, 1.0)]) {
             let before = *x;
-            self.table.ahead.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
+            ahead_weighted.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
             for r in 0..blocks::<S>(s) {
                 x.set(r, x.block::<S>(r) * factor);
             }
@@ -280,7 +319,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             self.carry::<S>();
         } else {
             self.l = Stages::ZERO;
-            self.rho = Stages([1.0; MOST]);
+            self.falling = Stages::ZERO;
             if !P::PHYSICAL {
                 self.extension.g = Stages([self.rate(); MOST]);
             }
@@ -316,22 +355,24 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         let s = self.table.s;
         let m = blocks::<S>(s);
         let zero = Lanes::<S>::splat(0.0);
-        let (mut falling, mut impulses) = (Stages::ZERO, [Stages::ZERO; N]);
-        self.table.a.apply(&self.rate, s, &mut falling, |_| zero);
+        let (before, mut impulses) = (self.falling, [Stages::ZERO; N]);
+        self.table.m.apply(&self.rate, s, &mut self.falling, |_| zero);
         for d in 0..N {
             let p = Lanes::<S>::splat(self.p[d].value);
-            self.table.a.apply(&self.force[d], s, &mut impulses[d], |_| p);
+            self.table.m.apply(&self.force[d], s, &mut impulses[d], |_| p);
         }
         let one = Lanes::<S>::splat(1.0);
         let (mut dv, mut sv, mut dr, mut sr) = (zero, zero, zero, one);
         for r in 0..m {
-            let rho = one - falling.block(r);
-            dr = dr.max((rho - self.rho.block(r)).abs());
-            self.rho.set(r, rho);
+            let falling = self.falling.block::<S>(r);
+            dr = dr.max((falling - before.block(r)).abs());
+            let rho = one - falling;
             let inverse = rho.recip();
             sr = sr.max(rho.abs());
-            let excess =
-                SVector::<Lanes<S>, N>::from_fn(|d, _| impulses[d].block::<S>(r) * inverse - self.l_v[d].block(r));
+            let excess = SVector::<Lanes<S>, N>::from_fn(|d, _| {
+                let l_v = self.l_v[d].block::<S>(r);
+                l_v.mul_add(falling, impulses[d].block::<S>(r) - l_v) * inverse
+            });
             for i in 0..N {
                 let mut change = zero;
                 for j in 0..N {
@@ -369,39 +410,54 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             // With the rates of the last evaluation.
             self.stride::<S>();
         }
-        let moved = if P::PHYSICAL { &self.v } else { &self.extension.moved };
-        let (b, s) = (&self.table.b, self.table.s);
-        let (fallen, dz) = (b.sum::<S>(&self.rate, s), b.sum::<S>(&self.l, s));
-        if fallen.head >= 1.0 {
-            return Progress::SigmaVanished { sigma: 1.0 / (1.0 - fallen.head) };
+        let s = self.table.s;
+        let (fallen, dz) = (self.rate.sum::<S>(s), self.l.sum::<S>(s));
+        if fallen >= 1.0 {
+            return Progress::SigmaVanished { sigma: 1.0 / (1.0 - fallen) };
         }
-        let sigma = 1.0 / (1.0 - fallen.head);
+        // sigma_d - 1, so that a small rate does not round the whole.
+        let grow = fallen / (1.0 - fallen);
+        let single = |head| Twofold { head, tail: 0.0 };
         let (mut dq, mut dp) = ([Twofold::default(); N], [Twofold::default(); N]);
         for d in 0..N {
-            dq[d] = b.sum::<S>(&moved[d], s);
-            // (p fallen + force) / (1 - fallen), to first order in the tails.
-            let pushed = fallen * self.p[d].value + b.sum::<S>(&self.force[d], s);
-            let head = pushed.head / (1.0 - fallen.head);
-            dp[d] = Twofold { head, tail: (pushed.tail + fallen.tail * head) * sigma };
+            dq[d] = single(self.moved[d].sum::<S>(s));
+            let pushed = self.force[d].sum::<S>(s);
+            dp[d] = Twofold { head: pushed, tail: grow * (pushed + self.p[d].value) };
         }
         // The largest change over lanes may hide a NaN; one of `fallen` is in `dp`.
-        if !finite(&dq, &dp, dz) {
+        if !finite(&dq, &dp, single(dz)) {
             return Progress::NonFinite;
         }
         if !P::PHYSICAL {
-            let dt = b.sum::<S>(&self.extension.g, s);
+            let mut dt = Stages::ZERO;
+            for r in 0..blocks::<S>(s) {
+                dt.set(r, self.table.weights.block::<S>(r) * self.extension.g.block(r));
+            }
+            let dt = dt.sum::<S>(s);
             let runs = self.extension.g.0[..s].iter().all(|g| *g > 0.0);
-            if !(runs && dt.head.is_finite()) {
+            if !(runs && dt.is_finite()) {
                 return Progress::NonFinite;
             }
-            self.extension.t.add(dt);
-            self.extension.p_t.add(fallen * (self.extension.p_t.value * sigma));
+            self.extension.t.add(single(dt));
+            self.extension.p_t.add(single(grow * self.extension.p_t.value));
         }
         add(&mut self.q, &dq);
         add(&mut self.p, &dp);
-        self.z.add(dz);
-        self.fallen = fallen.head;
+        self.z.add(single(dz));
+        self.fallen = fallen;
         self.warm = true;
         Progress::Done
+    }
+
+    /// The stages of the last step, for dense output.
+    pub fn solved(&self) -> Solved<N> {
+        let (s, weights) = (self.table.s, &self.table.weights.0);
+        let unweighted = |x: &Stages| from_fn(|i| if i < s { x.0[i] / weights[i] } else { 0.0 });
+        Solved {
+            v: self.v.map(|v| v.0),
+            force: from_fn(|d| unweighted(&self.force[d])),
+            rate: unweighted(&self.rate),
+            l: unweighted(&self.l),
+        }
     }
 }

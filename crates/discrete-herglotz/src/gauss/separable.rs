@@ -12,6 +12,9 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 use pulp::Simd;
 
+/// The steps after which a matrix is expected to last.
+const LASTING: usize = 32;
+
 /// The state and the workspace of the condensed step.
 pub(super) struct Separable<'a, L, const N: usize> {
     pub lagrangian: &'a L,
@@ -28,6 +31,8 @@ pub(super) struct Separable<'a, L, const N: usize> {
     /// The accelerations of the last sweep.
     pub a: [Stages; N],
     x: [Stages; N],
+    /// What the positions begin with: what comes of the state, and of the parts that the matrices' rounding leaves out.
+    base: [Stages; N],
     /// Whether `rest` belongs to the step before.
     warm: bool,
     /// Steps since the start, and the one at which the slope of the force is looked at again.
@@ -57,6 +62,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             rest: [Stages::ZERO; N],
             a: [Stages::ZERO; N],
             x: [Stages::ZERO; N],
+            base: [Stages::ZERO; N],
             warm: false,
             taken: 0,
             review: 1,
@@ -105,12 +111,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
                 self.table.ahead.apply(&before, s, &mut self.rest[d], |_| Lanes::<S>::splat(0.0));
             }
         }
+        self.begin::<S>();
         let mut sweeps = Sweeps::default();
         let outcome = loop {
             for d in 0..N {
-                let (q, v) = (Lanes::<S>::splat(self.q[d].value), Lanes::<S>::splat(self.v[d].value));
-                let left = &self.left;
-                left.b.apply(&self.rest[d], s, &mut self.x[d], |r| left.u.block(r).mul_add(v, left.q.block(r) * q));
+                let base = &self.base[d];
+                self.left.head.b.apply(&self.rest[d], s, &mut self.x[d], |r| base.block::<S>(r));
             }
             let (mut change, mut size) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
             for r in 0..m {
@@ -141,8 +147,31 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         if self.taken == self.review {
             self.review *= 2;
             self.adapt();
+            if self.taken >= LASTING {
+                self.left.refine(&self.table);
+            }
         }
         Progress::Done
+    }
+
+    /// What the sweeps of a step have in common. The tails of the matrices act on the guess: it is near enough for them.
+    #[inline(always)]
+    fn begin<S: Simd>(&mut self) {
+        let (head, s) = (&self.left.head, self.table.s);
+        for d in 0..N {
+            let (q, v) = (Lanes::<S>::splat(self.q[d].value), Lanes::<S>::splat(self.v[d].value));
+            let base = &mut self.base[d];
+            match &self.left.tail {
+                Some(tail) => {
+                    tail.b.apply::<S>(&self.rest[d], s, base, |r| tail.u.block(r).mul_add(v, tail.q.block(r) * q))
+                }
+                None => *base = Stages::ZERO,
+            }
+            for r in 0..blocks::<S>(s) {
+                let rest = head.u.block::<S>(r).mul_add(v, base.block(r));
+                base.set(r, head.q.block::<S>(r).mul_add(q, rest));
+            }
+        }
     }
 
     /// The end of the step from its accelerations.

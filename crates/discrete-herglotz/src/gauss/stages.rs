@@ -25,6 +25,12 @@ impl Stages {
     pub fn set<S: Simd>(&mut self, r: usize, x: Lanes<S>) {
         S::as_mut_simd_f64s(&mut self.0).0[r] = x.0;
     }
+
+    /// The sum of what is 0 beyond the last stage.
+    #[inline(always)]
+    pub fn sum<S: Simd>(&self, s: usize) -> f64 {
+        (0..blocks::<S>(s)).fold(Lanes::<S>::splat(0.0), |sum, r| sum + self.block(r)).sum()
+    }
 }
 
 /// The registers that hold `s` stages.

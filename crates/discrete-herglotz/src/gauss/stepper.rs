@@ -159,9 +159,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
                 condensed(table, &run.accelerations(&self.from.q, &self.from.y), run.wants_z())
             }
             (Last::Route, Route::Condensed(run)) => condensed(&run.table, &run.a.map(|a| a.0), run.wants_z),
-            (Last::Route, Route::General(run)) => {
-                Solved { v: run.v.map(|v| v.0), force: run.force.map(|f| f.0), rate: run.rate.0, l: run.l.0 }
-            }
+            (Last::Route, Route::General(run)) => run.solved(),
         };
         Some(DenseStep::new(s, t, h, start, &solved))
     }
