@@ -6,17 +6,22 @@
 use super::coefficients::{Coefficients, MOST};
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::extension::{Extension, Pace, Values};
+use super::resolution::{FORETOLD, Tail, of_sigma};
+use super::simplified::{CorrectStages, StageNewton, mean};
 use super::stages::{StageMap, Stages, Weights, blocks, padded};
-use super::sweeps::{Progress, Sweeps};
+use super::sweeps::{Progress, SLOW, Sweeps};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{KernelDual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, linear};
-use pulp::Simd;
+use contact_geom::{
+    Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint, larger, linear,
+};
+use pulp::{Arch, Simd};
 use qd::Quad;
 
 /// The products of the coefficients with the step.
 pub(super) struct Table {
     pub s: usize,
+    pub h: f64,
     /// `h A`.
     pub a: StageMap,
     /// `h b`.
@@ -32,6 +37,7 @@ impl Table {
         let (g, step) = (Coefficients::of(s), Quad::from(h));
         Table {
             s,
+            h,
             a: StageMap::from_exact(&g.a.map(|row| row.map(|e| step * e)), s),
             b: Weights::new(&std::array::from_fn(|j| if j < s { step * g.b[j] } else { Quad::from(0.0) })),
             times: padded(&g.c.map(|c| step * c), s),
@@ -39,6 +45,9 @@ impl Table {
         }
     }
 }
+
+/// The change of the integrating factor in a step from which on it is compared with the drag's integral.
+const FALLEN: f64 = 0.2;
 
 /// How velocities are found from momenta.
 pub(super) enum Mass<const N: usize> {
@@ -82,12 +91,21 @@ pub(super) struct General<'a, L, P, const N: usize> {
     pub force: [Stages; N],
     pub l: Stages,
     pub rate: Stages,
-    rho: Stages,
+    pub rho: Stages,
     z_stages: Stages,
     x: [Stages; N],
     /// `1 - rho` at the end of the last step.
     pub fallen: f64,
     warm: bool,
+    /// Corrects the sweeps where they do not contract by themselves.
+    pub newton: Option<Box<StageNewton<N>>>,
+    tail: Tail,
+    /// Above one where the last step has not resolved the motion, or its drag.
+    pub misfit: f64,
+    /// The same while it is not used.
+    parked: Option<Box<StageNewton<N>>>,
+    /// Whether the stages of the next step are solved: v, l and rho are theirs.
+    solved: bool,
     pub evaluations: u64,
 }
 
@@ -101,6 +119,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         state: &PhasePoint<N>,
         v: &SVector<f64, N>,
     ) -> Self {
+        let tail = Tail::new(table.s);
         let mut general = General {
             lagrangian,
             extension,
@@ -119,20 +138,63 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             x: [Stages::ZERO; N],
             fallen: 0.0,
             warm: false,
+            newton: None,
+            tail,
+            misfit: 0.0,
+            parked: None,
+            solved: false,
             evaluations: 0,
         };
-        general.restart(state, v, 0.0);
+        general.q = std::array::from_fn(|i| state.q[i].into());
+        general.p = std::array::from_fn(|i| state.p[i].into());
+        general.z = state.z.into();
+        general.guess(v);
         general
     }
 
-    /// Goes on from another state with its velocity, without what was carried; `fallen` belongs to the step that led there.
-    pub fn restart(&mut self, state: &PhasePoint<N>, v: &SVector<f64, N>, fallen: f64) {
-        self.q = std::array::from_fn(|i| state.q[i].into());
-        self.p = std::array::from_fn(|i| state.p[i].into());
-        self.z = state.z.into();
+    /// Guesses the next step to be a motion of constant velocity.
+    pub fn guess(&mut self, v: &SVector<f64, N>) {
         self.v = std::array::from_fn(|i| Stages([v[i]; MOST]));
-        self.fallen = fallen;
         self.warm = false;
+    }
+
+    /// Has the sweeps corrected by Newton's method, with these derivatives of L from now on; `false` where that is not possible.
+    pub fn linearise(&mut self, gradient: &Triple<N>, hessian: &Hessian<N>) -> bool {
+        if self.newton.is_none() {
+            self.newton = self.parked.take().or_else(|| Some(Box::new(StageNewton::new(&self.table))));
+        }
+        self.newton.as_mut().is_some_and(|newton| newton.factorise(gradient, hessian))
+    }
+
+    /// Takes the sweeps as they are again.
+    pub fn park_newton(&mut self) {
+        self.parked = self.newton.take();
+    }
+
+    /// Has the next step taken from stages that are solved: their velocities, actions' rates and factors.
+    pub fn accept(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, f64, f64)>) {
+        for (i, (v, l, rho)) in stages.enumerate() {
+            // Beyond the last stage it is repeated.
+            for d in 0..N {
+                self.v[d].0[i..].fill(v[d]);
+            }
+            self.l.0[i..].fill(l);
+            self.rho.0[i..].fill(rho);
+        }
+        self.solved = true;
+    }
+
+    /// Takes Newton's Jacobian anew, as the mean over the stages of the last step.
+    #[cold]
+    #[inline(never)]
+    fn renew(&mut self, t: f64) {
+        let (gradient, hessian) = mean(self.lagrangian, self.table.s, |i| {
+            let (q, v) = (SVector::from_fn(|d, _| self.x[d].0[i]), SVector::from_fn(|d, _| self.v[d].0[i]));
+            (t + self.table.times.0[i], VelocityPoint { q, v, z: self.z_stages.0[i] })
+        });
+        if !self.linearise(&gradient, &hessian) {
+            self.warm = false;
+        }
     }
 
     pub fn values(&self) -> Values<N> {
@@ -274,11 +336,15 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
     pub fn step<S: Simd>(&mut self, t: f64) -> Progress {
+        let solved = std::mem::take(&mut self.solved);
         // Without a step before, from a motion of constant velocity.
-        let mut cold = !self.warm;
-        if self.warm {
+        let mut cold = !self.warm || self.newton.is_some();
+        if self.warm && !solved {
             self.carry::<S>();
-        } else {
+            if self.newton.is_some() {
+                self.rho = self.factors::<S>();
+            }
+        } else if !solved {
             self.l = Stages::ZERO;
             self.rho = Stages([1.0; MOST]);
             if !P::PHYSICAL {
@@ -293,8 +359,23 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         let mut sweeps = Sweeps::default();
         // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
         loop {
-            let change = if cold { f64::INFINITY } else { self.sweep::<S>() };
+            let change = if cold || solved {
+                f64::INFINITY
+            } else if let Some(newton) = self.newton.take() {
+                let (change, moved) = self.correct(&newton);
+                self.newton = Some(newton);
+                sweeps.still = moved <= 4.0 * f64::EPSILON;
+                change
+            } else {
+                self.sweep::<S>()
+            };
             let of_clock = self.evaluate::<S>(t);
+            if solved {
+                let outcome = self.finish::<S>();
+                self.judge(f64::INFINITY);
+                self.renew(t);
+                return outcome;
+            }
             if cold {
                 cold = false;
                 continue;
@@ -303,10 +384,84 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             let change = if !P::PHYSICAL && (of_clock > change || of_clock.is_nan()) { of_clock } else { change };
             match sweeps.judge(change, 1.0) {
                 Progress::Going => {}
-                Progress::Done => return self.finish::<S>(),
+                Progress::Done => {
+                    let outcome = self.finish::<S>();
+                    self.judge(sweeps.first());
+                    if self.newton.is_some() && sweeps.count() > SLOW {
+                        self.renew(t);
+                    }
+                    return outcome;
+                }
+                Progress::Slow { .. } if self.holds::<S>() => return self.finish::<S>(),
                 refused => return refused,
             }
         }
+    }
+
+    /// Judges how well a step has resolved the motion, from how far its start was off what the step before foretold.
+    #[inline(always)]
+    fn judge(&mut self, first: f64) {
+        let resolved = first <= FORETOLD;
+        self.misfit = if resolved && self.fallen.abs() <= FALLEN { 0.0 } else { self.look(resolved) };
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn look(&self, resolved: bool) -> f64 {
+        let s = self.table.s;
+        let integral = (0..s).fold(0.0, |sum, j| sum + self.table.b.of(j) * self.rate.0[j] / self.rho.0[j]);
+        let moved = if P::PHYSICAL { &self.v } else { &self.extension.moved };
+        let of_motion = if resolved { 0.0 } else { self.tail.misfit(moved, &self.x, self.table.h) };
+        larger(of_motion, of_sigma(1.0 / (1.0 - self.fallen), integral))
+    }
+
+    /// Whether the stages satisfy their equations to round-off, though the velocities still change: where W is ill conditioned
+    /// they are determined no better.
+    #[cold]
+    #[inline(never)]
+    fn holds<S: Simd>(&self) -> bool {
+        let s = self.table.s;
+        // `start + hA rates` against what it should be, in units of its terms.
+        let holds = |start: f64, rates: &Stages, sums: &dyn Fn(usize) -> f64| {
+            let mut sum = Stages::ZERO;
+            self.table.a.apply(rates, s, &mut sum, |_| Lanes::<S>::splat(0.0));
+            (0..s).all(|i| {
+                let terms = (0..s).fold(start.abs(), |m, j| m + (self.table.a.0[j].0[i] * rates.0[j]).abs());
+                let off = start + sum.0[i] - sums(i);
+                off.abs() <= 8.0 * f64::EPSILON * larger(terms, sums(i).abs())
+            })
+        };
+        holds(1.0, &self.rate.map(|rate| -rate), &|i| self.rho.0[i])
+            && holds(self.z.value, &self.l, &|i| self.z_stages.0[i])
+            && (0..N).all(|d| holds(self.p[d].value, &self.force[d], &|i| self.rho.0[i] * self.l_v[d].0[i]))
+    }
+
+    /// The factors of the stages from their rates.
+    #[inline(always)]
+    fn factors<S: Simd>(&self) -> Stages {
+        let (s, mut rho) = (self.table.s, Stages::ZERO);
+        self.table.a.apply(&self.rate, s, &mut rho, |_| Lanes::<S>::splat(0.0));
+        for r in 0..blocks::<S>(s) {
+            rho.set(r, Lanes::splat(1.0) - rho.block::<S>(r));
+        }
+        rho
+    }
+
+    /// A sweep of Newton's method, in the place of [`sweep`](Self::sweep).
+    fn correct(&mut self, newton: &StageNewton<N>) -> (f64, f64) {
+        Arch::new().dispatch(CorrectStages {
+            newton,
+            table: &self.table,
+            start: (self.q.map(|q| q.value), self.p.map(|p| p.value), self.z.value),
+            l: &self.l,
+            l_v: &self.l_v,
+            force: &self.force,
+            rate: &self.rate,
+            v: &mut self.v,
+            z: &mut self.z_stages,
+            rho: &mut self.rho,
+            x: &mut self.x,
+        })
     }
 
     /// New velocities, positions, actions and factors of the stages; returns the largest change, each in units of the
@@ -372,6 +527,14 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         let moved = if P::PHYSICAL { &self.v } else { &self.extension.moved };
         let (b, s) = (&self.table.b, self.table.s);
         let (fallen, dz) = (b.sum::<S>(&self.rate, s), b.sum::<S>(&self.l, s));
+        let mut negative = Lanes::<S>::splat(f64::NEG_INFINITY);
+        for r in 0..blocks::<S>(s) {
+            negative = negative.max(-self.rho.block::<S>(r));
+        }
+        let rho = -negative.largest();
+        if rho <= 0.0 {
+            return Progress::StageFactor { rho };
+        }
         if fallen.head >= 1.0 {
             return Progress::SigmaVanished { sigma: 1.0 / (1.0 - fallen.head) };
         }

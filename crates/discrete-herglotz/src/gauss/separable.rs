@@ -5,12 +5,14 @@
 
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
+use super::resolution::{FORETOLD, Tail};
+use super::simplified::{SlopeNewton, mean};
 use super::stages::{Stages, blocks};
-use super::sweeps::{Progress, Sweeps};
+use super::sweeps::{Progress, SLOW, Sweeps};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
-use pulp::Simd;
+use contact_geom::{Lagrangian, VelocityPoint, largest};
+use pulp::{Arch, Simd};
 
 /// The state and the workspace of the condensed step.
 pub(super) struct Separable<'a, L, const N: usize> {
@@ -30,7 +32,16 @@ pub(super) struct Separable<'a, L, const N: usize> {
     x: [Stages; N],
     /// Whether `rest` belongs to the step before.
     warm: bool,
+    /// Corrects the sweeps where they do not contract by themselves.
+    pub newton: Option<Box<SlopeNewton<N>>>,
+    /// The same while it is not used.
+    parked: Option<Box<SlopeNewton<N>>>,
+    /// Whether the stages of the next step are solved, and `rest` is theirs.
+    solved: bool,
     /// Steps since the start, and the one at which the slope of the force is looked at again.
+    tail: Tail,
+    /// Above one where the last step has not resolved the motion.
+    pub misfit: f64,
     taken: usize,
     review: usize,
     pub evaluations: u64,
@@ -45,6 +56,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         start: &VelocityPoint<N>,
         wants_z: bool,
     ) -> Self {
+        let tail = Tail::new(table.s);
         Separable {
             lagrangian,
             table,
@@ -58,18 +70,66 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             a: [Stages::ZERO; N],
             x: [Stages::ZERO; N],
             warm: false,
+            newton: None,
+            parked: None,
+            solved: false,
+            tail,
+            misfit: 0.0,
             taken: 0,
             review: 1,
             evaluations: 0,
         }
     }
 
-    /// Goes on from another state, without what was carried.
-    pub fn restart(&mut self, state: &PhasePoint<N>, v: &SVector<f64, N>) {
-        self.q = std::array::from_fn(|i| state.q[i].into());
-        self.v = std::array::from_fn(|i| v[i].into());
-        self.z = state.z.into();
+    /// Has the sweeps corrected by Newton's method, with the second derivatives of L in q from now on; `false` where that is not
+    /// possible.
+    pub fn linearise(&mut self, qq: &SMatrix<f64, N, N>) -> bool {
+        if self.newton.is_none() {
+            let Some(left) = self.table.preconditioned(0.0) else { return false };
+            self.left = left;
+            self.newton = self.parked.take().or_else(|| Some(Box::new(SlopeNewton::new(&self.table))));
+            self.forget();
+        }
+        let slope = self.inverse_mass.map_or(*qq, |inverse| inverse * qq);
+        self.newton.as_mut().is_some_and(|newton| newton.factorise(&slope))
+    }
+
+    /// Takes the sweeps as they are again.
+    pub fn park_newton(&mut self) {
+        self.parked = self.newton.take();
+        self.adapt();
+    }
+
+    /// Guesses the next step to be a motion without forces.
+    pub fn forget(&mut self) {
+        self.rest = [Stages::ZERO; N];
         self.warm = false;
+    }
+
+    /// Has the next step taken from stages that are solved, by L's derivatives in q and the positions there.
+    pub fn accept(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, SVector<f64, N>)>) {
+        self.rest = [Stages::ZERO; N];
+        for (i, (force, q)) in stages.enumerate() {
+            let a = self.inverse_mass.map_or(force, |inverse| inverse * force);
+            for d in 0..N {
+                // Beyond the last stage it is repeated.
+                self.rest[d].0[i..].fill(a[d] + self.left.kappa * q[d]);
+            }
+        }
+        self.solved = true;
+    }
+
+    /// Takes Newton's Jacobian anew, as the mean over the stages of the last step.
+    #[cold]
+    #[inline(never)]
+    fn renew(&mut self, t: f64) {
+        let (_, mean) = mean(self.lagrangian, self.table.s, |i| {
+            let q = SVector::from_fn(|d, _| self.x[d].0[i]);
+            (t + self.table.times.0[i], VelocityPoint { q, v: SVector::zeros(), z: 0.0 })
+        });
+        if !self.linearise(&mean.qq) {
+            self.forget();
+        }
     }
 
     /// The accelerations at positions, one block of stages.
@@ -99,11 +159,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         let s = self.table.s;
         let m = blocks::<S>(s);
         let kappa = Lanes::<S>::splat(self.left.kappa);
-        if self.warm {
+        let solved = std::mem::take(&mut self.solved);
+        if self.warm && !solved {
             for d in 0..N {
                 let before = self.rest[d];
                 self.table.ahead.apply(&before, s, &mut self.rest[d], |_| Lanes::<S>::splat(0.0));
             }
+        }
+        if let Some(newton) = &mut self.newton {
+            newton.a = self.rest;
         }
         let mut sweeps = Sweeps::default();
         let outcome = loop {
@@ -125,17 +189,40 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
                 }
             }
             self.evaluations += s as u64;
-            match sweeps.judge(change.largest(), size.largest()) {
+            let (mut change, size) = (change.largest(), size.largest());
+            if solved {
+                break Progress::Done;
+            }
+            if let Some(newton) = &mut self.newton {
+                let moved;
+                (change, moved) = newton.correct(Arch::new(), &mut self.rest);
+                let position = largest(self.x.iter().flat_map(|x| &x.0[..s]).copied());
+                sweeps.still = moved <= 4.0 * f64::EPSILON * position;
+            }
+            match sweeps.judge(change, size) {
                 Progress::Going => {}
                 done => break done,
             }
         };
+        if let (Progress::Done, Some(_)) = (outcome, &self.newton) {
+            // Stiff forces magnify the round-off of the positions, and the correction takes it back.
+            self.a = self.rest;
+        }
         let outcome = if outcome == Progress::Done { self.finish::<S>(t) } else { outcome };
         self.warm = outcome == Progress::Done;
         if !self.warm {
             // What an iteration leaves that does not contract is worse than nothing.
             self.rest = [Stages::ZERO; N];
             return outcome;
+        }
+        let foretold = sweeps.first() <= FORETOLD && !solved;
+        let h = self.table.h;
+        self.misfit = if foretold { 0.0 } else { self.tail.misfit(&self.a, &self.x, h * h) };
+        if self.newton.is_some() {
+            if solved || sweeps.count() > SLOW {
+                self.renew(t);
+            }
+            return Progress::Done;
         }
         self.taken += 1;
         if self.taken == self.review {

@@ -16,6 +16,10 @@ pub(super) struct Stages(pub [f64; MOST]);
 impl Stages {
     pub const ZERO: Stages = Stages([0.0; MOST]);
 
+    pub fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        Stages(self.0.map(f))
+    }
+
     #[inline(always)]
     pub fn block<S: Simd>(&self, r: usize) -> Lanes<S> {
         Lanes(S::as_simd_f64s(&self.0).0[r])
@@ -51,6 +55,11 @@ pub(super) struct Weights {
 impl Weights {
     pub fn new(x: &Exact) -> Self {
         Weights { head: Stages(x.map(|w| w.0)), tail: Stages(x.map(|w| w.1)) }
+    }
+
+    /// The weight of a stage.
+    pub fn of(&self, j: usize) -> f64 {
+        self.head.0[j]
     }
 
     /// The weighted sum over the stages.
