@@ -50,7 +50,7 @@ impl Modes {
                 break;
             }
             // The left eigenvector has the same components with alternate signs, in an orthonormal basis.
-            let sign = |k: usize| Quad::from(if k % 2 == 0 { 1.0 } else { -1.0 });
+            let sign = |k: usize| Quad::from(if k.is_multiple_of(2) { 1.0 } else { -1.0 });
             let sum = |f: &dyn Fn(usize) -> Complex<Quad>| (0..s).fold(Complex::<Quad>::zero(), |sum, k| sum + f(k));
             let norm = sum(&|k| x[k] * x[k] * (sign(k) / Quad::from((2 * k + 1) as f64)));
             for j in 0..s {
@@ -139,7 +139,7 @@ fn eigenvector(s: usize, guess: Complex<f64>) -> (Complex<Quad>, [Complex<Quad>;
             x[k + 1] = (below - value * x[k]) / next;
             slope[k + 1] = (slope_below - x[k] - value * slope[k]) / next;
         }
-        value = value - x[s] / slope[s];
+        value -= x[s] / slope[s];
     }
     (value, x)
 }

@@ -456,7 +456,7 @@ impl<const N: usize> Beginning<N> {
         }
         // Rows of different units are no matter: |W^-1| |W| is 1 for every diagonal W.
         let condition = largest((inverse.abs() * w.abs()).column_sum().iter().copied());
-        if !(condition <= 0.1 / f64::EPSILON) {
+        if condition.is_nan() || condition > 0.1 / f64::EPSILON {
             return Err(InputError::FirstStep(StepError::Singular { pivot: 1.0 / condition }));
         }
         Ok(Beginning { start, structure, w, inverse })
