@@ -7,9 +7,9 @@ use super::coefficients::{Coefficients, MOST};
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::extension::{Extension, Pace, Values};
 use super::resolution::{FORETOLD, Tail, of_sigma};
-use super::simplified::{CorrectStages, StageNewton, mean};
+use super::simplified::{CorrectStages, StageNewton};
 use super::stages::{StageMap, Stages, Weights, blocks, padded};
-use super::sweeps::{Progress, SLOW, Sweeps};
+use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
@@ -99,6 +99,8 @@ pub(super) struct General<'a, L, P, const N: usize> {
     warm: bool,
     /// Corrects the sweeps where they do not contract by themselves.
     pub newton: Option<Box<StageNewton<N>>>,
+    /// The steps that Newton's Jacobian has served.
+    age: u32,
     tail: Tail,
     /// Above one where the last step has not resolved the motion, or its drag.
     pub misfit: f64,
@@ -139,6 +141,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             fallen: 0.0,
             warm: false,
             newton: None,
+            age: 0,
             tail,
             misfit: 0.0,
             parked: None,
@@ -184,15 +187,15 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         self.solved = true;
     }
 
-    /// Takes Newton's Jacobian anew, as the mean over the stages of the last step.
+    /// Takes Newton's Jacobian anew, at the middle stage of the last step.
     #[cold]
     #[inline(never)]
     fn renew(&mut self, t: f64) {
-        let (gradient, hessian) = mean(self.lagrangian, self.table.s, |i| {
-            let (q, v) = (SVector::from_fn(|d, _| self.x[d].0[i]), SVector::from_fn(|d, _| self.v[d].0[i]));
-            (t + self.table.times.0[i], VelocityPoint { q, v, z: self.z_stages.0[i] })
-        });
-        if !self.linearise(&gradient, &hessian) {
+        self.age = 0;
+        let i = self.table.s / 2;
+        let (q, v) = (SVector::from_fn(|d, _| self.x[d].0[i]), SVector::from_fn(|d, _| self.v[d].0[i]));
+        let (t, x) = (t + self.table.times.0[i], VelocityPoint { q, v, z: self.z_stages.0[i] });
+        if !self.linearise(&self.lagrangian.gradient(t, &x), &self.lagrangian.hessian(t, &x)) {
             self.warm = false;
         }
     }
@@ -373,7 +376,6 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             if solved {
                 let outcome = self.finish::<S>();
                 self.judge(f64::INFINITY);
-                self.renew(t);
                 return outcome;
             }
             if cold {
@@ -387,7 +389,8 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
                 Progress::Done => {
                     let outcome = self.finish::<S>();
                     self.judge(sweeps.first());
-                    if self.newton.is_some() && sweeps.count() > SLOW {
+                    self.age = self.age.saturating_add(1);
+                    if self.newton.is_some() && sweeps.count() > SLOW && self.age > AGE {
                         self.renew(t);
                     }
                     return outcome;

@@ -6,9 +6,9 @@
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
 use super::resolution::{FORETOLD, Tail};
-use super::simplified::{SlopeNewton, mean};
+use super::simplified::SlopeNewton;
 use super::stages::{Stages, blocks};
-use super::sweeps::{Progress, SLOW, Sweeps};
+use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, VelocityPoint, largest};
@@ -39,6 +39,8 @@ pub(super) struct Separable<'a, L, const N: usize> {
     /// Whether the stages of the next step are solved, and `rest` is theirs.
     solved: bool,
     /// Steps since the start, and the one at which the slope of the force is looked at again.
+    /// The steps that Newton's Jacobian has served.
+    age: u32,
     tail: Tail,
     /// Above one where the last step has not resolved the motion.
     pub misfit: f64,
@@ -73,6 +75,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             newton: None,
             parked: None,
             solved: false,
+            age: 0,
             tail,
             misfit: 0.0,
             taken: 0,
@@ -119,15 +122,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         self.solved = true;
     }
 
-    /// Takes Newton's Jacobian anew, as the mean over the stages of the last step.
+    /// Takes Newton's Jacobian anew, at the middle stage of the last step.
     #[cold]
     #[inline(never)]
     fn renew(&mut self, t: f64) {
-        let (_, mean) = mean(self.lagrangian, self.table.s, |i| {
-            let q = SVector::from_fn(|d, _| self.x[d].0[i]);
-            (t + self.table.times.0[i], VelocityPoint { q, v: SVector::zeros(), z: 0.0 })
-        });
-        if !self.linearise(&mean.qq) {
+        self.age = 0;
+        let i = self.table.s / 2;
+        let q = SVector::from_fn(|d, _| self.x[d].0[i]);
+        let x = VelocityPoint { q, v: SVector::zeros(), z: 0.0 };
+        let hessian = self.lagrangian.hessian(t + self.table.times.0[i], &x);
+        if !self.linearise(&hessian.qq) {
             self.forget();
         }
     }
@@ -219,7 +223,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         let h = self.table.h;
         self.misfit = if foretold { 0.0 } else { self.tail.misfit(&self.a, &self.x, h * h) };
         if self.newton.is_some() {
-            if solved || sweeps.count() > SLOW {
+            self.age = self.age.saturating_add(1);
+            if sweeps.count() > SLOW && self.age > AGE {
                 self.renew(t);
             }
             return Progress::Done;

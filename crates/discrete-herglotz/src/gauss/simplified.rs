@@ -6,14 +6,13 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use super::coefficients::{Coefficients, MOST};
 use super::condensed::Condensed;
 use super::general::Table;
 use super::modes::Modes;
 use super::stages::{Stages, blocks};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{Complex, SMatrix, SVector};
-use contact_geom::{Hessian, Lagrangian, Triple, VelocityPoint, larger};
+use contact_geom::{Hessian, Triple, larger};
 use pulp::{Arch, Simd, WithSimd};
 
 type Matrix<const N: usize> = SMatrix<Complex<f64>, N, N>;
@@ -269,31 +268,4 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
 /// Inverts a matrix in place; `false` where it is singular or not finite.
 fn invert<const N: usize>(m: &mut Matrix<N>) -> bool {
     m.iter().all(|e| e.is_finite()) && m.try_inverse_mut() && m.iter().all(|e| e.is_finite())
-}
-
-/// The mean of L's derivatives over the stages of a step, weighted as the step is.
-pub(super) fn mean<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
-    s: usize,
-    stage: impl Fn(usize) -> (f64, VelocityPoint<N>),
-) -> (Triple<N>, Hessian<N>) {
-    let b = &Coefficients::of(s).b;
-    let at = |j: usize| {
-        let ((t, x), b) = (stage(j), b[j].0);
-        let (g, m) = (lagrangian.gradient(t, &x).scale(b), lagrangian.hessian(t, &x));
-        let Hessian { qq, qv, vv, qz, vz, zz } = m;
-        (g, Hessian { qq: qq * b, qv: qv * b, vv: vv * b, qz: qz * b, vz: vz * b, zz: zz * b })
-    };
-    (1..s.min(MOST)).fold(at(0), |(g, m), j| {
-        let (plus, n) = at(j);
-        let sum = Hessian {
-            qq: m.qq + n.qq,
-            qv: m.qv + n.qv,
-            vv: m.vv + n.vv,
-            qz: m.qz + n.qz,
-            vz: m.vz + n.vz,
-            zz: m.zz + n.zz,
-        };
-        (g.plus(plus), sum)
-    })
 }

@@ -33,9 +33,12 @@ impl From<Progress> for StepError {
 /// The sweeps after which an iteration counts as not contracting.
 const LIMIT: u32 = 60;
 
-/// The sweeps of Newton's method after which its Jacobian is taken anew, at the stages that they have led to: twice the usual
-/// number.
-pub(super) const SLOW: u32 = 12;
+/// The sweeps of Newton's method above which its Jacobian is taken anew: three times the usual number.
+pub(super) const SLOW: u32 = 18;
+
+/// The steps that a Jacobian serves at the least, unless one is refused: second derivatives by dual numbers cost as much as ten
+/// steps.
+pub(super) const AGE: u32 = 16;
 
 /// The changes of the sweeps of one step.
 ///
