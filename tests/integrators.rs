@@ -14,4 +14,5 @@ mod conformal_steppers;
 mod dense_output;
 mod gauss;
 mod gauss_catalogue;
+mod gauss_stress;
 mod scenes;

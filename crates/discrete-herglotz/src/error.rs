@@ -141,6 +141,15 @@ pub enum StepError {
         /// The value of sigma_d.
         sigma: f64,
     },
+    /// A stage of a collocation step has an integrating factor that is not positive: the step is not conformally contact.
+    #[error(
+        "the integrating factor of a stage is {rho}, where it must be positive: the step is too long for the rate L_z of the \
+         conformal factor; take a smaller step or more stages"
+    )]
+    StageFactor {
+        /// The smallest factor of a stage, 1 at the start of the step.
+        rho: f64,
+    },
     /// The exact motion of a step is not defined up to the step's end.
     #[error("the motion is defined only until t = {t}; take a smaller step")]
     OutsideDomain {

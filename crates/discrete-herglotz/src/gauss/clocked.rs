@@ -1,11 +1,12 @@
 //! Runs of contact Gauss collocation in the time of a clock.
 
 use super::Gauss;
+use super::beginning::Beginning;
 use super::extension::{Extension, Fictitious, Values};
-use super::general::{General, Mass, Table};
-use super::stepper::Beginning;
+use super::general::{General, Mass};
 use super::sweeps::Progress;
-use crate::{Halt, ITERATION_LIMIT, InputError, StepError, Stepper};
+use super::table::Table;
+use crate::{Halt, ITERATION_LIMIT, InputError, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Clock, Lagrangian, PhasePoint};
 use pulp::{Arch, Simd, WithSimd};
@@ -39,6 +40,8 @@ pub struct ClockedStepper<'a, L, C, const N: usize> {
     general: Box<General<'a, L, Fictitious<C>, N>>,
     arch: Arch,
     h: f64,
+    taken: usize,
+    suspicion: Option<Suspicion>,
 }
 
 impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C, N> {
@@ -62,7 +65,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         let extension = Extension::new(Fictitious(clock), t0, -energy);
         let (table, mass) = (Table::new(gauss.stages(), h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, &state, &start.v));
-        Ok(ClockedStepper { general, arch: Arch::new(), h })
+        Ok(ClockedStepper { general, arch: Arch::new(), h, taken: 0, suspicion: None })
     }
 
     /// The momentum `p_t` of the time, minus the energy but for the method's error: `E + p_t = K / g`. It is contracted as every
@@ -121,13 +124,15 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
     }
 
     fn step(&mut self) -> Result<(), StepError> {
-        self.arch.dispatch(Advance { general: &mut *self.general, steps: 1 }).map_err(|halt| halt.cause)
+        self.advance(1).map_err(|halt| halt.cause)
     }
 }
 
 /// Steps in the lanes of one instruction set; ends at a step that cannot be taken.
 struct Advance<'b, 'a, L, C, const N: usize> {
     general: &'b mut General<'a, L, Fictitious<C>, N>,
+    suspicion: &'b mut Option<Suspicion>,
+    taken: &'b mut usize,
     steps: usize,
 }
 
@@ -139,13 +144,14 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for Advance<'_, '_,
         for taken in 0..self.steps {
             // L does not depend on it.
             let t = self.general.extension.t.value;
-            let cause = match self.general.step::<S>(t) {
-                Progress::Done => continue,
-                Progress::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
-                Progress::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
-                _ => StepError::NonFinite,
-            };
-            return Err(Halt { taken, cause });
+            let progress = self.general.step::<S>(t);
+            if progress != Progress::Done {
+                return Err(Halt { taken, cause: progress.into() });
+            }
+            if self.general.misfit > 1.0 && self.suspicion.is_none() {
+                *self.suspicion = Some(Suspicion { step: *self.taken, misfit: self.general.misfit });
+            }
+            *self.taken += 1;
         }
         Ok(())
     }
@@ -154,7 +160,8 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for Advance<'_, '_,
 impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedStepper<'_, L, C, N> {
     /// The steps are equal in the clock's time.
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
-        self.arch.dispatch(Advance { general: &mut *self.general, steps })
+        let ClockedStepper { general, taken, suspicion, .. } = self;
+        self.arch.dispatch(Advance { general: &mut **general, suspicion, taken, steps })
     }
 
     fn state(&self) -> PhasePoint<N> {
@@ -173,5 +180,9 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
 
     fn evaluations(&self) -> u64 {
         self.general.evaluations
+    }
+
+    fn suspicion(&self) -> Option<Suspicion> {
+        self.suspicion
     }
 }

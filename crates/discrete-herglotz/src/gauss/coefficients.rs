@@ -25,7 +25,7 @@ pub(crate) struct Coefficients {
 }
 
 /// The Legendre polynomials `P_0(x) .. P_s(x)` on `[-1, 1]`.
-fn legendre(s: usize, x: Quad) -> [Quad; MOST + 1] {
+pub(super) fn legendre(s: usize, x: Quad) -> [Quad; MOST + 1] {
     let mut p = [Quad::one(); MOST + 1];
     p[1] = x;
     for k in 1..s {

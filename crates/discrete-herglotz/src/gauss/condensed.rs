@@ -3,7 +3,7 @@
 use super::coefficients::{Coefficients, MOST};
 use super::compensated::{Twofold, exact_sum};
 use super::stages::{Exact, StageMap, Stages, Weights, padded, solve_exactly};
-use crate::InputError;
+use crate::{InputError, StepError};
 use num_traits::{One, Zero};
 use pulp::{Arch, Simd, WithSimd};
 use qd::Quad;
@@ -51,8 +51,8 @@ pub(super) struct ExactEnd {
 
 impl Condensed {
     /// # Errors
-    /// [`InputError::Sigma`] where a stage of the integrating factor, or its end, is not positive: the step is too long for
-    /// this rate.
+    /// [`StepError::StageFactor`] and [`InputError::Sigma`] where a stage of the integrating factor, or its end, is not
+    /// positive: the step is too long for this rate.
     pub fn new(s: usize, h: f64, gamma: f64) -> Result<Self, InputError> {
         let g = Coefficients::of(s);
         let (one, zero, step, rate) = (Quad::one(), Quad::zero(), Quad::from(h), Quad::from(gamma));
@@ -70,10 +70,12 @@ impl Condensed {
         let sum = |f: &dyn Fn(usize) -> Quad| (0..s).fold(zero, |sum, j| sum + f(j));
         let fallen = step * rate * sum(&|j| g.b[j] * rho[j]);
         let end_rho = one - fallen;
-        let least = rho.iter().map(|r| r.0).fold(end_rho.0, f64::min);
         // Not `<= 0`: that would let a NaN pass.
-        if !(least > 0.0 && least.is_finite()) {
-            return Err(InputError::Sigma { sigma: 1.0 / least });
+        if let Some(rho) = rho[..s].iter().map(|rho| rho.0).find(|rho| !(*rho > 0.0 && rho.is_finite())) {
+            return Err(InputError::FirstStep(StepError::StageFactor { rho }));
+        }
+        if !(end_rho.0 > 0.0 && end_rho.0.is_finite()) {
+            return Err(InputError::Sigma { sigma: 1.0 / end_rho.0 });
         }
         let velocity: [Exact; MOST] = from_fn(|i| from_fn(|j| step * g.a[i][j] * rho[j] / rho[i]));
         let b = from_fn(|i| from_fn(|k| step * sum(&|j| g.a[i][j] * velocity[j][k])));
@@ -213,7 +215,7 @@ pub(super) struct Preconditioned {
     pub kappa: f64,
     pub head: Left,
     /// What the rounding of the head leaves out, found by [`refine`](Self::refine).
-    pub tail: Option<Box<Left>>,
+    pub tail: Option<Left>,
 }
 
 impl Preconditioned {
@@ -232,11 +234,11 @@ struct LeftOut<'a> {
 }
 
 impl WithSimd for LeftOut<'_> {
-    type Output = Box<Left>;
+    type Output = Left;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
-        Box::new(self.table.left_out(self.left))
+    fn with_simd<S: Simd>(self, _simd: S) -> Left {
+        self.table.left_out(self.left)
     }
 }
 

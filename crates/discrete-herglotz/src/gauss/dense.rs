@@ -6,7 +6,7 @@
 use super::coefficients::{Coefficients, MOST};
 use super::condensed::Condensed;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, PhasePoint, Triple, linear};
+use contact_geom::{Lagrangian, PhasePoint, linear};
 use std::array::from_fn;
 
 /// The state at the start of a step as a route holds it: momenta, or velocities in the condensed routes.
@@ -28,19 +28,6 @@ pub(super) struct Solved<const N: usize> {
 impl<const N: usize> Solved<N> {
     pub const ZERO: Self = Solved { v: [[0.0; MOST]; N], force: [[0.0; MOST]; N], rate: [0.0; MOST], l: [0.0; MOST] };
 
-    /// From L with its gradient at the stages, their velocities and factors.
-    pub fn from_gradients(v: &[SVector<f64, N>], rho: &[f64], l: &[Dual<f64, Triple<N>>]) -> Self {
-        let mut solved = Self::ZERO;
-        for (i, ((v, rho), l)) in v.iter().zip(rho).zip(l).enumerate() {
-            for d in 0..N {
-                solved.v[d][i] = v[d];
-                solved.force[d][i] = rho * l.d.x[d];
-            }
-            solved.rate[i] = rho * l.d.z;
-            solved.l[i] = l.re;
-        }
-        solved
-    }
     /// From the accelerations of a condensed step.
     pub fn from_accelerations(
         lagrangian: &impl Lagrangian<N>,

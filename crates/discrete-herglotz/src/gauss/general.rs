@@ -3,70 +3,25 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use super::coefficients::{Coefficients, MOST};
+use super::coefficients::MOST;
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::dense::Solved;
 use super::extension::{Extension, Pace, Values};
-use super::stages::{StageMap, Stages, blocks, padded};
-use super::sweeps::{Progress, Sweeps};
+use super::resolution::{FORETOLD, Tail, of_sigma};
+use super::simplified::{CorrectStages, StageNewton};
+use super::stages::{Stages, blocks};
+use super::sweeps::{AGE, Progress, SLOW, Sweeps};
+use super::table::Table;
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{KernelDual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, linear};
-use pulp::Simd;
-use qd::Quad;
+use contact_geom::{
+    Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint, larger, linear,
+};
+use pulp::{Arch, Simd};
 use std::array::from_fn;
-use std::cmp::Ordering;
 
-/// The coefficients of a step: `h a_ij = m_ij h b_j`.
-///
-/// What multiplies in every step acts in the same direction in every step, and so the rounding of `h a_ij` and `h b_j` would make
-/// the energy drift. But the method is symplectic with any weights where `m_ij + m_ji = 1`, and this numbers of 53 digits
-/// can satisfy exactly: stages take `M (h b f)`, the end the sum of the same `h b f`. See Antonana, Makazaga and Murua,
-/// "Reducing and monitoring round-off error propagation for symplectic implicit Runge-Kutta schemes", Numer. Algorithms 76 (2017).
-pub(super) struct Table {
-    pub s: usize,
-    /// `M`.
-    pub m: StageMap,
-    /// `h b`, 0 beyond the last stage.
-    pub weights: Stages,
-    /// The times of the stages after the step's start.
-    pub times: Stages,
-    /// From the stages of one step to those of the next, and the same for what is multiplied with the weights.
-    pub ahead: StageMap,
-    pub ahead_weighted: StageMap,
-}
-
-impl Table {
-    pub fn new(s: usize, h: f64) -> Self {
-        let (g, step) = (Coefficients::of(s), Quad::from(h));
-        let mut weights = from_fn(|j| if j < s { (step * g.b[j]).0 } else { 0.0 });
-        if s > 2 {
-            // The sum is h to the last digit of the smallest.
-            let inner = weights[1..s - 1].iter().fold(Quad::from(0.0), |sum, w| sum + Quad::from(*w));
-            weights[0] = (Quad::from(0.5) * (step - inner)).0;
-            weights[s - 1] = weights[0];
-        }
-        // From the transposed where it is the larger, about 1: the difference is exact.
-        let ratio = |i: usize, j: usize| (g.a[i][j] / g.b[j]).0;
-        let entry = |i: usize, j: usize| match i.cmp(&j) {
-            _ if i.max(j) >= s => 0.0,
-            Ordering::Less => 1.0 - ratio(j, i),
-            Ordering::Equal => 0.5,
-            Ordering::Greater => ratio(i, j),
-        };
-        let weighted = |i: usize, j: usize| {
-            if i.max(j) < s { g.b[i].0 * g.ahead[i][j] / g.b[j].0 } else { 0.0 }
-        };
-        Table {
-            s,
-            m: StageMap::new(&from_fn(|i| from_fn(|j| entry(i, j))), s),
-            weights: Stages(weights),
-            times: padded(&g.c.map(|c| step * c), s),
-            ahead: StageMap::new(&g.ahead, s),
-            ahead_weighted: StageMap::new(&from_fn(|i| from_fn(|j| weighted(i, j))), s),
-        }
-    }
-}
+/// The change of the integrating factor in a step from which on it is compared with the drag's integral.
+const FALLEN: f64 = 0.2;
 
 /// How velocities are found from momenta.
 pub(super) enum Mass<const N: usize> {
@@ -122,6 +77,17 @@ pub(super) struct General<'a, L, P, const N: usize> {
     /// `1 - rho` at the end of the last step.
     pub fallen: f64,
     warm: bool,
+    /// Corrects the sweeps where they do not contract by themselves.
+    pub newton: Option<Box<StageNewton<N>>>,
+    /// The steps that Newton's Jacobian has served.
+    age: u32,
+    tail: Tail,
+    /// Above one where the last step has not resolved the motion, or its drag.
+    pub misfit: f64,
+    /// The same while it is not used.
+    parked: Option<Box<StageNewton<N>>>,
+    /// Whether the stages of the next step are solved: v, l and falling are theirs.
+    solved: bool,
     pub evaluations: u64,
 }
 
@@ -135,6 +101,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         state: &PhasePoint<N>,
         v: &SVector<f64, N>,
     ) -> Self {
+        let tail = Tail::new(table.s);
         let mut general = General {
             lagrangian,
             extension,
@@ -154,20 +121,65 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             x: [Stages::ZERO; N],
             fallen: 0.0,
             warm: false,
+            newton: None,
+            age: 0,
+            tail,
+            misfit: 0.0,
+            parked: None,
+            solved: false,
             evaluations: 0,
         };
-        general.restart(state, v, 0.0);
+        general.q = from_fn(|i| state.q[i].into());
+        general.p = from_fn(|i| state.p[i].into());
+        general.z = state.z.into();
+        general.guess(v);
         general
     }
 
-    /// Goes on from another state with its velocity, without what was carried; `fallen` belongs to the step that led there.
-    pub fn restart(&mut self, state: &PhasePoint<N>, v: &SVector<f64, N>, fallen: f64) {
-        self.q = from_fn(|i| state.q[i].into());
-        self.p = from_fn(|i| state.p[i].into());
-        self.z = state.z.into();
+    /// Guesses the next step to be a motion of constant velocity.
+    pub fn guess(&mut self, v: &SVector<f64, N>) {
         self.v = from_fn(|i| Stages([v[i]; MOST]));
-        self.fallen = fallen;
         self.warm = false;
+    }
+
+    /// Has the sweeps corrected by Newton's method, with these derivatives of L from now on; `false` where that is not possible.
+    pub fn linearise(&mut self, gradient: &Triple<N>, hessian: &Hessian<N>) -> bool {
+        if self.newton.is_none() {
+            self.newton = self.parked.take().or_else(|| Some(Box::new(StageNewton::new(&self.table))));
+        }
+        self.newton.as_mut().is_some_and(|newton| newton.factorise(gradient, hessian))
+    }
+
+    /// Takes the sweeps as they are again.
+    pub fn park_newton(&mut self) {
+        self.parked = self.newton.take();
+    }
+
+    /// Has the next step taken from stages that are solved: their velocities, actions' rates and factors.
+    pub fn accept(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, f64, f64)>) {
+        self.l = Stages::ZERO;
+        for (i, (v, l, rho)) in stages.enumerate() {
+            // Beyond the last stage it is repeated.
+            for d in 0..N {
+                self.v[d].0[i..].fill(v[d]);
+            }
+            self.l.0[i] = self.table.weights.0[i] * l;
+            self.falling.0[i..].fill(1.0 - rho);
+        }
+        self.solved = true;
+    }
+
+    /// Takes Newton's Jacobian anew, at the middle stage of the last step.
+    #[cold]
+    #[inline(never)]
+    fn renew(&mut self, t: f64) {
+        self.age = 0;
+        let i = self.table.s / 2;
+        let (q, v) = (SVector::from_fn(|d, _| self.x[d].0[i]), SVector::from_fn(|d, _| self.v[d].0[i]));
+        let (t, x) = (t + self.table.times.0[i], VelocityPoint { q, v, z: self.z_stages.0[i] });
+        if !self.linearise(&self.lagrangian.gradient(t, &x), &self.lagrangian.hessian(t, &x)) {
+            self.warm = false;
+        }
     }
 
     pub fn values(&self) -> Values<N> {
@@ -313,11 +325,15 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
     pub fn step<S: Simd>(&mut self, t: f64) -> Progress {
+        let solved = std::mem::take(&mut self.solved);
         // Without a step before, from a motion of constant velocity.
-        let mut cold = !self.warm;
-        if self.warm {
+        let mut cold = !self.warm || self.newton.is_some();
+        if self.warm && !solved {
             self.carry::<S>();
-        } else {
+            if self.newton.is_some() {
+                self.table.m.apply(&self.rate, self.table.s, &mut self.falling, |_| Lanes::<S>::splat(0.0));
+            }
+        } else if !solved {
             self.l = Stages::ZERO;
             self.falling = Stages::ZERO;
             if !P::PHYSICAL {
@@ -332,8 +348,22 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         let mut sweeps = Sweeps::default();
         // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
         loop {
-            let change = if cold { f64::INFINITY } else { self.sweep::<S>() };
+            let change = if cold || solved {
+                f64::INFINITY
+            } else if let Some(newton) = self.newton.take() {
+                let (change, moved) = self.correct(&newton);
+                self.newton = Some(newton);
+                sweeps.still = moved <= 4.0 * f64::EPSILON;
+                change
+            } else {
+                self.sweep::<S>()
+            };
             let of_clock = self.evaluate::<S>(t);
+            if solved {
+                let outcome = self.finish::<S>();
+                self.judge(f64::INFINITY);
+                return outcome;
+            }
             if cold {
                 cold = false;
                 continue;
@@ -342,10 +372,80 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             let change = if !P::PHYSICAL && (of_clock > change || of_clock.is_nan()) { of_clock } else { change };
             match sweeps.judge(change, 1.0) {
                 Progress::Going => {}
-                Progress::Done => return self.finish::<S>(),
+                Progress::Done => {
+                    let outcome = self.finish::<S>();
+                    self.judge(sweeps.first());
+                    self.age = self.age.saturating_add(1);
+                    if self.newton.is_some() && sweeps.count() > SLOW && self.age > AGE {
+                        self.renew(t);
+                    }
+                    return outcome;
+                }
+                Progress::Slow { .. } if self.holds::<S>() => return self.finish::<S>(),
                 refused => return refused,
             }
         }
+    }
+
+    /// Judges how well a step has resolved the motion, from how far its start was off what the step before foretold.
+    #[inline(always)]
+    fn judge(&mut self, first: f64) {
+        let resolved = first <= FORETOLD;
+        self.misfit = if resolved && self.fallen.abs() <= FALLEN { 0.0 } else { self.look(resolved) };
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn look(&self, resolved: bool) -> f64 {
+        let s = self.table.s;
+        let integral = (0..s).fold(0.0, |sum, j| sum + self.rate.0[j] / (1.0 - self.falling.0[j]));
+        let of_motion = if resolved {
+            0.0
+        } else {
+            let values = from_fn::<_, N, _>(|d| Stages(self.unweighted(&self.moved[d])));
+            self.tail.misfit(&values, &self.x, self.table.h)
+        };
+        larger(of_motion, of_sigma(1.0 / (1.0 - self.fallen), integral))
+    }
+
+    /// Whether the stages satisfy their equations to round-off, though the velocities still change: where W is ill conditioned
+    /// they are determined no better.
+    #[cold]
+    #[inline(never)]
+    fn holds<S: Simd>(&self) -> bool {
+        let s = self.table.s;
+        // `start + M rates` against what it should be, in units of its terms.
+        let holds = |start: f64, rates: &Stages, sums: &dyn Fn(usize) -> f64| {
+            let mut sum = Stages::ZERO;
+            self.table.m.apply(rates, s, &mut sum, |_| Lanes::<S>::splat(0.0));
+            (0..s).all(|i| {
+                let terms = (0..s).fold(start.abs(), |m, j| m + (self.table.m.0[j].0[i] * rates.0[j]).abs());
+                let off = start + sum.0[i] - sums(i);
+                off.abs() <= 8.0 * f64::EPSILON * larger(terms, sums(i).abs())
+            })
+        };
+        let rho = self.falling.map(|falling| 1.0 - falling);
+        holds(1.0, &self.rate.map(|rate| -rate), &|i| rho.0[i])
+            && holds(self.z.value, &self.l, &|i| self.z_stages.0[i])
+            && (0..N).all(|d| holds(self.p[d].value, &self.force[d], &|i| rho.0[i] * self.l_v[d].0[i]))
+    }
+
+    /// A sweep of Newton's method, in the place of [`sweep`](Self::sweep).
+    fn correct(&mut self, newton: &StageNewton<N>) -> (f64, f64) {
+        Arch::new().dispatch(CorrectStages {
+            newton,
+            table: &self.table,
+            start: (self.q.map(|q| q.value), self.p.map(|p| p.value), self.z.value),
+            l_v: &self.l_v,
+            l: &self.l,
+            force: &self.force,
+            rate: &self.rate,
+            v: &mut self.v,
+            z: &mut self.z_stages,
+            falling: &mut self.falling,
+            moved: &mut self.moved,
+            x: &mut self.x,
+        })
     }
 
     /// New velocities, positions, actions and factors of the stages; returns the largest change, each in units of the
@@ -412,6 +512,14 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         }
         let s = self.table.s;
         let (fallen, dz) = (self.rate.sum::<S>(s), self.l.sum::<S>(s));
+        let mut deepest = Lanes::<S>::splat(f64::NEG_INFINITY);
+        for r in 0..blocks::<S>(s) {
+            deepest = deepest.max(self.falling.block::<S>(r));
+        }
+        let rho = 1.0 - deepest.largest();
+        if rho <= 0.0 {
+            return Progress::StageFactor { rho };
+        }
         if fallen >= 1.0 {
             return Progress::SigmaVanished { sigma: 1.0 / (1.0 - fallen) };
         }
@@ -451,13 +559,16 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
 
     /// The stages of the last step, for dense output.
     pub fn solved(&self) -> Solved<N> {
-        let (s, weights) = (self.table.s, &self.table.weights.0);
-        let unweighted = |x: &Stages| from_fn(|i| if i < s { x.0[i] / weights[i] } else { 0.0 });
         Solved {
             v: self.v.map(|v| v.0),
-            force: from_fn(|d| unweighted(&self.force[d])),
-            rate: unweighted(&self.rate),
-            l: unweighted(&self.l),
+            force: from_fn(|d| self.unweighted(&self.force[d])),
+            rate: self.unweighted(&self.rate),
+            l: self.unweighted(&self.l),
         }
+    }
+
+    /// What was multiplied with the weights, with 0 beyond the last stage.
+    fn unweighted(&self, x: &Stages) -> [f64; MOST] {
+        from_fn(|i| if i < self.table.s { x.0[i] / self.table.weights.0[i] } else { 0.0 })
     }
 }

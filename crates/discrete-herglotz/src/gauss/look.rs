@@ -5,10 +5,11 @@
 
 use super::coefficients::{Coefficients, MOST, lagrange_rows};
 use super::condensed::Condensed;
+use super::dense::Solved;
 use super::stages::{StageMap, Stages, blocks};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
+use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use pulp::{Simd, WithSimd};
 use std::sync::OnceLock;
 
@@ -55,18 +56,10 @@ impl<const N: usize> Curve<N> {
         }
     }
 
-    /// From L with its gradient at the stages, their velocities and factors.
-    pub fn of_gradients(&mut self, v: &[SVector<f64, N>], rho: &[f64], l: &[Dual<f64, Triple<N>>], with_action: bool) {
-        let mut action = Stages::ZERO;
-        for (i, ((v, rho), l)) in v.iter().zip(rho).zip(l).enumerate() {
-            for d in 0..N {
-                self.v[d].0[i] = v[d];
-                self.force[d].0[i] = rho * l.d.x[d];
-            }
-            self.rate.0[i] = rho * l.d.z;
-            action.0[i] = l.re;
-        }
-        self.l = with_action.then_some(action);
+    /// From the stages of a general step.
+    pub fn of_solved(&mut self, solved: &Solved<N>) {
+        (self.v, self.force) = (solved.v.map(Stages), solved.force.map(Stages));
+        (self.rate, self.l) = (Stages(solved.rate), Some(Stages(solved.l)));
     }
 
     /// From the accelerations of a condensed step that began with the velocity v0.

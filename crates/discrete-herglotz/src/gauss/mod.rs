@@ -1,5 +1,6 @@
 //! Contact Gauss collocation.
 
+mod beginning;
 mod clocked;
 pub(crate) mod coefficients;
 mod compensated;
@@ -9,16 +10,20 @@ mod extension;
 mod general;
 mod linear;
 mod look;
+mod modes;
+mod resolution;
 mod separable;
+mod simplified;
 mod stage_equations;
 mod stages;
 mod stepper;
 mod sweeps;
+mod table;
 
+pub(crate) use beginning::velocity;
 pub use clocked::ClockedStepper;
 pub use dense::DenseStep;
 pub(crate) use look::SETS;
-pub(crate) use stepper::velocity;
 pub use stepper::{GaussRoute, GaussStepper};
 
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};

@@ -5,12 +5,14 @@
 
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
+use super::resolution::{FORETOLD, Tail};
+use super::simplified::SlopeNewton;
 use super::stages::{Stages, blocks};
-use super::sweeps::{Progress, Sweeps};
+use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
-use pulp::Simd;
+use contact_geom::{Lagrangian, VelocityPoint, largest};
+use pulp::{Arch, Simd};
 
 /// The steps after which a matrix is expected to last.
 const LASTING: usize = 32;
@@ -35,6 +37,17 @@ pub(super) struct Separable<'a, L, const N: usize> {
     base: [Stages; N],
     /// Whether `rest` belongs to the step before.
     warm: bool,
+    /// Corrects the sweeps where they do not contract by themselves.
+    pub newton: Option<Box<SlopeNewton<N>>>,
+    /// The same while it is not used.
+    parked: Option<Box<SlopeNewton<N>>>,
+    /// Whether the stages of the next step are solved, and `rest` is theirs.
+    solved: bool,
+    /// The steps that Newton's Jacobian has served.
+    age: u32,
+    tail: Tail,
+    /// Above one where the last step has not resolved the motion.
+    pub misfit: f64,
     /// Steps since the start, and the one at which the slope of the force is looked at again.
     taken: usize,
     review: usize,
@@ -50,6 +63,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         start: &VelocityPoint<N>,
         wants_z: bool,
     ) -> Self {
+        let tail = Tail::new(table.s);
         Separable {
             lagrangian,
             table,
@@ -64,18 +78,69 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             x: [Stages::ZERO; N],
             base: [Stages::ZERO; N],
             warm: false,
+            newton: None,
+            parked: None,
+            solved: false,
+            age: 0,
+            tail,
+            misfit: 0.0,
             taken: 0,
             review: 1,
             evaluations: 0,
         }
     }
 
-    /// Goes on from another state, without what was carried.
-    pub fn restart(&mut self, state: &PhasePoint<N>, v: &SVector<f64, N>) {
-        self.q = std::array::from_fn(|i| state.q[i].into());
-        self.v = std::array::from_fn(|i| v[i].into());
-        self.z = state.z.into();
+    /// Has the sweeps corrected by Newton's method, with the second derivatives of L in q from now on; `false` where that is not
+    /// possible.
+    pub fn linearise(&mut self, qq: &SMatrix<f64, N, N>) -> bool {
+        if self.newton.is_none() {
+            let Some(mut left) = self.table.preconditioned(0.0) else { return false };
+            left.refine(&self.table);
+            self.left = left;
+            self.newton = self.parked.take().or_else(|| Some(Box::new(SlopeNewton::new(&self.table))));
+            self.forget();
+        }
+        let slope = self.inverse_mass.map_or(*qq, |inverse| inverse * qq);
+        self.newton.as_mut().is_some_and(|newton| newton.factorise(&slope))
+    }
+
+    /// Takes the sweeps as they are again.
+    pub fn park_newton(&mut self) {
+        self.parked = self.newton.take();
+        self.look_again();
+    }
+
+    /// Guesses the next step to be a motion without forces.
+    pub fn forget(&mut self) {
+        self.rest = [Stages::ZERO; N];
         self.warm = false;
+    }
+
+    /// Has the next step taken from stages that are solved, by L's derivatives in q and the positions there.
+    pub fn accept(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, SVector<f64, N>)>) {
+        self.rest = [Stages::ZERO; N];
+        for (i, (force, q)) in stages.enumerate() {
+            let a = self.inverse_mass.map_or(force, |inverse| inverse * force);
+            for d in 0..N {
+                // Beyond the last stage it is repeated.
+                self.rest[d].0[i..].fill(a[d] + self.left.kappa * q[d]);
+            }
+        }
+        self.solved = true;
+    }
+
+    /// Takes Newton's Jacobian anew, at the middle stage of the last step.
+    #[cold]
+    #[inline(never)]
+    fn renew(&mut self, t: f64) {
+        self.age = 0;
+        let i = self.table.s / 2;
+        let q = SVector::from_fn(|d, _| self.x[d].0[i]);
+        let x = VelocityPoint { q, v: SVector::zeros(), z: 0.0 };
+        let hessian = self.lagrangian.hessian(t + self.table.times.0[i], &x);
+        if !self.linearise(&hessian.qq) {
+            self.forget();
+        }
     }
 
     /// The accelerations at positions, one block of stages.
@@ -105,15 +170,22 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         let s = self.table.s;
         let m = blocks::<S>(s);
         let kappa = Lanes::<S>::splat(self.left.kappa);
-        if self.warm {
+        let solved = std::mem::take(&mut self.solved);
+        if self.warm && !solved {
             for d in 0..N {
                 let before = self.rest[d];
                 self.table.ahead.apply(&before, s, &mut self.rest[d], |_| Lanes::<S>::splat(0.0));
             }
         }
-        self.begin::<S>();
+        if let Some(newton) = &mut self.newton {
+            newton.a = self.rest;
+        }
         let mut sweeps = Sweeps::default();
         let outcome = loop {
+            // Where Newton's method is needed the guess may be too far off for the tails of the matrices.
+            if sweeps.count() == 0 || self.newton.is_some() {
+                self.begin::<S>();
+            }
             for d in 0..N {
                 let base = &self.base[d];
                 self.left.head.b.apply(&self.rest[d], s, &mut self.x[d], |r| base.block::<S>(r));
@@ -131,11 +203,25 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
                 }
             }
             self.evaluations += s as u64;
-            match sweeps.judge(change.largest(), size.largest()) {
+            let (mut change, size) = (change.largest(), size.largest());
+            if solved {
+                break Progress::Done;
+            }
+            if let Some(newton) = &mut self.newton {
+                let moved;
+                (change, moved) = newton.correct(Arch::new(), &mut self.rest);
+                let position = largest(self.x.iter().flat_map(|x| &x.0[..s]).copied());
+                sweeps.still = moved <= 4.0 * f64::EPSILON * position;
+            }
+            match sweeps.judge(change, size) {
                 Progress::Going => {}
                 done => break done,
             }
         };
+        if let (Progress::Done, Some(_)) = (outcome, &self.newton) {
+            // Stiff forces magnify the round-off of the positions, and the correction takes it back.
+            self.a = self.rest;
+        }
         let outcome = if outcome == Progress::Done { self.finish::<S>(t) } else { outcome };
         self.warm = outcome == Progress::Done;
         if !self.warm {
@@ -143,18 +229,34 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             self.rest = [Stages::ZERO; N];
             return outcome;
         }
+        let foretold = sweeps.first() <= FORETOLD && !solved;
+        let h = self.table.h;
+        self.misfit = if foretold { 0.0 } else { self.tail.misfit(&self.a, &self.x, h * h) };
+        if self.newton.is_some() {
+            self.age = self.age.saturating_add(1);
+            if sweeps.count() > SLOW && self.age > AGE {
+                self.renew(t);
+            }
+            return Progress::Done;
+        }
         self.taken += 1;
         if self.taken == self.review {
             self.review *= 2;
-            self.adapt();
-            if self.taken >= LASTING {
-                self.left.refine(&self.table);
-            }
+            self.look_again();
         }
         Progress::Done
     }
 
-    /// What the sweeps of a step have in common. The tails of the matrices act on the guess: it is near enough for them.
+    /// Looks at the slope of the force, and refines matrices that last.
+    fn look_again(&mut self) {
+        self.adapt();
+        if self.taken >= LASTING {
+            self.left.refine(&self.table);
+        }
+    }
+
+    /// What the positions begin with. The tails of the matrices act on the accelerations so far: they are near enough for them, and
+    /// so the sweeps of a step have this in common.
     #[inline(always)]
     fn begin<S: Simd>(&mut self) {
         let (head, s) = (&self.left.head, self.table.s);

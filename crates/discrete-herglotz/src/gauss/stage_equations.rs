@@ -1,9 +1,10 @@
 //! The stage equations of contact Gauss collocation, with their Jacobian: for Newton's method, and for the discrete Lagrangian.
 
 use super::coefficients::{Coefficients, MOST};
-use crate::{ITERATION_LIMIT, StepError, last_correction};
+use crate::solver::DenseLu;
+use crate::{ITERATION_LIMIT, StepError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, linear, seed};
+use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, seed};
 
 /// The products of the coefficients with a step, which may be negative.
 #[derive(Clone, Debug)]
@@ -92,8 +93,13 @@ pub(super) struct Workspace<const N: usize> {
     /// L and its gradient at the stages of the solution.
     pub l: Vec<Dual<f64, Triple<N>>>,
     jacobian: DMatrix<f64>,
+    /// The factors of the Jacobian that an iteration uses: of its own iterate, or of one before.
+    lu: DenseLu,
     residual: DVector<f64>,
 }
+
+/// The ratio of two changes above which the Jacobian is taken anew: an iteration with the old one costs a tenth of it or less.
+const CONTRACTION: f64 = 0.2;
 
 /// The stage equations of a step.
 pub(super) struct StageEquations<'a, L, const N: usize> {
@@ -109,7 +115,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     }
 
     /// `q0 + hA V` at a stage.
-    fn position<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>, i: usize) -> SVector<T, N> {
+    pub fn position<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>, i: usize) -> SVector<T, N> {
         let (Given::Start(PhasePoint { q: q0, .. }) | Given::Ends { q0, .. }) = given;
         x.v.iter().zip(&self.products.a[i]).fold(*q0, |sum, (v, a)| sum + v.map(|e| e * *a))
     }
@@ -127,7 +133,13 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     pub fn workspace(&self, given: &Given<N, f64>) -> Workspace<N> {
         let (s, n) = (self.products.s, self.size(given));
         let x = Unknowns { v: vec![SVector::zeros(); s], z: vec![0.0; s], rho: vec![1.0; s], p0: SVector::zeros() };
-        Workspace { x, l: Vec::with_capacity(s), jacobian: DMatrix::zeros(n, n), residual: DVector::zeros(n) }
+        Workspace {
+            x,
+            l: Vec::with_capacity(s),
+            jacobian: DMatrix::zeros(n, n),
+            lu: DenseLu::new(n),
+            residual: DVector::zeros(n),
+        }
     }
 
     /// The residuals: of the momenta, then of the actions, the factors, and the end position.
@@ -279,25 +291,30 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         p0: &SVector<f64, N>,
         work: &mut Workspace<N>,
     ) -> Result<u32, StepError> {
-        let Workspace { x, l, jacobian, residual } = work;
+        let Workspace { x, l, jacobian, lu, residual } = work;
         let (Given::Start(PhasePoint { z: z0, .. }) | Given::Ends { z0, .. }) = given;
         x.make_uniform(v, p0, *z0);
         self.stages(given, x, l);
         let ends = matches!(given, Given::Ends { .. });
-        let mut before = f64::INFINITY;
+        let (mut before, mut ratio) = (f64::INFINITY, f64::INFINITY);
         for iterations in 1..=ITERATION_LIMIT {
             self.residual(given, x, l, residual);
-            self.jacobian(given, x, l, jacobian);
-            linear::solve(jacobian, residual).map_err(|e| StepError::Singular { pivot: e.pivot })?;
+            // Newton's iteration, until the changes fall so fast that its Jacobian need not be that of the last iterate.
+            if ratio > CONTRACTION {
+                self.jacobian(given, x, l, jacobian);
+                lu.factorise(|i, j| jacobian[(i, j)])?;
+            }
+            lu.solve(residual.as_mut_slice())?;
             let change = self.correct(x, residual, ends);
             if !change.is_finite() {
                 return Err(StepError::NonFinite);
             }
             self.stages(given, x, l);
-            let predicted = before.is_finite() && last_correction(change, before, f64::EPSILON);
+            ratio = if before.is_finite() { change / before } else { 1.0 };
+            let predicted = ratio * change <= f64::EPSILON;
             // With half of the digits at the least.
             let near = (1e3 * f64::EPSILON * x.spread()).min(f64::EPSILON.sqrt());
-            let stagnant = change >= 0.5 * before && change <= near;
+            let stagnant = ratio >= 0.5 && change <= near;
             if change <= f64::EPSILON || predicted || stagnant {
                 return Ok(iterations);
             }

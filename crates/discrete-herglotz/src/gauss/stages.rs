@@ -16,6 +16,10 @@ pub(super) struct Stages(pub [f64; MOST]);
 impl Stages {
     pub const ZERO: Stages = Stages([0.0; MOST]);
 
+    pub fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        Stages(self.0.map(f))
+    }
+
     #[inline(always)]
     pub fn block<S: Simd>(&self, r: usize) -> Lanes<S> {
         Lanes(S::as_simd_f64s(&self.0).0[r])

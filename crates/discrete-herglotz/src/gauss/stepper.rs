@@ -1,18 +1,21 @@
 //! Runs of contact Gauss collocation.
 
 use super::Gauss;
+use super::beginning::{Beginning, velocity};
 use super::condensed::Condensed;
 use super::dense::{DenseStep, Solved, Start};
 use super::extension::{Extension, Physical};
-use super::general::{General, Mass, Table};
+use super::general::{General, Mass};
 use super::linear::Linear;
 use super::look::{Compare, Curve, Look};
+use super::resolution;
 use super::separable::Separable;
 use super::stage_equations::{Given, Products, StageEquations, Workspace};
 use super::sweeps::Progress;
-use crate::{Halt, InputError, StepError, Stepper, verified};
+use super::table::Table;
+use crate::{Halt, InputError, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, Structure, Triple, VelocityPoint, linear};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 use pulp::{Arch, Simd, WithSimd};
 
 /// How the steps of contact Gauss collocation are computed.
@@ -36,18 +39,21 @@ enum Route<'a, L, const N: usize> {
     General(General<'a, L, Physical, N>),
 }
 
-/// How the last step was taken, for dense output.
-enum Last {
-    /// There is none, or the next one failed and left nothing of it.
-    None,
-    /// By the route; the stages are in its workspace.
-    Route,
-    /// By Newton's method; the stages are in its workspace.
+/// How the stages of a step are solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Solution {
+    /// By sweeps as they are.
+    Sweeps,
+    /// By sweeps that simplified Newton iteration corrects.
+    Simplified,
+    /// By Newton's method on all equations of the step at once.
     Newton,
 }
 
 /// Contact Gauss collocation at work: stages in the lanes of the processor's vector registers, each step's start extrapolated
-/// from the one before, iteration to round-off, Newton's method where the iteration does not contract, compensated sums.
+/// from the one before, iteration to round-off, compensated sums. Where the iteration does not contract simplified Newton
+/// iteration takes its place, with a Jacobian that is kept as long as it serves; and where that does not either, Newton's
+/// method.
 pub struct GaussStepper<'a, L, const N: usize> {
     lagrangian: &'a L,
     products: &'a Products,
@@ -58,11 +64,19 @@ pub struct GaussStepper<'a, L, const N: usize> {
     k: usize,
     /// The state at the start of the last step.
     from: Start<N>,
-    last: Last,
+    /// Whether the stages of the last step are in the route's workspace.
+    solved: bool,
     newton: bool,
+    solution: Solution,
+    /// Steps until the cheaper solution is tried again, and how many there are next time: twice as many.
+    pause: usize,
+    pauses: usize,
     /// Made for the first step that needs it.
     workspace: Option<Box<Workspace<N>>>,
     newton_steps: u64,
+    /// The misfit of a constant conformal factor.
+    of_sigma: f64,
+    suspicion: Option<Suspicion>,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
@@ -76,10 +90,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let (lagrangian, s, h) = (&gauss.lagrangian, gauss.stages(), gauss.forward.h);
         let Beginning { start, structure, w, inverse } = Beginning::of(lagrangian, t0, &state, guess)?;
         let condensed = structure.separable && structure.has_constant_rate();
-        let mut mass = None;
+        let (mut mass, mut of_sigma) = (None, 0.0);
         let route = if condensed {
             let table = Condensed::new(s, h, lagrangian.gradient(t0, &start).z)?;
             mass = Some(w);
+            of_sigma = resolution::of_sigma(1.0 + table.grow.head, table.gamma * h);
             let linear = if structure.quadratic && structure.autonomous {
                 Linear::new(lagrangian, &table, &inverse, t0, &start, wants_z)
             } else {
@@ -107,10 +122,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             t0,
             k: 0,
             from: Start { q: [0.0; N], y: [0.0; N], z: 0.0 },
-            last: Last::None,
+            solved: false,
             newton: true,
+            solution: Solution::Sweeps,
+            pause: 0,
+            pauses: PAUSE,
             workspace: None,
             newton_steps: 0,
+            of_sigma,
+            suspicion: None,
         })
     }
 
@@ -144,22 +164,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             let mass = self.mass.unwrap_or_else(SMatrix::identity);
             Solved::from_accelerations(self.lagrangian, table, &mass, t, &self.from, a, wants_z)
         };
+        if !self.solved {
+            return None;
+        }
         let start = self.phase(&self.from);
-        let solved = match (&self.last, &*self.route) {
-            (Last::None, _) => return None,
-            (Last::Newton, route) => {
-                let Workspace { x, l, .. } = self.workspace.as_deref()?;
-                let mut solved = Solved::from_gradients(&x.v, &x.rho, l);
-                if matches!(route, Route::Condensed(run) if !run.wants_z) {
-                    solved.l.fill(0.0);
-                }
-                solved
-            }
-            (Last::Route, Route::Linear(run, table)) => {
+        let solved = match &*self.route {
+            Route::Linear(run, table) => {
                 condensed(table, &run.accelerations(&self.from.q, &self.from.y), run.wants_z())
             }
-            (Last::Route, Route::Condensed(run)) => condensed(&run.table, &run.a.map(|a| a.0), run.wants_z),
-            (Last::Route, Route::General(run)) => run.solved(),
+            Route::Condensed(run) => condensed(&run.table, &run.a.map(|a| a.0), run.wants_z),
+            Route::General(run) => run.solved(),
         };
         Some(DenseStep::new(s, t, h, start, &solved))
     }
@@ -189,47 +203,125 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         PhasePoint { q: SVector::from(x.q), p: self.mass.map_or(y, |mass| mass * y), z: x.z }
     }
 
-    /// Takes a step by Newton's method.
+    /// Has the refused step tried again: by simplified Newton iteration, with the Jacobian at its start if that is not so
+    /// already, then by Newton's method. `refused` where all have been tried.
     #[cold]
     #[inline(never)]
-    fn newton_step(&mut self, t: f64, refused: StepError) -> Result<(), StepError> {
+    fn try_again(&mut self, tried: &mut Tried, refused: StepError) -> Result<(), StepError> {
         if !self.newton {
             return Err(refused);
         }
-        let (values, from) = (self.values(), self.state());
+        if !tried.simplified {
+            tried.simplified = true;
+            if self.solution != Solution::Simplified {
+                self.pause_for(Solution::Simplified);
+            }
+            if self.linearise() {
+                return Ok(());
+            }
+        }
+        if tried.newton {
+            return Err(refused);
+        }
+        self.pause_for(Solution::Newton);
+        Ok(())
+    }
+
+    /// Goes over to another solution, for twice as long as the last time.
+    fn pause_for(&mut self, solution: Solution) {
+        self.solution = solution;
+        self.pause = self.pauses;
+        self.pauses = self.pauses.saturating_mul(2);
+    }
+
+    /// Has the sweeps of the next steps corrected by Newton's method, with the Jacobian at the state; `false` where it is
+    /// singular there, or not finite.
+    fn linearise(&mut self) -> bool {
+        let (t, state) = (self.time(), self.state());
+        let Ok(v) = velocity(self.lagrangian, t, &state, SVector::zeros()) else { return false };
+        let x = VelocityPoint { q: state.q, v, z: state.z };
+        let hessian = self.lagrangian.hessian(t, &x);
+        match &mut *self.route {
+            Route::Linear(..) => false,
+            Route::Condensed(run) => {
+                run.forget();
+                run.linearise(&hessian.qq)
+            }
+            Route::General(run) => {
+                run.guess(&v);
+                run.linearise(&self.lagrangian.gradient(t, &x), &hessian)
+            }
+        }
+    }
+
+    /// Solves the stages of the next step by Newton's method, from a constant velocity.
+    fn solve_stages(&mut self) -> Result<(), StepError> {
+        self.solved = false;
+        let (t, from) = (self.time(), self.state());
         let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t };
         let given = Given::Start(from);
-        let v = velocity(self.lagrangian, t, &from, SVector::zeros()).map_err(|_| refused)?;
+        let v = match velocity(self.lagrangian, t, &from, SVector::zeros()) {
+            Ok(v) => v,
+            Err(InputError::FirstStep(cause)) => return Err(cause),
+            Err(_) => return Err(StepError::NonFinite),
+        };
         let work = self.workspace.get_or_insert_with(|| Box::new(equations.workspace(&given)));
         equations.solve(&given, &v, &from.p, work)?;
         let Workspace { x, l, .. } = &**work;
-        let end = equations.end(&given, x, l);
-        let mut next = PhasePoint { q: end.q, p: end.p, z: from.z + end.action };
-        if !Triple::from(next).is_finite() {
-            return Err(StepError::NonFinite);
-        }
-        if !(end.rho > 0.0 && end.rho.is_finite()) {
-            return Err(StepError::SigmaVanished { sigma: 1.0 / end.rho });
-        }
-        let guess = x.v.last().copied().unwrap_or(v);
-        let v = velocity(self.lagrangian, t + self.products.h, &next, guess).map_err(|_| refused)?;
         match &mut *self.route {
-            // Its steps are not refused but where they are not finite.
-            Route::Linear(..) => return Err(refused),
+            Route::Linear(..) => {}
             Route::Condensed(run) => {
-                if !run.wants_z {
-                    next.z = from.z;
-                }
-                run.restart(&next, &v);
+                let position = |i: usize| equations.position(&given, x, i);
+                run.accept(l.iter().enumerate().map(|(i, l)| (l.d.x, position(i))));
             }
-            Route::General(run) => run.restart(&next, &v, 1.0 - end.rho),
+            Route::General(run) => run.accept((0..self.products.s).map(|i| (x.v[i], l[i].re, x.rho[i]))),
         }
-        self.newton_steps += 1;
-        self.from = values;
-        self.last = Last::Newton;
         Ok(())
     }
+
+    /// Takes steps by sweeps; returns how many, and why there are no more where they are not all.
+    fn sweep(&mut self, steps: usize) -> (usize, Option<StepError>) {
+        let (taken, refused) = match self.arch.dispatch(Advance { run: self, steps }) {
+            Ok(()) => (steps, None),
+            Err((taken, progress)) => (taken, Some(progress)),
+        };
+        if self.solution != Solution::Sweeps {
+            self.newton_steps += taken as u64;
+            self.pause = self.pause.saturating_sub(taken);
+        }
+        self.solved = refused.is_none();
+        (taken, refused.map(StepError::from))
+    }
+
+    /// Tries the next cheaper solution once its pause is over.
+    fn resume(&mut self) {
+        if self.solution != Solution::Sweeps && self.pause == 0 {
+            self.solution = match self.solution {
+                Solution::Newton => Solution::Simplified,
+                _ => Solution::Sweeps,
+            };
+            self.pause = self.pauses;
+            if self.solution == Solution::Sweeps {
+                match &mut *self.route {
+                    Route::Linear(..) => {}
+                    Route::Condensed(run) => run.park_newton(),
+                    Route::General(run) => run.park_newton(),
+                }
+            }
+        }
+    }
 }
+
+/// What has been tried on a step.
+#[derive(Default)]
+struct Tried {
+    /// Simplified Newton iteration with the Jacobian at its start.
+    simplified: bool,
+    newton: bool,
+}
+
+/// The steps of Newton's method after which cheaper sweeps are tried again for the first time.
+const PAUSE: usize = 8;
 
 /// The stages of the last step, for a look between them.
 struct Stages<'b, 'a, L, const N: usize> {
@@ -241,23 +333,19 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Stages<'_, '_, L, N> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Option<Curve<N>> {
-        let GaussStepper { products, route, last, workspace, from, k, t0, .. } = self.run;
+        let GaussStepper { products, route, solved, from, k, t0, .. } = self.run;
+        if !solved {
+            return None;
+        }
         let start = self.run.phase(from);
         let t = t0 + k.checked_sub(1)? as f64 * products.h;
         let mut curve = Curve::new(products.s, t, products.h, &start);
-        match (last, &**route) {
-            (Last::None, _) | (Last::Route, Route::Linear(..)) => return None,
-            (Last::Newton, route) => {
-                let Workspace { x, l, .. } = workspace.as_deref()?;
-                let wants_z = !matches!(route, Route::Condensed(run) if !run.wants_z);
-                curve.of_gradients(&x.v, &x.rho, l, wants_z);
-            }
-            (Last::Route, Route::Condensed(run)) => {
+        match &**route {
+            Route::Linear(..) => return None,
+            Route::Condensed(run) => {
                 curve.of_accelerations::<S>(&run.table, self.run.mass.as_ref(), &from.y, &run.a);
             }
-            (Last::Route, Route::General(run)) => {
-                (curve.v, curve.force, curve.rate, curve.l) = (run.v, run.force, run.rate, Some(run.l));
-            }
+            Route::General(run) => curve.of_solved(&run.solved()),
         }
         Some(curve)
     }
@@ -296,6 +384,14 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
             if progress != Progress::Done {
                 return Err((taken, progress));
             }
+            let misfit = match &*run.route {
+                Route::Linear(..) => 0.0,
+                Route::Condensed(condensed) => condensed.misfit,
+                Route::General(general) => general.misfit,
+            };
+            if misfit > 1.0 && run.suspicion.is_none() {
+                run.suspicion = Some(Suspicion { step: run.k, misfit });
+            }
             run.k += 1;
         }
         Ok(())
@@ -304,26 +400,28 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
 
 impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
-        let mut done = 0;
+        let (mut done, mut tried) = (0, Tried::default());
         while done < steps {
-            let outcome = self.arch.dispatch(Advance { run: self, steps: steps - done });
-            let Err((taken, progress)) = outcome else {
-                self.last = Last::Route;
-                break;
-            };
-            // The refused step has overwritten the stages of the one before.
-            self.last = Last::None;
-            done += taken;
-            let refused = match progress {
-                Progress::SigmaVanished { sigma } => {
-                    return Err(Halt { taken: done, cause: StepError::SigmaVanished { sigma } });
+            self.resume();
+            let left = steps - done;
+            let (taken, refused) = match self.solution {
+                Solution::Sweeps => self.sweep(left),
+                Solution::Simplified => self.sweep(self.pause.min(left)),
+                Solution::Newton => {
+                    tried.newton = true;
+                    self.solve_stages().map_or_else(|cause| (0, Some(cause)), |()| self.sweep(1))
                 }
-                Progress::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
-                _ => StepError::NonFinite,
             };
-            self.newton_step(self.time(), refused).map_err(|cause| Halt { taken: done, cause })?;
-            self.k += 1;
-            done += 1;
+            done += taken;
+            if taken > 0 {
+                tried = Tried::default();
+            }
+            let Some(refused) = refused else { continue };
+            let of_sigma = matches!(refused, StepError::SigmaVanished { .. } | StepError::StageFactor { .. });
+            if !of_sigma && self.try_again(&mut tried, refused).is_ok() {
+                continue;
+            }
+            return Err(Halt { taken: done, cause: refused });
         }
         Ok(())
     }
@@ -352,65 +450,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             Route::General(run) => run.evaluations,
         }
     }
-}
 
-/// What is found of a Lagrangian at the start of a run.
-pub(super) struct Beginning<const N: usize> {
-    pub start: VelocityPoint<N>,
-    pub structure: Structure,
-    /// W and its inverse.
-    pub w: SMatrix<f64, N, N>,
-    pub inverse: SMatrix<f64, N, N>,
-}
-
-impl<const N: usize> Beginning<N> {
-    pub fn of(
-        lagrangian: &impl Lagrangian<N>,
-        t0: f64,
-        state: &PhasePoint<N>,
-        guess: SVector<f64, N>,
-    ) -> Result<Self, InputError> {
-        state.check()?;
-        let v = velocity(lagrangian, t0, state, guess)?;
-        let start = VelocityPoint { q: state.q, v, z: state.z };
-        let structure = verified(lagrangian, t0, &start)?;
-        let identity = SMatrix::<f64, N, N>::identity();
-        let w = lagrangian.hessian(t0, &start).vv;
-        let mut inverse = identity;
-        for j in 0..N {
-            let mut column = SVector::from_fn(|i, _| identity[(i, j)]);
-            linear::solve(&mut w.clone(), &mut column)
-                .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
-            inverse.set_column(j, &column);
+    fn suspicion(&self) -> Option<Suspicion> {
+        if self.of_sigma > 1.0 && self.k > 0 {
+            return Some(Suspicion { step: 0, misfit: self.of_sigma });
         }
-        Ok(Beginning { start, structure, w, inverse })
+        self.suspicion
     }
-}
-
-/// The velocity that belongs to a momentum, `L_v(t, q, v, z) = p`, by Newton's method.
-pub(crate) fn velocity<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
-    t: f64,
-    state: &PhasePoint<N>,
-    guess: SVector<f64, N>,
-) -> Result<SVector<f64, N>, InputError> {
-    let mut x = VelocityPoint { q: state.q, v: guess, z: state.z };
-    let mut before = f64::INFINITY;
-    for _ in 0..crate::ITERATION_LIMIT {
-        let mut change = lagrangian.gradient(t, &x).y - state.p;
-        let mut w = lagrangian.hessian(t, &x).vv;
-        linear::solve(&mut w, &mut change)
-            .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
-        x.v -= change;
-        let (size, scale) = (change.amax(), x.v.amax());
-        if !(size + scale).is_finite() {
-            return Err(InputError::FirstStep(StepError::NonFinite));
-        }
-        let round_off = f64::EPSILON * scale;
-        if crate::last_correction(size, before, round_off) || (size >= 0.5 * before && size <= 64.0 * round_off) {
-            return Ok(x.v);
-        }
-        before = size;
-    }
-    Err(InputError::FirstStep(StepError::NotConverged { residual: before, iterations: crate::ITERATION_LIMIT }))
 }

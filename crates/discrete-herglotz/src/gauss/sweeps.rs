@@ -1,5 +1,7 @@
 //! When an iteration of the stages ends.
 
+use crate::StepError;
+
 /// What is to be done after a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Progress {
@@ -11,31 +13,67 @@ pub(super) enum Progress {
     Slow { change: f64, sweeps: u32 },
     /// A value is not finite.
     NonFinite,
+    /// The integrating factor of a stage is not positive.
+    StageFactor { rho: f64 },
     /// The step is not conformally contact.
     SigmaVanished { sigma: f64 },
+}
+
+impl From<Progress> for StepError {
+    fn from(refused: Progress) -> Self {
+        match refused {
+            Progress::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
+            Progress::StageFactor { rho } => StepError::StageFactor { rho },
+            Progress::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
+            _ => StepError::NonFinite,
+        }
+    }
 }
 
 /// The sweeps after which an iteration counts as not contracting.
 const LIMIT: u32 = 60;
 
+/// The sweeps of Newton's method above which its Jacobian is taken anew: three times the usual number.
+pub(super) const SLOW: u32 = 18;
+
+/// The steps that a Jacobian serves at the least, unless one is refused: second derivatives by dual numbers cost as much as ten
+/// steps.
+pub(super) const AGE: u32 = 16;
+
 /// The changes of the sweeps of one step.
 ///
 /// The iteration ends when the next change, predicted from the last two, is below the round-off of the terms, or when changes
-/// near round-off no longer fall. It is given up when larger changes have not fallen three times, or at the limit: so it
+/// near round-off, or that move nothing, no longer fall. It is given up when larger changes have not fallen three times, or at the limit: so it
 /// neither stalls nor loops.
 #[derive(Default)]
 pub(super) struct Sweeps {
     count: u32,
+    first: f64,
     before: f64,
     ratio: f64,
     risen: u32,
+    /// Whether the last sweep has not moved the positions but for their round-off: where forces are stiff that alone changes
+    /// the accelerations by more than theirs.
+    pub still: bool,
 }
 
 impl Sweeps {
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// The change of the first sweep relative to the largest term: how far what the last step foretold was off.
+    pub fn first(&self) -> f64 {
+        self.first
+    }
+
     /// Judges a sweep by its largest change and the largest term.
     #[inline(always)]
     pub fn judge(&mut self, change: f64, size: f64) -> Progress {
         self.count += 1;
+        if self.count == 1 {
+            self.first = change / size;
+        }
         let round_off = 0.5 * f64::EPSILON * size;
         if change <= round_off {
             return Progress::Done;
@@ -51,7 +89,7 @@ impl Sweeps {
                 return Progress::Done;
             }
             if ratio >= 1.0 {
-                if change <= 256.0 * round_off {
+                if change <= 256.0 * round_off || self.still {
                     return Progress::Done;
                 }
                 self.risen += 1;

@@ -1,0 +1,54 @@
+//! Whether a step resolves the motion that it crosses.
+
+use super::coefficients::Coefficients;
+use super::stages::Stages;
+use contact_geom::largest;
+
+/// The relative error of `sigma_d` in a step from which on the step does not resolve the drag: a tenth. Gauss' method with one
+/// stage reaches it at `gamma h = 1`, where the factor changes by e.
+const SIGMA: f64 = 0.1;
+
+/// The last coefficient of the stages in the Legendre polynomials, in units of the largest stage, from which on they are not
+/// the values of a function that a polynomial of their degree follows: one half. A harmonic reaches it with three to four
+/// stages a period; where a step resolves the motion the coefficients fall geometrically.
+const TAIL: f64 = 0.5;
+
+/// What a tail must move of the positions to count: below it the stages are round-off.
+const MOVED: f64 = 1e-8;
+
+/// The change of a sweep, relative to the stages, from which on their tail is looked at: what the last step's polynomial has
+/// foretold to a tenth is resolved.
+pub(super) const FORETOLD: f64 = 0.1;
+
+/// The misfit of a conformal factor: `ln sigma_d` against the integral of `L_z`; above one where the step does not resolve it.
+pub(super) fn of_sigma(sigma: f64, integral: f64) -> f64 {
+    (sigma.ln() - integral).abs() / SIGMA
+}
+
+/// The functional that takes the last coefficient of a polynomial from its values at the stages.
+pub(super) struct Tail {
+    s: usize,
+    weights: Stages,
+}
+
+impl Tail {
+    pub fn new(s: usize) -> Self {
+        let g = Coefficients::of(s);
+        let weights = std::array::from_fn(|j| if j < s { g.legendre_weight(s, j, s - 1) } else { 0.0 });
+        Tail { s, weights: Stages(weights) }
+    }
+
+    /// The misfit of a step: above one where the values at its stages are not those of a polynomial. `time` turns them to
+    /// lengths that are compared with the positions. Up to two stages do not tell: a step is then no worse than its order.
+    #[cold]
+    #[inline(never)]
+    pub fn misfit(&self, values: &[Stages], positions: &[Stages], time: f64) -> f64 {
+        if self.s < 3 {
+            return 0.0;
+        }
+        let all = |x: &[Stages]| largest(x.iter().flat_map(|x| &x.0[..self.s]).copied());
+        let last = |x: &Stages| x.0[..self.s].iter().zip(&self.weights.0).map(|(x, w)| x * w).sum::<f64>();
+        let tail = largest(values.iter().map(last));
+        if tail * time > MOVED * all(positions) { tail / (TAIL * all(values)) } else { 0.0 }
+    }
+}

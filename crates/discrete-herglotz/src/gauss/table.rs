@@ -1,0 +1,60 @@
+//! Coefficients of the general step of contact Gauss collocation.
+
+use super::coefficients::Coefficients;
+use super::stages::{StageMap, Stages, padded};
+use qd::Quad;
+use std::array::from_fn;
+use std::cmp::Ordering;
+
+/// The coefficients of a step: `h a_ij = m_ij h b_j`.
+///
+/// What multiplies in every step acts in the same direction in every step, and so the rounding of `h a_ij` and `h b_j` would make
+/// the energy drift. But the method is symplectic with any weights where `m_ij + m_ji = 1`, and this numbers of 53 digits
+/// can satisfy exactly: stages take `M (h b f)`, the end the sum of the same `h b f`. See Antonana, Makazaga and Murua,
+/// "Reducing and monitoring round-off error propagation for symplectic implicit Runge-Kutta schemes", Numer. Algorithms 76 (2017).
+pub(super) struct Table {
+    pub s: usize,
+    pub h: f64,
+    /// `M`.
+    pub m: StageMap,
+    /// `h b`, 0 beyond the last stage.
+    pub weights: Stages,
+    /// The times of the stages after the step's start.
+    pub times: Stages,
+    /// From the stages of one step to those of the next, and the same for what is multiplied with the weights.
+    pub ahead: StageMap,
+    pub ahead_weighted: StageMap,
+}
+
+impl Table {
+    pub fn new(s: usize, h: f64) -> Self {
+        let (g, step) = (Coefficients::of(s), Quad::from(h));
+        let mut weights = from_fn(|j| if j < s { (step * g.b[j]).0 } else { 0.0 });
+        if s > 2 {
+            // The sum is h to the last digit of the smallest.
+            let inner = weights[1..s - 1].iter().fold(Quad::from(0.0), |sum, w| sum + Quad::from(*w));
+            weights[0] = (Quad::from(0.5) * (step - inner)).0;
+            weights[s - 1] = weights[0];
+        }
+        // From the transposed where it is the larger, about 1: the difference is exact.
+        let ratio = |i: usize, j: usize| (g.a[i][j] / g.b[j]).0;
+        let entry = |i: usize, j: usize| match i.cmp(&j) {
+            _ if i.max(j) >= s => 0.0,
+            Ordering::Less => 1.0 - ratio(j, i),
+            Ordering::Equal => 0.5,
+            Ordering::Greater => ratio(i, j),
+        };
+        let weighted = |i: usize, j: usize| {
+            if i.max(j) < s { g.b[i].0 * g.ahead[i][j] / g.b[j].0 } else { 0.0 }
+        };
+        Table {
+            s,
+            h,
+            m: StageMap::new(&from_fn(|i| from_fn(|j| entry(i, j))), s),
+            weights: Stages(weights),
+            times: padded(&g.c.map(|c| step * c), s),
+            ahead: StageMap::new(&g.ahead, s),
+            ahead_weighted: StageMap::new(&from_fn(|i| from_fn(|j| weighted(i, j))), s),
+        }
+    }
+}
