@@ -1,6 +1,8 @@
 //! Contact Gauss collocation through its fast stepper: orders, agreement with Newton's steps and of the routes with each other,
 //! the conformal factor, round-off in long runs, and what happens where the iteration does not contract.
 
+#![allow(clippy::unwrap_used)]
+
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     CoupledInZ, CoupledPlane, DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, Relativistic, System,
@@ -272,10 +274,12 @@ fn newton_takes_over() {
     for route in [GaussRoute::Condensed, GaussRoute::ConstantMass, GaussRoute::General] {
         of(&Claims(pendulum, cut(&pendulum, route)), x, 4, 5.0, 1e-12);
     }
-    // Strong damping: factors up to e^20 in one step, of whose size the terms of all momenta are.
-    let damped = HarmonicOscillator { gamma: -20.0 };
-    let x = VelocityPoint::new([1.0], [1.0], 0.0);
-    of(&Claims(damped, Structure::default()), x, 8, 1.0, 1e-6);
+    // Damping by e^20 in one step: factors of stages are negative, and Newton's method does not hide it.
+    let damped = Claims(HarmonicOscillator { gamma: -20.0 }, Structure::default());
+    let gauss = Gauss::new(&damped, 8, 1.0).unwrap();
+    let mut stepper = gauss.stepper(0.0, PhasePoint::new([1.0], [1.0], 0.0), [1.0].into()).unwrap();
+    let halt = stepper.advance(1);
+    assert!(matches!(halt, Err(Halt { taken: 0, cause: StepError::StageFactor { rho } }) if rho < 0.0), "{halt:?}");
 }
 
 /// Bad input: a number of stages that there is not, and a step whose conformal factor is not positive.

@@ -211,6 +211,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         if !self.newton {
             return Err(refused);
         }
+        tried.refused.get_or_insert(refused);
         if !tried.simplified {
             tried.simplified = true;
             if self.solution != Solution::Simplified {
@@ -318,6 +319,8 @@ struct Tried {
     /// Simplified Newton iteration with the Jacobian at its start.
     simplified: bool,
     newton: bool,
+    /// Why it was refused at first.
+    refused: Option<StepError>,
 }
 
 /// The steps of Newton's method after which cheaper sweeps are tried again for the first time.
@@ -421,7 +424,9 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             if !of_sigma && self.try_again(&mut tried, refused).is_ok() {
                 continue;
             }
-            return Err(Halt { taken: done, cause: refused });
+            // The first reason: that of the last resort tells less, unless it is the integrating factor.
+            let cause = if of_sigma { refused } else { tried.refused.unwrap_or(refused) };
+            return Err(Halt { taken: done, cause });
         }
         Ok(())
     }
