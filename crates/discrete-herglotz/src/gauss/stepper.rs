@@ -71,7 +71,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     /// Steps until the cheaper solution is tried again, and how many there are next time: twice as many.
     pause: usize,
     pauses: usize,
-    /// Made for the first step that needs it.
+    /// Of Newton's method, made for the first step that the sweeps do not solve.
     workspace: Option<Box<Workspace<N>>>,
     newton_steps: u64,
     /// The misfit of a constant conformal factor.
@@ -212,6 +212,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             return Err(refused);
         }
         tried.refused.get_or_insert(refused);
+        if self.workspace.is_none() {
+            // With that of the simplified iteration, so that later steps allocate nothing.
+            let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t: self.time() };
+            self.workspace = Some(Box::new(equations.workspace(&Given::Start(self.state()))));
+        }
         if !tried.simplified {
             tried.simplified = true;
             if self.solution != Solution::Simplified {
