@@ -1,5 +1,8 @@
 //! Contact Gauss collocation condensed to the positions, for constant mass and constant rate of the conformal factor.
 
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
 use super::coefficients::{Coefficients, MOST};
 use super::compensated::{Twofold, exact_sum};
 use super::stages::{Exact, StageMap, Stages, Weights, padded, solve_exactly};
