@@ -32,7 +32,7 @@ impl<const N: usize> Sum<N> {
     }
 }
 
-/// A state, with the last kick's value and derivative: the next step begins with the same.
+/// Where a run goes on from, with the value and the derivative of the next kick: those at the last position.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Motion<const N: usize> {
     pub(super) q: Sum<N>,
@@ -52,10 +52,6 @@ impl<const N: usize> Motion<N> {
 
     pub(super) fn state(&self) -> PhasePoint<N> {
         PhasePoint { q: self.q.value, p: self.p.value, z: self.z.value[0] }
-    }
-
-    pub(super) fn is_finite(&self) -> bool {
-        Triple::from(self.state()).is_finite() && self.sigma.is_finite()
     }
 
     /// The flow of `-V` over a time s, with the force that the motion holds.
@@ -81,6 +77,8 @@ pub(super) struct Progress<const N: usize> {
     /// The forces of a step.
     pub(super) forces: usize,
     pub(super) motion: Motion<N>,
+    /// The state after the steps taken: that of the motion, completed where the next step has a part of the last.
+    pub(super) state: PhasePoint<N>,
 }
 
 impl<const N: usize> Progress<N> {
@@ -96,13 +94,18 @@ impl<const N: usize> Progress<N> {
     }
 
     /// Takes steps in chunks; in one that ends with what is not finite, step by step up to the last that is.
-    pub(super) fn advance(&mut self, steps: usize, after: impl Fn(&Self, usize) -> Motion<N>) -> Result<(), Halt> {
+    pub(super) fn advance(
+        &mut self,
+        steps: usize,
+        after: impl Fn(&Self, usize) -> (Motion<N>, PhasePoint<N>),
+    ) -> Result<(), Halt> {
         let (mut taken, mut longest) = (0, CHUNK);
         while taken < steps {
             let chunk = longest.min(steps - taken);
-            let reached = after(self, chunk);
-            if reached.is_finite() {
-                self.motion = reached;
+            let (motion, state) = after(self, chunk);
+            // What is not finite in the motion is not finite in its end, or in the next.
+            if Triple::from(state).is_finite() && motion.sigma.is_finite() {
+                (self.motion, self.state) = (motion, state);
                 self.taken += chunk;
                 taken += chunk;
             } else if chunk > 1 {

@@ -94,7 +94,7 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
         let table = Table { stages, closing: flow.over(0.5 * before * h), rest: (state.z, flow.rate(state.z)) };
         let (value, force) = form.first_kick(t0, &state.q, state.z)?;
         let motion = Motion::new(state, (value - table.rest.1, force));
-        let progress = Progress { h, t0, taken: 0, forces: scheme.stages(), motion };
+        let progress = Progress { h, t0, taken: 0, forces: scheme.stages(), motion, state };
         Ok(ActionSplitting { form, table, progress, compensated: false })
     }
 
@@ -115,7 +115,7 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
     }
 
     fn state(&self) -> PhasePoint<N> {
-        self.progress.motion.state()
+        self.progress.state
     }
 
     fn time(&self) -> f64 {
@@ -131,14 +131,14 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
     }
 }
 
-/// The motion after some steps more.
+/// The motion after some steps more, and its state.
 #[inline(never)]
 fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool>(
     form: &Separable<&L, N>,
     table: &Table<C>,
     from: &Progress<N>,
     steps: usize,
-) -> Motion<N> {
+) -> (Motion<N>, PhasePoint<N>) {
     let (mut m, (z, constant)) = (from.motion, table.rest);
     for k in 0..steps {
         let t = from.time_after(k);
@@ -156,7 +156,7 @@ fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool>(
         }
         apply::<C, N, COMPENSATED>(&mut m, &table.closing);
     }
-    m
+    (m, m.state())
 }
 
 /// The flow of f, and its factor.
