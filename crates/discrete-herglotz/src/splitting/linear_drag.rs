@@ -1,10 +1,10 @@
 //! Splittings where the drag is linear.
 
 use super::drag::{Drag, Drift};
-use super::motion::{Motion, Progress};
+use super::motion::{Motion, Progress, Reached};
 use super::separable::Separable;
-use crate::{Halt, InputError, SplittingScheme, Stepper};
-use contact_geom::{Lagrangian, PhasePoint};
+use crate::{Halt, InputError, SplittingScheme, Stepper, Suspicion};
+use contact_geom::{Lagrangian, PhasePoint, larger};
 
 /// A splitting at work on `L = v.Mv/2 - V(t, q) + gamma(t) z`.
 ///
@@ -79,9 +79,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
     ) -> Result<Self, InputError> {
         let form = Separable::read(lagrangian, h, t0, &state)?;
         let drag = Drag::of(&form, t0, &state)?;
-        let motion = Motion::new(state, form.first_kick(t0, &state.q, 0.0)?);
+        let kick = form.first_kick(t0, &state.q, 0.0)?;
         let table = Table::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
-        let progress = Progress { h, t0, taken: 0, forces: scheme.stages(), motion, state };
+        let progress = Progress::new(h, t0, scheme.stages(), state, kick);
         Ok(Splitting { form, drag, table, progress, action: true, compensated: false })
     }
 
@@ -148,6 +148,10 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     fn evaluations(&self) -> u64 {
         self.progress.evaluations()
     }
+
+    fn suspicion(&self) -> Option<Suspicion> {
+        self.progress.watch.first
+    }
 }
 
 /// What a step consists of.
@@ -175,22 +179,24 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
         &self,
         from: &Progress<N>,
         steps: usize,
-    ) -> (Motion<N>, PhasePoint<N>) {
+    ) -> Reached<N> {
         let Maps { form, table, .. } = self;
-        let mut m = from.motion;
+        let (mut m, mut misfit) = (from.motion, 0.0);
         let first = usize::from(from.taken == 0);
         for (stages, range) in [(&table.first, 0..first), (&table.joined, first..steps)] {
             for k in range {
                 let t = from.time_after(k);
                 for stage in stages {
+                    let (momentum, force) = (m.p.value, m.force);
                     self.kick_and_drift::<ACTION, COMPENSATED, TIMED>(&mut m, t, stage);
                     (m.value, m.force) = form.kick(t + stage.time, &m.q.value, 0.0);
+                    misfit = larger(misfit, m.misfit(&momentum, &force, stage.span));
                 }
             }
         }
         let mut end = m;
         self.kick_and_drift::<ACTION, COMPENSATED, TIMED>(&mut end, from.time_after(steps - 1), &table.closing);
-        (m, end.state())
+        Reached { motion: m, state: end.state(), misfit }
     }
 
     /// `sigma_d` of the step from the time t. Found where it is asked for: of a drag in time it costs as much as the drifts.
@@ -227,6 +233,7 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
             m.z.add::<COMPENSATED>(|_, z| drift.damping * z + drift.lift * p.dot(&v));
         }
         m.q.add::<COMPENSATED>(|i, _| drift.length * v[i]);
-        m.p.add::<COMPENSATED>(|_, p| drift.damping * p);
+        // What rounding takes from the drag is the same function of p in all steps, and piles up; it is carried on.
+        m.p.add::<true>(|_, p| drift.damping * p);
     }
 }
