@@ -38,8 +38,9 @@ pub(crate) fn misfit<const N: usize>(
     if now.dot(&before) < 0.0 { turning([&before, &now], [second, third, fourth], q, h) } else { None }
 }
 
-/// The misfit of two second differences of opposite directions among three velocities. A motion that has come to rest keeps
-/// velocities of rounding alone: what moves q by less than `2^-40` of it is none.
+/// The misfit of two second differences of opposite directions among three velocities. What moves q by less than a 256th of it is
+/// none: a motion that has come to rest keeps velocities of rounding alone, and where velocity and force vanish together the
+/// substeps of a long scheme turn by their own errors.
 #[inline(never)]
 pub(crate) fn turning<const N: usize>(
     changes: [&SVector<f64, N>; 2],
@@ -50,11 +51,11 @@ pub(crate) fn turning<const N: usize>(
     let size = |x: &SVector<f64, N>| largest(x.iter().copied());
     let change = size(changes[0]) + size(changes[1]);
     let velocity = largest(velocities.map(size));
-    (change > velocity && change * h.abs() > ROUNDING * size(q)).then(|| change / velocity)
+    (change > velocity && change * h.abs() > LEAST * size(q)).then(|| change / velocity)
 }
 
-/// Twelve bits above the last.
-const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
+/// See [`turning`].
+const LEAST: f64 = 1.0 / 256.0;
 
 /// The misfit of a rational conformal factor, the exponential of a rate in the motion itself: above one where a step contracts or
 /// grows by more than three. `(1 + x)/(1 - x)`, which is three at `x = 1/2`, is then off by a tenth or more.

@@ -99,7 +99,7 @@ fn the_edge_of_stability_is_marked() -> Outcome {
 /// Runs a motion to its end, without a mark.
 fn assert_unsuspicious<const N: usize>(name: &str, mut motion: impl Stepper<N>, steps: usize) {
     assert_eq!(motion.advance(steps), Ok(()), "{name}");
-    assert_eq!(motion.suspicion(), None, "{name}");
+    assert_eq!(motion.suspicion(), None, "{name}, until t = {}", motion.time());
 }
 
 /// Every splitting, and the rules, on a motion that they resolve: stages of the length h.
@@ -154,7 +154,7 @@ fn what_is_resolved_raises_no_suspicion() -> Outcome {
     assert_resolved(&Duffing::default(), 0.02, 0.0, start, 500.0)?;
     assert_resolved(&Duffing::forced(), 0.01, 0.0, start, 500.0)?;
     // Through subnormals to zero.
-    assert_resolved(&HarmonicOscillator { gamma: -2.0 }, 0.05, 0.0, start, 1000.0)?;
+    assert_resolved(&HarmonicOscillator { gamma: -2.0 }, 0.01, 0.0, start, 1000.0)?;
     // At rest, before a force and after.
     assert_resolved(&Pulse, 0.01, 0.0, PhasePoint::new([0.0], [0.0], 0.0), 100.0)?;
     // Fast in the units of time, and slow.
