@@ -25,6 +25,7 @@
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
 mod action;
+mod blocks;
 mod clock;
 mod contact_form;
 mod darboux;

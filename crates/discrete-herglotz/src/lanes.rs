@@ -2,6 +2,7 @@
 
 use contact_geom::Scalar;
 use pulp::{Simd, bytemuck};
+use std::cell::Cell;
 use std::fmt::{Debug, Formatter};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -22,6 +23,24 @@ fn token<S: Simd>() -> S {
     unsafe { std::mem::zeroed() }
 }
 
+thread_local! {
+    /// Whether one value was asked of lanes that differ.
+    static ASKED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether, since [`forget_branches`], one value was asked on this thread of lanes that differ, by `re`, `extent` or `==`: a
+/// formula has branched, in the same way for all of them. What was computed from it may be wrong.
+#[inline(always)]
+pub(crate) fn branched() -> bool {
+    ASKED.get()
+}
+
+/// Begins anew to watch for branches.
+#[inline(always)]
+pub(crate) fn forget_branches() {
+    ASKED.set(false);
+}
+
 impl<S: Simd> Lanes<S> {
     /// The lanes of a register.
     pub const COUNT: usize = S::F64_LANES;
@@ -37,12 +56,7 @@ impl<S: Simd> Lanes<S> {
         Lanes(token::<S>().mul_add_e_f64s(self.0, b.0, c.0))
     }
 
-    #[inline(always)]
-    pub fn abs(self) -> Self {
-        Lanes(token::<S>().abs_f64s(self.0))
-    }
-
-    /// Lane by lane the larger; where one is not a number, the result may be either.
+    /// Lane by lane the larger; where one is not a number, the result may be either, other than that of [`Scalar::max`].
     #[inline(always)]
     pub fn max(self, b: Self) -> Self {
         Lanes(token::<S>().max_f64s(self.0, b.0))
@@ -143,7 +157,12 @@ impl<S: Simd> Debug for Lanes<S> {
 
 impl<S: Simd> PartialEq for Lanes<S> {
     fn eq(&self, b: &Self) -> bool {
-        self.lanes() == b.lanes()
+        let (a, b) = (self.lanes(), b.lanes());
+        let equal = a.iter().zip(b).filter(|(a, b)| a == b).count();
+        if equal != 0 && equal != a.len() {
+            ASKED.set(true);
+        }
+        equal == a.len()
     }
 }
 
@@ -213,15 +232,32 @@ arithmetic! {
 impl<S: Simd> Scalar for Lanes<S> {
     #[inline(always)]
     fn re(self) -> f64 {
-        self.lanes()[0]
+        let lanes = self.lanes();
+        if lanes.iter().all(|x| *x == lanes[0] || (x.is_nan() && lanes[0].is_nan())) {
+            return lanes[0];
+        }
+        ASKED.set(true);
+        f64::NAN
     }
     #[inline(always)]
-    fn modulus(self) -> f64 {
+    fn pivot_size(self) -> f64 {
         self.lanes().iter().fold(f64::INFINITY, |m, x| if x.abs() < m || x.is_nan() { x.abs() } else { m })
     }
     #[inline(always)]
     fn extent(self) -> f64 {
-        self.lanes().iter().fold(0.0, |m, x| if x.is_nan() { f64::INFINITY } else { f64::max(m, x.abs()) })
+        Scalar::extent(self.re())
+    }
+    #[inline(always)]
+    fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
+        let set = token::<S>();
+        let less = set.less_than_f64s(self.0, than.0);
+        let not_less = set.less_than_or_equal_f64s(than.0, self.0);
+        let unordered = set.splat_f64s(f64::NAN);
+        Lanes(set.select_f64s(less, then.0, set.select_f64s(not_less, otherwise.0, unordered)))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Lanes(token::<S>().abs_f64s(self.0))
     }
     #[inline(always)]
     fn recip(self) -> Self {

@@ -104,7 +104,7 @@ pub(crate) fn end_directions<const N: usize>(
     at: &VelocityPoint<N>,
     s: f64,
 ) -> (f64, SVector<f64, N>, f64) {
-    if N > BLOCK {
+    if const { N > BLOCK } {
         return end_by_blocks(lagrangian, t, at, s);
     }
     let constant = |re: f64| -> Dual<f64, Border<N>> { Dual::constant(re) };
@@ -142,4 +142,13 @@ fn end_by_blocks<const N: usize>(
         (value, rate) = (l.re, l.d.z);
     }
     (value, momentum, rate)
+}
+
+/// W alone where there are many coordinates; else with the other second derivatives, which are compiled in any case.
+pub(crate) fn mass_matrix<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+) -> SMatrix<f64, N, N> {
+    if const { N > BLOCK } { lagrangian.mass_matrix(t, x) } else { lagrangian.hessian(t, x).vv }
 }

@@ -103,7 +103,7 @@ impl Size {
     fn see<T: Scalar>(&mut self, x: T) {
         // Comparisons rather than `f64::max`: an extent is no NaN, and of a plain number it is the modulus.
         let (extent, plain) = (x.extent(), size_of::<T>() == size_of::<f64>());
-        let modulus = if plain { extent } else { x.modulus() };
+        let modulus = if plain { extent } else { x.pivot_size() };
         if modulus > self.0[0] {
             self.0[0] = modulus;
         }

@@ -8,7 +8,7 @@ use super::compensated::{Compensated, Twofold, add, finite};
 use super::extension::{Extension, Pace, Values};
 use super::stages::{StageMap, Stages, Weights, blocks, padded};
 use super::sweeps::{Progress, Sweeps};
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, branched};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{KernelDual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, linear};
 use pulp::Simd;
@@ -383,6 +383,9 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             let pushed = fallen * self.p[d].value + b.sum::<S>(&self.force[d], s);
             let head = pushed.head / (1.0 - fallen.head);
             dp[d] = Twofold { head, tail: (pushed.tail + fallen.tail * head) * sigma };
+        }
+        if branched() {
+            return Progress::Branched;
         }
         // The largest change over lanes may hide a NaN; one of `fallen` is in `dp`.
         if !finite(&dq, &dp, dz) {

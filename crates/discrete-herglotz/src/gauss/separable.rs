@@ -7,7 +7,7 @@ use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
 use super::stages::{Stages, blocks};
 use super::sweeps::{Progress, Sweeps};
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, branched};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 use pulp::Simd;
@@ -157,6 +157,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             let v = self.v[d].value;
             dq[d] = table.end_b.sum::<S>(&self.a[d], s) + table.end_u * v;
             dv[d] = table.end_v.sum::<S>(&self.a[d], s) + table.grow * v;
+        }
+        if branched() {
+            return Progress::Branched;
         }
         // The largest change over lanes may hide a NaN.
         if !finite(&dq, &dv, dz) {

@@ -9,6 +9,8 @@ use super::linear::Linear;
 use super::separable::Separable;
 use super::stage_equations::{Given, Products, StageEquations, Workspace};
 use super::sweeps::Progress;
+use crate::lanes::forget_branches;
+use crate::step_equations::mass_matrix;
 use crate::{Halt, InputError, StepError, Stepper, verified};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Structure, Triple, VelocityPoint, linear};
@@ -26,6 +28,9 @@ pub enum GaussRoute {
     /// The same with W taken at the stages of each step.
     General,
 }
+
+/// The largest dimension whose linear motion is advanced by one matrix.
+const MOST_LINEAR: usize = 32;
 
 /// The state and the workspace of a route.
 #[allow(clippy::large_enum_variant)] // One is made for a run, in a box.
@@ -79,7 +84,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let route = if condensed {
             let table = Condensed::new(s, h, lagrangian.gradient(t0, &start).z)?;
             mass = Some(w);
-            let linear = if structure.quadratic && structure.autonomous {
+            // Of many coordinates the matrix costs more than the sweeps that it spares, and more room than the stack has.
+            let linear = if structure.quadratic && structure.autonomous && const { N <= MOST_LINEAR } {
                 Linear::new(lagrangian, &table, &inverse, t0, &start, wants_z)
             } else {
                 None
@@ -236,6 +242,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let Advance { run, steps } = self;
+        forget_branches();
         let (t0, h) = (run.t0, run.products.h);
         if let Route::Linear(linear, _) = &mut *run.route {
             let (taken, from) = linear.advance(steps);
@@ -280,6 +287,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
                     return Err(Halt { taken: done, cause: StepError::SigmaVanished { sigma } });
                 }
                 Progress::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
+                Progress::Branched => StepError::Branched,
                 _ => StepError::NonFinite,
             };
             self.newton_step(self.time(), refused).map_err(|cause| Halt { taken: done, cause })?;
@@ -336,7 +344,7 @@ impl<const N: usize> Beginning<N> {
         let start = VelocityPoint { q: state.q, v, z: state.z };
         let structure = verified(lagrangian, t0, &start)?;
         let identity = SMatrix::<f64, N, N>::identity();
-        let w = lagrangian.hessian(t0, &start).vv;
+        let w = mass_matrix(lagrangian, t0, &start);
         let mut inverse = identity;
         for j in 0..N {
             let mut column = SVector::from_fn(|i, _| identity[(i, j)]);
@@ -359,7 +367,7 @@ fn velocity<const N: usize>(
     let mut before = f64::INFINITY;
     for _ in 0..crate::ITERATION_LIMIT {
         let mut change = lagrangian.gradient(t, &x).y - state.p;
-        let mut w = lagrangian.hessian(t, &x).vv;
+        let mut w = mass_matrix(lagrangian, t, &x);
         linear::solve(&mut w, &mut change)
             .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
         x.v -= change;

@@ -1,5 +1,6 @@
 //! Lagrangians `v.Mv/2 - V(t, q) + f(z)`, as splittings read them.
 
+use crate::step_equations::mass_matrix;
 use crate::verified::PROBE;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
@@ -39,7 +40,7 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
             }
         }
         let rest = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
-        let mass = lagrangian.hessian(t, &rest).vv;
+        let mass = mass_matrix(&lagrangian, t, &rest);
         let inverse = if mass == SMatrix::<f64, N, N>::identity() { None } else { Some(inverted(&mass)?) };
         Ok(Separable { lagrangian, mass, inverse })
     }
