@@ -5,7 +5,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     DoublePendulum, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, SystemVisitor,
 };
-use contact_geom::{Lagrangian, Scalar, Structure, Symmetry, VelocityPoint, legendre};
+use contact_geom::{Lagrangian, Larger, Largest, Scalar, Structure, Symmetry, VelocityPoint, legendre};
 use discrete_herglotz::{InputError, Integrator, Method, Outcome, Plan, Scene, SplittingScheme, Status, Steps, Wanted};
 
 /// A system that claims another structure.
@@ -56,9 +56,9 @@ fn every_integrator() {
                     assert!(refused, "{} by {integrator}: {outcome:?}", system.name());
                     continue;
                 };
-                let size = truth.q.amax().max(truth.p.amax()).max(truth.z.abs());
-                let error = (q - truth.q).amax().max((p - truth.p).amax()).max((z - truth.z).abs()) / size;
-                let bound = (1.0f64 / 4.0).powi(integrator.order().min(10) as i32).max(1e-8);
+                let size = truth.q.largest().larger(truth.p.largest()).larger(truth.z.abs());
+                let error = (q - truth.q).largest().larger((p - truth.p).largest()).larger((z - truth.z).abs()) / size;
+                let bound = (1.0f64 / 4.0).powi(integrator.order().min(10) as i32).larger(1e-8);
                 assert!(error <= bound, "{} by {integrator}: {error:e}, not {bound:e}", system.name());
                 self.0 += 1;
             }
@@ -96,7 +96,7 @@ fn what_is_left_out_changes_nothing() {
         assert_eq!((nothing.status, all.status), (Status::Completed, Status::Completed), "{by}");
         // Each stage of each step rounds once.
         let roundings = if let Integrator::Splitting(scheme) = by { 200 * scheme.stages() } else { 0 };
-        let off = (nothing.q - all.q).amax().max((nothing.p - all.p).amax());
+        let off = (nothing.q - all.q).largest().larger((nothing.p - all.p).largest());
         assert!(off <= roundings as f64 * f64::EPSILON, "{by}: {off:e}");
         assert_eq!((nothing.z, nothing.conformal_factor, nothing.rows.len()), (None, None, 0));
         // 0, 7, ..., 196, 200.

@@ -51,7 +51,7 @@ impl<const N: usize, T: Scalar> Motion<N, T> {
 /// paper, section 4.1. To round-off, for any regular L and over any [`Scalar`]: on duals it gives the first (and further)
 /// variational equations' solution.
 ///
-/// Collocation at up to 12 Gauss points (order 24) on panels that are as long as the estimated error and the convergence of the
+/// Collocation at up to 24 Gauss points (order 48) on panels that are as long as the estimated error and the convergence of the
 /// iteration allow; the changes of all panels are added with compensation. The error stays within some units of round-off
 /// times the condition of the motion.
 ///

@@ -5,7 +5,9 @@ use crate::panel::{Rate, Rates, State};
 use crate::{ExactError, Motion};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::{Border, Dual, GeometryError, Lagrangian, Module, Regularity, Scalar, Triple, VelocityPoint, seed};
+use contact_geom::{
+    Border, Dual, GeometryError, Lagrangian, Module, Regularity, Scalar, Triple, VelocityPoint, larger, seed,
+};
 
 /// A point `(q, z, v, w)` of T(Q x R); on `M_L` where `w = L(q, v, z)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,7 +144,7 @@ impl<L> NonHolonomic<L> {
             let Motion { end, b: w, .. } = integrate(self, t0 + from, &state, to - from, ACCURACY)?;
             at = ExtendedPoint { q: end.q, z: end.z, v: end.v, w };
             let on = self.lift(t0 + to, &end).w.re();
-            defect = defect.max((w.re() - on).abs() / (1.0 + on.abs()));
+            defect = larger(defect, (w.re() - on).abs() / (1.0 + on.abs()));
         }
         Ok(ExtendedMotion { end: at, defect })
     }

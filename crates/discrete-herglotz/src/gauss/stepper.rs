@@ -383,3 +383,6 @@ fn velocity<const N: usize>(
     }
     Err(InputError::FirstStep(StepError::NotConverged { residual: before, iterations: crate::ITERATION_LIMIT }))
 }
+
+#[cfg(test)]
+mod tests;
