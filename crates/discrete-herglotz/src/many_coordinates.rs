@@ -24,33 +24,64 @@ fn exact<const N: usize>(gamma: f64, t: f64) -> [f64; 2] {
     [decay * (c - half / rate * s), -decay * omega * omega / rate * s]
 }
 
-/// Builds, verifies and takes steps by a rule, a splitting and collocation.
-fn try_all<const N: usize>() {
-    // The drag is below the critical one, which falls with N.
-    let chain = Chain::<N> { ends: Ends::Fixed, beta: 0.0, gamma: -0.01 };
-    let start = chain.initial();
-    assert_eq!(verified(&chain, 0.0, &start), Ok(chain.structure()));
-    let (h, from) = (0.5, legendre(&chain, 0.0, &start));
-    let check = |what: &str, steps: f64, state: &PhasePoint<N>, tolerance: f64| {
-        let ([q, p], off) = wave(state);
-        let [q_exact, p_exact] = exact::<N>(chain.gamma, steps * h);
-        let error = contact_geom::largest([q - q_exact, p - p_exact]);
-        assert!(error <= tolerance && off <= 1e-13, "{what}, N = {N}: {error:e}, {off:e} off the wave");
-    };
-    // Of order two: h^2 times the time's third power of the frequency, below pi/N.
-    let second = 0.1 * (h * std::f64::consts::PI / N as f64).powi(2);
-    let midpoint = Midpoint::new(&chain, h).unwrap();
-    let step = midpoint.forward(0.0, &from, &SVector::zeros(), &mut Solver::default()).unwrap();
-    check("midpoint", 1.0, &step.end, second);
-    let mut strang = Splitting::new(&chain, &SplittingScheme::STRANG, h, 0.0, from).unwrap();
+/// The time step.
+const STEP: f64 = 0.5;
+
+/// The chain with a drag below the critical one, which falls with N.
+fn chain<const N: usize>() -> Chain<N> {
+    Chain { ends: Ends::Fixed, beta: 0.0, gamma: -0.01 }
+}
+
+fn start<const N: usize>() -> PhasePoint<N> {
+    legendre(&chain::<N>(), 0.0, &chain::<N>().initial())
+}
+
+/// What a method of order two may err by in a step: `h^2` times the time's third power of the frequency, below pi/N.
+fn second<const N: usize>() -> f64 {
+    0.1 * (STEP * std::f64::consts::PI / N as f64).powi(2)
+}
+
+fn check<const N: usize>(what: &str, steps: f64, state: &PhasePoint<N>, tolerance: f64) {
+    let ([q, p], off) = wave(state);
+    let [q_exact, p_exact] = exact::<N>(chain::<N>().gamma, steps * STEP);
+    let error = contact_geom::largest([q - q_exact, p - p_exact]);
+    assert!(error <= tolerance && off <= 1e-13, "{what}, N = {N}: {error:e}, {off:e} off the wave");
+}
+
+fn claims<const N: usize>() {
+    let chain = chain::<N>();
+    assert_eq!(verified(&chain, 0.0, &chain.initial()), Ok(chain.structure()));
+}
+
+fn rule<const N: usize>() {
+    let midpoint = Midpoint::new(chain::<N>(), STEP).unwrap();
+    let step = midpoint.forward(0.0, &start(), &SVector::zeros(), &mut Solver::default()).unwrap();
+    check::<N>("midpoint", 1.0, &step.end, second::<N>());
+}
+
+fn splitting<const N: usize>() {
+    let chain = chain::<N>();
+    let mut strang = Splitting::new(&chain, &SplittingScheme::STRANG, STEP, 0.0, start()).unwrap();
     strang.advance(10).unwrap();
-    check("Strang", 10.0, &strang.state(), 10.0 * second);
-    let gauss = Gauss::new(chain, 2, h).unwrap();
-    let mut run = gauss.stepper(0.0, from, SVector::zeros()).unwrap();
+    check::<N>("Strang", 10.0, &strang.state(), 10.0 * second::<N>());
+}
+
+fn collocation<const N: usize>() {
+    let gauss = Gauss::new(chain::<N>(), 2, STEP).unwrap();
+    let mut run = gauss.stepper(0.0, start(), SVector::zeros()).unwrap();
     run.advance(10).unwrap();
-    check("Gauss", 10.0, &run.state(), 1e-3 * second);
-    let step = gauss.forward(0.0, &from, &SVector::zeros(), &mut Solver::default()).unwrap();
-    check("Gauss by Newton's method", 1.0, &step.end, 1e-3 * second);
+    check::<N>("Gauss", 10.0, &run.state(), 1e-3 * second::<N>());
+}
+
+fn collocation_by_newton<const N: usize>() {
+    let gauss = Gauss::new(chain::<N>(), 2, STEP).unwrap();
+    let step = gauss.forward(0.0, &start(), &SVector::zeros(), &mut Solver::default()).unwrap();
+    check::<N>("Gauss by Newton's method", 1.0, &step.end, 1e-3 * second::<N>());
+}
+
+/// Builds, verifies and takes steps by a rule, a splitting and collocation.
+fn all<const N: usize>() -> [fn(); 5] {
+    [claims::<N>, rule::<N>, splitting::<N>, collocation::<N>, collocation_by_newton::<N>]
 }
 
 fn in_small_thread(run: fn()) {
@@ -60,10 +91,10 @@ fn in_small_thread(run: fn()) {
 
 #[test]
 fn forty_coordinates_fit_a_thread() {
-    in_small_thread(try_all::<40>);
+    all::<40>().into_iter().for_each(in_small_thread);
 }
 
 #[test]
 fn a_hundred_and_twenty_eight_coordinates_fit_a_thread() {
-    in_small_thread(try_all::<128>);
+    all::<128>().into_iter().for_each(in_small_thread);
 }

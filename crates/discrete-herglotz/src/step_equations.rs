@@ -2,6 +2,7 @@
 
 use crate::Node;
 use crate::unknowns::Unknowns;
+use contact_geom::linear::{self, SingularMatrix};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Border, Dual, Lagrangian, VelocityPoint};
 
@@ -151,4 +152,19 @@ pub(crate) fn mass_matrix<const N: usize>(
     x: &VelocityPoint<N>,
 ) -> SMatrix<f64, N, N> {
     if const { N > BLOCK } { lagrangian.mass_matrix(t, x) } else { lagrangian.hessian(t, x).vv }
+}
+
+/// Whether a matrix is the identity; without one to compare with, for the sake of the stack.
+pub(crate) fn is_identity<const N: usize>(m: &SMatrix<f64, N, N>) -> bool {
+    (0..N).all(|j| (0..N).all(|i| m[(i, j)] == f64::from(u8::from(i == j))))
+}
+
+/// The inverse, column by column. In a frame of its own, for the sake of the stack.
+#[inline(never)]
+pub(crate) fn inverted<const N: usize>(m: &SMatrix<f64, N, N>) -> Result<SMatrix<f64, N, N>, SingularMatrix> {
+    let mut inverse = SMatrix::<f64, N, N>::identity();
+    for mut column in inverse.column_iter_mut() {
+        linear::solve(&mut m.clone_owned(), &mut column)?;
+    }
+    Ok(inverse)
 }

@@ -188,7 +188,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         let (row_z, row_r) = (s * N, s * (N + 1));
         for k in 0..s {
             let y = VelocityPoint { q: self.position(given, x, k), v: x.v[k], z: x.z[k] };
-            let Hessian { qq, qv, vv, qz, vz, zz } = self.lagrangian.hessian(self.t + c[k], &y);
+            let Hessian { qq, qv, vv, qz, vz, zz } = &self.lagrangian.hessian(self.t + c[k], &y);
             let (rho, g) = (x.rho[k], &l[k].d);
             // What stage k adds to the equations of stage i, through its own velocity, action and factor.
             for i in 0..s {

@@ -10,7 +10,7 @@ use super::separable::Separable;
 use super::stage_equations::{Given, Products, StageEquations, Workspace};
 use super::sweeps::Progress;
 use crate::lanes::forget_branches;
-use crate::step_equations::mass_matrix;
+use crate::step_equations::{inverted, is_identity, mass_matrix};
 use crate::{Halt, InputError, StepError, Stepper, verified};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Structure, Triple, VelocityPoint, linear};
@@ -94,7 +94,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
                 Some(linear) => Route::Linear(linear, table),
                 None => {
                     let left = table.preconditioned(0.0).ok_or(InputError::Step { h })?;
-                    let inverse = (w != SMatrix::<f64, N, N>::identity()).then_some(inverse);
+                    let inverse = (!is_identity(&w)).then_some(inverse);
                     Route::Condensed(Separable::new(lagrangian, table, left, inverse, &start, wants_z))
                 }
             }
@@ -343,20 +343,14 @@ impl<const N: usize> Beginning<N> {
         let v = velocity(lagrangian, t0, state, guess)?;
         let start = VelocityPoint { q: state.q, v, z: state.z };
         let structure = verified(lagrangian, t0, &start)?;
-        let identity = SMatrix::<f64, N, N>::identity();
         let w = mass_matrix(lagrangian, t0, &start);
-        let mut inverse = identity;
-        for j in 0..N {
-            let mut column = SVector::from_fn(|i, _| identity[(i, j)]);
-            linear::solve(&mut w.clone(), &mut column)
-                .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
-            inverse.set_column(j, &column);
-        }
+        let inverse = inverted(&w).map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
         Ok(Beginning { start, structure, w, inverse })
     }
 }
 
 /// The velocity that belongs to a momentum, `L_v(t, q, v, z) = p`, by Newton's method.
+#[inline(never)]
 fn velocity<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,
