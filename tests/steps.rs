@@ -88,7 +88,6 @@ fn small_steps_keep_their_digits() {
 /// total momentum of a free chain, follows the product of sigma_d.
 #[test]
 fn a_large_chain() {
-    // Matrices of this size are numbers on the stack while a step is built.
     let run = || {
         let chain = Chain::<48> { ends: contact_geom::systems::Ends::Free, ..Chain::default() };
         let ld = Midpoint::new(&chain, 0.1).unwrap();
@@ -105,7 +104,7 @@ fn a_large_chain() {
         assert!((after - sigma * before).abs() <= 1e-13 * start.p.abs().sum(), "{before} {after} {sigma}");
         status == Ok(Status::Completed)
     };
-    let thread = std::thread::Builder::new().stack_size(256 << 20).spawn(run);
+    let thread = std::thread::Builder::new().stack_size(2 << 20).spawn(run);
     assert!(thread.is_ok_and(|t| t.join().is_ok_and(|ok| ok)));
 }
 

@@ -1,9 +1,12 @@
 //! Systems of many coordinates, in the two mebibytes of stack that a thread of the standard library has.
 
-use crate::{DiscreteLagrangian, Gauss, Midpoint, Solver, Splitting, SplittingScheme, Stepper, verified};
+use crate::{
+    DiscreteLagrangian, Gauss, Midpoint, Solver, Splitting, SplittingScheme, Stepper, derived_jet, derived_second_jet,
+    verified,
+};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Chain, Ends, System};
-use contact_geom::{Lagrangian, PhasePoint, legendre};
+use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, legendre};
 
 const MEBIBYTE: usize = 1 << 20;
 
@@ -97,4 +100,33 @@ fn forty_coordinates_fit_a_thread() {
 #[test]
 fn a_hundred_and_twenty_eight_coordinates_fit_a_thread() {
     all::<128>().into_iter().for_each(in_small_thread);
+}
+
+/// By blocks of directions as by the Hessian of L.
+#[test]
+fn derived_jets_of_many_coordinates() {
+    const N: usize = 11;
+    let chain = Chain::<N>::default();
+    let midpoint = Midpoint::new(chain, 0.3).unwrap();
+    let x = DiscretePoint {
+        q0: SVector::<f64, N>::from_fn(|i, _| (1.7 * i as f64).sin()),
+        q1: SVector::from_fn(|i, _| (1.7 * i as f64 + 0.2).sin()),
+        z0: 0.4,
+    };
+    let (jet, second) = (derived_jet(&midpoint, 0.0, &x).unwrap(), derived_second_jet(&midpoint, 0.0, &x).unwrap());
+    let closed = midpoint.second_jet(0.0, &x).unwrap();
+    // The terms are of the size of the masses divided by the step, below 10.
+    let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 100.0 * f64::EPSILON);
+    for first in [jet, second.first] {
+        let pairs = [(first.d1, closed.first.d1), (first.d2, closed.first.d2)];
+        assert!(pairs.iter().all(|(a, b)| close(a.as_slice(), b.as_slice())));
+        assert!(close(&[first.value, first.dz], &[closed.first.value, closed.first.dz]));
+    }
+    for (a, b) in [(second.d11, closed.d11), (second.d12, closed.d12), (second.d22, closed.d22)] {
+        assert!(close(a.as_slice(), b.as_slice()), "{a} {b}");
+    }
+    for (a, b) in [(second.d1z, closed.d1z), (second.d2z, closed.d2z)] {
+        assert!(close(a.as_slice(), b.as_slice()));
+    }
+    assert!(close(&[second.dzz], &[closed.dzz]));
 }

@@ -159,12 +159,22 @@ pub(crate) fn is_identity<const N: usize>(m: &SMatrix<f64, N, N>) -> bool {
     (0..N).all(|j| (0..N).all(|i| m[(i, j)] == f64::from(u8::from(i == j))))
 }
 
-/// The inverse, column by column. In a frame of its own, for the sake of the stack.
+/// W on the heap, for what is kept.
 #[inline(never)]
-pub(crate) fn inverted<const N: usize>(m: &SMatrix<f64, N, N>) -> Result<SMatrix<f64, N, N>, SingularMatrix> {
+pub(crate) fn kept_mass_matrix<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+) -> Box<SMatrix<f64, N, N>> {
+    Box::new(mass_matrix(lagrangian, t, x))
+}
+
+/// The inverse, column by column, on the heap.
+#[inline(never)]
+pub(crate) fn inverted<const N: usize>(m: &SMatrix<f64, N, N>) -> Result<Box<SMatrix<f64, N, N>>, SingularMatrix> {
     let mut inverse = SMatrix::<f64, N, N>::identity();
     for mut column in inverse.column_iter_mut() {
         linear::solve(&mut m.clone_owned(), &mut column)?;
     }
-    Ok(inverse)
+    Ok(Box::new(inverse))
 }

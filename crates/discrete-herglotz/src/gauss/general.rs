@@ -43,14 +43,14 @@ impl Table {
 /// How velocities are found from momenta.
 pub(super) enum Mass<const N: usize> {
     /// `W^-1`, the same everywhere.
-    Constant(SMatrix<f64, N, N>),
+    Constant(Box<SMatrix<f64, N, N>>),
     /// `W^-1` at the stages, taken anew in each step.
     Stages(Box<[[Stages; N]; N]>),
 }
 
 impl<const N: usize> Mass<N> {
     /// From `W^-1` at the start.
-    pub fn new(structure: &Structure, inverse: SMatrix<f64, N, N>) -> Self {
+    pub fn new(structure: &Structure, inverse: Box<SMatrix<f64, N, N>>) -> Self {
         if structure.constant_mass || structure.separable {
             Mass::Constant(inverse)
         } else {

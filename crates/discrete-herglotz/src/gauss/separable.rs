@@ -18,7 +18,7 @@ pub(super) struct Separable<'a, L, const N: usize> {
     pub table: Condensed,
     pub left: Preconditioned,
     /// `M^-1`; `None` where M is the identity.
-    inverse_mass: Option<SMatrix<f64, N, N>>,
+    inverse_mass: Option<Box<SMatrix<f64, N, N>>>,
     pub wants_z: bool,
     pub q: [Compensated; N],
     pub v: [Compensated; N],
@@ -41,7 +41,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         lagrangian: &'a L,
         table: Condensed,
         left: Preconditioned,
-        inverse_mass: Option<SMatrix<f64, N, N>>,
+        inverse_mass: Option<Box<SMatrix<f64, N, N>>>,
         start: &VelocityPoint<N>,
         wants_z: bool,
     ) -> Self {

@@ -10,7 +10,7 @@ use super::separable::Separable;
 use super::stage_equations::{Given, Products, StageEquations, Workspace};
 use super::sweeps::Progress;
 use crate::lanes::forget_branches;
-use crate::step_equations::{inverted, is_identity, mass_matrix};
+use crate::step_equations::{inverted, is_identity, kept_mass_matrix, mass_matrix};
 use crate::{Halt, InputError, StepError, Stepper, verified};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Structure, Triple, VelocityPoint, linear};
@@ -35,7 +35,8 @@ const MOST_LINEAR: usize = 32;
 /// The state and the workspace of a route.
 #[allow(clippy::large_enum_variant)] // One is made for a run, in a box.
 enum Route<'a, L, const N: usize> {
-    Linear(Linear<N>, Condensed),
+    /// In a box of its own: its matrices are larger than all that others hold.
+    Linear(Box<Linear<N>>, Condensed),
     Condensed(Separable<'a, L, N>),
     General(General<'a, L, Physical, N>),
 }
@@ -56,7 +57,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     lagrangian: &'a L,
     products: &'a Products,
     route: Box<Route<'a, L, N>>,
-    mass: Option<SMatrix<f64, N, N>>,
+    mass: Option<Box<SMatrix<f64, N, N>>>,
     arch: Arch,
     t0: f64,
     k: usize,
@@ -83,6 +84,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let mut mass = None;
         let route = if condensed {
             let table = Condensed::new(s, h, lagrangian.gradient(t0, &start).z)?;
+            let unit = is_identity(&w);
             mass = Some(w);
             // Of many coordinates the matrix costs more than the sweeps that it spares, and more room than the stack has.
             let linear = if structure.quadratic && structure.autonomous && const { N <= MOST_LINEAR } {
@@ -94,7 +96,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
                 Some(linear) => Route::Linear(linear, table),
                 None => {
                     let left = table.preconditioned(0.0).ok_or(InputError::Step { h })?;
-                    let inverse = (!is_identity(&w)).then_some(inverse);
+                    let inverse = (!unit).then_some(inverse);
                     Route::Condensed(Separable::new(lagrangian, table, left, inverse, &start, wants_z))
                 }
             }
@@ -146,7 +148,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let (s, h) = (self.products.s, self.products.h);
         let t = self.t0 + self.k.checked_sub(1)? as f64 * h;
         let condensed = |table: &Condensed, a, wants_z| {
-            let mass = self.mass.unwrap_or_else(SMatrix::identity);
+            let mass = self.mass.as_deref().copied().unwrap_or_else(SMatrix::identity);
             Solved::from_accelerations(self.lagrangian, table, &mass, t, &self.from, a, wants_z)
         };
         let start = self.phase(&self.from);
@@ -185,7 +187,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     /// With momenta for the velocities of the condensed routes.
     fn phase(&self, x: &Start<N>) -> PhasePoint<N> {
         let y = SVector::from(x.y);
-        PhasePoint { q: SVector::from(x.q), p: self.mass.map_or(y, |mass| mass * y), z: x.z }
+        PhasePoint { q: SVector::from(x.q), p: self.mass.as_ref().map_or(y, |mass| **mass * y), z: x.z }
     }
 
     /// Takes a step by Newton's method.
@@ -328,8 +330,8 @@ pub(super) struct Beginning<const N: usize> {
     pub start: VelocityPoint<N>,
     pub structure: Structure,
     /// W and its inverse.
-    pub w: SMatrix<f64, N, N>,
-    pub inverse: SMatrix<f64, N, N>,
+    pub w: Box<SMatrix<f64, N, N>>,
+    pub inverse: Box<SMatrix<f64, N, N>>,
 }
 
 impl<const N: usize> Beginning<N> {
@@ -343,7 +345,7 @@ impl<const N: usize> Beginning<N> {
         let v = velocity(lagrangian, t0, state, guess)?;
         let start = VelocityPoint { q: state.q, v, z: state.z };
         let structure = verified(lagrangian, t0, &start)?;
-        let w = mass_matrix(lagrangian, t0, &start);
+        let w = kept_mass_matrix(lagrangian, t0, &start);
         let inverse = inverted(&w).map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
         Ok(Beginning { start, structure, w, inverse })
     }

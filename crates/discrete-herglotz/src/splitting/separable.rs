@@ -1,6 +1,6 @@
 //! Lagrangians `v.Mv/2 - V(t, q) + f(z)`, as splittings read them.
 
-use crate::step_equations::{inverted, is_identity, mass_matrix};
+use crate::step_equations::{inverted, is_identity, kept_mass_matrix};
 use crate::verified::PROBE;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
@@ -10,12 +10,12 @@ use contact_geom::{Defect, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 pub(super) const FALSE_CLAIM: f64 = 1e-9;
 
 /// A separable Lagrangian with its mass matrix, read once.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Separable<L, const N: usize> {
     pub(crate) lagrangian: L,
-    mass: SMatrix<f64, N, N>,
+    mass: Box<SMatrix<f64, N, N>>,
     /// `None` for the identity: a product with it would cost a third of a step of the oscillator.
-    inverse: Option<SMatrix<f64, N, N>>,
+    inverse: Option<Box<SMatrix<f64, N, N>>>,
 }
 
 impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
@@ -40,7 +40,7 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
             }
         }
         let rest = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
-        let mass = mass_matrix(&lagrangian, t, &rest);
+        let mass = kept_mass_matrix(&lagrangian, t, &rest);
         let inverse = if is_identity(&mass) {
             None
         } else {
@@ -104,7 +104,7 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
     pub(crate) fn velocity(&self, p: &SVector<f64, N>) -> SVector<f64, N> {
         match &self.inverse {
             None => *p,
-            Some(inverse) => inverse * p,
+            Some(inverse) => **inverse * p,
         }
     }
 }
