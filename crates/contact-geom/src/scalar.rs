@@ -13,8 +13,9 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 ///
 /// A formula must not branch on a number by `if`: it may be worked on for several states at once, in the lanes of a vector
 /// register, each of which has its own answer. [`if_less`](Self::if_less), [`abs`](Self::abs), [`max`](Self::max) and the like
-/// choose lane by lane; both values are computed, and one is taken with its differentials. Integrators gain their order only
-/// where L is smooth along a step.
+/// choose lane by lane; both values are computed, and one is taken with its differentials. Where a formula asks for one value
+/// of lanes that differ, by [`re`](Self::re), [`extent`](Self::extent), `==` or `is_zero`, the step is not taken in lanes.
+/// Integrators reach their order only where L is smooth along a step.
 ///
 /// ```
 /// use contact_geom::Scalar;
