@@ -33,7 +33,7 @@ fn without_a_guess() {
                 found => found?,
             };
             let reached = exp.at(t, &found.start)?.q1;
-            let condition = statements::condition(system, t, &found.start, h)?.min(1e3);
+            let condition = -(-statements::condition(system, t, &found.start, h)?).larger(-1e3);
             Ok((reached - y.q1).largest() / (condition * (1.0 + y.q1.largest())))
         }
     }

@@ -30,7 +30,7 @@ fn by_differences<const N: usize>(system: &impl System<N>, x: &VelocityPoint<N>,
         (value(d) - value(-d)) / (2.0 * d)
     };
     let extrapolated = |i: usize| {
-        let [a, b, c] = [0.02, 0.01, 0.005].map(|d| slope(i, d * h.min(0.5)));
+        let [a, b, c] = [0.02, 0.01, 0.005].map(|d| slope(i, d * if h < 0.5 { h } else { 0.5 }));
         let (once, again) = ((4.0 * b - a) / 3.0, (4.0 * c - b) / 3.0);
         (16.0 * again - once) / 15.0
     };

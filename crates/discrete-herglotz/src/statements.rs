@@ -191,7 +191,7 @@ fn action_differential<const N: usize>(
     for steps in [1, 2, 3, most] {
         let path = wiggly_path(x, steps)?;
         let (formula, derived) = (path.action_differential(ld, t, x.z0)?, differentiated(ld, t, &path, x.z0)?);
-        let size = ld.jet(t, x)?.d1.largest().larger(derived.iter().map(SVector::amax).fold(0.0, larger));
+        let size = ld.jet(t, x)?.d1.largest().larger(derived.iter().map(Largest::largest).fold(0.0, larger));
         for (a, b) in formula.iter().zip(&derived) {
             worst = worst.larger(relative_vector(*a, *b, size));
         }
@@ -214,7 +214,7 @@ fn two_steps<const N: usize>(
     let second = ld.jet(t + ld.step_size(), &DiscretePoint { q0: q[1], q1: q[2], z0: x.z0 + first.value })?;
     let remark = [first.d1 * (1.0 + second.dz), second.d1 + first.d2 * (1.0 + second.dz), second.d2];
     let derived = differentiated(ld, t, &path, x.z0)?;
-    let size = remark.iter().map(SVector::amax).fold(first.d2.largest(), f64::max);
+    let size = remark.iter().map(Largest::largest).fold(first.d2.largest(), larger);
     Ok(remark.iter().zip(&derived).map(|(a, b)| relative_vector(*a, *b, size)).fold(0.0, larger))
 }
 
@@ -238,7 +238,7 @@ fn principle<const N: usize>(
     let size = ld.jet(t, x)?.d1.largest().larger(ld.jet(t, x)?.d2.largest());
     // A rounded point of the path changes its neighbours' residuals by D12 times the rounding.
     let second = ld.second_jet(t, x)?;
-    let largest = solution.points().iter().map(SVector::amax).fold(0.0, larger);
+    let largest = solution.points().iter().map(Largest::largest).fold(0.0, larger);
     let size_of_solution = size.larger(second.d12.largest() * largest);
     let differential = differentiated(ld, t, &solution, x.z0)?;
     let mut worst = differential[1..3].iter().map(|d| d.largest() / size_of_solution).fold(0.0, larger);
