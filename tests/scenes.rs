@@ -5,7 +5,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     DoublePendulum, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, SystemVisitor,
 };
-use contact_geom::{Lagrangian, Scalar, Structure, Symmetry, VelocityPoint, legendre};
+use contact_geom::{Lagrangian, Larger, Largest, Scalar, Structure, Symmetry, VelocityPoint, legendre};
 use discrete_herglotz::{
     InputError, Integrator, Method, Obstacle, Outcome, Plan, Scene, SplittingScheme, Status, Steps, Wanted,
 };
@@ -58,9 +58,9 @@ fn every_integrator() {
                     assert!(refused, "{} by {integrator}: {outcome:?}", system.name());
                     continue;
                 };
-                let size = truth.q.amax().max(truth.p.amax()).max(truth.z.abs());
-                let error = (q - truth.q).amax().max((p - truth.p).amax()).max((z - truth.z).abs()) / size;
-                let bound = (1.0f64 / 4.0).powi(integrator.order().min(10) as i32).max(1e-8);
+                let size = truth.q.largest().larger(truth.p.largest()).larger(truth.z.abs());
+                let error = (q - truth.q).largest().larger((p - truth.p).largest()).larger((z - truth.z).abs()) / size;
+                let bound = (1.0f64 / 4.0).powi(integrator.order().min(10) as i32).larger(1e-8);
                 assert!(error <= bound, "{} by {integrator}: {error:e}, not {bound:e}", system.name());
                 self.0 += 1;
             }

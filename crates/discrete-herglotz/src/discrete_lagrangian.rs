@@ -1,8 +1,9 @@
 //! Discrete Lagrangians on Q x Q x R.
 
 use crate::newton::{Linearised, Start, newton};
+use crate::step_equations::BLOCK;
 use crate::{InputError, Solver, StepError};
-use contact_geom::nalgebra::SVector;
+use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed};
 
 /// A discrete Lagrangian `L_d : Q x Q x R -> R` with the action's recursion `z1 = z0 + L_d(q0, q1, z0)`; paper, section 3.
@@ -202,6 +203,22 @@ pub fn derived_jet<const N: usize>(
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<DiscreteJet<N>, StepError> {
+    if const { N > BLOCK } {
+        let (mut value, mut d) = (0.0, Triple { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 });
+        for start in blocks::<N>() {
+            let l = ld.value(t, &lifted(x, start))?;
+            value = l.re;
+            for (k, slope) in l.d.iter().enumerate() {
+                match start + k {
+                    i if i < N => d.x[i] = *slope,
+                    i if i < 2 * N => d.y[i - N] = *slope,
+                    i if i == 2 * N => d.z = *slope,
+                    _ => {}
+                }
+            }
+        }
+        return Ok(DiscreteJet::new(value, d.x, d.y, d.z));
+    }
     let l = ld.value(t, &seed(&Triple::from(*x)).into())?;
     Ok(DiscreteJet::new(l.re, l.d.x, l.d.y, l.d.z))
 }
@@ -215,7 +232,9 @@ pub fn derived_second_jet<const N: usize>(
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<SecondDiscreteJet<N>, StepError> {
-    use contact_geom::nalgebra::SMatrix;
+    if const { N > BLOCK } {
+        return second_jet_by_blocks(ld, t, x);
+    }
     let l: Dual<Dual<f64, Triple<N>>, _> = ld.value(t, &seed(&seed(&Triple::from(*x))).into())?;
     Ok(SecondDiscreteJet {
         first: DiscreteJet::new(l.re.re, l.re.d.x, l.re.d.y, l.re.d.z),
@@ -226,4 +245,57 @@ pub fn derived_second_jet<const N: usize>(
         d2z: SVector::from_fn(|i, _| l.d.y[i].d.z),
         dzz: l.d.z.d.z,
     })
+}
+
+/// The starts of the blocks of the `2N + 1` coordinates.
+fn blocks<const N: usize>() -> impl Iterator<Item = usize> {
+    (0..=2 * N).step_by(BLOCK)
+}
+
+/// The point with the coordinates from `start` on as directions, in the order `q0, q1, z0`: one block of [`seed`].
+fn lifted<T: Scalar, const N: usize>(
+    x: &DiscretePoint<N, T>,
+    start: usize,
+) -> DiscretePoint<N, Dual<T, SVector<T, BLOCK>>> {
+    let one = |i: usize, re: T| {
+        let mut number = Dual::<T, SVector<T, BLOCK>>::constant(re);
+        if (start..start + BLOCK).contains(&i) {
+            number.d[i - start] = T::one();
+        }
+        number
+    };
+    DiscretePoint {
+        q0: SVector::from_fn(|i, _| one(i, x.q0[i])),
+        q1: SVector::from_fn(|i, _| one(N + i, x.q1[i])),
+        z0: one(2 * N, x.z0),
+    }
+}
+
+/// [`derived_second_jet`] of many coordinates: by blocks of directions, for the sake of the stack.
+fn second_jet_by_blocks<const N: usize>(
+    ld: &(impl DiscreteLagrangian<N> + ?Sized),
+    t: f64,
+    x: &DiscretePoint<N>,
+) -> Result<SecondDiscreteJet<N>, StepError> {
+    let (matrix, vector) = (SMatrix::zeros(), SVector::zeros());
+    let first = derived_jet(ld, t, x)?;
+    let mut jet =
+        SecondDiscreteJet { first, d11: matrix, d12: matrix, d22: matrix, d1z: vector, d2z: vector, dzz: 0.0 };
+    for (a, b) in blocks::<N>().flat_map(|a| blocks::<N>().filter(move |b| *b >= a).map(move |b| (a, b))) {
+        let second = ld.value(t, &lifted(&lifted(x, a), b))?.d;
+        for (k, m) in (0..BLOCK).flat_map(|k| (0..BLOCK).map(move |m| (k, m))) {
+            let (i, j) = ((a + m).min(b + k), (a + m).max(b + k));
+            let entry = second[k].d[m];
+            match (i / N, j / N) {
+                _ if j > 2 * N => {}
+                (0, 0) => (jet.d11[(i, j)], jet.d11[(j, i)]) = (entry, entry),
+                (0, 1) => jet.d12[(i, j - N)] = entry,
+                (1, 1) => (jet.d22[(i - N, j - N)], jet.d22[(j - N, i - N)]) = (entry, entry),
+                (0, _) => jet.d1z[i] = entry,
+                (1, _) => jet.d2z[i - N] = entry,
+                _ => jet.dzz = entry,
+            }
+        }
+    }
+    Ok(jet)
 }

@@ -166,6 +166,12 @@ pub enum StepError {
     /// A coordinate or a derivative is infinite or not a number.
     #[error("a value is not finite: the motion leaves the domain of the Lagrangian, or grows without bound")]
     NonFinite,
+    /// A formula branches on the value of a number, of which vector lanes have several.
+    #[error(
+        "the Lagrangian or the clock asks for one value (`re`, `extent`, `==`) of lanes that differ; \
+         choose by `if_less`, `max`, `min`, `abs` or `signum`"
+    )]
+    Branched,
 }
 
 impl From<StepError> for GeometryError {

@@ -29,6 +29,8 @@ mod flow;
 mod gauss;
 mod lanes;
 mod legendre;
+#[cfg(test)]
+mod many_coordinates;
 mod method;
 mod momentum;
 mod newton;

@@ -137,14 +137,14 @@ impl<L, R: Rule> Quadrature<L, R> {
             }
             let change = -defect.re / defect.d[0];
             z1 += change;
-            let size = change.modulus();
+            let size = change.pivot_size();
             if !size.is_finite() {
                 return Err(StepError::NonFinite);
             }
             if !Self::implicit(false) {
                 return Ok(z1);
             }
-            if size <= f64::EPSILON * z1.modulus() || size >= last {
+            if size <= f64::EPSILON * z1.pivot_size() || size >= last {
                 extra -= 1;
                 if extra == 0 {
                     return Ok(z1);
@@ -198,7 +198,7 @@ impl<L, R: Rule> Quadrature<L, R> {
                 z: if implicit { from.z * (1.0 - node.action) + z1 * node.action } else { from.z },
             };
             let frame = Frame { node, h, p: &from.p, t: t + node.place * h, at: &at };
-            if N > BLOCK {
+            if const { N > BLOCK } {
                 frame.by_blocks(&self.lagrangian, N + usize::from(implicit), &mut sums);
             } else if implicit {
                 frame.accumulate::<Border<N>, N>(&self.lagrangian, 0, 0, &mut sums);

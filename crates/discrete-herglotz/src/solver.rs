@@ -1,8 +1,8 @@
 //! The linear solve inside a Newton step: on the stack for small N, faer beyond the measured crossover.
 
 use crate::StepError;
-use contact_geom::linear;
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{larger, linear};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::{factor, solve};
 use faer::{Mat, Par};
@@ -96,7 +96,7 @@ impl Large {
         // faer is silent on a singular or non-finite matrix: the factor's diagonal and the solution tell.
         let mut least = f64::INFINITY;
         for i in 0..N {
-            least = least.min(self.matrix[(i, i)].abs());
+            least = -larger(-least, -self.matrix[(i, i)].abs());
             b[i] = self.rhs[(i, 0)];
         }
         if least > 0.0 && b.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(StepError::Singular { pivot: least }) }

@@ -104,7 +104,7 @@ impl Size {
     fn see<T: Scalar>(&mut self, x: T) {
         // Comparisons rather than `f64::max`: an extent is no NaN, and of a plain number it is the modulus.
         let (extent, plain) = (x.extent(), size_of::<T>() == size_of::<f64>());
-        let modulus = if plain { extent } else { x.modulus() };
+        let modulus = if plain { extent } else { x.pivot_size() };
         if modulus > self.0[0] {
             self.0[0] = modulus;
         }
@@ -282,15 +282,15 @@ fn between_nodes<const N: usize, T: Scalar>(
     evaluations: &mut u64,
 ) -> Result<Rate<N, T>, Refused> {
     let Problem { t, h, from, accuracy, .. } = *problem;
-    let sizes = |r: &Rate<N, T>| [r.a.iter().map(|a| a.modulus()).fold(0.0, larger), r.z.modulus(), r.b.modulus()];
+    let sizes = |r: &Rate<N, T>| [r.a.iter().map(|a| a.pivot_size()).fold(0.0, larger), r.z.pivot_size(), r.b.pivot_size()];
     let most = |rates: &[Rate<N, T>]| {
         rates.iter().map(sizes).fold([0.0; 3], |m: [f64; 3], e| std::array::from_fn(|i| larger(m[i], e[i])))
     };
     let (largest, tails) = (most(nodes), most(&g.tail.map(|row| Rate::sum(nodes, &row))));
     let floor = problem.floor.over(h, 64.0);
-    let position = from.q.iter().map(|q| q.modulus()).fold(0.0, larger);
+    let position = from.q.iter().map(|q| q.pivot_size()).fold(0.0, larger);
     // What a change of a rate must exceed to matter: the polynomial's own error, and what changes the state by roundings.
-    let state = [seen.scales[0].0[0], from.z.modulus(), 1.0];
+    let state = [seen.scales[0].0[0], from.z.pivot_size(), 1.0];
     let allowed: [f64; 3] = std::array::from_fn(|i| {
         let rounding = larger(1e4 * accuracy * largest[i], 32.0 * accuracy * state[i] / h.abs());
         larger(16.0 * tails[i], rounding) + floor[i].0[0]
@@ -305,7 +305,7 @@ fn between_nodes<const N: usize, T: Scalar>(
     {
         return Err(Refused::Hidden(0.0));
     }
-    let moved = panel.displacement.iter().map(|d| d.modulus()).fold(0.0, larger);
+    let moved = panel.displacement.iter().map(|d| d.pivot_size()).fold(0.0, larger);
     let still = largest[0] == 0.0;
     // Of a motion of many panels also the change of the velocity tells: it may have come to rest.
     let faster = if problem.part.abs() < 0.5 { largest[0] * h.abs() / state[0] } else { 0.0 };

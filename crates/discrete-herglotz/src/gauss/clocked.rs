@@ -5,6 +5,7 @@ use super::extension::{Extension, Fictitious, Values};
 use super::general::{General, Mass, Table};
 use super::stepper::Beginning;
 use super::sweeps::Progress;
+use crate::lanes::forget_branches;
 use crate::{Halt, ITERATION_LIMIT, InputError, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Clock, Lagrangian, PhasePoint};
@@ -136,6 +137,7 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for Advance<'_, '_,
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        forget_branches();
         for taken in 0..self.steps {
             // L does not depend on it.
             let t = self.general.extension.t.value;
@@ -143,6 +145,7 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for Advance<'_, '_,
                 Progress::Done => continue,
                 Progress::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
                 Progress::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
+                Progress::Branched => StepError::Branched,
                 _ => StepError::NonFinite,
             };
             return Err(Halt { taken, cause });

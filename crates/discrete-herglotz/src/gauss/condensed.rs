@@ -4,6 +4,7 @@ use super::coefficients::{Coefficients, MOST};
 use super::compensated::{Twofold, exact_sum};
 use super::stages::{Exact, StageMap, Stages, Weights, padded, solve_exactly};
 use crate::InputError;
+use contact_geom::larger;
 use num_traits::{One, Zero};
 use pulp::{Arch, Simd, WithSimd};
 use qd::Quad;
@@ -70,7 +71,7 @@ impl Condensed {
         let sum = |f: &dyn Fn(usize) -> Quad| (0..s).fold(zero, |sum, j| sum + f(j));
         let fallen = step * rate * sum(&|j| g.b[j] * rho[j]);
         let end_rho = one - fallen;
-        let least = rho.iter().map(|r| r.0).fold(end_rho.0, f64::min);
+        let least = rho.iter().map(|r| r.0).fold(end_rho.0, |m, r| -larger(-m, -r));
         // Not `<= 0`: that would let a NaN pass.
         if !(least > 0.0 && least.is_finite()) {
             return Err(InputError::Sigma { sigma: 1.0 / least });

@@ -9,7 +9,7 @@ use super::dense::Solved;
 use super::extension::{Extension, Pace, Values};
 use super::stages::{StageMap, Stages, blocks, padded};
 use super::sweeps::{Progress, Sweeps};
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, branched};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{KernelDual, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, linear};
 use pulp::Simd;
@@ -71,14 +71,14 @@ impl Table {
 /// How velocities are found from momenta.
 pub(super) enum Mass<const N: usize> {
     /// `W^-1`, the same everywhere.
-    Constant(SMatrix<f64, N, N>),
+    Constant(Box<SMatrix<f64, N, N>>),
     /// `W^-1` at the stages, taken anew in each step.
     Stages(Box<[[Stages; N]; N]>),
 }
 
 impl<const N: usize> Mass<N> {
     /// From `W^-1` at the start.
-    pub fn new(structure: &Structure, inverse: SMatrix<f64, N, N>) -> Self {
+    pub fn new(structure: &Structure, inverse: Box<SMatrix<f64, N, N>>) -> Self {
         if structure.constant_mass || structure.separable {
             Mass::Constant(inverse)
         } else {
@@ -423,6 +423,9 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             dq[d] = single(self.moved[d].sum::<S>(s));
             let pushed = self.force[d].sum::<S>(s);
             dp[d] = Twofold { head: pushed, tail: grow * (pushed + self.p[d].value) };
+        }
+        if branched() {
+            return Progress::Branched;
         }
         // The largest change over lanes may hide a NaN; one of `fallen` is in `dp`.
         if !finite(&dq, &dp, single(dz)) {

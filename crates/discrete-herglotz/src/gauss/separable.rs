@@ -7,7 +7,7 @@ use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
 use super::stages::{Stages, blocks};
 use super::sweeps::{Progress, Sweeps};
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, branched};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 use pulp::Simd;
@@ -21,7 +21,7 @@ pub(super) struct Separable<'a, L, const N: usize> {
     pub table: Condensed,
     pub left: Preconditioned,
     /// `M^-1`; `None` where M is the identity.
-    inverse_mass: Option<SMatrix<f64, N, N>>,
+    inverse_mass: Option<Box<SMatrix<f64, N, N>>>,
     pub wants_z: bool,
     pub q: [Compensated; N],
     pub v: [Compensated; N],
@@ -46,7 +46,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         lagrangian: &'a L,
         table: Condensed,
         left: Preconditioned,
-        inverse_mass: Option<SMatrix<f64, N, N>>,
+        inverse_mass: Option<Box<SMatrix<f64, N, N>>>,
         start: &VelocityPoint<N>,
         wants_z: bool,
     ) -> Self {
@@ -186,6 +186,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             let v = self.v[d].value;
             dq[d] = table.end_b.sum::<S>(&self.a[d], s) + table.end_u * v;
             dv[d] = table.end_v.sum::<S>(&self.a[d], s) + table.grow * v;
+        }
+        if branched() {
+            return Progress::Branched;
         }
         // The largest change over lanes may hide a NaN.
         if !finite(&dq, &dv, dz) {

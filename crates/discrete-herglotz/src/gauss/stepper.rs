@@ -10,6 +10,8 @@ use super::look::{Compare, Curve, Look};
 use super::separable::Separable;
 use super::stage_equations::{Given, Products, StageEquations, Workspace};
 use super::sweeps::Progress;
+use crate::lanes::forget_branches;
+use crate::step_equations::{inverted, is_identity, kept_mass_matrix, mass_matrix};
 use crate::{Halt, InputError, StepError, Stepper, verified};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Structure, Triple, VelocityPoint, linear};
@@ -28,10 +30,14 @@ pub enum GaussRoute {
     General,
 }
 
+/// The largest dimension whose linear motion is advanced by one matrix.
+const MOST_LINEAR: usize = 32;
+
 /// The state and the workspace of a route.
 #[allow(clippy::large_enum_variant)] // One is made for a run, in a box.
 enum Route<'a, L, const N: usize> {
-    Linear(Linear<N>, Condensed),
+    /// In a box of its own: its matrices are larger than all that others hold.
+    Linear(Box<Linear<N>>, Condensed),
     Condensed(Separable<'a, L, N>),
     General(General<'a, L, Physical, N>),
 }
@@ -52,7 +58,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     lagrangian: &'a L,
     products: &'a Products,
     route: Box<Route<'a, L, N>>,
-    mass: Option<SMatrix<f64, N, N>>,
+    mass: Option<Box<SMatrix<f64, N, N>>>,
     arch: Arch,
     t0: f64,
     k: usize,
@@ -79,8 +85,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let mut mass = None;
         let route = if condensed {
             let table = Condensed::new(s, h, lagrangian.gradient(t0, &start).z)?;
+            let unit = is_identity(&w);
             mass = Some(w);
-            let linear = if structure.quadratic && structure.autonomous {
+            // Of many coordinates the matrix costs more than the sweeps that it spares, and more room than the stack has.
+            let linear = if structure.quadratic && structure.autonomous && const { N <= MOST_LINEAR } {
                 Linear::new(lagrangian, &table, &inverse, t0, &start, wants_z)
             } else {
                 None
@@ -89,7 +97,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
                 Some(linear) => Route::Linear(linear, table),
                 None => {
                     let left = table.preconditioned(0.0).ok_or(InputError::Step { h })?;
-                    let inverse = (w != SMatrix::<f64, N, N>::identity()).then_some(inverse);
+                    let inverse = (!unit).then_some(inverse);
                     Route::Condensed(Separable::new(lagrangian, table, left, inverse, &start, wants_z))
                 }
             }
@@ -141,7 +149,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let (s, h) = (self.products.s, self.products.h);
         let t = self.t0 + self.k.checked_sub(1)? as f64 * h;
         let condensed = |table: &Condensed, a, wants_z| {
-            let mass = self.mass.unwrap_or_else(SMatrix::identity);
+            let mass = self.mass.as_deref().copied().unwrap_or_else(SMatrix::identity);
             Solved::from_accelerations(self.lagrangian, table, &mass, t, &self.from, a, wants_z)
         };
         let start = self.phase(&self.from);
@@ -186,7 +194,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     /// With momenta for the velocities of the condensed routes.
     fn phase(&self, x: &Start<N>) -> PhasePoint<N> {
         let y = SVector::from(x.y);
-        PhasePoint { q: SVector::from(x.q), p: self.mass.map_or(y, |mass| mass * y), z: x.z }
+        PhasePoint { q: SVector::from(x.q), p: self.mass.as_ref().map_or(y, |mass| **mass * y), z: x.z }
     }
 
     /// Takes a step by Newton's method.
@@ -253,10 +261,12 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Stages<'_, '_, L, N> {
                 curve.of_gradients(&x.v, &x.rho, l, wants_z);
             }
             (Last::Route, Route::Condensed(run)) => {
-                curve.of_accelerations::<S>(&run.table, self.run.mass.as_ref(), &from.y, &run.a);
+                curve.of_accelerations::<S>(&run.table, self.run.mass.as_deref(), &from.y, &run.a);
             }
             (Last::Route, Route::General(run)) => {
-                (curve.v, curve.force, curve.rate, curve.l) = (run.v, run.force, run.rate, Some(run.l));
+                let solved = run.solved();
+                (curve.v, curve.force) = (solved.v.map(super::stages::Stages), solved.force.map(super::stages::Stages));
+                (curve.rate, curve.l) = (super::stages::Stages(solved.rate), Some(super::stages::Stages(solved.l)));
             }
         }
         Some(curve)
@@ -275,6 +285,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let Advance { run, steps } = self;
+        forget_branches();
         let (t0, h) = (run.t0, run.products.h);
         if let Route::Linear(linear, _) = &mut *run.route {
             let (taken, from) = linear.advance(steps);
@@ -319,6 +330,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
                     return Err(Halt { taken: done, cause: StepError::SigmaVanished { sigma } });
                 }
                 Progress::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
+                Progress::Branched => StepError::Branched,
                 _ => StepError::NonFinite,
             };
             self.newton_step(self.time(), refused).map_err(|cause| Halt { taken: done, cause })?;
@@ -359,8 +371,8 @@ pub(super) struct Beginning<const N: usize> {
     pub start: VelocityPoint<N>,
     pub structure: Structure,
     /// W and its inverse.
-    pub w: SMatrix<f64, N, N>,
-    pub inverse: SMatrix<f64, N, N>,
+    pub w: Box<SMatrix<f64, N, N>>,
+    pub inverse: Box<SMatrix<f64, N, N>>,
 }
 
 impl<const N: usize> Beginning<N> {
@@ -374,20 +386,14 @@ impl<const N: usize> Beginning<N> {
         let v = velocity(lagrangian, t0, state, guess)?;
         let start = VelocityPoint { q: state.q, v, z: state.z };
         let structure = verified(lagrangian, t0, &start)?;
-        let identity = SMatrix::<f64, N, N>::identity();
-        let w = lagrangian.hessian(t0, &start).vv;
-        let mut inverse = identity;
-        for j in 0..N {
-            let mut column = SVector::from_fn(|i, _| identity[(i, j)]);
-            linear::solve(&mut w.clone(), &mut column)
-                .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
-            inverse.set_column(j, &column);
-        }
+        let w = kept_mass_matrix(lagrangian, t0, &start);
+        let inverse = inverted(&w).map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
         Ok(Beginning { start, structure, w, inverse })
     }
 }
 
 /// The velocity that belongs to a momentum, `L_v(t, q, v, z) = p`, by Newton's method.
+#[inline(never)]
 pub(crate) fn velocity<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,
@@ -398,7 +404,7 @@ pub(crate) fn velocity<const N: usize>(
     let mut before = f64::INFINITY;
     for _ in 0..crate::ITERATION_LIMIT {
         let mut change = lagrangian.gradient(t, &x).y - state.p;
-        let mut w = lagrangian.hessian(t, &x).vv;
+        let mut w = mass_matrix(lagrangian, t, &x);
         linear::solve(&mut w, &mut change)
             .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
         x.v -= change;
@@ -414,3 +420,6 @@ pub(crate) fn velocity<const N: usize>(
     }
     Err(InputError::FirstStep(StepError::NotConverged { residual: before, iterations: crate::ITERATION_LIMIT }))
 }
+
+#[cfg(test)]
+mod tests;

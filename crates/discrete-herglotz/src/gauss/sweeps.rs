@@ -11,6 +11,8 @@ pub(super) enum Progress {
     Slow { change: f64, sweeps: u32 },
     /// A value is not finite.
     NonFinite,
+    /// The Lagrangian branches on a value of its own, other than lane by lane.
+    Branched,
     /// The step is not conformally contact.
     SigmaVanished { sigma: f64 },
 }

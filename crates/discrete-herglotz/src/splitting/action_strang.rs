@@ -13,7 +13,7 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 /// `z0 + L_d = phi(phi(z0) + (q1 - q0).M(q1 - q0)/(2h) - h/2 V(t, q0) - h/2 V(t + h, q1))`.
 ///
 /// Symmetric and explicit; `sigma_d` is the product of the two factors `phi'`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct ActionStrang<L, F: ActionFlow, const N: usize> {
     form: Separable<L, N>,
     h: f64,

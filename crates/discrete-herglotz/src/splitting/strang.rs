@@ -27,7 +27,7 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 /// flow.run(100, &mut FinalOnly)?;
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Strang<L, const N: usize> {
     form: Separable<L, N>,
     h: f64,

@@ -4,7 +4,7 @@ use super::{ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, Split
 use crate::{Composition, DiscreteLagrangian, Flow, Halt, InputError, Midpoint, Solver, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, Duffing, Kepler, LaneEmden, Pendulum, QuadraticInZ};
-use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, Triple};
+use contact_geom::{DiscretePoint, Lagrangian, Largest, PhasePoint, Scalar, Structure, Triple};
 
 /// The time that errors are measured after.
 const DURATION: f64 = 4.0;
@@ -50,7 +50,7 @@ impl Lagrangian<1> for Tides {
 }
 
 fn distance<const N: usize>(a: PhasePoint<N>, b: PhasePoint<N>) -> f64 {
-    Triple::from(a).minus(Triple::from(b)).amax()
+    Triple::from(a).minus(Triple::from(b)).largest()
 }
 
 /// The state after so many steps.
@@ -307,9 +307,9 @@ fn assert_step_is_of_value<const N: usize>(ld: &impl DiscreteLagrangian<N>, star
     let bad = InputError::FirstStep;
     let ahead = ld.forward(t, &start, &start.p, &mut solver).map_err(bad)?;
     let derived = ByValue(ld).forward(t, &start, &ahead.velocity, &mut solver).map_err(bad)?;
-    let rounding = 32.0 * f64::EPSILON * (1.0 + Triple::from(ahead.end).amax()) / ld.step_size();
+    let rounding = 32.0 * f64::EPSILON * (1.0 + Triple::from(ahead.end).largest()) / ld.step_size();
     assert!(distance(ahead.end, derived.end) < rounding, "{ahead:?}, {derived:?}");
-    assert!((ahead.velocity - derived.velocity).amax() < rounding);
+    assert!((ahead.velocity - derived.velocity).largest() < rounding);
     assert!((ahead.sigma / derived.sigma - 1.0).abs() <= 2.0 * f64::EPSILON, "{} {}", ahead.sigma, derived.sigma);
     let back = ld.backward(t, &ahead.end, &ahead.velocity, &mut solver).map_err(bad)?;
     let derived = ByValue(ld).backward(t, &ahead.end, &ahead.velocity, &mut solver).map_err(bad)?;

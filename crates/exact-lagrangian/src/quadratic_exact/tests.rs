@@ -3,7 +3,7 @@
 use super::*;
 use crate::herglotz_flow;
 use contact_geom::systems::{Chain, ChargedParticle, Ends, FreeParticle, HarmonicOscillator, Pendulum, UniformField};
-use contact_geom::{GeometryError, Structure};
+use contact_geom::{GeometryError, Larger, Largest, Structure};
 
 const GAMMAS: [f64; 12] = [-40.0, -2.5, -2.0 - 1e-12, -2.0, -2.0 + 1e-12, -1.999, -1e-9, 0.0, 1e-15, 0.3, 2.0, 2.5];
 const STEPS: [f64; 5] = [1e-8, 1e-5, 1e-3, 0.1, 0.8];
@@ -35,18 +35,19 @@ impl Units {
             (ld.motion(start), ld.jet(0.0, &x))
         });
         let Ok((motion, Ok(jet))) = found else { unreachable!("{h}: {found:?}") };
-        let size = start.q.amax().max(start.v.amax()).max(end.q.amax()).max(end.v.amax());
-        let of_motion = ((motion.q - end.q).amax().max((motion.v - end.v).amax()) / size)
-            .max((motion.z - end.z).abs() / end.z.abs().max(size * size));
+        let size = start.q.largest().larger(start.v.largest()).larger(end.q.largest()).larger(end.v.largest());
+        let of_motion = ((motion.q - end.q).largest().larger((motion.v - end.v).largest()) / size)
+            .larger((motion.z - end.z).abs() / end.z.abs().larger(size * size));
         let (p0, p1) = (lagrangian.gradient(0.0, start).y, lagrangian.gradient(0.0, end).y);
         // A rounding of q0 moves the momenta by about p/|q1 - q0| times it, and the action by p times it.
-        let ill = start.q.amax() / (end.q - start.q).amax();
-        let largest = p0.amax().max(p1.amax());
-        let of_momenta = (jet.d1 / jet.sigma() + p0).amax().max((jet.d2 - p1).amax()) / ((1.0 + ill) * largest);
+        let ill = start.q.largest() / (end.q - start.q).largest();
+        let largest = p0.largest().larger(p1.largest());
+        let of_momenta =
+            (jet.d1 / jet.sigma() + p0).largest().larger((jet.d2 - p1).largest()) / ((1.0 + ill) * largest);
         let of_value = (jet.value - action).abs() / (action.abs() + ill * p1.dot(&(end.q - start.q)).abs());
-        self.motion = self.motion.max(of_motion / EPS);
-        self.value = self.value.max(of_value / EPS);
-        self.momenta = self.momenta.max(of_momenta / EPS);
+        self.motion = self.motion.larger(of_motion / EPS);
+        self.value = self.value.larger(of_value / EPS);
+        self.momenta = self.momenta.larger(of_momenta / EPS);
     }
 
     fn assert_below(&self, motion: f64, value: f64, momenta: f64, what: &str) {
@@ -109,7 +110,7 @@ fn the_value_away_from_the_origin_keeps_all_digits_of_the_displacement() {
         let (Ok(ld), Some(v)) = (ld, v0) else { unreachable!("{gamma}, {h}") };
         let action = system.solution(h, &VelocityPoint { q: q0, v, z: 0.0 }).z;
         let Ok(found) = ld.value(0.0, &DiscretePoint { q0, q1, z0: 0.0 }) else { unreachable!("{gamma}, {h}") };
-        worst = worst.max((found - action).abs() / (action.abs() * EPS));
+        worst = worst.larger((found - action).abs() / (action.abs() * EPS));
     }
     println!("away from the origin: {worst}");
     assert!(worst <= 16.0, "{worst}");
@@ -126,7 +127,7 @@ fn the_small_part_that_the_start_has_in_the_displacement_is_not_lost() {
         let by_velocity = system.solution(h, &VelocityPoint::new([0.0], [1.0], 0.0)).q[0];
         let Ok(jet) = ld.jet(0.0, &DiscretePoint::new([1.0], [1.0 + step], 0.0)) else { unreachable!("{gamma}, {h}") };
         let v0 = (step - of_start) / by_velocity;
-        worst = worst.max((jet.d1[0] / jet.sigma() + v0).abs() / (v0 * EPS));
+        worst = worst.larger((jet.d1[0] / jet.sigma() + v0).abs() / (v0 * EPS));
     }
     println!("part of the start: {worst}");
     assert!(worst <= 16.0, "{worst}");
@@ -181,8 +182,8 @@ fn fast_oscillations_and_strong_drags_keep_their_digits_over_long_steps() {
         let end = system.solution(h, &start);
         let Ok(found) = QuadraticExact::new(&system, h).map(|ld| ld.motion(&start)) else { unreachable!() };
         let size = end.q[0].hypot(end.v[0]);
-        let error = (found.q - end.q).amax().max((found.v - end.v).amax()) / size;
-        oscillator.motion = oscillator.motion.max(error / (EPS * (1.0 + h)));
+        let error = (found.q - end.q).largest().larger((found.v - end.v).largest()) / size;
+        oscillator.motion = oscillator.motion.larger(error / (EPS * (1.0 + h)));
     }
     for (gamma, h) in [-40.0, -1e3, -1e6].into_iter().flat_map(|gamma| [0.1, 0.8, 10.0].map(|h| (gamma, h))) {
         let system = FreeParticle { gamma };
@@ -190,10 +191,11 @@ fn fast_oscillations_and_strong_drags_keep_their_digits_over_long_steps() {
         let end = system.solution(h, &start);
         let Ok(ld) = QuadraticExact::new(&system, h) else { unreachable!("{gamma}, {h}") };
         let found = ld.motion(&start);
-        strong.motion = strong.motion.max(((found.q - end.q) / (end.q[0] * EPS)).amax());
+        strong.motion = strong.motion.larger(((found.q - end.q) / (end.q[0] * EPS)).largest());
         // What decays is known to the rounding of the exponent; below the smallest normal number, not relative to itself.
-        let decayed = [(found.v[0], end.v[0]), (found.z, end.z)].map(|(a, b)| (a - b).abs() / b.max(f64::MIN_POSITIVE));
-        strong.value = strong.value.max(decayed[0].max(decayed[1]) / (EPS * (1.0 + (gamma * h).abs())));
+        let decayed =
+            [(found.v[0], end.v[0]), (found.z, end.z)].map(|(a, b)| (a - b).abs() / b.larger(f64::MIN_POSITIVE));
+        strong.value = strong.value.larger(decayed[0].larger(decayed[1]) / (EPS * (1.0 + (gamma * h).abs())));
     }
     // In units of the rounded phase, and of the size of the slow motion that is left.
     oscillator.assert_below(8.0, 0.0, 0.0, "phase");
