@@ -141,3 +141,37 @@ fn lowest<E>(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, E>) -> 
     }
     Ok(if at_a < at_b { (a, at_a) } else { (b, at_b) })
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use contact_geom::systems::HarmonicOscillator;
+
+    /// A slope that has merely decayed is no conjugate point; those of the decaying oscillation are found as long as there is
+    /// something of it.
+    #[test]
+    fn decay_is_no_fold() {
+        let x = VelocityPoint::new([0.0], [1.2], 0.0);
+        // By e^-30 and more, and beyond the smallest number.
+        for (gamma, h) in [(-3.0, 60.0), (-3.0, 4000.0), (-1.0, 60.0), (-1.9, 60.0)] {
+            let exp = ContactExponential::new(HarmonicOscillator { gamma }, h).unwrap();
+            let found = exp.conjugate_points(0.0, &x).unwrap();
+            let w = (1.0 - gamma * gamma / 4.0f64).sqrt();
+            for (k, point) in found.iter().enumerate() {
+                let truth = (k + 1) as f64 * std::f64::consts::PI / w;
+                assert!((point.after - truth).abs() < 1e-11 * truth, "{gamma}: {point:?}");
+            }
+            let count = if gamma > -2.0 { (h * w / std::f64::consts::PI) as usize } else { 0 };
+            assert_eq!(found.len(), count, "{gamma}");
+        }
+        // From the origin the end, however small, tells the velocity.
+        for (gamma, h) in [(-0.5, 100.0), (-1.0, 71.0), (-3.0, 60.0)] {
+            let exp = ContactExponential::new(HarmonicOscillator { gamma }, h).unwrap();
+            let y = exp.at(0.0, &x).unwrap();
+            let back = exp.retract(0.0, &y);
+            assert!(!matches!(back, Err(ExactError::ConjugatePoint { .. })), "{gamma}: {back:?}");
+            assert!(back.is_ok_and(|b| (b.start.v[0] - 1.2).abs() < 1e-10), "{gamma}: {back:?}");
+        }
+    }
+}

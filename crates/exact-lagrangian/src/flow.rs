@@ -1,5 +1,9 @@
 //! The flow of the Herglotz vector field, to round-off.
 
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;
+
 use crate::ExactError;
 use crate::panel::{Floor, Panel, Problem, Rate, Rates, Refused, Size, State, collocate};
 use contact_geom::nalgebra::SVector;

@@ -40,6 +40,8 @@
 //! How exact: against closed forms some 1e-15, of the motion's own size where it decays by `e^-50`. How fast: `L_h^e` with its first
 //! derivatives costs 1.2 to 3.5 calls of a dop853 that computes the motion alone, to 1e-13. Nothing allocates for static N.
 
+#[cfg(test)]
+mod bad_numbers;
 mod composition;
 mod conjugate;
 mod error;

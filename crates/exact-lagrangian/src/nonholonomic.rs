@@ -82,7 +82,7 @@ impl<L> NonHolonomic<L> {
     /// derivative in time. Defined on all of T(Q x R), tangent to the sets `Phi = const`.
     ///
     /// # Errors
-    /// [`GeometryError::Singular`] where W is singular.
+    /// [`GeometryError::Singular`] where W is singular, [`GeometryError::Undefined`] where a term is not finite.
     pub fn chetaev<T: Scalar, const N: usize>(
         &self,
         t: f64,
@@ -121,6 +121,9 @@ impl<L> NonHolonomic<L> {
         right[N + 1] = value.d.z;
         solve(&mut matrix, &mut right)
             .map_err(|e| e.of("the matrix of Chetaev's equations", "L is not regular here; choose another point"))?;
+        if !right.iter().all(|e| e.extent().is_finite()) {
+            return Err(GeometryError::Undefined { what: "the solution of Chetaev's equations" });
+        }
         Ok(Chetaev { a: SVector::from_fn(|i, _| right[i]), dw: right[N], multiplier: right[N + 1] })
     }
 

@@ -456,6 +456,9 @@ fn estimate<const N: usize, T: Scalar>(problem: &Problem<N, T>, nodes: &[Rate<N,
         // Below some roundings the coefficients do not fall.
         if tail <= 64.0 * f64::EPSILON { tail * tail } else { tail * larger(tail, (fall * fall).min(1.0)) }
     });
-    let velocity = relative[0] * accelerations.over(seen.scales[0], Size::default()) * h.abs();
+    let velocity = match relative[0] {
+        0.0 => 0.0,
+        tail => tail * accelerations.over(seen.scales[0], Size::default()) * h.abs(),
+    };
     larger(larger(velocity, relative[1]), relative[2]) / (2 * g.s + 1) as f64
 }

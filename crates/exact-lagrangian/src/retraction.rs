@@ -8,7 +8,7 @@ use crate::panel::{End, Floor, Problem, Rates, State, collocate};
 use crate::{ContactExponential, ExactError, Motion, herglotz_flow};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{DiscretePoint, Dual, Lagrangian, Scalar, VelocityPoint};
+use contact_geom::{DiscretePoint, Dual, Lagrangian, Scalar, VelocityPoint, larger};
 use discrete_herglotz::{InputError, last_correction};
 
 /// The Newton iterations that a retraction may take.
@@ -84,11 +84,20 @@ fn fold<const N: usize>(shot: &Shot<N>, time: f64) -> Fold {
     Fold::of(&slope(shot), &SMatrix::from_fn(|i, j| shot.end.v[i].d[j]), time)
 }
 
+/// How far from singular the slope is that has this inverse, in units of what the motion makes of velocities: like the sine of its
+/// [`Fold`], without allocation and exactly that for `N = 1`.
+fn regularity<const N: usize>(shot: &Shot<N>, inverse: &SMatrix<f64, N, N>, time: f64) -> f64 {
+    let entries = |i: usize, j: usize| larger(shot.displacement[i].d[j].abs(), (shot.end.v[i].d[j] * time).abs());
+    let size = (0..N * N).fold(0.0, |size, k| larger(size, entries(k / N, k % N)));
+    smallest(inverse) / size
+}
+
 /// A motion through both points, and the inverse of `dq1/dv0` there.
 struct Found<const N: usize> {
     retraction: Retraction<N>,
     inverse: SMatrix<f64, N, N>,
-    fold: Fold,
+    /// [How far from singular](regularity) the slope is.
+    regularity: f64,
 }
 
 /// The smallest singular value of a matrix with this inverse, up to a factor of at most `sqrt N`.
@@ -340,7 +349,7 @@ impl<L> ContactExponential<L> {
         L: Lagrangian<N>,
     {
         let shot = self.shot(t, &seeded(start), self.h, ROUGH, work).ok()?;
-        slope(&shot).try_inverse().filter(|_| fold(&shot, self.h).sine > NEARLY)
+        slope(&shot).try_inverse().filter(|inverse| regularity(&shot, inverse, self.h) > NEARLY)
     }
 
     /// Newton's method on `exp_h`: to some digits first; the rest by collocation with the slope found, or else to the end.
@@ -356,7 +365,7 @@ impl<L> ContactExponential<L> {
     {
         let rough = self.shoot(t, x, guess, (self.h, ROUGH), work)?;
         let near = rough.retraction.start.v;
-        let regular = rough.fold.sine > NEARLY;
+        let regular = rough.regularity > NEARLY;
         if regular && let Some((found, _)) = self.by_collocation(t, x, &mut { near }, &rough.inverse, 1.0)? {
             // Still the motion that Newton's method has found, not another one.
             if (found.start.v - near).amax() <= ROUGH.sqrt() * near.amax() {
@@ -403,8 +412,7 @@ impl<L> ContactExponential<L> {
                 continue;
             }
             nearest = nearest.min(residual);
-            let fold = fold(&shot, h);
-            last = Some((start, residual, slope, fold));
+            last = Some((start, residual, slope, shot));
             change = -missed;
             let (mut matrix, size) = (slope, v.amax());
             if solve(&mut matrix, &mut change).is_err() {
@@ -416,20 +424,24 @@ impl<L> ContactExponential<L> {
             let resolution = 2.0 * accuracy * (x.q0.amax().max(x.q1.amax()) / h.abs()).max(size);
             let stagnant = now >= 0.5 * before && now <= 64.0 * resolution;
             if residual == 0.0 || (before.is_finite() && (predicted || stagnant)) {
-                let Some(inverse) = slope.try_inverse().filter(|_| fold.sine > CONJUGATE) else { break };
-                return Ok(Found { retraction: moved(x, &start, &shot, &change), inverse, fold });
+                let Some(inverse) = slope.try_inverse() else { break };
+                let regularity = regularity(&shot, &inverse, h);
+                if regularity.is_nan() || regularity <= CONJUGATE {
+                    break;
+                }
+                return Ok(Found { retraction: moved(x, &start, &shot, &change), inverse, regularity });
             }
             v += change;
             before = now;
         }
-        let Some((start, residual, slope, fold)) = last else {
+        let Some((start, residual, slope, shot)) = last else {
             return Err(ExactError::NotConverged {
                 last: VelocityPoint { q: x.q0, v: *guess, z: x.z0 },
                 residual: f64::INFINITY,
                 smallest: 0.0,
             });
         };
-        let smallest = singular_values(&slope).smallest;
+        let (smallest, fold) = (singular_values(&slope).smallest, fold(&shot, h));
         // Newton's method is slow, and its limit ill determined, where the slope nearly vanishes.
         Err(if fold.sine <= f64::EPSILON.sqrt() && !fold.decayed {
             ExactError::ConjugatePoint { last: start, residual, smallest }

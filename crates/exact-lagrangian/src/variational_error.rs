@@ -153,12 +153,12 @@ const PLATEAU: usize = 8;
 /// The largest slope of a plateau: half of the lowest order there is.
 const FLAT: f64 = 0.5;
 
-/// Raises the floors to the round-off plateau that the smallest steps show: constant, or growing by at most `1/h` as it does where
+/// Raises the floors, if they are too low, to the round-off plateau that the smallest steps show: constant, or growing by at most `1/h` as it does where
 /// momenta are differences of positions divided by h.
 fn raise_floors(rows: &mut [Row]) {
     let smallest = &rows[rows.len().saturating_sub(PLATEAU)..];
     let seen: Vec<(f64, f64)> = smallest.iter().filter(|r| r.error > 0.0).map(|r| (r.h, r.error)).collect();
-    if seen.len() < PLATEAU {
+    if seen.len() < PLATEAU || !smallest.iter().any(|r| r.error > CLEAR * r.floor) {
         return;
     }
     let slope = least_squares_slope(&seen);
@@ -190,4 +190,65 @@ fn least_squares_slope(points: &[(f64, f64)]) -> f64 {
     let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), (h, e)| (x + h.ln() / n, y + e.ln() / n));
     let covariance: f64 = points.iter().map(|(h, e)| (h.ln() - x) * (e.ln() - y)).sum();
     covariance / points.iter().map(|(h, _)| (h.ln() - x).powi(2)).sum::<f64>()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use contact_geom::Scalar;
+    use contact_geom::systems::CoupledInZ;
+    use discrete_herglotz::{Midpoint, StepError};
+
+    /// The midpoint rule by its value alone: its momenta and steps are differences that lose digits like `1/h`.
+    struct ValueOnly<'a>(Midpoint<&'a CoupledInZ>);
+    impl DiscreteLagrangian<1> for ValueOnly<'_> {
+        fn step_size(&self) -> f64 {
+            DiscreteLagrangian::<1>::step_size(&self.0)
+        }
+        fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<1, T>) -> Result<T, StepError> {
+            self.0.value(t, x)
+        }
+    }
+
+    /// The plateau of a discrete Lagrangian that has only a value is not fitted, from whatever largest step; where no step is above
+    /// it, no order is told.
+    #[test]
+    fn a_plateau_is_no_order() {
+        let system = CoupledInZ::default();
+        let x = VelocityPoint::new([0.8], [-0.6], 0.4);
+        let of =
+            |largest| error_orders(&system, |h| Midpoint::new(&system, h).map(ValueOnly), 0.0, &x, largest).unwrap();
+        let orders = of(0.25);
+        for (what, found, expected) in [
+            ("value", &orders.value, 3.0),
+            ("F-", &orders.legendre_minus, 2.0),
+            ("F+", &orders.legendre_plus, 2.0),
+            ("flow", &orders.flow, 3.0),
+        ] {
+            assert!(found.order.is(expected, 0.15), "{what}: {:?} from {:?}", found.order, found.fitted);
+        }
+        for largest in [1e-3, 1e-6, 1e-9] {
+            let orders = of(largest);
+            for (found, expected) in [(&orders.value, 3.0), (&orders.legendre_minus, 2.0), (&orders.flow, 3.0)] {
+                let told = matches!(found.order, Order::Exact | Order::Unclear) || found.order.is(expected, 0.3);
+                assert!(told, "{largest}: {:?} from {:?}", found.order, found.fitted);
+            }
+        }
+    }
+
+    /// Two steps above the plateau give no slope, none an exact method, and no steps nothing.
+    #[test]
+    fn what_can_be_told_of_an_order() {
+        let of = |errors: &[f64]| {
+            let row = |(k, e): (usize, &f64)| Row { h: 0.5f64.powi(k as i32), error: *e, floor: 1e-16 };
+            fit(errors.iter().enumerate().map(row).collect()).order
+        };
+        assert_eq!(of(&[]), Order::Unclear);
+        assert_eq!(of(&[1e-16; 12]), Order::Exact);
+        let two: Vec<f64> = (0..12).map(|k| if k < 2 { 0.1f64.powi(k) } else { 1e-10 * 2f64.powi(k) }).collect();
+        assert_eq!(of(&two), Order::Unclear);
+        let cubic: Vec<f64> = (0..40).map(|k| 0.125f64.powi(k) + 1e-12 * 2f64.powi(k)).collect();
+        assert!(of(&cubic).is(3.0, 0.01), "{:?}", of(&cubic));
+    }
 }
