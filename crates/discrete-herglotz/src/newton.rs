@@ -61,8 +61,8 @@ pub fn last_correction(now: f64, before: f64, tolerance: f64) -> bool {
 /// Solves the step equations for `(u, z)` from a guess.
 ///
 /// Stopping rule, the first that holds: the next corrections of `u` and `z`, predicted from the last two, are below their
-/// round-off; the residual and the defect of `z` are below the round-off of their own terms; the corrections stagnate below
-/// what moves the position. An iterate outside the domain (a value that is not finite) is drawn back half-way, which counts
+/// round-off; the residual and the defect of `z` are below the round-off of their own terms; the corrections of `u` stagnate below
+/// what moves the position, and those of `z` stagnate too. An iterate outside the domain (a value that is not finite) is drawn back half-way, which counts
 /// as an iteration; after [`ITERATION_LIMIT`] the step fails.
 #[inline(always)]
 pub(crate) fn newton<const N: usize>(
@@ -101,11 +101,37 @@ pub(crate) fn newton<const N: usize>(
             && last_correction(z_size, last_z_size, f64::EPSILON * z.abs());
         let round_off = 8.0 * f64::EPSILON;
         let exact = residual_size <= round_off * at.size && at.z_change.abs() <= round_off * z.abs();
-        let stagnant = size >= 0.5 * last_size && size <= round_off * (resolution + u_size);
+        // From an exact guess of u its corrections are rounding at once, while z is still on its way.
+        let z_settled = z_size >= 0.5 * last_z_size || z_size <= round_off * z.abs();
+        let stagnant = size >= 0.5 * last_size && size <= round_off * (resolution + u_size) && z_settled;
         if predicted || exact || stagnant {
             return Ok(Root { u, z, iterations });
         }
         (last, last_z, last_size, last_z_size) = (change, z_change, size, z_size);
     }
     Err(StepError::NotConverged { residual: residual_size, iterations: ITERATION_LIMIT })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// `u = 1`, known from the start, and `z^2 = 2`: the iteration goes on until z is there as well.
+    #[test]
+    fn an_exact_guess_of_u_does_not_end_the_search_for_z() {
+        let start = Start { u: SVector::from([1.0]), z: 1.5, resolution: 1.0 };
+        let root = newton(start, &mut Solver::default(), |u: &SVector<f64, 1>, z| {
+            Ok(Linearised {
+                residual: SVector::from([u[0] - 1.0]),
+                jacobian: SMatrix::identity(),
+                // No bound on the round-off of the residual, so that the corrections decide.
+                size: 0.0,
+                z_change: (2.0 - z * z) / (2.0 * z),
+                z_slope: SVector::zeros(),
+            })
+        });
+        let z = root.unwrap().z;
+        assert!((z - 2.0f64.sqrt()).abs() <= 2.0 * f64::EPSILON, "{z}");
+    }
 }
