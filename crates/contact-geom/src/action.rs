@@ -92,7 +92,11 @@ impl<const N: usize> Symmetry<N> {
     /// [`GeometryError::WrongSize`] unless both indices are below `N` and differ.
     pub fn rotation(i: usize, j: usize) -> Result<Self, GeometryError> {
         if i == j || i >= N || j >= N {
-            return Err(GeometryError::WrongSize { what: "the plane of rotation", expected: N, found: i.max(j) + 1 });
+            return Err(GeometryError::WrongSize {
+                what: "the plane of rotation",
+                expected: N,
+                found: i.max(j).saturating_add(1),
+            });
         }
         Ok(Symmetry::Rotation(i, j))
     }

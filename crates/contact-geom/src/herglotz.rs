@@ -22,6 +22,10 @@ impl Regularity {
         if !matrix.iter().all(|e| e.is_finite()) {
             return Regularity { smallest: 0.0, largest: f64::INFINITY };
         }
+        if matrix.is_empty() {
+            // Of dimension 0 there is one matrix, the identity.
+            return Regularity { smallest: 1.0, largest: 1.0 };
+        }
         let values = matrix.singular_values();
         Regularity { smallest: values.min(), largest: values.max() }
     }

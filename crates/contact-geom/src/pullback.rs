@@ -54,6 +54,8 @@ pub fn conformality_with_jacobian<const N: usize>(
     }
     let pullback = apply_transposed(jacobian, &target.eta(image)?);
     let sigma = pullback.dot(&source.reeb(x)?);
-    let defect = pullback.minus(source.eta(x)?.scale(sigma)).largest() / pullback.largest();
+    let (difference, size) = (pullback.minus(source.eta(x)?.scale(sigma)).largest(), pullback.largest());
+    // A map that sends everything to one point pulls back nothing: conformal, with the factor 0.
+    let defect = if difference == 0.0 && size == 0.0 { 0.0 } else { difference / size };
     Ok(Conformality { pullback, sigma, defect })
 }

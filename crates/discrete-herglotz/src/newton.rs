@@ -117,3 +117,27 @@ pub(crate) fn newton<const N: usize>(
     }
     Err(StepError::NotConverged { residual: residual_size, iterations: ITERATION_LIMIT })
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// `u = 1`, known from the start, and `z^2 = 2`: the iteration goes on until z is there as well.
+    #[test]
+    fn an_exact_guess_of_u_does_not_end_the_search_for_z() {
+        let start = Start { u: SVector::from([1.0]), z: 1.5, resolution: 1.0 };
+        let root = newton(start, &mut Solver::default(), |u: &SVector<f64, 1>, z| {
+            Ok(Linearised {
+                residual: SVector::from([u[0] - 1.0]),
+                jacobian: SMatrix::identity(),
+                // No bound on the round-off of the residual, so that the corrections decide.
+                size: 0.0,
+                z_change: (2.0 - z * z) / (2.0 * z),
+                z_slope: SVector::zeros(),
+            })
+        });
+        let z = root.unwrap().z;
+        assert!((z - 2.0f64.sqrt()).abs() <= 2.0 * f64::EPSILON, "{z}");
+    }
+}

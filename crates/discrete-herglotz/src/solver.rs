@@ -50,7 +50,12 @@ impl<const N: usize> Solver<N> {
     #[inline]
     pub fn solve(&mut self, a: &mut SMatrix<f64, N, N>, b: &mut SVector<f64, N>) -> Result<(), StepError> {
         match &mut self.large {
-            None => linear::solve(a, b).map(drop).map_err(|e| StepError::Singular { pivot: e.pivot }),
+            None => match linear::solve(a, b) {
+                Ok(_) if b.iter().all(|x| x.is_finite()) => Ok(()),
+                // A pivot so small that the solution is beyond all numbers.
+                Ok(determinant) => Err(StepError::Singular { pivot: determinant.abs() }),
+                Err(e) => Err(StepError::Singular { pivot: e.pivot }),
+            },
             Some(large) => large.solve(a, b),
         }
     }
@@ -94,11 +99,14 @@ impl Large {
             MemStack::new(&mut self.scratch),
         );
         // faer is silent on a singular or non-finite matrix: the factor's diagonal and the solution tell.
-        let mut least = f64::INFINITY;
+        let (mut least, mut finite) = (f64::INFINITY, true);
         for i in 0..N {
-            least = -larger(-least, -self.matrix[(i, i)].abs());
+            let pivot = self.matrix[(i, i)].abs();
+            // By an infinite pivot the solution would be 0.
+            finite &= pivot.is_finite() && self.rhs[(i, 0)].is_finite();
+            least = -larger(-least, -pivot);
             b[i] = self.rhs[(i, 0)];
         }
-        if least > 0.0 && b.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(StepError::Singular { pivot: least }) }
+        if least > 0.0 && finite { Ok(()) } else { Err(StepError::Singular { pivot: least }) }
     }
 }

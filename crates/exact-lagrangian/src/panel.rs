@@ -282,7 +282,8 @@ fn between_nodes<const N: usize, T: Scalar>(
     evaluations: &mut u64,
 ) -> Result<Rate<N, T>, Refused> {
     let Problem { t, h, from, accuracy, .. } = *problem;
-    let sizes = |r: &Rate<N, T>| [r.a.iter().map(|a| a.pivot_size()).fold(0.0, larger), r.z.pivot_size(), r.b.pivot_size()];
+    let sizes =
+        |r: &Rate<N, T>| [r.a.iter().map(|a| a.pivot_size()).fold(0.0, larger), r.z.pivot_size(), r.b.pivot_size()];
     let most = |rates: &[Rate<N, T>]| {
         rates.iter().map(sizes).fold([0.0; 3], |m: [f64; 3], e| std::array::from_fn(|i| larger(m[i], e[i])))
     };

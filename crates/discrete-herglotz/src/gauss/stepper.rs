@@ -382,6 +382,7 @@ impl<const N: usize> Beginning<N> {
         state: &PhasePoint<N>,
         guess: SVector<f64, N>,
     ) -> Result<Self, InputError> {
+        crate::run::check_time(t0)?;
         state.check()?;
         let v = velocity(lagrangian, t0, state, guess)?;
         let start = VelocityPoint { q: state.q, v, z: state.z };
