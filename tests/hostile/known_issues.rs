@@ -2,10 +2,10 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Pendulum};
-use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint};
+use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::{
-    Composition, Event, Flow, Gauss, Integrator, Method, Midpoint, Rectangle, Scene, Splitting, SplittingScheme,
-    Status, Stepper, Steps, Wanted, run_with_events,
+    Composition, Event, Flow, Gauss, Integrator, Method, Midpoint, Rectangle, Scene, SplittingScheme, Status, Stepper,
+    Steps, Wanted, run_with_events,
 };
 use std::fs;
 use std::path::Path;

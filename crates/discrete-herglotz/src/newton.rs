@@ -126,7 +126,7 @@ mod tests {
     /// `u = 1`, known from the start, and `z^2 = 2`: the iteration goes on until z is there as well.
     #[test]
     fn an_exact_guess_of_u_does_not_end_the_search_for_z() {
-        let start = Start { u: SVector::from([1.0]), z: 1.5, resolution: 1.0 };
+        let start = Start { u: SVector::from([1.0]), z: 1.5, resolution: 1.0, impulse: 1.0 };
         let root = newton(start, &mut Solver::default(), |u: &SVector<f64, 1>, z| {
             Ok(Linearised {
                 residual: SVector::from([u[0] - 1.0]),

@@ -322,7 +322,7 @@ mod tests {
             {
                 let smooth = Smooth { spring: 1.0, ..Smooth::default() };
                 let formula = Formula { kinetic, feature, rate, force, action, smooth, claims: None };
-                for defect in formula.structure().defects(&formula, 0.3, &x) {
+                for defect in formula.structure().defects(&formula, 0.3, &x).into_iter().flatten() {
                     assert!(defect.size < 1e-12, "{formula:?}: {defect:?}");
                 }
             }
