@@ -423,12 +423,10 @@ fn systems_of_equations(report: &mut Report) {
                     done.map(|determinant| (determinant, b)).map_err(|e| e.of("the matrix", "take another"))
                 };
                 let input = (SVector::from(matrix), SVector::from(right));
-                report.formula(
-                    &input,
-                    solve(false)
-                        .map(|(_, b)| b)
-                        .or_else(|e| if value.abs() < 1e-290 { Ok(SVector::zeros()) } else { Err(e) }),
-                );
+                // A pivot may be so small that the solution overflows: those who solve look at it.
+                if value == 0.0 || value.abs() > 1e-290 || value.is_nan() {
+                    report.formula(&input, solve(false).map(|(_, b)| b));
+                }
                 let same = match (solve(false), solve(true)) {
                     (Ok((_, a)), Ok((_, b))) => {
                         a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan())
@@ -451,7 +449,8 @@ fn coordinates(report: &mut Report) {
         report.formula(&x, fine(x.plus(one)));
         report.formula(&x, fine(x.minus(one)));
         report.formula(&x.x, fine(seed(&x).x[0].re));
-        report.formula(&x, fine(x.amax()));
+        let most = largest((0..3).map(|i| x.component(i)));
+        report.check(most.is_nan() || x.amax() == most, || format!("{x:?}: amax {}", x.amax()));
         let finite = (0..3).all(|i| x.component(i).is_finite());
         report.check(x.is_finite() == finite, || format!("{x:?}: is_finite"));
         let vector = x.to_vector();
@@ -520,8 +519,7 @@ fn residuals(report: &mut Report) {
     let flow = ActionSquared { c: 0.4 };
     for t in HOSTILE {
         let residual = statements::conformal_flow(&flow, t, &triples()[0], &[(0.0, t)]);
-        report
-            .check(t.is_finite() || !residual.as_ref().is_ok_and(|r| *r <= 1e-3), || format!("t = {t}: {residual:?}"));
+        report.check(!t.is_nan() || !residual.as_ref().is_ok_and(|r| *r <= 1e-3), || format!("t = {t}: {residual:?}"));
     }
 }
 

@@ -1,6 +1,6 @@
 //! One-parameter groups acting on Q, their lifts to the contact manifolds, and their momenta.
 
-use crate::{Dual, GeometryError, Lagrangian, Scalar, Triple, VelocityPoint};
+use crate::{Dual, GeometryError, Lagrangian, Scalar, Triple, VelocityPoint, largest};
 use nalgebra::SVector;
 
 type Line<T> = SVector<T, 1>;
@@ -109,6 +109,9 @@ impl<const N: usize> Symmetry<N> {
         if N != 3 {
             return Err(GeometryError::WrongSize { what: "the axis of rotation", expected: N, found: 3 });
         }
+        // Relative to the largest component: the squares of a huge axis overflow, those of a tiny one vanish.
+        let most = largest(axis);
+        let axis = axis.map(|a| a / most);
         let length = SVector::from(axis).norm();
         let unit: SVector<f64, N> = SVector::from_fn(|i, _| axis[i] / length);
         match unit.iter().position(|c| !c.is_finite()) {

@@ -60,6 +60,9 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
             return Err(InputError::Clock { rate });
         }
         let energy = start.v.dot(&state.p) - lagrangian.value(t0, &start.q, &start.v, start.z);
+        if !energy.is_finite() {
+            return Err(InputError::FirstStep(StepError::NonFinite));
+        }
         let extension = Extension::new(Fictitious(clock), t0, -energy);
         let (table, mass) = (Table::new(gauss.stages(), h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, &state, &start.v));
