@@ -1,7 +1,7 @@
 //! Damping and stiffness: a few steps of every family over all ratios of the step to the times of the motion.
 
 use crate::formula::{Formula, Kinetic, Rate, Smooth};
-use crate::motion::{End, FAMILIES, Problem, Worth, distance};
+use crate::motion::{End, FAMILIES, ORDER_ONE, Problem, Worth, distance};
 use crate::parallel::parallel;
 use crate::report::Report;
 use contact_examples::{Failure, number};
@@ -23,9 +23,6 @@ const MASSES: [f64; 7] = [1e-14, 1e-9, 1e-4, 1.0, 1e4, 1e9, 1e14];
 /// The steps of a run, each of length 1.
 const STEPS: usize = 4;
 
-/// An error of order one.
-pub const ORDER_ONE: f64 = 0.1;
-
 /// What the runs of one integrator are worth.
 pub type Tally = BTreeMap<Worth, usize>;
 
@@ -40,6 +37,7 @@ pub fn row(name: String, tally: &Tally) -> Vec<String> {
     vec![
         name,
         count(&[Worth::Right]),
+        count(&[Worth::Coarse]),
         count(&[Worth::Marked]),
         count(&[Worth::Halted]),
         count(&[Worth::Refused]),
@@ -48,7 +46,7 @@ pub fn row(name: String, tally: &Tally) -> Vec<String> {
 }
 
 /// The columns of [`row`], after the first.
-pub const COLUMNS: [&str; 5] = ["right", "marked", "halted", "refused", "wrong in silence"];
+pub const COLUMNS: [&str; 6] = ["right", "coarse", "marked", "halted", "refused", "wrong in silence"];
 
 /// The damped oscillator `q'' = -k q + gamma q'` by its closed form: in units of its own time.
 fn truth(gamma: f64, k: f64, t: f64, start: &VelocityPoint<1>) -> PhasePoint<1> {

@@ -1,7 +1,7 @@
 //! One Lagrangian with many faces, so that one type stands for all systems of a dimension.
 
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, Scalar, Structure};
+use contact_geom::{Lagrangian, Scalar, Structure, linear};
 
 /// `L = kinetic - smooth potential - feature + force(t) q_1 + rate(t, q) z - action z^2 / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,6 +171,21 @@ impl<const N: usize> Formula<N> {
     /// The same that claims nothing.
     pub fn claiming_nothing(self) -> Self {
         Formula { claims: Some(Structure::default()), ..self }
+    }
+
+    /// The velocity of a momentum; NaN where there is none.
+    pub fn velocity(&self, q: &SVector<f64, N>, p: &SVector<f64, N>) -> SVector<f64, N> {
+        let none = SVector::from_element(f64::NAN);
+        match &self.kinetic {
+            Kinetic::Unit => *p,
+            Kinetic::Mass(mass) => {
+                let mut v = *p;
+                if linear::solve(&mut mass.clone_owned(), &mut v).is_ok() { v } else { none }
+            }
+            Kinetic::Relativistic => p / (1.0 + p.dot(p)).sqrt(),
+            Kinetic::Sphere => SVector::from_fn(|i, _| if i == 0 { p[i] } else { p[i] / q[0].sin().powi(2) }),
+            Kinetic::Singular => none,
+        }
     }
 
     /// What is true of it.

@@ -112,13 +112,13 @@ fn over_jump(at: f64, height: f64, span: f64) -> PhasePoint<1> {
 }
 
 pub fn run(report: &mut Report) -> Result<(), Failure> {
-    let (count, finest) = if report.quick { (90, 1e-2) } else { (1800, 1e-3) };
+    let (count, finest) = if report.quick { (54, 1e-2) } else { (1800, 1e-3) };
     let found = parallel(&report.bar, count, |i| {
         let hidden = Hidden::random(i, finest);
         let truth = hidden.truth?;
         let to = hidden.problem.to(ACCURACY);
         let exact = hidden.problem.exact();
-        let exact = exact.map_or(End::Panicked, |x| End::Whole(x));
+        let exact = exact.map_or(End::Panicked, End::Whole);
         let exact_worth = match &exact {
             End::Panicked => Worth::Refused,
             end => end.worth(&truth, 0.0, EXACT),

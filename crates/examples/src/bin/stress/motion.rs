@@ -2,12 +2,15 @@
 
 use crate::formula::Formula;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, Triple, VelocityPoint, herglotz_rates, legendre};
+use contact_geom::{PhasePoint, Triple, VelocityPoint, herglotz_rates, larger, legendre};
 use differential_equations::methods::ExplicitRungeKutta;
 use differential_equations::prelude::{IVP, ODE};
 use discrete_herglotz::{InputError, Integrator, Method, Outcome, Scene, SplittingScheme, Status, StepError, Steps};
 use exact_lagrangian::{ExactError, herglotz_flow};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// An error of order one.
+pub const ORDER_ONE: f64 = 0.1;
 
 /// A motion to be computed.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +41,8 @@ pub enum End<const N: usize> {
 pub enum Worth {
     /// Within the bound.
     Right,
+    /// Not, though each step resolves the motion: many small errors of a method of low order, which is the choice of the step.
+    Coarse,
     /// Not, and said so.
     Marked,
     Halted,
@@ -58,6 +63,7 @@ impl Worth {
     pub fn name(self) -> &'static str {
         match self {
             Worth::Right => "right",
+            Worth::Coarse => "coarse",
             Worth::Marked => "marked",
             Worth::Halted => "halted",
             Worth::Refused => "refused",
@@ -130,6 +136,34 @@ impl<const N: usize> Problem<N> {
     /// The run with a number of steps of one integrator.
     pub fn by(&self, integrator: Integrator, count: usize) -> End<N> {
         end_of(&self.scene().by(integrator).steps(Steps::Count(count)))
+    }
+
+    /// What a run with fixed steps is worth, and its error: an error of order one in silence is a wrong result where a step of it
+    /// has such an error by itself.
+    pub fn worth(&self, integrator: Integrator, count: usize, truth: &PhasePoint<N>, scale: f64) -> (Worth, f64) {
+        let end = self.by(integrator, count);
+        let (worth, error) = (end.worth(truth, scale, ORDER_ONE), end.error(truth, scale));
+        let coarse =
+            worth == Worth::Wrong && self.local_error(integrator, count, scale).is_some_and(|e| e <= ORDER_ONE);
+        (if coarse { Worth::Coarse } else { worth }, error)
+    }
+
+    /// The largest error of a step of a run, each from where it started; `None` where the exact motion is not known.
+    fn local_error(&self, integrator: Integrator, count: usize, scale: f64) -> Option<f64> {
+        let plan = self.scene().by(integrator).steps(Steps::Count(count)).plan().ok()?;
+        let mut stepper = plan.stepper().ok()?;
+        let mut worst = 0.0;
+        for _ in 0..count {
+            let (before, t0) = (stepper.state(), stepper.time());
+            stepper.advance(1).ok()?;
+            let start = VelocityPoint { q: before.q, v: self.system.velocity(&before.q, &before.p), z: before.z };
+            let exact = Problem { t0, start, span: plan.step_size(), ..*self }.exact().ok()?;
+            worst = larger(worst, distance(&stepper.state(), &exact, scale));
+            if worst > ORDER_ONE {
+                break;
+            }
+        }
+        Some(worst)
     }
 
     /// The run to an accuracy, with the integrator that a scene takes where none is named.

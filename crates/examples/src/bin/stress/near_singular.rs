@@ -1,8 +1,8 @@
 //! Near singularities: of W, of Kepler's centre, of charts, of light, of time zero, of sigma_d, of conjugate points.
 
-use crate::damping::{ORDER_ONE, Tally, bad};
+use crate::damping::{Tally, bad};
 use crate::formula::{Feature, Formula, Kinetic, Rate, Smooth};
-use crate::motion::{End, FAMILIES, Problem, Worth, distance};
+use crate::motion::{End, FAMILIES, ORDER_ONE, Problem, Worth, distance};
 use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::SMatrix;
@@ -113,8 +113,8 @@ fn eccentric(report: &mut Report, table: &mut Table) -> Result<Points, Failure> 
         let problem = Problem { system, t0: 0.0, start, span: TAU };
         let exact = problem.state();
         for (integrator, count) in FAMILIES.into_iter().flat_map(|i| [32, 1024].map(|n| (i, n))) {
-            let end = problem.by(integrator, count);
-            table.add("orbit", integrator, e, end.worth(&exact, 0.0, ORDER_ONE), end.error(&exact, 0.0));
+            let (worth, error) = problem.worth(integrator, count, &exact, 0.0);
+            table.add("orbit", integrator, e, worth, error);
         }
         let end = problem.to(1e-6);
         let worth = end.worth(&exact, 0.0, 1e-5);
@@ -203,8 +203,8 @@ fn light(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
         let exact = problem.exact_in(64)?;
         let applies = |i: &Integrator| i.check(&contact_geom::Lagrangian::structure(&system)).is_ok();
         for (integrator, count) in FAMILIES.into_iter().filter(applies).flat_map(|i| [8, 64, 512].map(|n| (i, n))) {
-            let end = problem.by(integrator, count);
-            table.add("light", integrator, size, end.worth(&exact, 0.0, ORDER_ONE), end.error(&exact, 0.0));
+            let (worth, error) = problem.worth(integrator, count, &exact, 0.0);
+            table.add("light", integrator, size, worth, error);
         }
         // The same exact flow in one go.
         worst = larger(worst, problem.exact().map_or(f64::NAN, |x| distance(&x, &exact, 0.0)));
@@ -227,9 +227,8 @@ fn time_zero(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
         let problem = Problem { system, t0: 0.0, start, span: 3.0 };
         let exact = LaneEmden { n: 1 }.solution(3.0).map(|x| PhasePoint { q: x.q, p: x.v, z: x.z });
         let exact = exact.unwrap_or(problem.state());
-        let end = problem.by(integrator, 30);
-        let worth = end.worth(&exact, 0.0, ORDER_ONE);
-        table.add("time_zero", integrator, 0.0, worth, end.error(&exact, 0.0));
+        let (worth, error) = problem.worth(integrator, 30, &exact, 0.0);
+        table.add("time_zero", integrator, 0.0, worth, error);
         begun += u32::from(worth.is_bad());
         for t0 in [1e-6, 1e-3, 0.01, 0.1] {
             let Some((from, to)) = LaneEmden { n: 1 }.solution(t0).zip(LaneEmden { n: 1 }.solution(t0 + 3.0)) else {
@@ -238,8 +237,8 @@ fn time_zero(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
             let problem = Problem { system, t0, start: from, span: 3.0 };
             let exact = PhasePoint { q: to.q, p: to.v, z: to.z };
             for count in [10, 300] {
-                let end = problem.by(integrator, count);
-                table.add("time_zero", integrator, t0, end.worth(&exact, 0.0, ORDER_ONE), end.error(&exact, 0.0));
+                let (worth, error) = problem.worth(integrator, count, &exact, 0.0);
+                table.add("time_zero", integrator, t0, worth, error);
             }
         }
     }
@@ -257,10 +256,11 @@ fn vanishing_sigma(report: &mut Report, table: &mut Table) -> Result<(), Failure
             let problem = Problem { system: Formula::oscillator(gamma), t0: 0.0, start, span: 4.0 };
             let exact = HarmonicOscillator { gamma }.solution(4.0, &start);
             let exact = PhasePoint { q: exact.q, p: exact.v, z: exact.z };
-            let end = problem.by(integrator, 4);
+            let (worth, error) = problem.worth(integrator, 4, &exact, 1.0);
             let explicit = !method.implicit_in_z();
-            beyond += u32::from(explicit && left <= 0.0 && matches!(end, End::Whole(_)));
-            table.add("sigma", integrator, left, end.worth(&exact, 1.0, ORDER_ONE), end.error(&exact, 1.0));
+            beyond +=
+                u32::from(explicit && left <= 0.0 && matches!(worth, Worth::Right | Worth::Coarse | Worth::Wrong));
+            table.add("sigma", integrator, left, worth, error);
         }
     }
     report.at_most("rules explicit in z with sigma_d <= 0: that go on", f64::from(beyond), 0.0)

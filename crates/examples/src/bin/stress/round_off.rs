@@ -12,7 +12,7 @@ use crate::statistics::{mean, rms, slope};
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw_row, number};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Radial;
-use contact_geom::{PhasePoint, Structure, VelocityPoint, largest, legendre};
+use contact_geom::{PhasePoint, Structure, VelocityPoint, larger, largest, legendre};
 use discrete_herglotz::{Gauss, InputError, Integrator, Method, SplittingScheme, Stepper, Steps};
 
 /// The starts of an ensemble.
@@ -185,6 +185,12 @@ impl Ensemble {
         }
     }
 
+    /// How far the starts are from each other. A rounding of a sum is decided by the digits of the term below the last digit of the
+    /// sum, and these must differ from start to start; but the swing of a method's own error must not.
+    fn apart(&self) -> f64 {
+        if self.has_bias { 1e-9 } else { 1e-12 }
+    }
+
     /// The relative errors of the invariant at the sampled numbers of steps, one row for each start.
     fn errors(&self, first: usize, starts: usize, samples: &[usize]) -> Result<Vec<Vec<f64>>, InputError> {
         match self.motion {
@@ -239,7 +245,7 @@ impl Ensemble {
         Ok(states.iter().map(|run| relative(run.iter().map(|(t, x)| invariant(*t, x, rate(*t))))).collect())
     }
 
-    /// The states after the sampled numbers of steps, the start before them, from each start. The starts differ by some last digits.
+    /// The states after the sampled numbers of steps, the start before them, from each start. The starts differ by their last digits.
     fn states<const N: usize>(
         &self,
         system: &Formula<N>,
@@ -257,7 +263,7 @@ impl Ensemble {
         (first..first + starts)
             .map(|i| {
                 let mut random = Random::new(1, i);
-                let mut moved = |x: &f64| x * (1.0 + f64::EPSILON * (random.below(9) as f64 - 4.0));
+                let mut moved = |x: &f64| x * (1.0 + self.apart() * random.between(-1.0, 1.0));
                 let start = VelocityPoint { q: orbit.q.map(|x| moved(&x)), v: orbit.v.map(|x| moved(&x)), z: 0.0 };
                 let problem = Problem { system, t0: 0.0, start, span: self.h };
                 let walk = |stepper: &mut dyn Stepper<N>| {
@@ -311,7 +317,7 @@ impl Ensemble {
                 .iter()
                 .enumerate()
                 .filter(|(_, n)| **n * 128 > last)
-                .map(|(k, n)| ((*n as f64).ln(), rms(column(rows, k)).max(f64::EPSILON / 8.0).ln()))
+                .map(|(k, n)| ((*n as f64).ln(), larger(rms(column(rows, k)), f64::EPSILON / 8.0).ln()))
                 .collect();
             slope(&points)
         };

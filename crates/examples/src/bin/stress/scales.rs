@@ -1,6 +1,6 @@
 //! Tiny and huge: steps, states and times over all the numbers that a double can be.
 
-use crate::damping::{ORDER_ONE, Tally, bad};
+use crate::damping::{Tally, bad};
 use crate::formula::{Force, Formula};
 use crate::motion::{End, FAMILIES, Problem, Worth, distance, norm};
 use crate::parallel::parallel;
@@ -87,10 +87,8 @@ fn huge_steps(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
             let problem = Problem { system, t0: 0.0, start, span: h * f64::from(steps) };
             let exact = problem.exact()?;
             for integrator in FAMILIES {
-                let end = problem.by(integrator, steps as usize);
-                let worth = end.worth(&exact, 1.0, ORDER_ONE);
+                let (worth, error) = problem.worth(integrator, steps as usize, &exact, 1.0);
                 *tally.entry(worth).or_default() += 1;
-                let error = end.error(&exact, 1.0);
                 rows.push(row(&format!("huge_step_{name}"), &integrator.to_string(), h, worth.name(), error));
             }
         }

@@ -78,7 +78,7 @@ fn poor_guesses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), 
                     Some(x) => (End::Whole(x).worth(&truth, 0.0, 0.02), End::Whole(x).error(&truth, 0.0)),
                 };
                 wrong += u32::from(worth.is_bad());
-                rows.push(row(&format!("poor guess, {name}"), by, &guess.to_string(), worth.name(), error));
+                rows.push(row(&format!("poor guess, {name}"), by, &format!("{guess:e}"), worth.name(), error));
             }
         }
     }
@@ -109,14 +109,11 @@ fn domains(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failu
         // Below the height of the border it stays inside, and has a truth.
         let truth = problem.exact().ok();
         for (integrator, count) in FAMILIES.into_iter().flat_map(|i| [5, 50, 1000].map(|n| (i, n))) {
-            let end = problem.by(integrator, count);
-            let worth = match &truth {
-                Some(truth) => end.worth(truth, 0.0, 0.1),
-                None => end.worth(&PhasePoint::new([1e9], [1e9], 0.0), 0.0, 0.1),
-            };
+            let outside = PhasePoint::new([1e9], [1e9], 0.0);
+            let (worth, error) = problem.worth(integrator, count, truth.as_ref().unwrap_or(&outside), 0.0);
             on += u32::from(worth == Worth::Wrong);
             broken += u32::from(matches!(worth, Worth::NotANumber | Worth::Panicked));
-            rows.push(row("domain", &integrator.to_string(), &speed.to_string(), worth.name(), f64::NAN));
+            rows.push(row("domain", &integrator.to_string(), &speed.to_string(), worth.name(), error));
         }
     }
     report.at_most("motions out of the domain of L: that go on in silence", f64::from(on), 0.0)?;
@@ -277,13 +274,15 @@ fn of_step<const N: usize>(system: Formula<N>, start: VelocityPoint<N>, integrat
     for _ in 0..3 {
         let Ok(mut stepper) = plan.stepper() else { return f64::NAN };
         let clock = Instant::now();
-        let mut taken = 0;
-        while taken < 200 && clock.elapsed() < Duration::from_millis(50) && stepper.advance(5).is_ok() {
-            taken += 5;
+        let (mut tried, mut goes_on) = (0, true);
+        while goes_on && tried < 200 && clock.elapsed() < Duration::from_millis(50) {
+            // A step that is given up has its price, too.
+            (tried, goes_on) = match stepper.advance(5) {
+                Ok(()) => (tried + 5, true),
+                Err(halt) => (tried + halt.taken + 1, false),
+            };
         }
-        if taken > 0 {
-            least = least.min(clock.elapsed().as_secs_f64() / f64::from(taken));
-        }
+        least = least.min(clock.elapsed().as_secs_f64() / tried as f64);
     }
     least
 }
