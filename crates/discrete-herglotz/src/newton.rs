@@ -102,9 +102,10 @@ pub(crate) fn newton<const N: usize>(
             && last_correction(size, last_size, f64::EPSILON * u_size)
             && last_correction(z_size, last_z_size, f64::EPSILON * z.abs());
         let round_off = 8.0 * f64::EPSILON;
-        // The size of the terms that z is the sum of.
-        let action = z.abs() + start.z.abs() + impulse * u_size;
-        let exact = residual_size <= round_off * at.size && at.z_change.abs() <= round_off * action;
+        // The size of the terms that z is the sum of, with what rounding leaves of subnormal ones.
+        let action = z.abs() + start.z.abs() + impulse * u_size + f64::MIN_POSITIVE / f64::EPSILON;
+        // A residual of subnormal numbers is their rounding.
+        let exact = residual_size <= round_off * at.size + f64::MIN_POSITIVE && at.z_change.abs() <= round_off * action;
         // Where no z solves its equation (beyond a pole of the motion) its corrections stagnate too, but are as large as z: half
         // of the digits tell that from what a potential's own cancellation leaves.
         let settled =

@@ -1,8 +1,8 @@
 //! What a run sees of steps that do not resolve its motion.
 
 use crate::Suspicion;
+use contact_geom::largest;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{larger, largest};
 
 /// The first step of a run that cannot have resolved the motion.
 ///
@@ -61,5 +61,5 @@ const LEAST: f64 = 1.0 / 256.0;
 /// grows by more than three. `(1 + x)/(1 - x)`, which is three at `x = 1/2`, is then off by a tenth or more.
 #[inline(always)]
 pub(crate) fn factor_misfit(sigma: f64) -> Option<f64> {
-    if larger(sigma, 1.0 / sigma) > 3.0 { Some(sigma.ln().abs() / 3.0f64.ln()) } else { None }
+    if sigma > 3.0 || sigma < 1.0 / 3.0 { Some(sigma.ln().abs() / 3.0f64.ln()) } else { None }
 }
