@@ -12,7 +12,7 @@ use super::stage_equations::{Given, Products, StageEquations, Workspace};
 use super::sweeps::Progress;
 use crate::lanes::forget_branches;
 use crate::step_equations::{inverted, is_identity, kept_mass_matrix, mass_matrix};
-use crate::{Halt, InputError, StepError, Stepper, verified};
+use crate::{Halt, InputError, StepError, Stepper, Suspicion, verified};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Structure, Triple, VelocityPoint, linear};
 use pulp::{Arch, Simd, WithSimd};
@@ -41,6 +41,9 @@ enum Route<'a, L, const N: usize> {
     Condensed(Separable<'a, L, N>),
     General(General<'a, L, Physical, N>),
 }
+
+/// The misfit between the nodes from which a step does not resolve the motion: momenta are off by as much as they are.
+const UNRESOLVED: f64 = 1.0;
 
 /// How the last step was taken, for dense output.
 enum Last {
@@ -363,6 +366,13 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             Route::Condensed(run) => run.evaluations,
             Route::General(run) => run.evaluations,
         }
+    }
+
+    /// Looks at the last step alone, between its nodes: a run that wants more asks more often.
+    fn suspicion(&self) -> Option<Suspicion> {
+        let Look { misfit, .. } = self.look(1)?;
+        // Not `misfit > ..`: that would let a NaN pass.
+        if misfit <= UNRESOLVED { None } else { Some(Suspicion { step: self.k - 1, misfit: misfit / UNRESOLVED }) }
     }
 }
 

@@ -212,7 +212,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             }
             rows.push(self.row(&*stepper));
         }
-        let (mut taken, mut status) = (0, Status::Completed);
+        let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
         while taken < self.count {
             let next_row = stride.map_or(self.count, |stride| (taken / stride + 1) * stride);
             let chunk = if single { 1 } else { next_row.min(next_probe(taken)).min(self.count) - taken };
@@ -232,6 +232,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 rows.push(self.row(&*stepper));
             }
             if taken == self.count || taken == next_probe(taken - 1) {
+                suspicion = suspicion.or_else(|| stepper.suspicion());
                 if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
                     status = Status::FalseClaim { step: taken, claim, size };
                     break;
@@ -244,7 +245,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         let end = self.row(&*stepper);
         Ok(Outcome {
             status,
-            suspicion: stepper.suspicion(),
+            suspicion: suspicion.or_else(|| stepper.suspicion()),
             steps: taken,
             t: end.t,
             q: end.q,

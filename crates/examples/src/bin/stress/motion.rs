@@ -202,6 +202,7 @@ fn end_of<const N: usize>(scene: &Scene<'_, Formula<N>, N>) -> End<N> {
 pub fn end_of_outcome<const N: usize>(outcome: &Outcome<N>) -> End<N> {
     let state = PhasePoint { q: outcome.q, p: outcome.p, z: outcome.z.unwrap_or(0.0) };
     match outcome.status {
+        Status::Completed if outcome.suspicion.is_some() => End::Marked(state),
         Status::Completed => End::Whole(state),
         Status::Failed { cause, .. } => End::Halted(cause),
         _ => End::Marked(state),
