@@ -2,7 +2,7 @@
 
 #![allow(missing_docs)]
 // What a test cannot go on without is a failure of it.
-#![allow(clippy::panic, clippy::needless_range_loop, clippy::neg_cmp_op_on_partial_ord)]
+#![allow(clippy::panic, clippy::unwrap_used, clippy::needless_range_loop, clippy::neg_cmp_op_on_partial_ord)]
 
 // The theorems use the rest of it.
 #[allow(dead_code, unused_imports)]
@@ -13,4 +13,5 @@ mod conformal_steppers;
 mod dense_output;
 mod gauss;
 mod gauss_catalogue;
+mod round_off;
 mod scenes;
