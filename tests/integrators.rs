@@ -16,4 +16,5 @@ mod conformal_steppers;
 mod dense_output;
 mod gauss;
 mod gauss_catalogue;
+mod round_off;
 mod scenes;

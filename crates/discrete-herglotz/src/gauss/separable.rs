@@ -15,6 +15,9 @@ use pulp::Simd;
 /// The steps after which a matrix is expected to last.
 const LASTING: usize = 32;
 
+/// The largest relative change of a sweep after which its values are near enough for the parts that matrices' rounding leaves out.
+const NEAR: f64 = 1e-3;
+
 /// The state and the workspace of the condensed step.
 pub(super) struct Separable<'a, L, const N: usize> {
     pub lagrangian: &'a L,
@@ -33,6 +36,8 @@ pub(super) struct Separable<'a, L, const N: usize> {
     x: [Stages; N],
     /// What the positions begin with: what comes of the state, and of the parts that the matrices' rounding leaves out.
     base: [Stages; N],
+    /// Whether guesses are far from the solution.
+    far: bool,
     /// Whether `rest` belongs to the step before.
     warm: bool,
     /// Steps since the start, and the one at which the slope of the force is looked at again.
@@ -63,6 +68,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             a: [Stages::ZERO; N],
             x: [Stages::ZERO; N],
             base: [Stages::ZERO; N],
+            far: false,
             warm: false,
             taken: 0,
             review: 1,
@@ -111,7 +117,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
                 self.table.ahead.apply(&before, s, &mut self.rest[d], |_| Lanes::<S>::splat(0.0));
             }
         }
-        self.begin::<S>();
+        // The tails of the matrices act on the guess, or on the values of a later sweep where the guess is poor.
+        let mut due = self.far;
+        self.begin::<S>(!due);
+        self.far = false;
         let mut sweeps = Sweeps::default();
         let outcome = loop {
             for d in 0..N {
@@ -131,7 +140,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
                 }
             }
             self.evaluations += s as u64;
-            match sweeps.judge(change.largest(), size.largest()) {
+            let (change, size) = (change.largest(), size.largest());
+            match sweeps.judge(change, size) {
+                Progress::Going if change > NEAR * size => (due, self.far) = (true, true),
+                Progress::Going if due => {
+                    due = false;
+                    self.begin::<S>(true);
+                }
                 Progress::Going => {}
                 done => break done,
             }
@@ -154,22 +169,25 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         Progress::Done
     }
 
-    /// What the sweeps of a step have in common. The tails of the matrices act on the guess: it is near enough for them.
+    /// What the sweeps of a step have in common, with or without the tails of the matrices; with the rests of the state, which
+    /// are not free of its direction.
     #[inline(always)]
-    fn begin<S: Simd>(&mut self) {
+    fn begin<S: Simd>(&mut self, with_tail: bool) {
         let (head, s) = (&self.left.head, self.table.s);
         for d in 0..N {
             let (q, v) = (Lanes::<S>::splat(self.q[d].value), Lanes::<S>::splat(self.v[d].value));
+            let (q_rest, v_rest) = (Lanes::<S>::splat(self.q[d].rest), Lanes::<S>::splat(self.v[d].rest));
             let base = &mut self.base[d];
+            let rests = |r| head.u.block::<S>(r).mul_add(v_rest, head.q.block::<S>(r) * q_rest);
             match &self.left.tail {
-                Some(tail) => {
-                    tail.b.apply::<S>(&self.rest[d], s, base, |r| tail.u.block(r).mul_add(v, tail.q.block(r) * q))
-                }
-                None => *base = Stages::ZERO,
+                Some(tail) if with_tail => tail.b.apply::<S>(&self.rest[d], s, base, |r| {
+                    tail.u.block(r).mul_add(v, tail.q.block(r).mul_add(q, rests(r)))
+                }),
+                _ => (0..blocks::<S>(s)).for_each(|r| base.set(r, rests(r))),
             }
             for r in 0..blocks::<S>(s) {
-                let rest = head.u.block::<S>(r).mul_add(v, base.block(r));
-                base.set(r, head.q.block::<S>(r).mul_add(q, rest));
+                let small = head.u.block::<S>(r).mul_add(v, base.block(r));
+                base.set(r, head.q.block::<S>(r).mul_add(q, small));
             }
         }
     }
@@ -183,9 +201,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             dz = table.grow * self.z.value + table.end_v.sum::<S>(&self.action::<S>(t), s);
         }
         for d in 0..N {
-            let v = self.v[d].value;
-            dq[d] = table.end_b.sum::<S>(&self.a[d], s) + table.end_u * v;
-            dv[d] = table.end_v.sum::<S>(&self.a[d], s) + table.grow * v;
+            let v = self.v[d];
+            dq[d] = table.end_b.sum::<S>(&self.a[d], s) + table.end_u.times(v);
+            dv[d] = table.end_v.sum::<S>(&self.a[d], s) + table.grow.times(v);
         }
         if branched() {
             return Progress::Branched;

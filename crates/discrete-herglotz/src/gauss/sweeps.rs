@@ -20,17 +20,23 @@ pub(super) enum Progress {
 /// The sweeps after which an iteration counts as not contracting.
 const LIMIT: u32 = 60;
 
+/// The part of round-off that an iteration may leave. What it leaves has the same direction in every step, and so it adds up
+/// like the number of steps, where round-off adds up like its root.
+const LEFT: f64 = 1.0 / 32.0;
+
 /// The changes of the sweeps of one step.
 ///
-/// The iteration ends when the next change, predicted from the last two, is below the round-off of the terms, or when changes
-/// near round-off no longer fall. It is given up when larger changes have not fallen three times, or at the limit: so it
-/// neither stalls nor loops.
+/// The iteration ends when the next change, predicted from the last two, is a small part of the round-off of the terms, or when
+/// changes near round-off no longer fall. It is given up when larger changes have not fallen three times, or at the limit: so
+/// it neither stalls nor loops.
 #[derive(Default)]
 pub(super) struct Sweeps {
     count: u32,
     before: f64,
     ratio: f64,
     risen: u32,
+    /// Whether this sweep is the last: its change is round-off.
+    last: bool,
 }
 
 impl Sweeps {
@@ -39,7 +45,7 @@ impl Sweeps {
     pub fn judge(&mut self, change: f64, size: f64) -> Progress {
         self.count += 1;
         let round_off = 0.5 * f64::EPSILON * size;
-        if change <= round_off {
+        if change <= round_off || self.last && change <= 256.0 * round_off {
             return Progress::Done;
         }
         if !(change.is_finite() && size.is_finite()) {
@@ -49,9 +55,11 @@ impl Sweeps {
             // The slower of the last two contractions: the first is often that of components which die out at once.
             let ratio = change / self.before;
             let expected = if self.count > 2 { f64::max(ratio, self.ratio) } else { f64::max(ratio, 0.1) };
-            if change * expected <= round_off {
+            let next = change * expected;
+            if next <= LEFT * round_off {
                 return Progress::Done;
             }
+            self.last = next * expected <= LEFT * round_off;
             if ratio >= 1.0 {
                 if change <= 256.0 * round_off {
                     return Progress::Done;
