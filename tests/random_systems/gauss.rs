@@ -114,11 +114,11 @@ fn looked_at<const N: usize>(
     let within = curve.at(from + (to - from) * dice.between(0.0, 1.0));
     let (end, state) = (curve.at(to), stepper.state());
     let apart = Triple::from(end).minus(state.into());
-    ensure(
-        Triple::from(within).is_finite() && (to - stepper.time()).abs() <= 4.0 * f64::EPSILON * to.abs(),
-        Kind::NotFinite,
-        || format!("gauss_{stages}: {within:?} between {from} and {to}"),
-    )?;
+    // The times are `t0 + k h`, from a start that may be ten units away.
+    let spacing = 64.0 * f64::EPSILON * (1.0 + to.abs());
+    ensure(Triple::from(within).is_finite() && (to - stepper.time()).abs() <= spacing, Kind::NotFinite, || {
+        format!("gauss_{stages}: {within:?} between {from} and {to}")
+    })?;
     let start = curve.at(from);
     // Sums of 16 terms that may cancel: to 1e-9 of the largest on the way.
     let size = Triple::from(start).amax() + Triple::from(state).amax() + Triple::from(within).amax();
