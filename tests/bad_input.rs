@@ -21,7 +21,7 @@ fn steps() {
 /// Counts of zero: steps, stride, points, and coordinates.
 #[test]
 fn counts() {
-    let Ok(ld) = Midpoint::new(Pendulum::default(), 0.1) else { return };
+    let ld = Midpoint::new(Pendulum::default(), 0.1).unwrap();
     let none = Flow::new(&ld, 0.0, PhasePoint::new([0.1], [0.2], 0.0)).and_then(|mut f| f.run(0, &mut FinalOnly));
     assert_eq!(none, Err(InputError::Count { what: "the number of steps", least: 1, found: 0 }));
     assert!(matches!(Every::new(0, FinalOnly), Err(InputError::Count { found: 0, .. })));
@@ -41,7 +41,7 @@ fn counts() {
 fn coordinates() {
     let short = PhasePoint::<2>::from_slices(&[1.0], &[1.0, 2.0], 0.0);
     assert_eq!(short, Err(GeometryError::WrongSize { what: "q", expected: 2, found: 1 }));
-    let Ok(ld) = Midpoint::new(Kepler::<2>::default(), 0.1) else { return };
+    let ld = Midpoint::new(Kepler::<2>::default(), 0.1).unwrap();
     let start = PhasePoint::new([1.0, 0.0], [f64::INFINITY, 1.0], 0.0);
     let refused = Flow::new(&ld, 0.0, start).err();
     let expected = GeometryError::NonFinite { what: "p", index: 0, value: f64::INFINITY };
@@ -70,14 +70,14 @@ fn equal_points() {
     }
     let refused = Flow::from_points(&Length, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).err();
     assert_eq!(refused, Some(InputError::EqualPoints));
-    let Ok(ld) = Rectangle::new(FreeParticle::default(), 0.1) else { return };
+    let ld = Rectangle::new(FreeParticle::default(), 0.1).unwrap();
     assert!(Flow::from_points(&ld, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).is_ok());
 }
 
 /// A start inside a singularity is refused, not handed on as a NaN.
 #[test]
 fn a_singular_start() {
-    let Ok(ld) = Rectangle::new(Kepler::<2>::default(), 0.1) else { return };
+    let ld = Rectangle::new(Kepler::<2>::default(), 0.1).unwrap();
     let refused = Flow::new(&ld, 0.0, PhasePoint::new([0.0, 0.0], [0.0, 1.0], 0.0)).err();
     assert_eq!(refused, Some(InputError::FirstStep(StepError::NonFinite)));
 }
@@ -92,7 +92,7 @@ fn sigma_crosses_zero() {
         }
     }
     // sigma = 1 - h t_mid with t_mid = (k + 1/2) h: not positive from k = 100 on, for h = 0.1.
-    let Ok(ld) = LeftMidpoint::new(GrowingDrag, 0.1) else { return };
+    let ld = LeftMidpoint::new(GrowingDrag, 0.1).unwrap();
     let mut record = Record::default();
     let status = Flow::new(&ld, 0.0, PhasePoint::new([0.0], [1.0], 0.0)).and_then(|mut f| f.run(200, &mut record));
     let failed = matches!(status, Ok(Status::Failed { step: 100, cause: StepError::SigmaVanished { .. } }));
@@ -110,8 +110,8 @@ fn blow_up() {
             v[0] * v[0] * 0.5 + z * z
         }
     }
-    let Ok(explicit) = LeftMidpoint::new(Explosive, 0.01) else { return };
-    let Ok(implicit) = Midpoint::new(Explosive, 0.01) else { return };
+    let explicit = LeftMidpoint::new(Explosive, 0.01).unwrap();
+    let implicit = Midpoint::new(Explosive, 0.01).unwrap();
     let start = PhasePoint::new([0.0], [0.1], 1.0);
     let mut rows = (Record::default(), Record::default());
     let explicit = Flow::new(&explicit, 0.0, start).and_then(|mut f| f.run(400, &mut rows.0));
@@ -145,7 +145,7 @@ fn exact_input() {
         );
         assert_eq!(orders.err(), Some(ExactError::Input(InputError::Step { h })));
     }
-    let Ok(exp) = ContactExponential::new(Pendulum::default(), 0.5) else { return };
+    let exp = ContactExponential::new(Pendulum::default(), 0.5).unwrap();
     let bad = exp.retract(0.0, &DiscretePoint::new([0.1], [f64::NAN], 0.0));
     assert!(matches!(bad, Err(ExactError::Input(InputError::Geometry(GeometryError::NonFinite { what: "q1", .. })))));
     struct Massless;
@@ -154,12 +154,12 @@ fn exact_input() {
             v[0] * q[0] + z
         }
     }
-    let Ok(exp) = ContactExponential::new(Massless, 0.5) else { return };
+    let exp = ContactExponential::new(Massless, 0.5).unwrap();
     let singular = exp.retract(0.0, &DiscretePoint::new([0.1], [0.2], 0.0));
     let ok = matches!(singular, Err(ExactError::Input(InputError::Geometry(GeometryError::Singular { .. }))));
     assert!(ok, "{singular:?}");
     // Equal points as such are no bad input: the pendulum at rest joins them.
-    let Ok(exp) = ContactExponential::new(Pendulum::default(), 0.5) else { return };
+    let exp = ContactExponential::new(Pendulum::default(), 0.5).unwrap();
     assert!(exp.retract(0.0, &DiscretePoint::new([0.0], [0.0], 0.0)).is_ok_and(|r| r.start.v[0] == 0.0));
 }
 
@@ -173,7 +173,7 @@ fn no_motion_between_points() {
             v[0] * v[0] * 0.5 - q[0].exp() * 6.0 - z * 0.01
         }
     }
-    let Ok(exp) = ContactExponential::new(Bratu, 4.0) else { return };
+    let exp = ContactExponential::new(Bratu, 4.0).unwrap();
     let x = DiscretePoint::new([0.0], [0.1], 0.0);
     match exp.retract(0.0, &x) {
         Err(
@@ -199,7 +199,7 @@ fn splines() {
     let short = of(&[0.0, 1.0, 2.0], &points[..2]).err();
     assert!(matches!(short, Some(InputError::Geometry(GeometryError::WrongSize { expected: 3, found: 2, .. }))));
     assert!(of(&[0.0, 1.0, 1.0], &points).is_err() && of(&[0.0, f64::NAN, 1.0], &points).is_err());
-    let Ok(curve) = of(&[0.0, 1.0, 2.0], &points) else { return };
+    let curve = of(&[0.0, 1.0, 2.0], &points).unwrap();
     assert!(curve.at(1.5).is_ok() && curve.at(2.5).is_err() && curve.at(f64::NAN).is_err());
 }
 

@@ -4,7 +4,7 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, PerturbedKepler, Radial, System};
-use contact_geom::{Clock, PhasePoint, Scalar, VelocityPoint, legendre};
+use contact_geom::{Clock, Larger, PhasePoint, Scalar, VelocityPoint, legendre};
 use discrete_herglotz::{ClockedStepper, Gauss, InputError, StepError, Stepper};
 
 type Planar = Kepler<2>;
@@ -25,7 +25,7 @@ fn clocked<'a, C: Clock<2>>(
 }
 
 fn distance(a: &PhasePoint<2>, b: &PhasePoint<2>) -> f64 {
-    (a.q - b.q).norm().max((a.p - b.p).norm()).max((a.z - b.z).abs())
+    (a.q - b.q).norm().larger((a.p - b.p).norm()).larger((a.z - b.z).abs())
 }
 
 fn angular_momentum(x: &PhasePoint<2>) -> f64 {
@@ -98,7 +98,7 @@ fn momenta_contract_by_sigma() {
         run.advance(1).unwrap();
         contracted *= run.sigma();
         // K / g, which is 0 for the motion.
-        defect = defect.max((energy(&kepler, &run.state()) + run.time_momentum()).abs() / run.time_momentum().abs());
+        defect = defect.larger((energy(&kepler, &run.state()) + run.time_momentum()).abs() / run.time_momentum().abs());
     }
     let off = angular_momentum(&run.state()) / (contracted * angular_momentum(&start)) - 1.0;
     assert!(off.abs() < 1e-13, "{off:e}");

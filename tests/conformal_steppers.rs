@@ -4,7 +4,7 @@
 use crate::common::{bounded, on_some, step_from};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{Darboux, PhasePoint, Triple, conformality_with_jacobian, legendre};
+use contact_geom::{Darboux, Larger, Largest, PhasePoint, Triple, conformality_with_jacobian, legendre};
 use discrete_herglotz::{Composition, InputError, Midpoint, Splitting, SplittingScheme, Stepper};
 
 /// The random cases for each system and scheme.
@@ -59,8 +59,8 @@ fn defect<const N: usize>(
     let jacobian = jacobian(|x| Ok(map(x)?.0), from)?;
     let measured = conformality_with_jacobian(&Darboux, &Darboux, &(*from).into(), &to.into(), &jacobian)
         .map_err(|e| e.to_string())?;
-    let size = (1.0 + to.p.amax()) * jacobian.amax();
-    Ok(((measured.defect * measured.pullback.amax()).max((measured.sigma - sigma).abs()) / size, sigma))
+    let size = (1.0 + to.p.largest()) * jacobian.largest();
+    Ok(((measured.defect * measured.pullback.largest()).larger((measured.sigma - sigma).abs()) / size, sigma))
 }
 
 /// Every scheme, on every separable system with a linear drag, contracts the contact form, by `e^(gamma h)` where the rate is

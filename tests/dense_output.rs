@@ -2,7 +2,7 @@
 
 use crate::gauss::{Claims, cut};
 use contact_geom::systems::{HarmonicOscillator, Pendulum, QuadraticInZ};
-use contact_geom::{Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
+use contact_geom::{Lagrangian, Larger, Largest, PhasePoint, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{
     Direction, Event, EventRun, EventStatus, Gauss, GaussRoute, InputError, Stepper, run_with_events,
 };
@@ -31,8 +31,8 @@ fn curves_have_the_order_of_the_stages() {
                         let t = h * (f64::from(step) + f64::from(k) / 20.0);
                         let (a, b) = (curve.at(t), exact(t));
                         all.push(a);
-                        let off = [(a.q - b.q).amax(), (a.p - b.p).amax(), (a.z - b.z).abs()];
-                        worst = std::array::from_fn(|i| worst[i].max(off[i]));
+                        let off = [(a.q - b.q).largest(), (a.p - b.p).largest(), (a.z - b.z).abs()];
+                        worst = std::array::from_fn(|i| worst[i].larger(off[i]));
                     }
                 }
                 worst
@@ -44,7 +44,7 @@ fn curves_have_the_order_of_the_stages() {
         }
         let count = all.len() / 4;
         for (k, x) in all.iter().enumerate() {
-            let off = Triple::from(*x).minus(all[k % count].into()).amax();
+            let off = Triple::from(*x).minus(all[k % count].into()).largest();
             assert!(off <= 1e-14, "s = {s}: routes differ by {off:e}");
         }
     }
@@ -91,7 +91,7 @@ fn crossings_are_those_of_the_closed_form() {
     for (k, c) in of(0).iter().enumerate() {
         assert!((c.t - expected(k)).abs() <= 1e-13 * expected(k), "{k}: {} {}", c.t, expected(k));
         let there = legendre(&system, c.t, &system.solution(c.t, &x));
-        let off = Triple::from(c.state).minus(there.into()).amax();
+        let off = Triple::from(c.state).minus(there.into()).largest();
         assert!(off <= 1e-13, "{k}: {off:e}");
         // Falling first.
         assert_eq!(c.t, of(if k % 2 == 0 { 2 } else { 1 })[k / 2].t);

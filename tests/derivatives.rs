@@ -3,7 +3,9 @@
 use crate::common::{on_random, within};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Pendulum, System, SystemVisitor, visit_catalogue};
-use contact_geom::{Dual, Hessian, Lagrangian, Scalar, Triple, ValueOnly, VelocityPoint, check_closed_derivatives};
+use contact_geom::{
+    Dual, Hessian, Lagrangian, Larger, Largest, Scalar, Triple, ValueOnly, VelocityPoint, check_closed_derivatives,
+};
 use num_dual::HyperDual64;
 
 /// Every second derivative of every Lagrangian, and so every first, against hyper-dual numbers of another library.
@@ -15,7 +17,7 @@ fn against_num_dual() {
             on_random(system.name(), 2 * N + 2, |u| {
                 let (t, x) = system.sample(u);
                 let (g, h) = (system.gradient(t, &x), system.hessian(t, &x));
-                let size = 1.0 + g.amax().max(h.qq.amax()).max(h.qv.amax()).max(h.vv.amax());
+                let size = 1.0 + g.largest().larger(h.qq.largest()).larger(h.qv.largest()).larger(h.vv.largest());
                 for i in 0..=2 * N {
                     for j in i..=2 * N {
                         let along = |k: usize, re: f64| {
@@ -36,7 +38,7 @@ fn against_num_dual() {
                             _ if i < 2 * N => h.vz[i - N],
                             _ => h.zz,
                         };
-                        let defect = (l.eps1 - g.component(i)).abs().max((l.eps1eps2 - second).abs()) / size;
+                        let defect = (l.eps1 - g.component(i)).abs().larger((l.eps1eps2 - second).abs()) / size;
                         within(defect).map_err(|e| format!("{i}, {j}: {e}"))?;
                     }
                 }
@@ -72,7 +74,7 @@ fn elementary_functions() {
             (x.powi(0), one),
         ];
         for (k, (a, b)) in pairs.iter().enumerate() {
-            let size = |x: &Second| x.re.re.abs().max(x.re.d[0].abs()).max(x.d[0].d[0].abs());
+            let size = |x: &Second| x.re.re.abs().larger(x.re.d[0].abs()).larger(x.d[0].d[0].abs());
             let defect = size(&(*a - *b)) / (1.0 + size(b));
             if defect > 64.0 * f64::EPSILON {
                 return Err(format!("{k}: {defect:e}"));

@@ -7,7 +7,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     CoupledInZ, CoupledPlane, DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, Relativistic, System,
 };
-use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint, legendre};
+use contact_geom::{Lagrangian, Larger, Largest, PhasePoint, Scalar, Structure, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{DiscreteLagrangian, Gauss, GaussRoute, Halt, InputError, StepError, Stepper};
 
 /// A Lagrangian that claims less than it could.
@@ -79,7 +79,7 @@ fn orders_are_twice_the_stages() {
                 .map(|steps| {
                     let h = 1.0 / *steps as f64;
                     let (e, ..) = run(system, start, s, h, *steps);
-                    (h, [(e.q - truth.q).amax(), (e.p - truth.p).amax(), (e.z - truth.z).abs()])
+                    (h, [(e.q - truth.q).largest(), (e.p - truth.p).largest(), (e.z - truth.z).abs()])
                 })
                 .collect();
             for (component, name) in ["q", "p", "z"].iter().enumerate() {
@@ -129,7 +129,7 @@ fn orders_are_twice_the_stages() {
 
 /// The difference of two states relative to the larger.
 pub fn distance<const N: usize>(a: PhasePoint<N>, b: PhasePoint<N>) -> f64 {
-    Triple::from(a).minus(b.into()).amax() / Triple::from(a).amax().max(Triple::from(b).amax())
+    Triple::from(a).minus(b.into()).largest() / Triple::from(a).largest().larger(Triple::from(b).largest())
 }
 
 /// A decayed oscillation keeps its relative accuracy, after t = 1000 in units of the amplitude `e^(gamma t/2) = 1e-11`. By the
@@ -152,7 +152,7 @@ fn decayed_states_keep_their_accuracy() {
         for (route, bound) in [(GaussRoute::Linear, 4.0), (GaussRoute::Condensed, 400.0)] {
             let claims = Claims(system, cut(&system, route));
             let (end, _, taken) = run(&claims, (0.0, x), stages, h, (t / h) as usize);
-            let error = (end.q[0] - q).abs().max((end.p[0] - v).abs()) / (amplitude * f64::EPSILON);
+            let error = (end.q[0] - q).abs().larger((end.p[0] - v).abs()) / (amplitude * f64::EPSILON);
             assert_eq!(taken, route);
             assert!(error <= bound, "s = {stages} {route:?}: {error} eps");
         }
@@ -251,10 +251,9 @@ fn newton_takes_over() {
         );
         assert_eq!((without.state(), without.time(), without.sigma()), (start, 0.0, 1.0));
         assert!(without.dense().is_none());
-        let Ok(gauss) = &gauss else { return };
+        let gauss = gauss.as_ref().unwrap();
         let step = gauss.forward(0.0, &start, &x.v, &mut Default::default());
-        assert!(step.is_ok(), "{step:?}");
-        let Ok(step) = step else { return };
+        let step = step.unwrap();
         let off = distance(stepper.state(), step.end);
         assert!(
             off <= bound && (stepper.sigma() / step.sigma - 1.0).abs() <= bound,

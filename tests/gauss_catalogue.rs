@@ -4,7 +4,7 @@
 use crate::common::{TOLERANCE, around, bounded, on_some, step_from, visit_kinds};
 use crate::gauss::distance;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
+use contact_geom::{Lagrangian, Larger, Largest, PhasePoint, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{DiscreteLagrangian, Gauss, Stepper, derived_jet, statements};
 
 /// The stepper agrees with Newton's steps at random points of every system, and so does its `sigma_d`: to 1e-12, round-off times
@@ -69,10 +69,10 @@ fn the_flow_is_conformal_on_every_system() {
                         let said = gauss.jet(t, &point).map_err(|e| e.to_string())?;
                         let derived = derived_jet(&gauss, t, &point).map_err(|e| e.to_string())?;
                         let off = (said.d1 - derived.d1)
-                            .amax()
-                            .max((said.d2 - derived.d2).amax())
-                            .max((said.dz - derived.dz).abs());
-                        bounded(off / (1.0 + derived.d1.amax().max(derived.d2.amax())), 1e-12)
+                            .largest()
+                            .larger((said.d2 - derived.d2).largest())
+                            .larger((said.dz - derived.dz).abs());
+                        bounded(off / (1.0 + derived.d1.largest().larger(derived.d2.largest())), 1e-12)
                     },
                 );
             }
@@ -128,8 +128,8 @@ fn curves_meet_the_states() {
                     let Some(curve) = stepper.dense() else { panic!("{}: no curve", system.name()) };
                     assert_eq!(curve.span(), (t, t + 0.02));
                     let off = |t: f64, x: PhasePoint<N>| {
-                        let size = Triple::from(x).amax().max(Triple::from(from).amax());
-                        Triple::from(curve.at(t)).minus(x.into()).amax() / (size * f64::EPSILON)
+                        let size = Triple::from(x).largest().larger(Triple::from(from).largest());
+                        Triple::from(curve.at(t)).minus(x.into()).largest() / (size * f64::EPSILON)
                     };
                     let (there, here) = (off(t, from), off(stepper.time(), stepper.state()));
                     assert!(there <= 100.0 && here <= 100.0, "{} s = {s}: {there}, {here} eps", system.name());
@@ -137,7 +137,7 @@ fn curves_meet_the_states() {
                         let middle = t + 0.01;
                         let at = curve.at(middle);
                         let v = VelocityPoint { q: at.q, v: curve.velocity(middle), z: at.z };
-                        let off = (system.gradient(middle, &v).y - at.p).amax() / (1.0 + at.p.amax());
+                        let off = (system.gradient(middle, &v).y - at.p).largest() / (1.0 + at.p.largest());
                         assert!(off <= 1e-12, "{} s = {s}: momentum off by {off:e}", system.name());
                     }
                 }

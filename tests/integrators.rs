@@ -1,8 +1,10 @@
 //! The integrators: steppers, scenes, dense output and events, over the catalogue of systems.
 
 #![allow(missing_docs)]
+// In a check `f64::max` and `amax` would lose a NaN.
+#![deny(clippy::disallowed_methods)]
 // What a test cannot go on without is a failure of it.
-#![allow(clippy::panic, clippy::needless_range_loop, clippy::neg_cmp_op_on_partial_ord)]
+#![allow(clippy::panic, clippy::unwrap_used, clippy::needless_range_loop, clippy::neg_cmp_op_on_partial_ord)]
 
 // The theorems use the rest of it.
 #[allow(dead_code, unused_imports)]
@@ -15,4 +17,5 @@ mod dense_output;
 mod gauss;
 mod gauss_catalogue;
 mod gauss_stress;
+mod round_off;
 mod scenes;

@@ -5,7 +5,9 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     CoupledInZ, DoublePendulum, Duffing, HarmonicOscillator, Pendulum, PerturbedKepler, QuadraticInZ, System,
 };
-use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint, legendre};
+use contact_geom::{
+    DiscretePoint, Lagrangian, Largest, PhasePoint, Scalar, Structure, Triple, VelocityPoint, legendre,
+};
 use discrete_herglotz::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
 use discrete_herglotz::{DiscreteLagrangian, InputError, Method, Quadrature, Rule};
 
@@ -55,8 +57,7 @@ fn rules_by_name() {
         let (system, x) = (CoupledInZ::default(), DiscretePoint::new([0.3], [0.4], 0.7));
         let by_name = discretise(method, &system, 0.1, 0.0, &VelocityPoint::new([0.3], [0.4], 0.7));
         let by_type = Quadrature::<_, R>::new(&system, 0.1);
-        assert!(by_name.is_ok() && by_type.is_ok());
-        let (Ok(by_name), Ok(by_type)) = (by_name, by_type) else { return };
+        let (by_name, by_type) = (by_name.unwrap(), by_type.unwrap());
         assert_eq!(by_name.step_size(), by_type.step_size());
         assert_eq!(by_name.value::<f64>(0.0, &x), by_type.value(0.0, &x));
         assert_eq!(by_name.jet(0.0, &x), by_type.jet(0.0, &x));
@@ -94,8 +95,7 @@ fn exact_rates() {
     for method in Method::applicable(&system.structure()) {
         let x = DiscretePoint::new([0.3], [0.4], 0.7);
         let jet = discretise(method, &system, h, 0.0, &system.initial()).map(|ld| ld.jet(0.0, &x));
-        assert!(matches!(jet, Ok(Ok(_))), "{method}: {jet:?}");
-        let Ok(Ok(jet)) = jet else { continue };
+        let jet = jet.unwrap().unwrap();
         let off = (jet.sigma() - (system.gamma * h).exp()).abs();
         assert!(if method.exact_rate() { off < 1e-14 } else { off > 1e-8 }, "{method}: off by {off:e}");
     }
@@ -107,8 +107,7 @@ fn implicit_in_z() {
     let system = QuadraticInZ { c: 1.0 };
     for method in Method::applicable(&system.structure()) {
         let ld = discretise(method, &system, 0.5, 0.0, &system.initial());
-        assert!(ld.is_ok());
-        let Ok(ld) = ld else { continue };
+        let ld = ld.unwrap();
         let at = |z0: f64| ld.value(0.0, &DiscretePoint::new([0.3], [0.4], z0)).unwrap_or(f64::NAN);
         let third = (at(0.6) - 3.0 * at(0.4) + 3.0 * at(0.2) - at(0.0)).abs();
         assert!(if method.implicit_in_z() { third > 1e-5 } else { third < 1e-14 }, "{method}: {third:e}");
@@ -145,7 +144,7 @@ fn symmetric() {
             };
             let back = there_and_back();
             assert!(back.is_some(), "{} with {method}", system.name());
-            let off = back.map_or(f64::NAN, |back| Triple::from(turned(back.end)).minus(start.into()).amax());
+            let off = back.map_or(f64::NAN, |back| Triple::from(turned(back.end)).minus(start.into()).largest());
             let as_stated = if method.symmetric() { off < 1e-12 } else { off > 1e-5 };
             assert!(as_stated, "{} with {method}: off by {off:e}", system.name());
         }

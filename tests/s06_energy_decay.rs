@@ -3,7 +3,8 @@
 use crate::common::{on_random, over_catalogue, systems, within};
 use contact_geom::systems::{Lienard, VanDerPol};
 use contact_geom::{
-    Darboux, DarbouxField, Smooth, SmoothFunction, Triple, dissipation_defect, hamiltonian_vector_field,
+    Darboux, DarbouxField, Larger, Largest, Smooth, SmoothFunction, Triple, dissipation_defect,
+    hamiltonian_vector_field,
 };
 
 /// On every system of the catalogue.
@@ -19,8 +20,8 @@ fn without_lagrangian(name: &str, h: &impl SmoothFunction<1>) {
         let defect = dissipation_defect(&Darboux, h, h, t, &x).map_err(|e| e.to_string())?;
         let generic = hamiltonian_vector_field(&Darboux, h, t, &x).map_err(|e| e.to_string())?;
         let closed = DarbouxField { hamiltonian: h, t }.at(&x).map_err(|e| e.to_string())?;
-        let routes = generic.minus(closed).amax() / (1.0 + closed.amax());
-        let worst = defect.max(routes).max((closed.x[0] - x.z).abs());
+        let routes = generic.minus(closed).largest() / (1.0 + closed.largest());
+        let worst = defect.larger(routes).larger((closed.x[0] - x.z).abs());
         within(worst)
     });
 }

@@ -32,8 +32,8 @@ fn the_derivative_is_that_of_the_action() {
     assert!(formula.abs() > 0.1);
 }
 
-/// The action of a spline through nodes of a motion tends to that of the motion with the eighth power of their distance: it is
-/// critical there, so that an error of the fourth order in the curve counts twice.
+/// The action of a spline through nodes of a motion tends to that of the motion with the sixth power of their distance: it is
+/// critical there, so that the error of the curve counts twice, and its velocity's is of the third order.
 #[test]
 fn splines_through_nodes() {
     let (system, duration) = (Pendulum { gamma: -0.3 }, 2.0);
@@ -50,7 +50,6 @@ fn splines_through_nodes() {
         let z = spline.map(|s| action(&system, &s, (0.0, duration), start.z).map_or(f64::NAN, |a| a.z));
         (z.unwrap_or(f64::NAN) - truth).abs()
     };
-    // The velocity's error is of the third order, and its square of the sixth.
     let order = (error(8) / error(32)).log2() / 2.0;
     assert!((order - 6.0).abs() < 0.5, "order {order}, errors {:e}, {:e}", error(8), error(32));
 }
@@ -108,7 +107,7 @@ impl<C: Curve<1>> Curve<1> for Counted<'_, C> {
 fn a_spline_breaks_at_its_nodes() {
     let times: Vec<f64> = (0..=8).map(|k| -1.0 + 0.25 * f64::from(k)).collect();
     let points: Vec<_> = times.iter().map(|t| SVector::from([(3.0 * t).sin()])).collect();
-    let Ok(spline) = SplineCurve::new(&times, &points, None) else { unreachable!() };
+    let spline = SplineCurve::new(&times, &points, None).unwrap();
     let still = |_: f64| (SVector::<f64, 1>::zeros(), SVector::<f64, 1>::zeros());
     assert_eq!(spline.breaks(), times);
     assert_eq!(VariedCurve { curve: &spline, variation: &still, by: 1.0 }.breaks(), times);

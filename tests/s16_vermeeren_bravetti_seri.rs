@@ -2,9 +2,9 @@
 //! the discrete Herglotz equation, and its rules come back to Q x Q x R with the same momenta.
 
 use crate::common::{around, on_random, step_from, within};
-use contact_geom::DiscretePoint;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
+use contact_geom::{DiscretePoint, Larger, Largest};
 use discrete_herglotz::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
 use discrete_herglotz::{DiscreteLagrangian, DiscretePath, Quadrature, Rule, legendre_minus, legendre_plus};
 
@@ -21,8 +21,8 @@ fn with_rule<R: Rule, const N: usize, S: System<N>>(system: &S) {
         let (p0, p1) = (s.s1 / -(1.0 + s.z0), s.s2 / (1.0 - s.z1));
         let minus = legendre_minus(&ld, t, &x).map_err(|e| e.to_string())?;
         let plus = legendre_plus(&ld, t, &x).map_err(|e| e.to_string())?;
-        let size = minus.p.amax().max(plus.p.amax());
-        let momenta = (p0 - minus.p).amax().max((p1 - plus.p).amax()) / size;
+        let size = minus.p.largest().larger(plus.p.largest());
+        let momenta = (p0 - minus.p).largest().larger((p1 - plus.p).largest()) / size;
         let action = (s.value - jet.value).abs() / (1.0 + jet.value.abs());
 
         // 16: the two residuals on a path that is no solution.
@@ -32,12 +32,12 @@ fn with_rule<R: Rule, const N: usize, S: System<N>>(system: &S) {
         let herglotz = path.herglotz_residuals(&ld, t, x.z0).map_err(|e| e.to_string())?;
         let extended = path.extended_residuals(&ld, t, x.z0).map_err(|e| e.to_string())?;
         let z = path.actions(&ld, t, x.z0).map_err(|e| e.to_string())?;
-        let mut worst = momenta.max(action);
+        let mut worst = momenta.larger(action);
         for k in 0..4 {
             // The two differ by the factor 1 - S_z1 of the later step, which is no zero.
             let at = DiscretePoint { q0: path.points()[k + 1], q1: path.points()[k + 2], z0: z[k + 1] };
             let factor = 1.0 - ld.extended_jet(t + (k + 1) as f64 * h, &at, z[k + 2]).z1;
-            worst = worst.max((extended[k] / factor - herglotz[k]).amax() / size.max(herglotz[k].amax()));
+            worst = worst.larger((extended[k] / factor - herglotz[k]).largest() / size.larger(herglotz[k].largest()));
         }
         within(worst)
     });

@@ -3,7 +3,7 @@
 
 use crate::common::{over_discretisations, pairs};
 use contact_geom::systems::{Kepler, SphericalPendulum, System};
-use contact_geom::{DiscretePoint, PhasePoint, legendre};
+use contact_geom::{DiscretePoint, PhasePoint, larger, legendre};
 use discrete_herglotz::{Flow, LeftMidpoint, Method, MomentumDecay, Status, discrete_symmetry_defect};
 
 /// Statement 25, with every discretisation of every system that has a symmetry. Cartesian rules keep the linear symmetries
@@ -27,13 +27,12 @@ fn along_a_run() {
         let start: PhasePoint<N> = legendre(system, 0.0, &system.initial());
         for method in Method::applicable(&system.structure()) {
             let ld = method.discretise(system, h, 0.0, &start);
-            assert!(ld.is_ok());
-            let Ok(ld) = ld else { continue };
+            let ld = ld.unwrap();
             for group in system.symmetries() {
                 let mut decay = MomentumDecay::new(group);
                 let status = Flow::new(&ld, 0.0, start).and_then(|mut flow| flow.run(1000, &mut decay));
                 assert_eq!(status, Ok(Status::Completed), "{} with {method}", system.name());
-                let scale = decay.rows.iter().map(|row| row.momentum.abs()).fold(1e-3, f64::max);
+                let scale = decay.rows.iter().map(|row| row.momentum.abs()).fold(1e-3, larger);
                 for (k, row) in decay.rows.iter().enumerate() {
                     let defect = (row.momentum - row.predicted).abs() / scale;
                     let allowed = 64.0 * f64::EPSILON * (k + 1) as f64;
@@ -49,7 +48,7 @@ fn along_a_run() {
 /// A group that is no symmetry of L is none of L_d.
 #[test]
 fn without_symmetry() {
-    let Ok(ld) = LeftMidpoint::new(Kepler::<2>::default(), 0.1) else { return };
+    let ld = LeftMidpoint::new(Kepler::<2>::default(), 0.1).unwrap();
     let shift = contact_geom::Symmetry::Translation(contact_geom::nalgebra::SVector::from([1.0, 0.0]));
     let x = DiscretePoint::new([1.0, 0.0], [1.0, 0.1], 0.0);
     assert!(discrete_symmetry_defect(&ld, &shift, 0.0, &x).is_ok_and(|d| d > 0.01));

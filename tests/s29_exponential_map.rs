@@ -3,7 +3,7 @@
 use crate::common::over_motions;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{ChargedParticle, HarmonicOscillator, Pendulum};
-use contact_geom::{Lagrangian, Scalar, VelocityPoint};
+use contact_geom::{Lagrangian, Largest, Scalar, VelocityPoint};
 use exact_lagrangian::{ContactExponential, ExactError};
 
 /// Along random motions of every system.
@@ -17,7 +17,7 @@ fn on_every_system() {
 fn conjugate_points_of_the_oscillator() {
     for gamma in [0.0f64, -0.1, -1.0] {
         let w = (1.0 - gamma * gamma / 4.0).sqrt();
-        let Ok(exp) = ContactExponential::new(HarmonicOscillator { gamma }, 10.0) else { return };
+        let exp = ContactExponential::new(HarmonicOscillator { gamma }, 10.0).unwrap();
         let x = VelocityPoint::new([0.4], [1.2], 0.0);
         let found = exp.conjugate_points(0.0, &x).unwrap_or_default();
         assert_eq!(found.len(), (10.0 * w / std::f64::consts::PI) as usize);
@@ -60,8 +60,8 @@ fn no_retraction_at_a_conjugate_point() {
 #[test]
 fn branches() {
     let pendulum = Pendulum { gamma: -0.05 };
-    let Ok(exp) = ContactExponential::new(pendulum, 8.0) else { return };
-    let Ok(y) = exp.at(0.0, &VelocityPoint::new([0.0], [1.0], 0.0)) else { return };
+    let exp = ContactExponential::new(pendulum, 8.0).unwrap();
+    let y = exp.at(0.0, &VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
     let guesses: Vec<_> = (-8..=8).map(|k| [0.24 * f64::from(k)].into()).collect();
     let found = exp.branches(0.0, &y, &guesses).unwrap_or_default();
     assert!(found.len() >= 3, "{} motions", found.len());
@@ -102,13 +102,13 @@ fn the_slope_of_a_motion_at_rest() {
 #[test]
 fn branches_are_different() {
     let pendulum = Pendulum { gamma: -0.05 };
-    let Ok(exp) = ContactExponential::new(pendulum, 8.0) else { return };
-    let Ok(y) = exp.at(0.0, &VelocityPoint::new([0.0], [1.0], 0.0)) else { return };
+    let exp = ContactExponential::new(pendulum, 8.0).unwrap();
+    let y = exp.at(0.0, &VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
     let guesses: Vec<_> = (-8..=8).map(|k| [0.24 * f64::from(k)].into()).collect();
     let found = exp.branches(0.0, &y, &guesses).unwrap_or_default();
     for (i, one) in found.iter().enumerate() {
         for other in &found[..i] {
-            assert!((one.start.v - other.start.v).amax() > 1e-6, "{one:?} and {other:?}");
+            assert!((one.start.v - other.start.v).largest() > 1e-6, "{one:?} and {other:?}");
         }
     }
 }
@@ -118,7 +118,7 @@ fn branches_are_different() {
 #[test]
 fn double_conjugate_points() {
     let particle = ChargedParticle::default();
-    let Ok(exp) = ContactExponential::new(particle, 8.0) else { return };
+    let exp = ContactExponential::new(particle, 8.0).unwrap();
     let found = exp.conjugate_points(0.0, &VelocityPoint::new([0.4, 0.1], [1.2, 0.3], 0.0)).unwrap_or_default();
     // dq1/dv0 is a complex number times sin(w h), its square root that of the characteristic polynomial.
     let ChargedParticle { b, k, gamma } = particle;
@@ -143,7 +143,7 @@ impl Lagrangian<1> for FadingSpring {
 fn a_minimum_that_is_not_zero_is_no_conjugate_point() {
     let x = VelocityPoint::new([0.4], [1.2], 0.0);
     // Its slope has a minimum of 0.55 near h = 3.
-    let Ok(exp) = ContactExponential::new(FadingSpring(2.2), 5.0) else { return };
+    let exp = ContactExponential::new(FadingSpring(2.2), 5.0).unwrap();
     assert_eq!(exp.conjugate_points(0.0, &x), Ok(vec![]));
 }
 
@@ -159,7 +159,7 @@ impl Lagrangian<1> for Soft {
 #[test]
 fn conjugate_points_in_any_unit_of_time() {
     for w in [1e-6, 1e6] {
-        let Ok(exp) = ContactExponential::new(Soft(w), 7.0 / w) else { return };
+        let exp = ContactExponential::new(Soft(w), 7.0 / w).unwrap();
         let found = exp.conjugate_points(0.0, &VelocityPoint::new([0.4], [1.2 * w], 0.0)).unwrap_or_default();
         assert_eq!(found.len(), 2);
         assert!(found.iter().all(|c| c.smallest < 1e-13), "{found:?}");

@@ -1,5 +1,10 @@
 //! The theorems, one file each, over every system and every discretisation.
 
+// In a check `f64::max` and `amax` would lose a NaN.
+#![deny(clippy::disallowed_methods)]
+// What a test cannot go on without is a failure of it.
+#![allow(clippy::unwrap_used)]
+
 // The integrators use the rest of it.
 #[allow(dead_code)]
 mod common;

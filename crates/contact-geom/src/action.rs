@@ -1,6 +1,6 @@
 //! One-parameter groups acting on Q, their lifts to the contact manifolds, and their momenta.
 
-use crate::{Dual, GeometryError, Lagrangian, Scalar, Triple, VelocityPoint};
+use crate::{Dual, GeometryError, Lagrangian, Scalar, Triple, VelocityPoint, largest};
 use nalgebra::SVector;
 
 type Line<T> = SVector<T, 1>;
@@ -92,7 +92,11 @@ impl<const N: usize> Symmetry<N> {
     /// [`GeometryError::WrongSize`] unless both indices are below `N` and differ.
     pub fn rotation(i: usize, j: usize) -> Result<Self, GeometryError> {
         if i == j || i >= N || j >= N {
-            return Err(GeometryError::WrongSize { what: "the plane of rotation", expected: N, found: i.max(j) + 1 });
+            return Err(GeometryError::WrongSize {
+                what: "the plane of rotation",
+                expected: N,
+                found: i.max(j).saturating_add(1),
+            });
         }
         Ok(Symmetry::Rotation(i, j))
     }
@@ -105,6 +109,9 @@ impl<const N: usize> Symmetry<N> {
         if N != 3 {
             return Err(GeometryError::WrongSize { what: "the axis of rotation", expected: N, found: 3 });
         }
+        // Relative to the largest component: the squares of a huge axis overflow, those of a tiny one vanish.
+        let most = largest(axis);
+        let axis = axis.map(|a| a / most);
         let length = SVector::from(axis).norm();
         let unit: SVector<f64, N> = SVector::from_fn(|i, _| axis[i] / length);
         match unit.iter().position(|c| !c.is_finite()) {

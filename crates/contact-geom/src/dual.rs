@@ -188,6 +188,10 @@ macro_rules! arithmetic {
                 self.re.re()
             }
             #[$inline]
+            fn pivot_size(self) -> f64 {
+                self.re.pivot_size()
+            }
+            #[$inline]
             fn extent(self) -> f64 {
                 let mut largest = self.re.extent();
                 self.d.each(|a| {
@@ -195,6 +199,18 @@ macro_rules! arithmetic {
                     a
                 });
                 largest
+            }
+            #[$inline]
+            fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
+                let (a, b) = (self.re, than.re);
+                $Dual {
+                    re: a.if_less(b, then.re, otherwise.re),
+                    d: then.d.join(otherwise.d, |x, y| a.if_less(b, x, y)),
+                }
+            }
+            #[$inline]
+            fn abs(self) -> Self {
+                self.chain(self.re.abs(), self.re.signum())
             }
             #[$inline]
             fn recip(self) -> Self {

@@ -1,7 +1,7 @@
 //! Contact Hamiltonian vector fields, the Jacobi bracket and dissipated quantities.
 
 use crate::smooth::{apply, apply_transposed};
-use crate::{ContactForm, GeometryError, Module, Scalar, Smooth, SmoothFunction, Triple};
+use crate::{ContactForm, GeometryError, Largest, Module, Scalar, Smooth, SmoothFunction, Triple};
 
 /// The contact Hamiltonian vector field `X_f` of any contact form: `flat(X_f) = df - (f + R(f)) eta`; paper, section 2.1.
 ///
@@ -142,7 +142,7 @@ pub fn infinitesimal_conformality<const N: usize, F: Smooth<N> + ContactForm<N>>
 ) -> Result<InfinitesimalConformality, GeometryError> {
     let change = lie_derivative(form, field, at)?;
     let rate = change.dot(&form.reeb(at)?);
-    let defect = change.minus(form.eta(at)?.scale(rate)).amax() / (1.0 + change.amax());
+    let defect = change.minus(form.eta(at)?.scale(rate)).largest() / (1.0 + change.largest());
     Ok(InfinitesimalConformality { rate, defect })
 }
 

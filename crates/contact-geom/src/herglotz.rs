@@ -1,6 +1,7 @@
 //! Regularity, energy, the Legendre transformation and the Herglotz vector field of a Lagrangian.
 
-use crate::linear::solve;
+use crate::blocks::BLOCK;
+use crate::linear::{SingularMatrix, solve};
 use crate::{Border, Dual, GeometryError, Lagrangian, Module, PhasePoint, Scalar, Smooth, SmoothFunction};
 use crate::{OneParameterGroup, Triple, VelocityPoint};
 use nalgebra::{DMatrix, SMatrix, SVector};
@@ -20,6 +21,10 @@ impl Regularity {
     pub fn of(matrix: DMatrix<f64>) -> Self {
         if !matrix.iter().all(|e| e.is_finite()) {
             return Regularity { smallest: 0.0, largest: f64::INFINITY };
+        }
+        if matrix.is_empty() {
+            // Of dimension 0 there is one matrix, the identity.
+            return Regularity { smallest: 1.0, largest: 1.0 };
         }
         let values = matrix.singular_values();
         Regularity { smallest: values.min(), largest: values.max() }
@@ -119,6 +124,9 @@ pub fn herglotz_rates<T: Scalar, const N: usize>(
     t: T,
     x: &VelocityPoint<N, T>,
 ) -> Result<(Triple<N, T>, T), GeometryError> {
+    if const { N > BLOCK } {
+        return rates_of_many(lagrangian, t, x);
+    }
     // L_q, L_z and L along the N + 1 directions of q and z.
     let still = Dual::<T, Border<N, T>>::constant;
     let mut y = VelocityPoint { q: x.q.map(still), v: x.v.map(still), z: still(x.z) };
@@ -146,9 +154,33 @@ pub fn herglotz_rates<T: Scalar, const N: usize>(
     let p = lagrangian.along(Dual { re: t, d: Border { x: Module::null(), z: T::one() } }, &y).d;
     let mut a = SVector::<T, N>::from_fn(|i, _| slope.x[i] + p[i].re * slope.z - p[i].d.z);
     let mut w = SMatrix::<T, N, N>::from_fn(|i, j| p[i].d.x[j]);
-    solve(&mut w, &mut a)
-        .map_err(|e| e.of("W = L_vv", "Herglotz' equations have no unique acceleration here; L is not regular"))?;
+    solve(&mut w, &mut a).map_err(irregular)?;
     Ok((Triple { x: x.v, y: a, z: zdot }, slope.z))
+}
+
+/// [`herglotz_rates`] of many coordinates: by blocks of directions, for the sake of the stack.
+#[inline(never)]
+fn rates_of_many<T: Scalar, const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: T,
+    x: &VelocityPoint<N, T>,
+) -> Result<(Triple<N, T>, T), GeometryError> {
+    let (zdot, slope) = lagrangian.with_gradient(t, x);
+    let drifting = |re: T, drift: T| Dual { re, d: SVector::<T, 1>::new(drift) };
+    let y = VelocityPoint {
+        q: x.q.zip_map(&x.v, drifting),
+        v: x.v.map(|v| drifting(v, T::zero())),
+        z: drifting(x.z, zdot),
+    };
+    let p = lagrangian.gradient(drifting(t, T::one()), &y).y;
+    let mut a = SVector::<T, N>::from_fn(|i, _| slope.x[i] + p[i].re * slope.z - p[i].d[0]);
+    solve(&mut lagrangian.mass_matrix(t, x), &mut a).map_err(irregular)?;
+    Ok((Triple { x: x.v, y: a, z: zdot }, slope.z))
+}
+
+/// What a singular W means for the equations of motion.
+fn irregular(singular: SingularMatrix) -> GeometryError {
+    singular.of("W = L_vv", "Herglotz' equations have no unique acceleration here; L is not regular")
 }
 
 /// The Herglotz vector field at a fixed time, as a field that can be differentiated.

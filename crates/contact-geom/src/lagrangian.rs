@@ -1,5 +1,6 @@
 //! Lagrangians L(t, q, v, z) and their derivatives.
 
+use crate::blocks::{self, BLOCK};
 use crate::points::seed;
 use crate::{Dual, KernelDual, Module, Scalar, Structure, Triple, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
@@ -70,6 +71,9 @@ pub trait Lagrangian<const N: usize> {
         if let Some(gradient) = self.closed_gradient(t, x) {
             return (self.value(t, &x.q, &x.v, x.z), gradient);
         }
+        if const { N > BLOCK } {
+            return blocks::with_gradient(self, t, x);
+        }
         let mut q = still::<T, Triple<N, T>, N>(&x.q);
         let mut v = still::<T, Triple<N, T>, N>(&x.v);
         let mut z = KernelDual::<T, Triple<N, T>>::constant(x.z);
@@ -88,6 +92,9 @@ pub trait Lagrangian<const N: usize> {
         if let Some(gradient) = self.closed_gradient(t, x) {
             return (self.value(t, &x.q, &x.v, x.z), gradient.x);
         }
+        if const { N > BLOCK } {
+            return blocks::with_force(self, t, x);
+        }
         let mut q = still::<T, SVector<T, N>, N>(&x.q);
         for i in 0..N {
             q[i].d[i] = T::one();
@@ -101,6 +108,9 @@ pub trait Lagrangian<const N: usize> {
     fn mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SMatrix<T, N, N> {
         if let Some(hessian) = self.closed_hessian(t, x) {
             return hessian.vv;
+        }
+        if const { N > BLOCK } {
+            return blocks::mass_matrix(self, t, x);
         }
         let mut y = VelocityPoint {
             q: still::<T, SVector<T, N>, N>(&x.q),
@@ -165,6 +175,9 @@ pub fn derived_gradient<T: Scalar, const N: usize>(
     t: T,
     x: &VelocityPoint<N, T>,
 ) -> Triple<N, T> {
+    if const { N > BLOCK } {
+        return blocks::with_gradient(lagrangian, t, x).1;
+    }
     let s = seed(&Triple::from(*x));
     lagrangian.value(Dual::constant(t), &s.x, &s.y, s.z).d
 }
@@ -176,6 +189,9 @@ pub fn derived_hessian<T: Scalar, const N: usize>(
     t: T,
     x: &VelocityPoint<N, T>,
 ) -> Hessian<N, T> {
+    if const { N > BLOCK } {
+        return blocks::hessian(lagrangian, t, x);
+    }
     let g = lagrangian.gradient(Dual::constant(t), &seed(&Triple::from(*x)).into());
     Hessian {
         qq: SMatrix::from_fn(|i, j| g.x[i].d.x[j]),

@@ -25,6 +25,7 @@
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
 mod action;
+mod blocks;
 mod clock;
 mod contact_form;
 mod darboux;
@@ -69,7 +70,7 @@ pub use herglotz::{
 };
 pub use lagrangian::{Hessian, Lagrangian, ValueOnly, derived_gradient, derived_hessian};
 pub use lagrangian_form::LagrangianForm;
-pub use largest::{larger, largest};
+pub use largest::{Larger, Largest, larger, largest};
 pub use module::{Border, Module};
 pub use points::{DiscretePoint, PhasePoint, Triple, VelocityPoint, seed};
 pub use probe::check_closed_derivatives;

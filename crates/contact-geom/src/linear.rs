@@ -49,11 +49,11 @@ pub fn solve_in_kernel<T: Scalar, D: Dim>(
     for k in 0..n {
         let mut row = k;
         for i in k + 1..n {
-            if a[(i, k)].modulus() > a[(row, k)].modulus() {
+            if a[(i, k)].pivot_size() > a[(row, k)].pivot_size() {
                 row = i;
             }
         }
-        let size = a[(row, k)].modulus();
+        let size = a[(row, k)].pivot_size();
         if !(size > 0.0 && size.is_finite()) {
             return Err(SingularMatrix { pivot: size });
         }

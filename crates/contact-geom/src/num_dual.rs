@@ -13,6 +13,18 @@ macro_rules! scalar {
             fn extent(self) -> f64 {
                 Scalar::extent(self.re)
             }
+            fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
+                if self.re < than.re {
+                    then
+                } else if self.re >= than.re {
+                    otherwise
+                } else {
+                    f64::NAN.into()
+                }
+            }
+            fn abs(self) -> Self {
+                self * Scalar::signum(self.re)
+            }
             fn recip(self) -> Self {
                 <Self as DualNum>::recip(&self)
             }

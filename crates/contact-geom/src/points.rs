@@ -1,6 +1,6 @@
 //! Points of the three contact manifolds, and the coordinates that they share.
 
-use crate::{Dual, GeometryError, Module, Scalar};
+use crate::{Dual, GeometryError, Larger, Largest, Module, Scalar};
 use nalgebra::{DVector, SVector};
 
 /// Coordinates `(x, y, z)` in `R^N x R^N x R`: of a point in a chart, of a tangent vector or of a covector.
@@ -96,9 +96,9 @@ impl<const N: usize> Triple<N> {
         DVector::from_fn(Self::DIMENSION, |i, _| self.component(i))
     }
 
-    /// The largest absolute component.
+    /// The largest absolute component; not a number where a component is not, unlike nalgebra's function of this name.
     pub fn amax(&self) -> f64 {
-        self.x.amax().max(self.y.amax()).max(self.z.abs())
+        self.x.largest().larger(self.y.largest()).larger(self.z.abs())
     }
 
     /// Whether every component is finite.
@@ -106,6 +106,13 @@ impl<const N: usize> Triple<N> {
     pub fn is_finite(&self) -> bool {
         let [x, y] = [self.x.data.0[0], self.y.data.0[0]];
         x.iter().all(|c| c.is_finite()) && y.iter().all(|c| c.is_finite()) && self.z.is_finite()
+    }
+}
+
+impl<const N: usize> Largest for Triple<N> {
+    #[inline]
+    fn largest(&self) -> f64 {
+        self.amax()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Pullbacks of contact forms: is a map contact, and with which conformal factor?
 
 use crate::smooth::apply_transposed;
-use crate::{ContactForm, GeometryError, Smooth, Triple};
+use crate::{ContactForm, GeometryError, Largest, Smooth, Triple};
 use nalgebra::DMatrix;
 
 /// The pullback of a contact form along a map at a point, compared with the contact form there: `F* tau = sigma eta`?
@@ -54,6 +54,8 @@ pub fn conformality_with_jacobian<const N: usize>(
     }
     let pullback = apply_transposed(jacobian, &target.eta(image)?);
     let sigma = pullback.dot(&source.reeb(x)?);
-    let defect = pullback.minus(source.eta(x)?.scale(sigma)).amax() / pullback.amax();
+    let (difference, size) = (pullback.minus(source.eta(x)?.scale(sigma)).largest(), pullback.largest());
+    // A map that sends everything to one point pulls back nothing: conformal, with the factor 0.
+    let defect = if difference == 0.0 && size == 0.0 { 0.0 } else { difference / size };
     Ok(Conformality { pullback, sigma, defect })
 }

@@ -141,6 +141,18 @@ impl Scalar for Rounded {
     fn extent(self) -> f64 {
         self.value.extent()
     }
+    fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
+        if self.value < than.value {
+            then
+        } else if self.value >= than.value {
+            otherwise
+        } else {
+            f64::NAN.into()
+        }
+    }
+    fn abs(self) -> Self {
+        Rounded { value: self.value.abs(), size: self.size }
+    }
     fn recip(self) -> Self {
         let r = self.value.recip();
         self.through(r, r * r)

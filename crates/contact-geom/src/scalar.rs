@@ -9,12 +9,21 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 ///
 /// A Lagrangian, a Hamiltonian, a map or a group action is one function, generic over `T: Scalar`; its derivatives are
 /// that same function evaluated on duals. The trait holds arithmetic (with another `Self` and with `f64`), the elementary
-/// functions, and nothing that could branch on a value: a formula that branches is not smooth.
+/// functions, and comparisons that choose a value.
+///
+/// A formula must not branch on a number by `if`: it may be worked on for several states at once, in the lanes of a vector
+/// register, each of which has its own answer. [`if_less`](Self::if_less), [`abs`](Self::abs), [`max`](Self::max) and the like
+/// choose lane by lane; both values are computed, and one is taken with its differentials. Where a formula asks for one value
+/// of lanes that differ, by [`re`](Self::re), [`extent`](Self::extent), `==` or `is_zero`, the step is not taken in lanes.
+/// Integrators reach their order only where L is smooth along a step.
 ///
 /// ```
 /// use contact_geom::Scalar;
 /// fn potential<T: Scalar>(q: T) -> T { -q.cos() + 1.0 }
 /// assert_eq!(potential(0.0), 0.0);
+/// /// A spring that only pushes, `q < 0`.
+/// fn one_sided<T: Scalar>(q: T) -> T { q.if_less(T::zero(), q * q * 0.5, T::zero()) }
+/// assert_eq!([one_sided(-2.0), one_sided(2.0)], [2.0, 0.0]);
 /// ```
 pub trait Scalar:
     nalgebra::Scalar
@@ -32,17 +41,39 @@ pub trait Scalar:
     + Mul<f64, Output = Self>
     + Div<f64, Output = Self>
 {
-    /// The value without its differentials. For lanes: of the first; only a guess that is improved upon may depend on it.
+    /// The value without its differentials, of what lies between formulas: guesses, domains, messages. Lanes of a vector
+    /// register that differ have no such value: it is not a number then, and the integrator refuses the step.
     fn re(self) -> f64;
     /// The size of the value without its differentials, used only to choose pivots and to see that a number is finite.
     /// For lanes: of the lane that matters most to a pivot, the smallest.
     #[inline(always)]
-    fn modulus(self) -> f64 {
+    fn pivot_size(self) -> f64 {
         self.re().abs()
     }
     /// The largest absolute value among the value and all its differentials: what an iteration or an error control over
     /// this scalar has to make small. A NaN anywhere makes it infinite.
     fn extent(self) -> f64;
+    /// `then` where this number is less than another, `otherwise` where it is not, each with its differentials; not a number
+    /// where one of the two is none. At a tie `otherwise`.
+    fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self;
+    /// The larger of two numbers; not a number where one is none. At a tie this one, with its differentials.
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.if_less(other, other, self)
+    }
+    /// The smaller of two numbers; not a number where one is none. At a tie this one, with its differentials.
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        other.if_less(self, other, self)
+    }
+    /// The absolute value. Its derivative is [`signum`](Self::signum), so 0 at 0.
+    fn abs(self) -> Self;
+    /// 1, -1 or 0: the sign, and 0 of either zero. Its derivative is 0 everywhere.
+    #[inline(always)]
+    fn signum(self) -> Self {
+        let zero = Self::zero();
+        self.if_less(zero, -Self::one(), zero.if_less(self, Self::one(), zero))
+    }
     /// `1 / x`.
     fn recip(self) -> Self;
     /// The square root.
@@ -107,6 +138,20 @@ impl Scalar for f64 {
     #[inline]
     fn extent(self) -> f64 {
         if self.is_nan() { f64::INFINITY } else { self.abs() }
+    }
+    #[inline]
+    fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
+        if self < than {
+            then
+        } else if self >= than {
+            otherwise
+        } else {
+            f64::NAN
+        }
+    }
+    #[inline]
+    fn abs(self) -> Self {
+        f64::abs(self)
     }
     #[inline]
     fn recip(self) -> Self {
@@ -177,5 +222,63 @@ impl Scalar for f64 {
     #[inline]
     fn atan(self) -> Self {
         f64::atan(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Dual, KernelDual};
+    use nalgebra::SVector;
+
+    /// A number with a first and a second derivative along one direction.
+    type Second = Dual<Dual<f64, SVector<f64, 1>>, SVector<Dual<f64, SVector<f64, 1>>, 1>>;
+
+    fn moving(x: f64) -> Second {
+        Dual { re: Dual { re: x, d: SVector::<f64, 1>::new(1.0) }, d: SVector::<_, 1>::new(Dual::from(1.0)) }
+    }
+
+    /// The value with the first and the second derivative.
+    fn jet(x: Second) -> [f64; 3] {
+        assert_eq!(x.re.d[0], x.d[0].re, "the first derivative stands twice");
+        [x.re.re, x.re.d[0], x.d[0].d[0]]
+    }
+
+    #[test]
+    fn what_is_chosen_comes_with_its_derivatives() {
+        let square = |x: Second| x.if_less(Second::zero(), x * x, x.powi(3));
+        assert_eq!(jet(square(moving(-2.0))), [4.0, -4.0, 2.0]);
+        assert_eq!(jet(square(moving(2.0))), [8.0, 12.0, 12.0]);
+        assert_eq!(jet(Scalar::max(moving(2.0), Second::one())), [2.0, 1.0, 0.0]);
+        assert_eq!(jet(Scalar::max(moving(0.5), Second::one())), [1.0, 0.0, 0.0]);
+        assert_eq!(jet(Scalar::min(moving(2.0), Second::one())), [1.0, 0.0, 0.0]);
+        assert_eq!(jet(Scalar::min(moving(0.5), Second::one())), [0.5, 1.0, 0.0]);
+        assert_eq!(jet(moving(-3.0).abs().powi(3)), [27.0, -27.0, 18.0]);
+        assert_eq!(jet(moving(-3.0).signum()), [-1.0, 0.0, 0.0]);
+        // What is not chosen does not count, not even where it is infinite.
+        let root = |x: Second| x.if_less(Second::zero(), Second::zero(), x.sqrt());
+        assert_eq!(jet(root(moving(-1.0))), [0.0; 3]);
+        assert_eq!(jet(Second::zero().if_less(moving(1.0), moving(0.0), moving(0.0).ln())), [0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn ties_and_numbers_that_are_none() {
+        assert_eq!(jet(Scalar::max(moving(1.0), Second::one())), [1.0, 1.0, 0.0]);
+        assert_eq!(jet(Scalar::max(Second::one(), moving(1.0))), [1.0, 0.0, 0.0]);
+        assert_eq!(jet(Scalar::min(moving(1.0), Second::one())), [1.0, 1.0, 0.0]);
+        assert_eq!(jet(Scalar::min(Second::one(), moving(1.0))), [1.0, 0.0, 0.0]);
+        assert_eq!(jet(moving(0.0).abs()), [0.0; 3]);
+        assert_eq!([0.0, -0.0].map(Scalar::signum), [0.0; 2]);
+        for (a, b) in [(f64::NAN, 1.0), (1.0, f64::NAN)] {
+            let of = |x: f64| KernelDual::<f64, SVector<f64, 1>>::from(x);
+            assert!(a.if_less(b, 2.0, 3.0).is_nan());
+            assert!(Scalar::max(a, b).is_nan() && Scalar::min(a, b).is_nan());
+            assert!(Scalar::max(of(a), of(b)).re.is_nan() && of(a).if_less(of(b), of(1.0), of(1.0)).d[0].is_nan());
+        }
+        assert!(Scalar::signum(f64::NAN).is_nan() && Scalar::abs(f64::NAN).is_nan());
+        assert_eq!(
+            [Scalar::max(f64::INFINITY, 1.0), Scalar::min(f64::NEG_INFINITY, 1.0)],
+            [f64::INFINITY, f64::NEG_INFINITY]
+        );
     }
 }

@@ -3,13 +3,16 @@
 //! The numbers are those of the project's list of statements (NOTATION.md has it). A residual of a true statement is
 //! round-off times the conditions of the matrices involved; a test compares it with a tolerance, this module has none.
 
+// In a check `f64::max` and `amax` would lose a NaN.
+#![deny(clippy::disallowed_methods)]
+
 use crate::systems::{FreeParticle, HarmonicOscillator, System};
 use crate::{
     ContactForm, Darboux, DarbouxBracket, DarbouxField, Dual, Energy, Form, GeometryError, HerglotzField, Lagrangian,
-    LagrangianForm, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, PhasePoint, Quotient, Scalar, Smooth,
-    SmoothFunction, Triple, VelocityPoint, conformal_factor_along, conformality, dissipation_defect, generic,
-    hamiltonian_vector_field, herglotz_field, infinitesimal_conformality, jacobi_bracket, legendre, legendre_jacobian,
-    lie_bracket, lie_derivative, regularity,
+    LagrangianForm, Larger, Largest, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, PhasePoint, Quotient,
+    Scalar, Smooth, SmoothFunction, Triple, VelocityPoint, conformal_factor_along, conformality, dissipation_defect,
+    generic, hamiltonian_vector_field, herglotz_field, infinitesimal_conformality, jacobi_bracket, legendre,
+    legendre_jacobian, lie_bracket, lie_derivative, regularity,
 };
 use nalgebra::SVector;
 
@@ -78,27 +81,30 @@ pub fn known_hamiltonian<const N: usize, S: System<N>>(system: &S) -> Option<Sys
 
 /// The difference of two elements relative to the larger of them (and to `least`, for what may vanish).
 fn relative<const N: usize>(a: Triple<N>, b: Triple<N>, least: f64) -> f64 {
-    a.minus(b).amax() / a.amax().max(b.amax()).max(least)
+    a.minus(b).largest() / a.largest().larger(b.largest()).larger(least)
 }
 
 /// The difference of two numbers relative to the larger of them (and to `least`).
 fn relative_number(a: f64, b: f64, least: f64) -> f64 {
-    (a - b).abs() / a.abs().max(b.abs()).max(least)
+    (a - b).abs() / a.abs().larger(b.abs()).larger(least)
 }
 
 /// The contact condition, flat, sharp and Reeb field of one form: closed against generic, and against their definitions.
 fn form_residual<const N: usize>(form: &impl ContactForm<N>, x: &Triple<N>) -> Result<f64, GeometryError> {
     let (eta, d_eta, reeb) = (form.eta(x)?, form.d_eta(x)?, form.reeb(x)?);
-    let contraction = crate::smooth::apply_transposed(&d_eta, &reeb).amax() / (d_eta.amax() * reeb.amax());
-    let mut worst = contraction.max((eta.dot(&reeb) - 1.0).abs() / (eta.amax() * reeb.amax()).max(1.0));
-    worst = worst.max(relative(reeb, generic::reeb(form, x)?, 0.0));
-    worst = worst.max(relative(form.flat(x, &reeb)?, eta, 0.0));
+    let contraction = crate::smooth::apply_transposed(&d_eta, &reeb).largest() / (d_eta.largest() * reeb.largest());
+    let mut worst = contraction.larger((eta.dot(&reeb) - 1.0).abs() / (eta.largest() * reeb.largest()).larger(1.0));
+    worst = worst.larger(relative(reeb, generic::reeb(form, x)?, 0.0));
+    worst = worst.larger(relative(form.flat(x, &reeb)?, eta, 0.0));
     for j in 0..Triple::<N>::DIMENSION {
         let e = Triple::from_fn(|i| f64::from(u8::from(i == j)));
         let flat = form.flat(x, &e)?;
-        worst = worst.max(relative(flat, generic::flat(form, x, &e)?, 0.0));
-        worst =
-            worst.max(relative(form.sharp(x, &flat)?, e, 0.0)).max(relative(generic::sharp(form, x, &flat)?, e, 0.0));
+        worst = worst.larger(relative(flat, generic::flat(form, x, &e)?, 0.0));
+        worst = worst.larger(relative(form.sharp(x, &flat)?, e, 0.0)).larger(relative(
+            generic::sharp(form, x, &flat)?,
+            e,
+            0.0,
+        ));
     }
     Ok(worst)
 }
@@ -121,18 +127,18 @@ fn volume_residual<const N: usize>(form: &impl ContactForm<N>, x: &Triple<N>) ->
 /// Statement 1: `eta ^ (d eta)^n` is a volume form on T\*Q x R and TQ x R.
 fn volume<const N: usize>(system: &impl System<N>, t: f64, x: &VelocityPoint<N>) -> Result<f64, GeometryError> {
     let (phase, eta_l, velocity) = forms(system, t, x);
-    Ok(volume_residual(&Darboux, &phase)?.max(volume_residual(&eta_l, &velocity)?))
+    Ok(volume_residual(&Darboux, &phase)?.larger(volume_residual(&eta_l, &velocity)?))
 }
 
 /// Statement 2: the Reeb field; flat and sharp are inverse; `flat(R) = eta`; `R = d/dz` in Darboux coordinates.
 fn reeb<const N: usize>(system: &impl System<N>, t: f64, x: &VelocityPoint<N>) -> Result<f64, GeometryError> {
     let (phase, eta_l, velocity) = forms(system, t, x);
     let dz = Triple { x: SVector::zeros(), y: SVector::zeros(), z: 1.0 };
-    let darboux = relative(generic::reeb(&Darboux, &phase)?, dz, 0.0).max(form_residual(&Darboux, &phase)?);
+    let darboux = relative(generic::reeb(&Darboux, &phase)?, dz, 0.0).larger(form_residual(&Darboux, &phase)?);
     // eta_L's d eta in closed form against that by differentiating its components.
     let (closed, derived) = (eta_l.d_eta(&velocity)?, Form(&eta_l).d_eta(&velocity)?);
-    let d_eta = (&closed - &derived).amax() / derived.amax();
-    Ok(darboux.max(d_eta).max(form_residual(&eta_l, &velocity)?))
+    let d_eta = (&closed - &derived).largest() / derived.largest();
+    Ok(darboux.larger(d_eta).larger(form_residual(&eta_l, &velocity)?))
 }
 
 /// `flat(X_f) = df - (f + R(f)) eta`, `f = -eta(X_f)` and `eta`-component by component, for one form and function.
@@ -145,10 +151,10 @@ fn hamiltonian_field_residual<const N: usize>(
     let field = hamiltonian_vector_field(form, f, t, x)?;
     let (value, df, eta) = (f.value(t, x), f.differential(t, x), form.eta(x)?);
     let contracted = df.minus(eta.scale(value + df.dot(&form.reeb(x)?)));
-    let size = df.amax().max(contracted.amax());
-    let flat = form.flat(x, &field)?.minus(contracted).amax() / size;
+    let size = df.largest().larger(contracted.largest());
+    let flat = form.flat(x, &field)?.minus(contracted).largest() / size;
     let terms = eta.x.abs().dot(&field.x.abs()) + eta.y.abs().dot(&field.y.abs()) + (eta.z * field.z).abs();
-    Ok(flat.max((value + eta.dot(&field)).abs() / terms.max(value.abs())))
+    Ok(flat.larger((value + eta.dot(&field)).abs() / terms.larger(value.abs())))
 }
 
 /// Statement 3: the contact Hamiltonian vector field, of E_L on TQ x R, of any f on both; closed form in Darboux
@@ -162,9 +168,9 @@ fn hamiltonian_field<const N: usize>(
     let any = AnyFunction(0.37);
     let closed = DarbouxField { hamiltonian: &any, t }.at(&phase)?;
     Ok(relative(closed, hamiltonian_vector_field(&Darboux, &any, t, &phase)?, 0.0)
-        .max(hamiltonian_field_residual(&Darboux, &any, t, &phase)?)
-        .max(hamiltonian_field_residual(&eta_l, &any, t, &velocity)?)
-        .max(hamiltonian_field_residual(&eta_l, &Energy(system), t, &velocity)?))
+        .larger(hamiltonian_field_residual(&Darboux, &any, t, &phase)?)
+        .larger(hamiltonian_field_residual(&eta_l, &any, t, &velocity)?)
+        .larger(hamiltonian_field_residual(&eta_l, &Energy(system), t, &velocity)?))
 }
 
 /// A function of `(q, p)` alone, for a strict contactomorphism: `R(f) = 0`.
@@ -186,8 +192,8 @@ fn conformal_residual<const N: usize, F: Smooth<N> + ContactForm<N>>(
 ) -> Result<f64, GeometryError> {
     let measured = infinitesimal_conformality(form, field, x)?;
     let rate = -f.differential(t, x).dot(&form.reeb(x)?);
-    let size = 1.0 + lie_derivative(form, field, x)?.amax();
-    Ok(measured.defect.max((measured.rate - rate).abs() / size))
+    let size = 1.0 + lie_derivative(form, field, x)?.largest();
+    Ok(measured.defect.larger((measured.rate - rate).abs() / size))
 }
 
 /// Statement 4: `L_{X_f} eta = -R(f) eta`, strict where `R(f) = 0`; and `X_{f,g} = [X_f, X_g]`, on T\*Q x R; xi_L on TQ x R.
@@ -203,16 +209,21 @@ fn infinitesimal_conformal<const N: usize>(
     let strict = WithoutAction(f);
     let strict_field = DarbouxField { hamiltonian: &strict, t };
     let change = lie_derivative(&Darboux, &strict_field, &phase)?;
-    worst = worst.max(change.amax() / (1.0 + strict_field.at(&phase)?.amax()));
-    worst =
-        worst.max(conformal_residual(&eta_l, &HerglotzField { lagrangian: system, t }, &Energy(system), t, &velocity)?);
+    worst = worst.larger(change.largest() / (1.0 + strict_field.at(&phase)?.largest()));
+    worst = worst.larger(conformal_residual(
+        &eta_l,
+        &HerglotzField { lagrangian: system, t },
+        &Energy(system),
+        t,
+        &velocity,
+    )?);
     let bracket = DarbouxBracket { f: &f, g: &g };
     let commutator = lie_bracket(&field(&f), &field(&g), &phase)?;
-    worst = worst.max(relative(DarbouxField { hamiltonian: &bracket, t }.at(&phase)?, commutator, 1.0));
+    worst = worst.larger(relative(DarbouxField { hamiltonian: &bracket, t }.at(&phase)?, commutator, 1.0));
     let forward = jacobi_bracket(&Darboux, &f, &g, t, &phase)?;
     let backward = jacobi_bracket(&Darboux, &g, &f, t, &phase)?;
-    worst = worst.max(relative_number(forward, bracket.value(t, &phase), 1.0));
-    Ok(worst.max(relative_number(forward, -backward, 1.0)))
+    worst = worst.larger(relative_number(forward, bracket.value(t, &phase), 1.0));
+    Ok(worst.larger(relative_number(forward, -backward, 1.0)))
 }
 
 /// Statement 6: `X_H(H) = -R(H) H`, for E_L and any f.
@@ -220,7 +231,7 @@ fn energy_decay<const N: usize>(system: &impl System<N>, t: f64, x: &VelocityPoi
     let (phase, eta_l, velocity) = forms(system, t, x);
     let (energy, any) = (Energy(system), AnyFunction(0.37));
     Ok(dissipation_defect(&eta_l, &energy, &energy, t, &velocity)?
-        .max(dissipation_defect(&Darboux, &any, &any, t, &phase)?))
+        .larger(dissipation_defect(&Darboux, &any, &any, t, &phase)?))
 }
 
 /// Statement 7: L is regular exactly if eta_L is contact, since `eta_L ^ (d eta_L)^n` is `det W` times the canonical
@@ -238,8 +249,8 @@ fn regular_iff_contact<const N: usize>(
         return Ok(f64::INFINITY);
     }
     let reeb = eta_l.reeb(&velocity)?;
-    let through_w = (h.vv * reeb.y + h.vz).amax() / h.vv.amax().max(h.vz.amax());
-    Ok(relative_number(generic::volume(&eta_l, &velocity)?, determinant, 0.0).max(through_w))
+    let through_w = (h.vv * reeb.y + h.vz).largest() / h.vv.largest().larger(h.vz.largest());
+    Ok(relative_number(generic::volume(&eta_l, &velocity)?, determinant, 0.0).larger(through_w))
 }
 
 /// Statement 8: `xi_L = X_{E_L}` is a second-order equation that solves Herglotz' equations.
@@ -254,7 +265,7 @@ fn second_order_equation<const N: usize>(
     let (_, eta_l, velocity) = forms(system, t, x);
     let field = herglotz_field(system, t, x)?;
     let hamiltonian = hamiltonian_vector_field(&eta_l, &Energy(system), t, &velocity)?;
-    let second_order = (field.x - x.v).amax().max((hamiltonian.x - x.v).amax()) / (1.0 + x.v.amax());
+    let second_order = (field.x - x.v).largest().larger((hamiltonian.x - x.v).largest()) / (1.0 + x.v.largest());
     // d/dt L_v along the field, by a dual along it.
     let along = |re: f64, d: f64| Dual { re, d: SVector::<f64, 1>::new(d) };
     let moving = VelocityPoint {
@@ -266,10 +277,10 @@ fn second_order_equation<const N: usize>(
     let mut herglotz: f64 = (field.z - system.value(t, &x.q, &x.v, x.z)).abs() / (1.0 + field.z.abs());
     for i in 0..N {
         let terms = [g.y[i].d[0], g.x[i].re, g.y[i].re * g.z.re];
-        let size = 1.0 + terms.iter().fold(0.0, |m: f64, a| m.max(a.abs()));
-        herglotz = herglotz.max((terms[0] - terms[1] - terms[2]).abs() / size);
+        let size = 1.0 + terms.iter().fold(0.0, |m: f64, a| m.larger(a.abs()));
+        herglotz = herglotz.larger((terms[0] - terms[1] - terms[2]).abs() / size);
     }
-    Ok(relative(field, hamiltonian, 1.0).max(second_order).max(herglotz))
+    Ok(relative(field, hamiltonian, 1.0).larger(second_order).larger(herglotz))
 }
 
 /// Statement 9: `FL* eta_Q = eta_L`; and where H is known, `E_L = H o FL` and `FL_* xi_L = X_H`.
@@ -281,15 +292,15 @@ fn legendre_is_contact<const N: usize>(
     let (phase, eta_l, velocity) = forms(system, t, x);
     let map = Legendre { lagrangian: system, t };
     let pullback = conformality(&eta_l, &Darboux, &map, &velocity)?;
-    let mut worst = pullback.defect.max((pullback.sigma - 1.0).abs());
+    let mut worst = pullback.defect.larger((pullback.sigma - 1.0).abs());
     let jacobian = legendre_jacobian(system, t, x);
     let (_, derived) = map.with_jacobian(&velocity)?;
-    worst = worst.max((&jacobian - &derived).amax() / derived.amax());
+    worst = worst.larger((&jacobian - &derived).largest() / derived.largest());
     if let Some(h) = known_hamiltonian(system) {
         let energy = Energy(system).value(t, &velocity);
-        worst = worst.max(relative_number(energy, h.value(t, &phase), 1.0));
+        worst = worst.larger(relative_number(energy, h.value(t, &phase), 1.0));
         let pushed = crate::smooth::apply(&jacobian, &herglotz_field(system, t, x)?);
-        worst = worst.max(relative(pushed, DarbouxField { hamiltonian: &h, t }.at(&phase)?, 1.0));
+        worst = worst.larger(relative(pushed, DarbouxField { hamiltonian: &h, t }.at(&phase)?, 1.0));
     }
     Ok(worst)
 }
@@ -306,13 +317,13 @@ fn dissipated_quantities<const N: usize>(
     let mut worst = dissipation_defect(&eta_l, &energy, &energy, t, &velocity)?;
     for symmetry in system.symmetries() {
         let momentum = NoetherMomentum { lagrangian: system, group: &symmetry };
-        worst = worst.max(dissipation_defect(&eta_l, &energy, &momentum, t, &velocity)?);
+        worst = worst.larger(dissipation_defect(&eta_l, &energy, &momentum, t, &velocity)?);
         // Conserved: X_H(momentum / energy) = 0, relative to the rates of the two.
         let field = hamiltonian_vector_field(&eta_l, &energy, t, &velocity)?;
         let d = Quotient { f: &momentum, g: &energy }.differential(t, &velocity);
         let size = d.x.abs().dot(&field.x.abs()) + d.y.abs().dot(&field.y.abs()) + (d.z * field.z).abs();
         if size > 0.0 {
-            worst = worst.max(d.dot(&field).abs() / size);
+            worst = worst.larger(d.dot(&field).abs() / size);
         }
     }
     if dissipation_defect(&eta_l, &energy, &AnyFunction(0.37), t, &velocity)? < 1e-9 {
@@ -336,11 +347,11 @@ fn noether<const N: usize>(
         let (value, eta_xi) = (momentum.value(t, &velocity), eta_l.eta(&velocity)?.dot(&group.velocity_generator(x)));
         let residual = group
             .symmetry_defect(system, t, x)
-            .max(action.defect)
-            .max((action.sigma - 1.0).abs())
-            .max(relative_number(value, -eta_xi, 1.0))
-            .max(dissipation_defect(&eta_l, &Energy(system), &momentum, t, &velocity)?);
-        worst = Some(worst.map_or(residual, |w: f64| w.max(residual)));
+            .larger(action.defect)
+            .larger((action.sigma - 1.0).abs())
+            .larger(relative_number(value, -eta_xi, 1.0))
+            .larger(dissipation_defect(&eta_l, &Energy(system), &momentum, t, &velocity)?);
+        worst = Some(worst.map_or(residual, |w: f64| w.larger(residual)));
     }
     Ok(worst)
 }
@@ -433,5 +444,5 @@ pub fn conformal_flow(
     let sigma = conformal_factor_along(&Darboux, &map, |s| flow.flow(s, x), quadrature)?;
     let (before, after) = (flow.hamiltonian(x), flow.hamiltonian(&flow.flow(t, x)));
     let decay = (after - sigma * before).abs() / (1.0 + before.abs());
-    Ok(pullback.defect.max(relative_number(pullback.sigma, sigma, 0.0)).max(decay))
+    Ok(pullback.defect.larger(relative_number(pullback.sigma, sigma, 0.0)).larger(decay))
 }

@@ -1,8 +1,9 @@
 //! Discrete Lagrangians on Q x Q x R.
 
 use crate::newton::{Linearised, Start, newton};
-use crate::{Solver, StepError};
-use contact_geom::nalgebra::SVector;
+use crate::step_equations::BLOCK;
+use crate::{InputError, Solver, StepError};
+use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed};
 
 /// A discrete Lagrangian `L_d : Q x Q x R -> R` with the action's recursion `z1 = z0 + L_d(q0, q1, z0)`; paper, section 3.
@@ -19,6 +20,22 @@ pub trait DiscreteLagrangian<const N: usize> {
     /// # Errors
     /// A [`StepError`] where it is not defined, or where an implicit definition cannot be solved.
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError>;
+
+    /// What must hold at the start of a run beside the regularity of `L_d`: that of the Lagrangian behind it, where there is one.
+    ///
+    /// # Errors
+    /// An [`InputError`] that names what does not hold.
+    fn check_start(&self, _t: f64, _from: &PhasePoint<N>, _velocity: &SVector<f64, N>) -> Result<(), InputError> {
+        Ok(())
+    }
+
+    /// How far a step is from one that resolves its motion, in units of the largest misfit that such a step can have; `None` where
+    /// it is below one, and where nothing is known, as by default: a discrete Lagrangian may be exact for long steps.
+    /// `velocities` are the mean velocities of the last four steps, the latest last, `to` and `sigma` the latest one's end.
+    #[inline(always)]
+    fn misfit(&self, _velocities: [&SVector<f64, N>; 4], _to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
+        None
+    }
 
     /// Value and first derivatives `D1 L_d, D2 L_d, Dz L_d`.
     ///
@@ -51,7 +68,7 @@ pub trait DiscreteLagrangian<const N: usize> {
     ) -> Result<Transition<N>, StepError> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>| DiscretePoint { q0: from.q, q1: from.q + u * h, z0: from.z };
-        let start = Start { u: *guess, z: 0.0, resolution: from.q.amax() / h };
+        let start = Start { u: *guess, z: 0.0, resolution: from.q.amax() / h, impulse: from.p.amax() * h };
         let root = newton(start, solver, |u, _| {
             let jet = self.second_jet(t, &point(u))?;
             Ok(Linearised {
@@ -83,7 +100,7 @@ pub trait DiscreteLagrangian<const N: usize> {
     ) -> Result<Transition<N>, StepError> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>, z0: f64| DiscretePoint { q0: from.q - u * h, q1: from.q, z0 };
-        let start = Start { u: *guess, z: from.z, resolution: from.q.amax() / h };
+        let start = Start { u: *guess, z: from.z, resolution: from.q.amax() / h, impulse: from.p.amax() * h };
         let root = newton(start, solver, |u, z0| {
             let jet = self.second_jet(t, &point(u, z0))?;
             let defect = z0 + jet.first.value - from.z;
@@ -111,6 +128,13 @@ impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
     }
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
         (**self).value(t, x)
+    }
+    fn check_start(&self, t: f64, from: &PhasePoint<N>, velocity: &SVector<f64, N>) -> Result<(), InputError> {
+        (**self).check_start(t, from, velocity)
+    }
+    #[inline(always)]
+    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
+        (**self).misfit(velocities, to, sigma)
     }
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
         (**self).jet(t, x)
@@ -179,6 +203,22 @@ pub fn derived_jet<const N: usize>(
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<DiscreteJet<N>, StepError> {
+    if const { N > BLOCK } {
+        let (mut value, mut d) = (0.0, Triple { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 });
+        for start in blocks::<N>() {
+            let l = ld.value(t, &lifted(x, start))?;
+            value = l.re;
+            for (k, slope) in l.d.iter().enumerate() {
+                match start + k {
+                    i if i < N => d.x[i] = *slope,
+                    i if i < 2 * N => d.y[i - N] = *slope,
+                    i if i == 2 * N => d.z = *slope,
+                    _ => {}
+                }
+            }
+        }
+        return Ok(DiscreteJet::new(value, d.x, d.y, d.z));
+    }
     let l = ld.value(t, &seed(&Triple::from(*x)).into())?;
     Ok(DiscreteJet::new(l.re, l.d.x, l.d.y, l.d.z))
 }
@@ -192,7 +232,9 @@ pub fn derived_second_jet<const N: usize>(
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<SecondDiscreteJet<N>, StepError> {
-    use contact_geom::nalgebra::SMatrix;
+    if const { N > BLOCK } {
+        return second_jet_by_blocks(ld, t, x);
+    }
     let l: Dual<Dual<f64, Triple<N>>, _> = ld.value(t, &seed(&seed(&Triple::from(*x))).into())?;
     Ok(SecondDiscreteJet {
         first: DiscreteJet::new(l.re.re, l.re.d.x, l.re.d.y, l.re.d.z),
@@ -203,4 +245,57 @@ pub fn derived_second_jet<const N: usize>(
         d2z: SVector::from_fn(|i, _| l.d.y[i].d.z),
         dzz: l.d.z.d.z,
     })
+}
+
+/// The starts of the blocks of the `2N + 1` coordinates.
+fn blocks<const N: usize>() -> impl Iterator<Item = usize> {
+    (0..=2 * N).step_by(BLOCK)
+}
+
+/// The point with the coordinates from `start` on as directions, in the order `q0, q1, z0`: one block of [`seed`].
+fn lifted<T: Scalar, const N: usize>(
+    x: &DiscretePoint<N, T>,
+    start: usize,
+) -> DiscretePoint<N, Dual<T, SVector<T, BLOCK>>> {
+    let one = |i: usize, re: T| {
+        let mut number = Dual::<T, SVector<T, BLOCK>>::constant(re);
+        if (start..start + BLOCK).contains(&i) {
+            number.d[i - start] = T::one();
+        }
+        number
+    };
+    DiscretePoint {
+        q0: SVector::from_fn(|i, _| one(i, x.q0[i])),
+        q1: SVector::from_fn(|i, _| one(N + i, x.q1[i])),
+        z0: one(2 * N, x.z0),
+    }
+}
+
+/// [`derived_second_jet`] of many coordinates: by blocks of directions, for the sake of the stack.
+fn second_jet_by_blocks<const N: usize>(
+    ld: &(impl DiscreteLagrangian<N> + ?Sized),
+    t: f64,
+    x: &DiscretePoint<N>,
+) -> Result<SecondDiscreteJet<N>, StepError> {
+    let (matrix, vector) = (SMatrix::zeros(), SVector::zeros());
+    let first = derived_jet(ld, t, x)?;
+    let mut jet =
+        SecondDiscreteJet { first, d11: matrix, d12: matrix, d22: matrix, d1z: vector, d2z: vector, dzz: 0.0 };
+    for (a, b) in blocks::<N>().flat_map(|a| blocks::<N>().filter(move |b| *b >= a).map(move |b| (a, b))) {
+        let second = ld.value(t, &lifted(&lifted(x, a), b))?.d;
+        for (k, m) in (0..BLOCK).flat_map(|k| (0..BLOCK).map(move |m| (k, m))) {
+            let (i, j) = ((a + m).min(b + k), (a + m).max(b + k));
+            let entry = second[k].d[m];
+            match (i / N, j / N) {
+                _ if j > 2 * N => {}
+                (0, 0) => (jet.d11[(i, j)], jet.d11[(j, i)]) = (entry, entry),
+                (0, 1) => jet.d12[(i, j - N)] = entry,
+                (1, 1) => (jet.d22[(i - N, j - N)], jet.d22[(j - N, i - N)]) = (entry, entry),
+                (0, _) => jet.d1z[i] = entry,
+                (1, _) => jet.d2z[i - N] = entry,
+                _ => jet.dzz = entry,
+            }
+        }
+    }
+    Ok(jet)
 }

@@ -118,6 +118,16 @@ pub enum InputError {
     FirstStep(StepError),
 }
 
+impl InputError {
+    /// Of a first step that cannot be taken.
+    pub(crate) fn first_step(cause: StepError) -> Self {
+        match cause {
+            StepError::SigmaVanished { sigma } => InputError::Sigma { sigma },
+            cause => InputError::FirstStep(cause),
+        }
+    }
+}
+
 /// Why a step could not be taken: bad luck, not bad input.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum StepError {
@@ -165,6 +175,12 @@ pub enum StepError {
     /// A coordinate or a derivative is infinite or not a number.
     #[error("a value is not finite: the motion leaves the domain of the Lagrangian, or grows without bound")]
     NonFinite,
+    /// A formula branches on the value of a number, of which vector lanes have several.
+    #[error(
+        "the Lagrangian or the clock asks for one value (`re`, `extent`, `==`) of lanes that differ; \
+         choose by `if_less`, `max`, `min`, `abs` or `signum`"
+    )]
+    Branched,
 }
 
 impl From<StepError> for GeometryError {

@@ -2,6 +2,7 @@
 
 use contact_geom::Scalar;
 use pulp::{Simd, bytemuck};
+use std::cell::Cell;
 use std::fmt::{Debug, Formatter};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -20,6 +21,24 @@ fn token<S: Simd>() -> S {
     // SAFETY: a token is a proof, of size 0, that the processor has the instructions. `Lanes<S>` is private to this crate, which
     // makes them only below `Arch::dispatch`, which has handed out a token of the same type there.
     unsafe { std::mem::zeroed() }
+}
+
+thread_local! {
+    /// Whether one value was asked of lanes that differ.
+    static ASKED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether, since [`forget_branches`], one value was asked on this thread of lanes that differ, by `re`, `extent` or `==`: a
+/// formula has branched, in the same way for all of them. What was computed from it may be wrong.
+#[inline(always)]
+pub(crate) fn branched() -> bool {
+    ASKED.get()
+}
+
+/// Begins anew to watch for branches.
+#[inline(always)]
+pub(crate) fn forget_branches() {
+    ASKED.set(false);
 }
 
 impl<S: Simd> Lanes<S> {
@@ -42,7 +61,7 @@ impl<S: Simd> Lanes<S> {
         Lanes(token::<S>().abs_f64s(self.0))
     }
 
-    /// Lane by lane the larger; where one is not a number, the result may be either.
+    /// Lane by lane the larger; where one is not a number, the result may be either, other than that of [`Scalar::max`].
     #[inline(always)]
     pub fn max(self, b: Self) -> Self {
         Lanes(token::<S>().max_f64s(self.0, b.0))
@@ -143,7 +162,12 @@ impl<S: Simd> Debug for Lanes<S> {
 
 impl<S: Simd> PartialEq for Lanes<S> {
     fn eq(&self, b: &Self) -> bool {
-        self.lanes() == b.lanes()
+        let (a, b) = (self.lanes(), b.lanes());
+        let equal = a.iter().zip(b).filter(|(a, b)| a == b).count();
+        if equal != 0 && equal != a.len() {
+            ASKED.set(true);
+        }
+        equal == a.len()
     }
 }
 
@@ -213,15 +237,32 @@ arithmetic! {
 impl<S: Simd> Scalar for Lanes<S> {
     #[inline(always)]
     fn re(self) -> f64 {
-        self.lanes()[0]
+        let lanes = self.lanes();
+        if lanes.iter().all(|x| *x == lanes[0] || (x.is_nan() && lanes[0].is_nan())) {
+            return lanes[0];
+        }
+        ASKED.set(true);
+        f64::NAN
     }
     #[inline(always)]
-    fn modulus(self) -> f64 {
+    fn pivot_size(self) -> f64 {
         self.lanes().iter().fold(f64::INFINITY, |m, x| if x.abs() < m || x.is_nan() { x.abs() } else { m })
     }
     #[inline(always)]
     fn extent(self) -> f64 {
-        self.lanes().iter().fold(0.0, |m, x| if x.is_nan() { f64::INFINITY } else { f64::max(m, x.abs()) })
+        Scalar::extent(self.re())
+    }
+    #[inline(always)]
+    fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
+        let set = token::<S>();
+        let less = set.less_than_f64s(self.0, than.0);
+        let not_less = set.less_than_or_equal_f64s(than.0, self.0);
+        let unordered = set.splat_f64s(f64::NAN);
+        Lanes(set.select_f64s(less, then.0, set.select_f64s(not_less, otherwise.0, unordered)))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Lanes::abs(self)
     }
     #[inline(always)]
     fn recip(self) -> Self {
@@ -351,5 +392,87 @@ mod tests {
                 assert!(ulps(cos, c) <= 2.0, "cos {x:e}: {cos:e}, not {c:e}: {} ulp", ulps(cos, c));
             }
         }
+    }
+
+    /// Choices of numbers by pairs, as many as there are lanes at a time.
+    struct Choose<'a>(&'a [f64], &'a [f64]);
+
+    /// `if_less` of a, b and 10, 20; the larger, the smaller, the size and the sign of a.
+    fn choices<T: Scalar>(a: T, b: T) -> [T; 5] {
+        [a.if_less(b, 10.0.into(), 20.0.into()), Scalar::max(a, b), Scalar::min(a, b), Scalar::abs(a), a.signum()]
+    }
+
+    impl WithSimd for Choose<'_> {
+        type Output = Vec<[f64; 5]>;
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+            let (mut out, n) = (Vec::new(), Lanes::<S>::COUNT);
+            for (a, b) in self.0.chunks_exact(n).zip(self.1.chunks_exact(n)) {
+                let chosen = choices(Lanes::<S>(S::as_simd_f64s(a).0[0]), Lanes::<S>(S::as_simd_f64s(b).0[0]));
+                out.extend((0..n).map(|i| chosen.map(|x| x.lanes()[i])));
+            }
+            out
+        }
+    }
+
+    #[test]
+    fn choices_are_those_of_one_number() {
+        let values = [0.0, -0.0, 1.0, -1.0, 2.5, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
+        let pairs = values.iter().flat_map(|a| values.iter().map(move |b| (*a, *b)));
+        let (a, b): (Vec<_>, Vec<_>) = pairs.unzip();
+        let mut sets = vec![pulp::Scalar::new().vectorize(Choose(&a, &b))];
+        #[cfg(target_arch = "x86_64")]
+        {
+            sets.extend(pulp::x86::V3::try_new().map(|set| Simd::vectorize(set, Choose(&a, &b))));
+            sets.extend(pulp::x86::V4::try_new().map(|set| Simd::vectorize(set, Choose(&a, &b))));
+        }
+        for set in sets {
+            assert_eq!(set.len(), a.len());
+            for ((a, b), found) in a.iter().zip(&b).zip(set) {
+                let expected = choices(*a, *b);
+                let same = found.iter().zip(&expected).all(|(x, y)| x == y || (x.is_nan() && y.is_nan()));
+                assert!(same, "{a}, {b}: {found:?}, not {expected:?}");
+                assert!(!(a.is_nan() || b.is_nan()) || found[..3].iter().all(|x| x.is_nan()));
+            }
+        }
+    }
+
+    /// Asks for one value of the lanes of two numbers in turn, in all ways that there are.
+    struct Ask(f64, f64);
+
+    impl WithSimd for Ask {
+        type Output = [bool; 4];
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+            let mut x = Lanes::<S>::splat(self.0);
+            bytemuck::cast_slice_mut::<_, f64>(std::slice::from_mut(&mut x.0))[0] = self.1;
+            let zero = <Lanes<S> as num_traits::Zero>::zero();
+            let asked = |ask: &dyn Fn() -> bool| {
+                forget_branches();
+                ask();
+                branched()
+            };
+            [
+                asked(&|| x.re() > 0.0),
+                asked(&|| x.extent() > 0.0),
+                asked(&|| x == zero),
+                asked(&|| num_traits::Zero::is_zero(&x)),
+            ]
+        }
+    }
+
+    #[test]
+    fn one_value_of_lanes_that_differ_is_noticed() {
+        assert_eq!(pulp::Scalar::new().vectorize(Ask(0.0, 1.0)), [false; 4]);
+        for (a, b) in [(1.0, 1.0), (0.0, -0.0), (f64::NAN, f64::NAN)] {
+            assert_eq!(pulp::Arch::new().dispatch(Ask(a, b)), [false; 4], "{a}, {b}");
+        }
+        if !matches!(pulp::Arch::new(), pulp::Arch::Scalar) {
+            assert_eq!(pulp::Arch::new().dispatch(Ask(0.0, 1.0)), [true; 4]);
+            assert_eq!(pulp::Arch::new().dispatch(Ask(f64::NAN, 0.0)), [true; 4]);
+        }
+        forget_branches();
     }
 }

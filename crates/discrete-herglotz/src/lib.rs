@@ -29,11 +29,15 @@ mod flow;
 mod gauss;
 mod lanes;
 mod legendre;
+#[cfg(test)]
+mod many_coordinates;
 mod method;
 mod momentum;
 mod newton;
 mod path;
 mod quadrature;
+#[cfg(test)]
+mod round_off_tests;
 pub mod rules;
 mod run;
 mod scene;
@@ -44,6 +48,9 @@ mod step_equations;
 mod stepper;
 mod unknowns;
 mod verified;
+mod watch;
+#[cfg(test)]
+mod watch_tests;
 
 pub use composition::Composition;
 pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};

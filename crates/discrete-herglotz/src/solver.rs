@@ -53,7 +53,12 @@ impl<const N: usize> Solver<N> {
     #[inline]
     pub fn solve(&mut self, a: &mut SMatrix<f64, N, N>, b: &mut SVector<f64, N>) -> Result<(), StepError> {
         match &mut self.large {
-            None => linear::solve(a, b).map(drop).map_err(|e| StepError::Singular { pivot: e.pivot }),
+            None => match linear::solve(a, b) {
+                Ok(_) if b.iter().all(|x| x.is_finite()) => Ok(()),
+                // A pivot so small that the solution is beyond all numbers.
+                Ok(determinant) => Err(StepError::Singular { pivot: determinant.abs() }),
+                Err(e) => Err(StepError::Singular { pivot: e.pivot }),
+            },
             Some(lu) => lu.factorise(|i, j| a[(i, j)]).and_then(|()| lu.solve(b.as_mut_slice())),
         }
     }

@@ -4,6 +4,9 @@
 //! The numbers are those of the project's list of statements (NOTATION.md has it). A residual of a true statement is
 //! round-off times the conditions of the matrices involved; a test compares it with a tolerance, this module has none.
 
+// In a check `f64::max` and `amax` would lose a NaN.
+#![deny(clippy::disallowed_methods)]
+
 use crate::{
     DiscreteLagrangian, DiscretePath, HamiltonianFlow, StepError, derived_jet, derived_second_jet, discrete_action,
     discrete_flow, discrete_flow_jacobian, discrete_momentum, discrete_symmetry_defect, hamiltonian_flow,
@@ -11,8 +14,9 @@ use crate::{
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    ContactForm, Darboux, DiscretePoint, Dual, EtaMinus, EtaPlus, GeometryError, OneParameterGroup, PhasePoint, Scalar,
-    SecondDiscreteJet, Smooth, Symmetry, Triple, conformality, conformality_with_jacobian, generic, seed,
+    ContactForm, Darboux, DiscretePoint, Dual, EtaMinus, EtaPlus, GeometryError, Larger, Largest, OneParameterGroup,
+    PhasePoint, Scalar, SecondDiscreteJet, Smooth, Symmetry, Triple, conformality, conformality_with_jacobian, generic,
+    larger, seed,
 };
 
 /// The statements of section 3 that [`residual`] evaluates.
@@ -59,7 +63,7 @@ fn worst<const N: usize>(
     let mut worst = None;
     for group in symmetries {
         let r = residual(group)?;
-        worst = Some(worst.map_or(r, |w: f64| w.max(r)));
+        worst = Some(worst.map_or(r, |w: f64| w.larger(r)));
     }
     Ok(worst)
 }
@@ -67,11 +71,11 @@ fn worst<const N: usize>(
 /// The difference of two elements relative to the larger of them.
 fn relative<const N: usize>(a: impl Into<Triple<N>>, b: impl Into<Triple<N>>) -> f64 {
     let (a, b) = (a.into(), b.into());
-    a.minus(b).amax() / a.amax().max(b.amax())
+    a.minus(b).largest() / a.largest().larger(b.largest())
 }
 
 fn relative_vector<const N: usize>(a: SVector<f64, N>, b: SVector<f64, N>, size: f64) -> f64 {
-    (a - b).amax() / size
+    (a - b).largest() / size
 }
 
 fn jets<const N: usize>(
@@ -117,7 +121,7 @@ fn form_residual<const N: usize>(
     (eta, d_eta): (Triple<N>, DMatrix<f64>),
     x: &Triple<N>,
 ) -> Result<f64, GeometryError> {
-    Ok(relative(closed.eta(x)?, eta).max((closed.d_eta(x)? - &d_eta).amax() / d_eta.amax()))
+    Ok(relative(closed.eta(x)?, eta).larger((closed.d_eta(x)? - &d_eta).largest() / d_eta.largest()))
 }
 
 /// Statement 1 on Q x Q x R: the contact condition for eta+ and eta-, in closed form and by the volume.
@@ -128,23 +132,24 @@ fn volume<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscreteP
     };
     let (minus, plus) = (EtaMinus(jets(ld, t)), EtaPlus(jets(ld, t)));
     Ok(of(minus.volume(&point)?, generic::volume(&minus, &point)?)
-        .max(of(plus.volume(&point)?, generic::volume(&plus, &point)?)))
+        .larger(of(plus.volume(&point)?, generic::volume(&plus, &point)?)))
 }
 
 /// Statement 2 on Q x Q x R: Reeb fields, flat and sharp of eta+ and eta-, closed against generic and by definition.
 fn reeb<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscretePoint<N>) -> Result<f64, GeometryError> {
     fn of<const N: usize>(form: &impl ContactForm<N>, x: &Triple<N>) -> Result<f64, GeometryError> {
         let (eta, reeb) = (form.eta(x)?, form.reeb(x)?);
-        let mut worst = relative(reeb, generic::reeb(form, x)?).max((eta.dot(&reeb) - 1.0).abs() / eta.amax().max(1.0));
-        worst = worst.max(form.flat(x, &reeb)?.minus(eta).amax() / (form.d_eta(x)?.amax() * reeb.amax()));
+        let mut worst =
+            relative(reeb, generic::reeb(form, x)?).larger((eta.dot(&reeb) - 1.0).abs() / eta.largest().larger(1.0));
+        worst = worst.larger(form.flat(x, &reeb)?.minus(eta).largest() / (form.d_eta(x)?.largest() * reeb.largest()));
         for j in 0..Triple::<N>::DIMENSION {
             let e = Triple::from_fn(|i| f64::from(u8::from(i == j)));
-            worst = worst.max(relative(form.sharp(x, &form.flat(x, &e)?)?, e));
+            worst = worst.larger(relative(form.sharp(x, &form.flat(x, &e)?)?, e));
         }
         Ok(worst)
     }
     let point = (*x).into();
-    Ok(of(&EtaMinus(jets(ld, t)), &point)?.max(of(&EtaPlus(jets(ld, t)), &point)?))
+    Ok(of(&EtaMinus(jets(ld, t)), &point)?.larger(of(&EtaPlus(jets(ld, t)), &point)?))
 }
 
 /// A path of so many steps near the points of `x`, no faster than they are: not a solution.
@@ -186,13 +191,13 @@ fn action_differential<const N: usize>(
     for steps in [1, 2, 3, most] {
         let path = wiggly_path(x, steps)?;
         let (formula, derived) = (path.action_differential(ld, t, x.z0)?, differentiated(ld, t, &path, x.z0)?);
-        let size = ld.jet(t, x)?.d1.amax().max(derived.iter().map(SVector::amax).fold(0.0, f64::max));
+        let size = ld.jet(t, x)?.d1.largest().larger(derived.iter().map(Largest::largest).fold(0.0, larger));
         for (a, b) in formula.iter().zip(&derived) {
-            worst = worst.max(relative_vector(*a, *b, size));
+            worst = worst.larger(relative_vector(*a, *b, size));
         }
         let z = path.actions(ld, t, x.z0)?;
         let end = discrete_action(ld, t, path.points(), x.z0)?;
-        worst = worst.max((z[steps] - end).abs() / (1.0 + end.abs()));
+        worst = worst.larger((z[steps] - end).abs() / (1.0 + end.abs()));
     }
     Ok(worst)
 }
@@ -209,8 +214,8 @@ fn two_steps<const N: usize>(
     let second = ld.jet(t + ld.step_size(), &DiscretePoint { q0: q[1], q1: q[2], z0: x.z0 + first.value })?;
     let remark = [first.d1 * (1.0 + second.dz), second.d1 + first.d2 * (1.0 + second.dz), second.d2];
     let derived = differentiated(ld, t, &path, x.z0)?;
-    let size = remark.iter().map(SVector::amax).fold(first.d2.amax(), f64::max);
-    Ok(remark.iter().zip(&derived).map(|(a, b)| relative_vector(*a, *b, size)).fold(0.0, f64::max))
+    let size = remark.iter().map(Largest::largest).fold(first.d2.largest(), larger);
+    Ok(remark.iter().zip(&derived).map(|(a, b)| relative_vector(*a, *b, size)).fold(0.0, larger))
 }
 
 /// Statement 15: a path is critical for A_d with fixed ends exactly if it solves the discrete Herglotz equations.
@@ -230,20 +235,24 @@ fn principle<const N: usize>(
         points.push(step.q1);
     }
     let solution = DiscretePath::new(points).map_err(|_| GeometryError::Undefined { what: "the path" })?;
-    let size = ld.jet(t, x)?.d1.amax().max(ld.jet(t, x)?.d2.amax());
+    let size = ld.jet(t, x)?.d1.largest().larger(ld.jet(t, x)?.d2.largest());
     // A rounded point of the path changes its neighbours' residuals by D12 times the rounding.
     let second = ld.second_jet(t, x)?;
-    let largest = solution.points().iter().map(SVector::amax).fold(0.0, f64::max);
-    let size_of_solution = size.max(second.d12.amax() * largest);
+    let largest = solution.points().iter().map(Largest::largest).fold(0.0, larger);
+    let size_of_solution = size.larger(second.d12.largest() * largest);
     let differential = differentiated(ld, t, &solution, x.z0)?;
-    let mut worst = differential[1..3].iter().map(|d| d.amax() / size_of_solution).fold(0.0, f64::max);
+    let mut worst = differential[1..3].iter().map(|d| d.largest() / size_of_solution).fold(0.0, larger);
 
     let path = wiggly_path(x, 5)?;
     let (differential, residuals) = (differentiated(ld, t, &path, x.z0)?, path.herglotz_residuals(ld, t, x.z0)?);
     let z = path.actions(ld, t, x.z0)?;
     let mut later = 1.0;
     for k in (1..5).rev() {
-        worst = worst.max(relative_vector(differential[k], residuals[k - 1] * later, size.max(differential[k].amax())));
+        worst = worst.larger(relative_vector(
+            differential[k],
+            residuals[k - 1] * later,
+            size.larger(differential[k].largest()),
+        ));
         let at = DiscretePoint { q0: path.points()[k], q1: path.points()[k + 1], z0: z[k] };
         let sigma = ld.jet(t + k as f64 * h, &at)?.sigma();
         if sigma == 0.0 {
@@ -278,9 +287,9 @@ fn momentum_matching<const N: usize>(
     let next = discrete_flow(ld, t, x)?;
     let (plus, minus) = (legendre_plus(ld, t, x)?, legendre_minus(ld, t + h, &next)?);
     // q2 is rounded, and p1 depends on it by W/h.
-    let slope = ld.second_jet(t + h, &next)?.d12.amax();
-    let size = Triple::from(plus).amax().max(slope * next.q1.amax());
-    let matching = Triple::from(plus).minus(minus.into()).amax() / size;
+    let slope = ld.second_jet(t + h, &next)?.d12.largest();
+    let size = Triple::from(plus).largest().larger(slope * next.q1.largest());
+    let matching = Triple::from(plus).minus(minus.into()).largest() / size;
     // Away from the solution the mismatch of the momenta is the residual divided by sigma.
     let mut off = next;
     off.q1 += (next.q1 - next.q0) * 0.1;
@@ -288,9 +297,9 @@ fn momentum_matching<const N: usize>(
         DiscretePath::new(vec![x.q0, x.q1, off.q1]).map_err(|_| GeometryError::Undefined { what: "the path" })?;
     let residual = path.herglotz_residuals(ld, t, x.z0)?[0] / ld.jet(t + h, &off)?.sigma();
     let mismatch = plus.p - legendre_minus(ld, t + h, &off)?.p;
-    let distinguishes = mismatch.amax() > 1e-6 * slope * (off.q1 - next.q1).amax();
-    let equations = relative_vector(mismatch, residual, plus.p.amax().max(residual.amax()));
-    Ok(if distinguishes { matching.max(equations) } else { f64::INFINITY })
+    let distinguishes = mismatch.largest() > 1e-6 * slope * (off.q1 - next.q1).largest();
+    let equations = relative_vector(mismatch, residual, plus.p.largest().larger(residual.largest()));
+    Ok(if distinguishes { matching.larger(equations) } else { f64::INFINITY })
 }
 
 /// Statement 19: the flow exists where F-L_d is a local diffeomorphism: its solve and the inverses return the point.
@@ -302,7 +311,7 @@ fn flow_exists<const N: usize>(
     let guess = (x.q1 - x.q0) / ld.step_size();
     let minus = legendre_minus_inverse(ld, t, &legendre_minus(ld, t, x)?, &guess)?;
     let plus = legendre_plus_inverse(ld, t, &legendre_plus(ld, t, x)?, &guess)?;
-    Ok(relative(minus, *x).max(relative(plus, *x)))
+    Ok(relative(minus, *x).larger(relative(plus, *x)))
 }
 
 /// Statement 20: the three expressions of Phi~_d agree.
@@ -317,11 +326,11 @@ fn three_expressions<const N: usize>(
     let direct = by(HamiltonianFlow::Direct)?;
     let step = ld.forward(t, &state, &guess, &mut crate::Solver::default())?;
     // p is recovered from rounded positions, of which it depends by W/h.
-    let size = Triple::from(direct).amax().max(ld.second_jet(t, x)?.d12.amax() * x.q1.amax());
-    let distance = |a: PhasePoint<N>| Triple::from(a).minus(direct.into()).amax() / size;
+    let size = Triple::from(direct).largest().larger(ld.second_jet(t, x)?.d12.largest() * x.q1.largest());
+    let distance = |a: PhasePoint<N>| Triple::from(a).minus(direct.into()).largest() / size;
     Ok(distance(by(HamiltonianFlow::ThroughPlus)?)
-        .max(distance(by(HamiltonianFlow::ThroughMinus)?))
-        .max(distance(step.end)))
+        .larger(distance(by(HamiltonianFlow::ThroughMinus)?))
+        .larger(distance(step.end)))
 }
 
 /// Statement 21: eta+ and eta- in closed form are the pullbacks of Darboux' form; the jets that they are made of, and the
@@ -337,17 +346,19 @@ fn contact_forms<const N: usize>(
     let (first, derived) = (ld.jet(t, x)?, derived_jet(ld, t, x)?);
     let of = |jet: contact_geom::DiscreteJet<N>| Triple { x: jet.d1, y: jet.d2, z: jet.dz };
     let (second, derived_second) = (ld.second_jet(t, x)?, derived_second_jet(ld, t, x)?);
-    let blocks = (second.d11 - derived_second.d11).amax().max((second.d12 - derived_second.d12).amax());
-    let blocks = blocks.max((second.d22 - derived_second.d22).amax()).max((second.d1z - derived_second.d1z).amax());
-    let blocks = blocks.max((second.d2z - derived_second.d2z).amax()).max((second.dzz - derived_second.dzz).abs());
-    let size = derived_second.d11.amax().max(derived_second.d12.amax()).max(derived_second.d22.amax());
+    let blocks = (second.d11 - derived_second.d11).largest().larger((second.d12 - derived_second.d12).largest());
+    let blocks =
+        blocks.larger((second.d22 - derived_second.d22).largest()).larger((second.d1z - derived_second.d1z).largest());
+    let blocks =
+        blocks.larger((second.d2z - derived_second.d2z).largest()).larger((second.dzz - derived_second.dzz).abs());
+    let size = derived_second.d11.largest().larger(derived_second.d12.largest()).larger(derived_second.d22.largest());
     let jacobian = |plus| -> Result<f64, GeometryError> {
         let closed = if plus { second.legendre_plus_jacobian() } else { second.legendre_minus_jacobian() };
         let (_, derived) = Transform { ld, t, plus }.with_jacobian(&point)?;
-        Ok((&closed - &derived).amax() / derived.amax())
+        Ok((&closed - &derived).largest() / derived.largest())
     };
-    let transforms = jacobian(false)?.max(jacobian(true)?);
-    Ok(minus.max(plus).max(transforms).max(relative(of(first), of(derived))).max(blocks / size))
+    let transforms = jacobian(false)?.larger(jacobian(true)?);
+    Ok(minus.larger(plus).larger(transforms).larger(relative(of(first), of(derived))).larger(blocks / size))
 }
 
 /// Statement 22: `eta+ = sigma_d eta-` and `Phi_d* eta- = eta+`.
@@ -367,9 +378,9 @@ fn forms_are_related<const N: usize>(
     let jacobian = discrete_flow_jacobian(ld, t, x, &image)?;
     let next = EtaMinus(jets(ld, t + h));
     let pullback = pull(&jacobian, &next.eta(&image.into())?);
-    let size = next.eta(&image.into())?.amax() * jacobian.amax();
-    let related = pullback.minus(plus.eta(&point)?).amax() / size.max(plus.eta(&point)?.amax());
-    Ok(proportional.max(related).max(relative(plus.eta(&point)?, minus.eta(&point)?.scale(sigma))))
+    let size = next.eta(&image.into())?.largest() * jacobian.largest();
+    let related = pullback.minus(plus.eta(&point)?).largest() / size.larger(plus.eta(&point)?.largest());
+    Ok(proportional.larger(related).larger(relative(plus.eta(&point)?, minus.eta(&point)?.scale(sigma))))
 }
 
 /// A covector pulled back along a Jacobian.
@@ -391,12 +402,12 @@ fn discrete_flow_is_conformal<const N: usize>(
     let (from, to) = ((*x).into(), image.into());
     // Relative to the terms of the pullback, which may cancel.
     let of = |before: Triple<N>, after: Triple<N>, sigma: f64| {
-        let size = (after.amax() * jacobian.amax()).max(before.amax());
-        pull(&jacobian, &after).minus(before.scale(sigma)).amax() / size
+        let size = (after.largest() * jacobian.largest()).larger(before.largest());
+        pull(&jacobian, &after).minus(before.scale(sigma)).largest() / size
     };
     let minus = of(EtaMinus(jets(ld, t)).eta(&from)?, EtaMinus(jets(ld, t + h)).eta(&to)?, sigma);
     let plus = of(EtaPlus(jets(ld, t)).eta(&from)?, EtaPlus(jets(ld, t + h)).eta(&to)?, sigma_after);
-    Ok(minus.max(plus))
+    Ok(minus.larger(plus))
 }
 
 /// Statement 24: `Phi~_d* eta = (sigma_d o (F-L_d)^-1) eta`.
@@ -409,8 +420,8 @@ fn hamiltonian_flow_is_conformal<const N: usize>(
     let jacobian = hamiltonian_flow_jacobian(ld, t, x)?;
     let measured = conformality_with_jacobian(&Darboux, &Darboux, &from.into(), &to.into(), &jacobian)?;
     let sigma = ld.jet(t, x)?.sigma();
-    let size = (1.0 + to.p.amax()) * jacobian.amax();
-    Ok((measured.defect * measured.pullback.amax()).max((measured.sigma - sigma).abs()) / size)
+    let size = (1.0 + to.p.largest()) * jacobian.largest();
+    Ok((measured.defect * measured.pullback.largest()).larger((measured.sigma - sigma).abs()) / size)
 }
 
 /// The lift of a group element to Q x Q x R.
@@ -436,15 +447,15 @@ fn momentum_is_dissipated<const N: usize>(
         conformality(&plus, &plus, &Diagonal(group), &point)?,
     );
     let contact =
-        on_minus.defect.max(on_plus.defect).max((on_minus.sigma - 1.0).abs()).max((on_plus.sigma - 1.0).abs());
+        on_minus.defect.larger(on_plus.defect).larger((on_minus.sigma - 1.0).abs()).larger((on_plus.sigma - 1.0).abs());
     let h = ld.step_size();
     let image = discrete_flow(ld, t, x)?;
     let (before, after) = (discrete_momentum(ld, group, t, x)?, discrete_momentum(ld, group, t + h, &image)?);
     // p1 from rounded positions: W/h times their rounding, times the generator.
-    let xi = group.generator(&image.q0).amax();
-    let size = before.abs().max(xi * ld.second_jet(t + h, &image)?.d12.amax() * image.q1.amax());
+    let xi = group.generator(&image.q0).largest();
+    let size = before.abs().larger(xi * ld.second_jet(t + h, &image)?.d12.largest() * image.q1.largest());
     let sign = (before + minus.eta(&point)?.x.dot(&group.generator(&x.q0))).abs() / size;
-    Ok(contact.max(sign).max((after - ld.jet(t, x)?.sigma() * before).abs() / size))
+    Ok(contact.larger(sign).larger((after - ld.jet(t, x)?.sigma() * before).abs() / size))
 }
 
 /// Statement 39, its second half: sigma_d is positive for these steps; zero or infinite.

@@ -2,6 +2,7 @@
 
 use crate::Node;
 use crate::unknowns::Unknowns;
+use contact_geom::linear::{self, SingularMatrix};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Border, Dual, Lagrangian, VelocityPoint};
 
@@ -96,50 +97,80 @@ impl<const N: usize> Frame<'_, N> {
     }
 }
 
-/// `L`, its derivatives along `(s e_i, e_i, 0)` and its derivative `L_z`: what the end of a step needs of a node.
+/// `L`, `L_q` and `L_z`: what the end of a step needs of a node.
 #[inline(always)]
-pub(crate) fn end_directions<const N: usize>(
+pub(crate) fn rates_at<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,
     at: &VelocityPoint<N>,
-    s: f64,
 ) -> (f64, SVector<f64, N>, f64) {
-    if N > BLOCK {
-        return end_by_blocks(lagrangian, t, at, s);
+    if const { N > BLOCK } {
+        return rates_by_blocks(lagrangian, t, at);
     }
     let constant = |re: f64| -> Dual<f64, Border<N>> { Dual::constant(re) };
     let mut x = VelocityPoint { q: at.q.map(constant), v: at.v.map(constant), z: constant(at.z) };
     for i in 0..N {
-        x.q[i].d.x[i] = s;
-        x.v[i].d.x[i] = 1.0;
+        x.q[i].d.x[i] = 1.0;
     }
     x.z.d.z = 1.0;
     let l = lagrangian.along(t, &x);
     (l.re, l.d.x, l.d.z)
 }
 
-/// [`end_directions`] for a large system.
+/// [`rates_at`] for a large system.
 #[inline(never)]
-fn end_by_blocks<const N: usize>(
+fn rates_by_blocks<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,
     at: &VelocityPoint<N>,
-    s: f64,
 ) -> (f64, SVector<f64, N>, f64) {
     let constant = |re: f64| -> Dual<f64, Border<BLOCK>> { Dual::constant(re) };
-    let (mut value, mut momentum, mut rate) = (0.0, SVector::zeros(), 0.0);
+    let (mut value, mut force, mut rate) = (0.0, SVector::zeros(), 0.0);
     for start in (0..N).step_by(BLOCK) {
         let mut x = VelocityPoint { q: at.q.map(constant), v: at.v.map(constant), z: constant(at.z) };
         for i in start..N.min(start + BLOCK) {
-            x.q[i].d.x[i - start] = s;
-            x.v[i].d.x[i - start] = 1.0;
+            x.q[i].d.x[i - start] = 1.0;
         }
         x.z.d.z = 1.0;
         let l = lagrangian.along(t, &x);
         for i in start..N.min(start + BLOCK) {
-            momentum[i] = l.d.x[i - start];
+            force[i] = l.d.x[i - start];
         }
         (value, rate) = (l.re, l.d.z);
     }
-    (value, momentum, rate)
+    (value, force, rate)
+}
+
+/// W alone where there are many coordinates; else with the other second derivatives, which are compiled in any case.
+pub(crate) fn mass_matrix<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+) -> SMatrix<f64, N, N> {
+    if const { N > BLOCK } { lagrangian.mass_matrix(t, x) } else { lagrangian.hessian(t, x).vv }
+}
+
+/// Whether a matrix is the identity; without one to compare with, for the sake of the stack.
+pub(crate) fn is_identity<const N: usize>(m: &SMatrix<f64, N, N>) -> bool {
+    (0..N).all(|j| (0..N).all(|i| m[(i, j)] == f64::from(u8::from(i == j))))
+}
+
+/// W on the heap, for what is kept.
+#[inline(never)]
+pub(crate) fn kept_mass_matrix<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+) -> Box<SMatrix<f64, N, N>> {
+    Box::new(mass_matrix(lagrangian, t, x))
+}
+
+/// The inverse, column by column, on the heap.
+#[inline(never)]
+pub(crate) fn inverted<const N: usize>(m: &SMatrix<f64, N, N>) -> Result<Box<SMatrix<f64, N, N>>, SingularMatrix> {
+    let mut inverse = SMatrix::<f64, N, N>::identity();
+    for mut column in inverse.column_iter_mut() {
+        linear::solve(&mut m.clone_owned(), &mut column)?;
+    }
+    Ok(Box::new(inverse))
 }

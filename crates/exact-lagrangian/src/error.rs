@@ -25,8 +25,8 @@ pub enum ExactError<const N: usize> {
         /// What the geometry says beyond, if it says something.
         cause: Option<GeometryError>,
     },
-    /// The motion needs more panels than [`PANELS`](crate::PANELS): the drag is very strong, or the time very long.
-    #[error("t = {t} was reached with the largest number of panels; go on from there, or take a smaller h")]
+    /// The motion needs more work than [`EVALUATIONS`](crate::EVALUATIONS): the drag is very strong, or the time very long.
+    #[error("t = {t} was reached with the largest number of evaluations; go on from there, or take a smaller h")]
     Unfinished {
         /// The time that was reached.
         t: f64,

@@ -9,6 +9,9 @@ pub(crate) const MOST: usize = 24;
 /// The numbers of nodes that a panel may have: few for a short one, many for a long one.
 const SIZES: [usize; 4] = [4, 8, 14, MOST];
 
+/// The golden ratio less one: the fractional parts of its multiples are the most evenly spread of all numbers'.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
 /// Gauss collocation with `s` nodes on `[0, 1]`, for systems `q' = v, v' = a`.
 pub(crate) struct Gauss {
     /// The number of nodes.
@@ -25,9 +28,34 @@ pub(crate) struct Gauss {
     pub end: [f64; MOST],
     /// The functionals that give the last two Legendre coefficients of a function from its values at the nodes.
     pub tail: [[f64; MOST]; 2],
+    /// The functionals of the two coefficients half-way to the last.
+    pub middle: [[f64; MOST]; 2],
     /// The values at the nodes of the next larger collocation of the polynomial with given values at these nodes.
     pub refine: [[f64; MOST]; MOST],
+    /// The value at 0 of the polynomial with given values at the nodes.
+    pub start: [f64; MOST],
+    /// Places apart from the nodes at which a solution is compared with its equations: the end, and then those of the golden
+    /// ratio's multiples, of which any number of the first are spread evenly.
+    pub probes: Vec<Probe>,
 }
+
+/// A place on `[0, 1]` apart from the nodes, with the weights that continue a solution there from its values at the nodes.
+pub(crate) struct Probe {
+    /// The place.
+    pub c: f64,
+    /// Of the rates themselves.
+    pub value: [f64; MOST],
+    /// Of their integral from 0.
+    pub once: [f64; MOST],
+    /// Of its integral.
+    pub twice: [f64; MOST],
+}
+
+/// The number of probes.
+pub(crate) const PROBES: usize = 128;
+
+/// The number of probes of the collocation with fewest nodes.
+pub(crate) const PROBES_STILL: usize = 1024;
 
 /// The Legendre polynomials `P_0(x) .. P_s(x)` on `[-1, 1]`.
 fn legendre(s: usize, x: f64) -> [f64; MOST + 1] {
@@ -60,41 +88,62 @@ impl Gauss {
 
     fn new(s: usize, next: usize) -> Self {
         let (n, nodes, beyond) = (s as f64, Self::nodes(s), Self::nodes(next));
+        let polynomials = nodes.map(|x| legendre(s, x));
         let c = nodes.map(|x| (1.0 + x) * 0.5);
         let rough: [f64; MOST] = from_fn(|j| {
-            let below = n * legendre(s, nodes[j])[s - 1];
+            let below = n * polynomials[j][s - 1];
             if j < s { (1.0 - nodes[j] * nodes[j]) / (below * below) } else { 0.0 }
         });
         // The closed formula amplifies the nodes' rounding. One correction by the Legendre polynomials, whose integrals the
         // weights must give, brings all of them to the last digit.
         let defects: [f64; MOST] = from_fn(|k| {
-            let sum: f64 = (0..s).map(|j| rough[j] * legendre(s, nodes[j])[k]).sum();
+            let sum: f64 = (0..s).map(|j| rough[j] * polynomials[j][k]).sum();
             if k == 0 { 1.0 - sum } else { -sum }
         });
         let b = from_fn(|j| {
-            let p = legendre(s, nodes[j]);
+            let p = polynomials[j];
             rough[j] * (1.0 + (0..s).map(|k| (2 * k + 1) as f64 * p[k] * defects[k]).sum::<f64>())
         });
         // The Lagrange polynomial of node j is b_j sum (2k+1) P_k(x_j) P_k, and the integral of P_k a difference of two.
-        let a: [[f64; MOST]; MOST] = from_fn(|i| {
-            let at = legendre(s, nodes[i]);
+        let integrals = |x: f64| -> [f64; MOST] {
+            let at = legendre(s, x);
             from_fn(|j| {
-                let p = legendre(s, nodes[j]);
+                let p = polynomials[j];
                 let rest: f64 = (1..s).map(|k| p[k] * (at[k + 1] - at[k - 1])).sum();
-                if i < s { b[j] * (c[i] + 0.5 * rest) } else { 0.0 }
+                b[j] * 0.5 * (1.0 + x + rest)
             })
-        });
+        };
+        let a: [[f64; MOST]; MOST] = from_fn(|i| if i < s { integrals(nodes[i]) } else { [0.0; MOST] });
         let aa = from_fn(|i| from_fn(|j| (0..s).map(|k| a[i][k] * a[k][j]).sum()));
-        let tail = [s - 1, s - 2].map(|k| from_fn(|j| (2 * k + 1) as f64 * b[j] * legendre(s, nodes[j])[k]));
-        let refine = from_fn(|i| {
-            let at = legendre(s, beyond[i]);
+        let coefficient = |k: usize| from_fn(|j| (2 * k + 1) as f64 * b[j] * polynomials[j][k]);
+        // The values of the Lagrange polynomials, and their integrals from -1, at x.
+        let lagrange = |x: f64| {
+            let at = legendre(s, x);
             from_fn(|j| {
-                let p = legendre(s, nodes[j]);
-                let sum: f64 = (0..s).map(|k| (2 * k + 1) as f64 * p[k] * at[k]).sum();
-                if i < next { b[j] * sum } else { 0.0 }
+                let p = polynomials[j];
+                b[j] * (0..s).map(|k| (2 * k + 1) as f64 * p[k] * at[k]).sum::<f64>()
             })
-        });
-        Gauss { s, refine, c, b, a, aa, end: from_fn(|j| b[j] * (1.0 - c[j])), tail }
+        };
+        let probe = |k: usize| {
+            let c = if k == 0 { 1.0 } else { (k as f64 * GOLDEN).fract() };
+            let once: [f64; MOST] = integrals(2.0 * c - 1.0);
+            let twice = from_fn(|j| (0..s).map(|k| once[k] * a[k][j]).sum());
+            Probe { c, value: lagrange(2.0 * c - 1.0), once, twice }
+        };
+        let refine = from_fn(|i| if i < next { lagrange(beyond[i]) } else { [0.0; MOST] });
+        Gauss {
+            s,
+            refine,
+            c,
+            b,
+            aa,
+            end: from_fn(|j| b[j] * (1.0 - c[j])),
+            tail: [s - 1, s - 2].map(coefficient),
+            middle: [s / 2, s / 2 - 1].map(coefficient),
+            start: lagrange(-1.0),
+            probes: (0..if s == SIZES[0] { PROBES_STILL } else { PROBES }).map(probe).collect(),
+            a,
+        }
     }
 }
 

@@ -40,6 +40,8 @@
 //! How exact: against closed forms some 1e-15, of the motion's own size where it decays by `e^-50`. How fast: `L_h^e` with its first
 //! derivatives costs 1.2 to 3.5 calls of a dop853 that computes the motion alone, to 1e-13. Nothing allocates for static N.
 
+#[cfg(test)]
+mod bad_numbers;
 mod composition;
 mod conjugate;
 mod error;
@@ -61,10 +63,10 @@ pub use conjugate::ConjugatePoint;
 pub use error::ExactError;
 pub use exact_lagrangian::ExactLagrangian;
 pub use exponential::{ContactExponential, ExponentialDifferential, HerglotzFlow};
-pub use flow::{Motion, PANELS, herglotz_flow};
+pub use flow::{EVALUATIONS, Motion, herglotz_flow};
 pub use nonholonomic::{Chetaev, ExtendedMotion, ExtendedPoint, NonHolonomic};
 pub use principle::{Curve, CurveAction, MotionCurve, VariedCurve, action, action_derivative};
 pub use quadratic_exact::QuadraticExact;
 pub use retraction::{Retraction, Route};
 pub use spline_curve::SplineCurve;
-pub use variational_error::{ErrorOrders, MeasuredOrder, error_orders};
+pub use variational_error::{ErrorOrders, MeasuredOrder, Order, error_orders};

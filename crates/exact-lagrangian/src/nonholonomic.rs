@@ -1,11 +1,13 @@
 //! The non-holonomic system (L~, M_L) that is equivalent to Herglotz' equations.
 
-use crate::flow::{ACCURACY, integrate};
+use crate::flow::{ACCURACY, Work, integrate};
 use crate::panel::{Rate, Rates, State};
 use crate::{ExactError, Motion};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::{Border, Dual, GeometryError, Lagrangian, Module, Regularity, Scalar, Triple, VelocityPoint, seed};
+use contact_geom::{
+    Border, Dual, GeometryError, Lagrangian, Module, Regularity, Scalar, Triple, VelocityPoint, larger, seed,
+};
 
 /// A point `(q, z, v, w)` of T(Q x R); on `M_L` where `w = L(q, v, z)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,7 +82,7 @@ impl<L> NonHolonomic<L> {
     /// derivative in time. Defined on all of T(Q x R), tangent to the sets `Phi = const`.
     ///
     /// # Errors
-    /// [`GeometryError::Singular`] where W is singular.
+    /// [`GeometryError::Singular`] where W is singular, [`GeometryError::Undefined`] where a term is not finite.
     pub fn chetaev<T: Scalar, const N: usize>(
         &self,
         t: f64,
@@ -119,6 +121,9 @@ impl<L> NonHolonomic<L> {
         right[N + 1] = value.d.z;
         solve(&mut matrix, &mut right)
             .map_err(|e| e.of("the matrix of Chetaev's equations", "L is not regular here; choose another point"))?;
+        if !right.iter().all(|e| e.extent().is_finite()) {
+            return Err(GeometryError::Undefined { what: "the solution of Chetaev's equations" });
+        }
         Ok(Chetaev { a: SVector::from_fn(|i, _| right[i]), dw: right[N], multiplier: right[N + 1] })
     }
 
@@ -135,14 +140,14 @@ impl<L> NonHolonomic<L> {
     where
         L: Lagrangian<N>,
     {
-        let (mut at, mut defect): (_, f64) = (*start, 0.0);
+        let (mut at, mut defect, mut work) = (*start, 0.0, Work::default());
         for k in 0..PARTS {
             let (from, to) = [k, k + 1].map(|k| duration * (k as f64 / PARTS as f64)).into();
             let state = State { q: at.q, v: at.v, z: at.z, b: at.w };
-            let Motion { end, b: w, .. } = integrate(self, t0 + from, &state, to - from, ACCURACY)?;
+            let Motion { end, b: w, .. } = integrate(self, t0 + from, &state, to - from, ACCURACY, &mut work)?;
             at = ExtendedPoint { q: end.q, z: end.z, v: end.v, w };
             let on = self.lift(t0 + to, &end).w.re();
-            defect = defect.max((w.re() - on).abs() / (1.0 + on.abs()));
+            defect = larger(defect, (w.re() - on).abs() / (1.0 + on.abs()));
         }
         Ok(ExtendedMotion { end: at, defect })
     }

@@ -1,6 +1,7 @@
 //! One panel of a motion: collocation at Gauss points, solved by iteration to round-off.
 
-use crate::gauss::{Gauss, MOST, collocations};
+use crate::gauss::{Gauss, MOST, PROBES, Probe, collocations};
+use contact_geom::larger;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{GeometryError, Scalar};
 
@@ -57,7 +58,7 @@ pub(crate) struct Panel<const N: usize, T> {
     pub v0: SVector<T, N>,
     pub displacement: SVector<T, N>,
     pub change: Rate<N, T>,
-    /// The rates at the last node, a guess for the next panel.
+    /// The rates at the end, with which the next panel starts.
     pub last: Rate<N, T>,
     /// The estimated relative error of the end values.
     pub error: f64,
@@ -67,8 +68,6 @@ pub(crate) struct Panel<const N: usize, T> {
     pub nodes: usize,
     /// The sweeps that were made with the last number of nodes.
     pub sweeps: u32,
-    /// The evaluations of the rates.
-    pub evaluations: u32,
 }
 
 /// The position at a panel's end, where it is given instead of the velocity at the start.
@@ -88,6 +87,8 @@ pub(crate) enum Refused {
     NonFinite,
     /// The rates are not defined at a node.
     Undefined(GeometryError),
+    /// The nodes miss something: at this part of the panel the rates are not those of the polynomial.
+    Hidden(f64),
 }
 
 /// The sweeps after which an iteration counts as not contracting.
@@ -96,14 +97,14 @@ const SWEEPS: u32 = 40;
 /// The largest size, of the values alone and of the values with their differentials: over duals both must converge, and
 /// neither may hide behind the other.
 #[derive(Clone, Copy, Default)]
-struct Size([f64; 2]);
+pub(crate) struct Size(pub [f64; 2]);
 
 impl Size {
     #[inline(always)]
     fn see<T: Scalar>(&mut self, x: T) {
         // Comparisons rather than `f64::max`: an extent is no NaN, and of a plain number it is the modulus.
         let (extent, plain) = (x.extent(), size_of::<T>() == size_of::<f64>());
-        let modulus = if plain { extent } else { x.modulus() };
+        let modulus = if plain { extent } else { x.pivot_size() };
         if modulus > self.0[0] {
             self.0[0] = modulus;
         }
@@ -113,21 +114,62 @@ impl Size {
     }
 
     #[inline]
-    fn of<'a, T: Scalar>(entries: impl IntoIterator<Item = &'a T>) -> Self {
+    pub fn of<'a, T: Scalar>(entries: impl IntoIterator<Item = &'a T>) -> Self {
         let mut size = Size::default();
         entries.into_iter().for_each(|e| size.see(*e));
         size
     }
 
-    /// The larger of the two quotients; 0 for 0/0, infinite where a size is.
+    /// The larger of the two quotients; infinite where a size is, and 0 where it is not above a floor, as it is for 0/0.
     #[inline]
-    fn over(self, scale: Size) -> f64 {
+    fn over(self, scale: Size, floor: Size) -> f64 {
         let quotient = |i: usize| match self.0[i] {
-            0.0 => 0.0,
+            size if size <= floor.0[i] => 0.0,
             size if size.is_finite() => size / scale.0[i],
             _ => f64::INFINITY,
         };
-        quotient(0).max(quotient(1))
+        larger(quotient(0), quotient(1))
+    }
+
+    /// The same multiple of both.
+    #[inline]
+    pub fn times(self, factor: f64) -> Size {
+        Size(self.0.map(|s| s * factor))
+    }
+
+    /// The larger of each.
+    #[inline]
+    pub fn or(self, other: Size) -> Size {
+        Size([larger(self.0[0], other.0[0]), larger(self.0[1], other.0[1])])
+    }
+}
+
+/// Sizes of rates that are nothing, of a, z and b: what rounding alone makes of them, and what lets none of the changes along a
+/// panel be a normal number.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Floor([Size; 3]);
+
+impl Floor {
+    /// From the rates at a state and at the same state with its last digits changed.
+    pub fn between<const N: usize, T: Scalar>(one: &Rate<N, T>, other: &Rate<N, T>) -> Self {
+        let of = |d: T| Size::of([&d]);
+        let a = (0..N).fold(Size::default(), |size, i| size.or(of(one.a[i] - other.a[i])));
+        let finite = |s: Size| Size(s.0.map(|e| if e.is_finite() { e } else { 0.0 }));
+        Floor([a, of(one.z - other.z), of(one.b - other.b)].map(finite))
+    }
+
+    /// At most what changes velocity, action and b by four roundings of these units along a panel: where rounding makes more,
+    /// the motion is not determined by its rounded state.
+    pub fn below(self, units: &[Size; 3], h: f64) -> Self {
+        let most = |i: usize, k: usize| 4.0 * f64::EPSILON * units[i].0[k] / h.abs();
+        Floor(std::array::from_fn(|i| Size(std::array::from_fn(|k| self.0[i].0[k].min(most(i, k))))))
+    }
+
+    /// A multiple of what rounding makes, and at least what is nothing along a panel of this length.
+    #[inline]
+    fn over(&self, h: f64, factor: f64) -> [Size; 3] {
+        let least = f64::MIN_POSITIVE / f64::min(h.abs(), 1.0);
+        self.0.map(|s| s.times(factor).or(Size([least; 2])))
     }
 }
 
@@ -152,9 +194,10 @@ impl Sweep {
     }
 
     /// The largest relative change: of the velocity in units of the velocity, of the rates of z and b in units of them.
-    fn largest(&self, h: f64) -> f64 {
-        let velocity = self.changes[0].over(self.scales[0]) * h.abs();
-        velocity.max(self.changes[1].over(self.scales[1])).max(self.changes[2].over(self.scales[2]))
+    #[inline]
+    fn largest(&self, h: f64, floor: &[Size; 3]) -> f64 {
+        let over = |i: usize| self.changes[i].over(self.scales[i], floor[i]);
+        larger(larger(over(0) * h.abs(), over(1)), over(2))
     }
 }
 
@@ -166,27 +209,52 @@ pub(crate) struct Problem<'a, const N: usize, T> {
     pub end: Option<End<'a, N, T>>,
     /// The relative error that is wanted; half a unit of round-off at least.
     pub accuracy: f64,
+    /// What is nothing beside the rates.
+    pub floor: Floor,
+    /// The part of the whole motion that the panel is.
+    pub part: f64,
+    /// Where a panel has been refused again and again: the largest velocity and action of the motion until here, and the unit of b.
+    /// Then few nodes are tried, and a jump of the rates is passed where it changes none of these by more than a rounding.
+    pub narrow: Option<[Size; 3]>,
 }
 
-/// Solves a panel, first with few nodes; with more, from where these have led, as long as they do not resolve the motion.
+/// The number of probes of a panel by that of its nodes, some quarter of its work. A motion that goes far has more.
+fn probes(nodes: usize) -> usize {
+    match nodes {
+        ..6 => 2,
+        6..10 => 4,
+        10..20 => 8,
+        _ => 24,
+    }
+}
+
+/// Solves a panel, first with few nodes; with more, from where these have led, as long as they do not resolve the motion. A
+/// solution is then compared with the equations between its nodes.
 ///
 /// `v0` is the initial velocity, or a guess of it that is improved upon, also if the panel is refused. A panel that the most nodes
-/// do not resolve is returned with its error.
+/// do not resolve is returned with its error. The evaluations of the rates are counted in `evaluations`.
 pub(crate) fn collocate<const N: usize, T: Scalar>(
     rates: &impl Rates<N>,
     problem: &Problem<N, T>,
     guess: Rate<N, T>,
     v0: &mut SVector<T, N>,
+    evaluations: &mut u64,
 ) -> Result<Panel<N, T>, Refused> {
     let mut nodes = [guess; MOST];
-    let (mut evaluations, mut contraction) = (0, 0.0);
-    for g in collocations() {
-        let largest = g.s == MOST;
-        let panel = sweeps(rates, problem, g, &mut nodes[..g.s], v0, largest)?;
-        evaluations += panel.evaluations;
-        contraction = panel.contraction.max(contraction);
-        if panel.error <= problem.accuracy || largest {
-            return Ok(Panel { evaluations, contraction, ..panel });
+    let mut contraction = 0.0;
+    let sizes = if problem.narrow.is_some() { 2 } else { collocations().len() };
+    for (k, g) in collocations()[..sizes].iter().enumerate() {
+        let largest = k + 1 == sizes;
+        let (mut panel, seen) = sweeps(rates, problem, g, &mut nodes[..g.s], v0, largest, evaluations)?;
+        contraction = larger(panel.contraction, contraction);
+        panel.contraction = contraction;
+        if panel.error <= problem.accuracy {
+            let start = problem.end.is_none().then_some(&guess);
+            panel.last = between_nodes(rates, problem, g, &nodes[..g.s], &panel, &seen, start, evaluations)?;
+            return Ok(panel);
+        }
+        if largest {
+            return Ok(panel);
         }
         let coarse = nodes;
         for (node, row) in nodes.iter_mut().zip(&g.refine) {
@@ -194,6 +262,76 @@ pub(crate) fn collocate<const N: usize, T: Scalar>(
         }
     }
     Err(Refused::Slow)
+}
+
+/// Compares a solution with its equations at the panel's ends and between its nodes, where something narrow may hide; the rates at
+/// the end.
+///
+/// There are so many probes that a motion is looked at in all at [`PROBES`] places and more if it is long, which is to say, if it
+/// changes its position or its velocity by as much as they are; and at [`PROBES_STILL`](crate::gauss::PROBES_STILL) if there is no
+/// force at all.
+#[expect(clippy::too_many_arguments)]
+fn between_nodes<const N: usize, T: Scalar>(
+    rates: &impl Rates<N>,
+    problem: &Problem<N, T>,
+    g: &Gauss,
+    nodes: &[Rate<N, T>],
+    panel: &Panel<N, T>,
+    seen: &Sweep,
+    start: Option<&Rate<N, T>>,
+    evaluations: &mut u64,
+) -> Result<Rate<N, T>, Refused> {
+    let Problem { t, h, from, accuracy, .. } = *problem;
+    let sizes =
+        |r: &Rate<N, T>| [r.a.iter().map(|a| a.pivot_size()).fold(0.0, larger), r.z.pivot_size(), r.b.pivot_size()];
+    let most = |rates: &[Rate<N, T>]| {
+        rates.iter().map(sizes).fold([0.0; 3], |m: [f64; 3], e| std::array::from_fn(|i| larger(m[i], e[i])))
+    };
+    let (largest, tails) = (most(nodes), most(&g.tail.map(|row| Rate::sum(nodes, &row))));
+    let floor = problem.floor.over(h, 64.0);
+    let position = from.q.iter().map(|q| q.pivot_size()).fold(0.0, larger);
+    // What a change of a rate must exceed to matter: the polynomial's own error, and what changes the state by roundings.
+    let state = [seen.scales[0].0[0], from.z.pivot_size(), 1.0];
+    let allowed: [f64; 3] = std::array::from_fn(|i| {
+        let rounding = larger(1e4 * accuracy * largest[i], 32.0 * accuracy * state[i] / h.abs());
+        larger(16.0 * tails[i], rounding) + floor[i].0[0]
+    });
+    let fits = |found: &Rate<N, T>, row: &[f64; MOST]| {
+        let continued = Rate::sum(nodes, row);
+        let apart = sizes(&Rate { a: found.a - continued.a, z: found.z - continued.z, b: found.b - continued.b });
+        (0..3).all(|i| apart[i] <= allowed[i])
+    };
+    if let Some(start) = start
+        && !fits(start, &g.start)
+    {
+        return Err(Refused::Hidden(0.0));
+    }
+    let moved = panel.displacement.iter().map(|d| d.pivot_size()).fold(0.0, larger);
+    let still = largest[0] == 0.0;
+    // Of a motion of many panels also the change of the velocity tells: it may have come to rest.
+    let faster = if problem.part.abs() < 0.5 { largest[0] * h.abs() / state[0] } else { 0.0 };
+    let share = if still { 1.0 } else { larger(moved / larger(position, moved), faster).min(1.0) };
+    let places = if still { g.probes.len() } else { PROBES };
+    let wanted = (places as f64 * problem.part.abs() * share * share) as usize;
+    let count = wanted.max(probes(g.s)).min(g.probes.len());
+    *evaluations += count as u64;
+    let mut last = None;
+    for Probe { c, value, once, twice } in &g.probes[..count] {
+        let Rate { a, z, b } = Rate::sum(nodes, once);
+        let aa = Rate::sum(nodes, twice).a;
+        let x = State {
+            q: SVector::from_fn(|k, _| from.q[k] + (panel.v0[k] * *c + aa[k] * h) * h),
+            v: panel.v0 + a * T::from(h),
+            z: from.z + z * h,
+            b: from.b + b * h,
+        };
+        let rate = rates.at(t + c * h, &x).map_err(Refused::Undefined)?;
+        if !fits(&rate, value) {
+            return Err(Refused::Hidden(*c));
+        }
+        last = last.or(Some(rate));
+    }
+    Ok(last.unwrap_or(panel.last))
 }
 
 /// Solves the collocation equations by iteration, from the rates in `nodes` and the velocity `v0`, and leaves the solution
@@ -209,9 +347,11 @@ fn sweeps<const N: usize, T: Scalar>(
     nodes: &mut [Rate<N, T>],
     v0: &mut SVector<T, N>,
     last: bool,
-) -> Result<Panel<N, T>, Refused> {
-    let Problem { t, h, from, end, accuracy } = problem;
+    evaluations: &mut u64,
+) -> Result<(Panel<N, T>, Sweep), Refused> {
+    let Problem { t, h, from, end, accuracy, narrow, .. } = problem;
     let (t, h) = (*t, *h);
+    let (nothing, rounding) = (Floor::default().over(h, 1.0), problem.floor.over(h, 16.0));
     let (mut before, mut contraction) = (f64::INFINITY, 0.0f64);
     for sweep in 1..=SWEEPS {
         if let Some(End { displacement, inverse, .. }) = end {
@@ -222,6 +362,7 @@ fn sweeps<const N: usize, T: Scalar>(
             }
         }
         let mut seen = Sweep::default();
+        *evaluations += g.s as u64;
         for i in 0..g.s {
             let (mut once, mut twice) = (Rate::<N, T>::zero(), SVector::<T, N>::from_element(T::zero()));
             for ((rate, a), aa) in nodes.iter().zip(&g.a[i]).zip(&g.aa[i]) {
@@ -242,7 +383,11 @@ fn sweeps<const N: usize, T: Scalar>(
             seen.see(&x, &rate, &nodes[i]);
             nodes[i] = rate;
         }
-        let change = seen.largest(h);
+        if let Some([v, z, b]) = narrow {
+            let units = [*v, z.times(1.0 / h.abs()), b.times(1.0 / h.abs())];
+            seen.scales = std::array::from_fn(|i| seen.scales[i].or(units[i]));
+        }
+        let change = seen.largest(h, &nothing);
         if !change.is_finite() {
             // After a first guess of zero rates a scale may be zero; one sweep later a value is not a number.
             if sweep > 1 {
@@ -250,7 +395,7 @@ fn sweeps<const N: usize, T: Scalar>(
             }
             continue;
         }
-        let error = estimate(nodes, &seen, h, g);
+        let error = estimate(problem, nodes, &seen, g);
         let ratio = if before.is_finite() { change / before } else { 1.0 };
         let above_noise = change > 1e3 * f64::EPSILON;
         if sweep > 2 && above_noise {
@@ -261,7 +406,7 @@ fn sweeps<const N: usize, T: Scalar>(
         let predicted = change * expected <= 0.5 * accuracy;
         // After few sweeps a larger change may still be one that is on its way.
         let noise = if sweep < 6 { 16.0 } else { 4096.0 } * f64::EPSILON;
-        let stagnant = before.is_finite() && ratio >= 1.0 && change <= noise;
+        let stagnant = before.is_finite() && ratio >= 1.0 && (change <= noise || seen.largest(h, &rounding) == 0.0);
         let unresolved = !last && error > *accuracy && change <= 0.1 * error.sqrt();
         if predicted || stagnant || unresolved {
             let (mean, twice) = (Rate::sum(nodes, &g.b), Rate::sum(nodes, &g.end).a);
@@ -269,7 +414,7 @@ fn sweeps<const N: usize, T: Scalar>(
                 Some(end) => *end.displacement,
                 None => SVector::from_fn(|i, _| (v0[i] + twice[i] * h) * h),
             };
-            return Ok(Panel {
+            let panel = Panel {
                 v0: *v0,
                 displacement,
                 change: Rate { a: mean.a.map(|a| a * h), z: mean.z * h, b: mean.b * h },
@@ -278,8 +423,8 @@ fn sweeps<const N: usize, T: Scalar>(
                 contraction,
                 nodes: g.s,
                 sweeps: sweep,
-                evaluations: sweep * g.s as u32,
-            });
+            };
+            return Ok((panel, seen));
         }
         let patience = end.as_ref().map_or(1.0, |end| end.patience);
         if (ratio >= 1.0 && sweep > 8) || (ratio > patience && sweep > 3 && above_noise) {
@@ -294,15 +439,27 @@ fn sweeps<const N: usize, T: Scalar>(
 ///
 /// The interpolation of the rates misses a part of the size of their last Legendre coefficients; Gauss' weights annihilate
 /// it up to a product with the like part of the adjoint motion. So the error is the square of the relative tail; for
-/// `v' = c v` this is exactly the error of the Padé approximation, up to the factor `1 / (2s + 1)` that is applied.
-fn estimate<const N: usize, T: Scalar>(nodes: &[Rate<N, T>], seen: &Sweep, h: f64, g: &Gauss) -> f64 {
-    let tails = g.tail.map(|row| Rate::sum(nodes, &row));
+/// `v' = c v` this is exactly the error of the Padé approximation, up to the factor `1 / (2s + 1)` that is applied. That holds
+/// where the coefficients fall geometrically, so that the tail is the square of what is half-way to it: of a function with a kink
+/// they fall by a power only, and the second factor is that from half-way to the end.
+fn estimate<const N: usize, T: Scalar>(problem: &Problem<N, T>, nodes: &[Rate<N, T>], seen: &Sweep, g: &Gauss) -> f64 {
+    let h = problem.h;
+    let floor = problem.floor.over(h, 32.0);
+    let [tails, middle] = [&g.tail, &g.middle].map(|rows| {
+        let [one, two] = (*rows).map(|row| Rate::sum(nodes, &row));
+        [Size::of(one.a.iter().chain(two.a.iter())), Size::of([&one.z, &two.z]), Size::of([&one.b, &two.b])]
+    });
     let accelerations = Size::of(nodes.iter().flat_map(|r| r.a.iter()));
-    let relative = [
-        Size::of(tails.iter().flat_map(|r| r.a.iter())).over(accelerations),
-        Size::of(tails.iter().map(|r| &r.z)).over(seen.scales[1]),
-        Size::of(tails.iter().map(|r| &r.b)).over(seen.scales[2]),
-    ];
-    let velocity = relative[0] * relative[0] * accelerations.over(seen.scales[0]) * h.abs();
-    velocity.max(relative[1] * relative[1]).max(relative[2] * relative[2]) / (2 * g.s + 1) as f64
+    let scales = [accelerations, seen.scales[1], seen.scales[2]];
+    let relative: [f64; 3] = std::array::from_fn(|i| {
+        let tail = tails[i].over(scales[i], floor[i]);
+        let fall = tails[i].over(middle[i], floor[i]);
+        // Below some roundings the coefficients do not fall.
+        if tail <= 64.0 * f64::EPSILON { tail * tail } else { tail * larger(tail, (fall * fall).min(1.0)) }
+    });
+    let velocity = match relative[0] {
+        0.0 => 0.0,
+        tail => tail * accelerations.over(seen.scales[0], Size::default()) * h.abs(),
+    };
+    larger(larger(velocity, relative[1]), relative[2]) / (2 * g.s + 1) as f64
 }

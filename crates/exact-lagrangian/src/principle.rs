@@ -1,6 +1,6 @@
 //! Herglotz' principle: the action of a curve, and how it changes with the curve.
 
-use crate::flow::{ACCURACY, integrate};
+use crate::flow::{ACCURACY, Work, integrate};
 use crate::panel::{Rate, Rates, State};
 use crate::{ExactError, herglotz_flow};
 use contact_geom::nalgebra::SVector;
@@ -146,9 +146,10 @@ impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> AlongCurve<'_, 
             stops.reverse();
         }
         let (mut s, mut z, mut b) = (0.0, z0, b0);
+        let mut work = Work::default();
         for stop in stops.into_iter().chain([duration]) {
             let from = State { q: SVector::zeros(), v: SVector::zeros(), z, b };
-            let motion = integrate(self, s, &from, stop - s, ACCURACY).map_err(|e| self.located(e))?;
+            let motion = integrate(self, s, &from, stop - s, ACCURACY, &mut work).map_err(|e| self.located(e))?;
             (s, z, b) = (stop, motion.end.z, motion.b);
         }
         Ok((z, b))

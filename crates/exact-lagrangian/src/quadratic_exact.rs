@@ -2,8 +2,10 @@
 
 mod evolution;
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests;
 
+use crate::conjugate::Fold;
 use crate::exponential::singular_values;
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
@@ -74,7 +76,8 @@ impl<const N: usize> QuadraticExact<N> {
     /// [`InputError::Dimension`] for `N = 0`; [`InputError::Step`] unless h is positive and finite; [`InputError::Unclaimed`]
     /// and [`InputError::FalseClaim`] where L is not of the form; [`InputError::Geometry`] where W is singular to round-off;
     /// [`InputError::FirstStep`] at a conjugate point, where two positions do not determine the motion, to within some
-    /// roundings of h, K and gamma or because it has decayed below the smallest number; and where the motion overflows.
+    /// roundings of h, K and gamma, and where the motion overflows; [`InputError::Hypothesis`] where a motion has decayed below
+    /// the smallest number, so that no position tells of its velocity.
     pub fn new(lagrangian: &impl Lagrangian<N>, h: f64) -> Result<Self, InputError> {
         if N == 0 {
             return Err(InputError::Dimension);
@@ -106,6 +109,11 @@ impl<const N: usize> QuadraticExact<N> {
         let rounding = 8.0 * f64::EPSILON * (size * row_sum(&velocity.v)).max(N as f64 * largest)
             + row_sum(&SMatrix::<f64, N, N>::from_fn(|i, j| moved[(i, N + j)]));
         let conjugate = InputError::FirstStep(StepError::ConjugatePoint { smallest: smallest * unit });
+        if Fold::of(&displacement.v, &velocity.v, h).decayed {
+            return Err(InputError::Hypothesis {
+                hypothesis: "a motion that has not decayed below the smallest number",
+            });
+        }
         if smallest <= rounding {
             return Err(conjugate);
         }
@@ -129,7 +137,7 @@ impl<const N: usize> QuadraticExact<N> {
         })
     }
 
-    /// The motion after the time h: `(q1, v1, z1)`.
+    /// The motion after the time h: `(q1, v1, z1)`. Not a number where the start is not, infinite beyond the largest.
     pub fn motion<T: Scalar>(&self, start: &VelocityPoint<N, T>) -> VelocityPoint<N, T> {
         let (q, v) = (&start.q, &start.v);
         VelocityPoint {
@@ -137,6 +145,14 @@ impl<const N: usize> QuadraticExact<N> {
             v: self.velocity.at(q, v),
             z: start.z * self.sigma + self.form(q, v),
         }
+    }
+
+    /// Whether nothing is left of the positions in the action: drag has brought all of it below the smallest number, and
+    /// `-z0` alone would be no discrete Lagrangian.
+    fn is_lost(&self) -> bool {
+        let nothing = |e: &f64| e.abs() < f64::MIN_POSITIVE;
+        let form = [self.qq, self.qv, self.vv].iter().all(|m| m.iter().all(nothing));
+        nothing(&self.sigma) && form && [self.q, self.v].iter().all(|c| c.iter().all(nothing))
     }
 
     /// `x.G x` at `x = (q, v, 1)`.
@@ -159,12 +175,18 @@ impl<const N: usize> DiscreteLagrangian<N> for QuadraticExact<N> {
         self.h
     }
 
-    fn value<T: Scalar>(&self, _t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
+    fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
+        if self.is_lost() {
+            return Err(StepError::SigmaVanished { sigma: self.sigma });
+        }
         let still = SVector::from_element(T::zero());
         // The displacement first: it may have few digits, and no more may be lost.
         let by_velocity = (x.q1 - x.q0) - self.displacement.at(&x.q0, &still);
         let v0 = times(&self.inverse, &by_velocity);
-        Ok(x.z0 * self.sigma_m1 + self.form(&x.q0, &v0))
+        let value = x.z0 * self.sigma_m1 + self.form(&x.q0, &v0);
+        // A position that is not finite makes the value so, but for one that the form does not contain.
+        let finite = t.is_finite() && value.extent().is_finite() && v0.iter().all(|v| v.extent().is_finite());
+        if finite { Ok(value) } else { Err(StepError::NonFinite) }
     }
 }
 

@@ -1,13 +1,14 @@
 //! The exact retractions: the motion from one point to another.
 
+use crate::conjugate::Fold;
 use crate::exact_lagrangian::seeded;
 use crate::exponential::singular_values;
-use crate::flow::{ACCURACY, Herglotz, integrate};
-use crate::panel::{End, Problem, Rates, State, collocate};
+use crate::flow::{ACCURACY, Herglotz, Work, integrate};
+use crate::panel::{End, Floor, Problem, Rates, State, collocate};
 use crate::{ContactExponential, ExactError, Motion, herglotz_flow};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{DiscretePoint, Dual, Lagrangian, Scalar, VelocityPoint};
+use contact_geom::{DiscretePoint, Dual, Lagrangian, Scalar, VelocityPoint, larger};
 use discrete_herglotz::{InputError, last_correction};
 
 /// The Newton iterations that a retraction may take.
@@ -16,7 +17,7 @@ pub(crate) const ITERATIONS: u32 = 50;
 /// The accuracy of the first Newton iterations: of what is only a guess for the last.
 const ROUGH: f64 = 1e-6;
 
-/// The smallest singular value of `dq1/dv0`, in units of h, below which the end points count as conjugate.
+/// The sine of a [`Fold`] below which the end points count as conjugate.
 const CONJUGATE: f64 = 64.0 * f64::EPSILON;
 
 /// The same where the slope is known to [`ROUGH`] accuracy only.
@@ -67,7 +68,7 @@ pub struct Retraction<const N: usize> {
     /// How it was found.
     pub route: Route,
     /// The evaluations of the vector field that the last pass took.
-    pub evaluations: u32,
+    pub evaluations: u64,
 }
 
 /// The motion with its derivatives in the initial velocity.
@@ -78,10 +79,25 @@ fn slope<const N: usize>(shot: &Shot<N>) -> SMatrix<f64, N, N> {
     SMatrix::from_fn(|i, j| shot.displacement[i].d[j])
 }
 
+/// What a shot makes of variations of its initial velocity.
+fn fold<const N: usize>(shot: &Shot<N>, time: f64) -> Fold {
+    Fold::of(&slope(shot), &SMatrix::from_fn(|i, j| shot.end.v[i].d[j]), time)
+}
+
+/// How far from singular the slope is that has this inverse, in units of what the motion makes of velocities: like the sine of its
+/// [`Fold`], without allocation and exactly that for `N = 1`.
+fn regularity<const N: usize>(shot: &Shot<N>, inverse: &SMatrix<f64, N, N>, time: f64) -> f64 {
+    let entries = |i: usize, j: usize| larger(shot.displacement[i].d[j].abs(), (shot.end.v[i].d[j] * time).abs());
+    let size = (0..N * N).fold(0.0, |size, k| larger(size, entries(k / N, k % N)));
+    smallest(inverse) / size
+}
+
 /// A motion through both points, and the inverse of `dq1/dv0` there.
 struct Found<const N: usize> {
     retraction: Retraction<N>,
     inverse: SMatrix<f64, N, N>,
+    /// [How far from singular](regularity) the slope is.
+    regularity: f64,
 }
 
 /// The smallest singular value of a matrix with this inverse, up to a factor of at most `sqrt N`.
@@ -119,6 +135,7 @@ impl<L> ContactExponential<L> {
         L: Lagrangian<N>,
     {
         x.check()?;
+        let mut work = Work::default();
         let guess = (x.q1 - x.q0) / self.h;
         let (free, mut v0) = (SMatrix::from_diagonal_element(1.0 / self.h), guess);
         let quick = self.by_collocation(t, x, &mut v0, &free, PATIENCE)?;
@@ -129,7 +146,7 @@ impl<L> ContactExponential<L> {
         }
         // Slow, or perhaps near a conjugate point, where all modes but one contract and that one may be absent: ask the slope, and
         // where the iteration was given up go on with it.
-        if let Some(inverse) = self.slope_inverse(t, &VelocityPoint { q: x.q0, v: v0, z: x.z0 }) {
+        if let Some(inverse) = self.slope_inverse(t, &VelocityPoint { q: x.q0, v: v0, z: x.z0 }, &mut work) {
             let found = match quick {
                 Some(found) => Some(found),
                 None => self.by_collocation(t, x, &mut v0, &inverse, SLOPED)?,
@@ -138,11 +155,11 @@ impl<L> ContactExponential<L> {
                 return Ok(Retraction { conjugate: reverses(inverse).then_some(self.h), ..found });
             }
         }
-        let failed = match self.by_newton(t, x, &guess) {
+        let failed = match self.by_newton(t, x, &guess, &mut work) {
             Ok(found) => return Ok(found),
             Err(failed) => failed,
         };
-        match self.lead(t, x) {
+        match self.lead(t, x, &mut work) {
             Some(found) => Ok(Retraction { route: Route::Continuation, ..found.retraction }),
             None if x.q0 == x.q1 => Err(InputError::EqualPoints.into()),
             None => Err(failed),
@@ -176,7 +193,7 @@ impl<L> ContactExponential<L> {
         L: Lagrangian<N>,
     {
         x.check()?;
-        self.by_newton(t, x, guess)
+        self.by_newton(t, x, guess, &mut Work::default())
     }
 
     /// The different motions among those that Newton's method finds from these guesses of the initial velocity, in the order of
@@ -197,7 +214,7 @@ impl<L> ContactExponential<L> {
         x.check()?;
         let mut found: Vec<Retraction<N>> = Vec::new();
         for guess in guesses {
-            if let Ok(new) = self.by_newton(t, x, guess) {
+            if let Ok(new) = self.by_newton(t, x, guess, &mut Work::default()) {
                 let same = |old: &Retraction<N>| {
                     let apart = (old.start.v - new.start.v).amax();
                     apart <= f64::EPSILON.sqrt() * old.start.v.amax().max(new.start.v.amax())
@@ -227,7 +244,8 @@ impl<L> ContactExponential<L> {
             Some(guess) => *guess,
             None => self.between(t, &values)?.start.v,
         };
-        let Found { retraction, inverse } = self.shoot(t, &values, &near, self.h, ACCURACY)?;
+        let Found { retraction, inverse, .. } =
+            self.shoot(t, &values, &near, (self.h, ACCURACY), &mut Work::default())?;
         let mut start = VelocityPoint { q: x.q0, v: retraction.start.v.map(T::from), z: x.z0 };
         let mut before = f64::INFINITY;
         for pass in 0..ITERATIONS {
@@ -266,8 +284,10 @@ impl<L> ContactExponential<L> {
         let from = State { q: x.q0, v: *v0, z: x.z0, b: 0.0 };
         let start = rates.at(t, &from)?;
         let end = End { displacement: &(x.q1 - x.q0), inverse, patience };
-        let problem = Problem { t, h: self.h, from: &from, end: Some(end), accuracy: ACCURACY };
-        Ok(match collocate(&rates, &problem, start, v0) {
+        let (floor, mut evaluations) = (Floor::default(), 1);
+        let problem =
+            Problem { t, h: self.h, from: &from, end: Some(end), accuracy: ACCURACY, floor, part: 1.0, narrow: None };
+        Ok(match collocate(&rates, &problem, start, v0, &mut evaluations) {
             Ok(panel) if panel.error <= ACCURACY => Some((
                 Retraction {
                     start: VelocityPoint { q: x.q0, v: panel.v0, z: x.z0 },
@@ -277,7 +297,7 @@ impl<L> ContactExponential<L> {
                     // The iteration contracts before the first conjugate point only.
                     conjugate: None,
                     route: Route::Collocation,
-                    evaluations: panel.evaluations,
+                    evaluations,
                 },
                 panel.contraction,
             )),
@@ -291,9 +311,9 @@ impl<L> ContactExponential<L> {
         L: Lagrangian<N>,
     {
         const PARTS: u32 = 32;
-        let (part, mut at) = (self.h / f64::from(PARTS), seeded(&found.start));
+        let (part, mut at, mut work) = (self.h / f64::from(PARTS), seeded(&found.start), Work::default());
         for k in 0..PARTS {
-            at = self.shot(t + f64::from(k) * part, &at, part, ROUGH)?.end;
+            at = self.shot(t + f64::from(k) * part, &at, part, ROUGH, &mut work)?.end;
             if reverses(SMatrix::<f64, N, N>::from_fn(|i, j| at.q[i].d[j])) {
                 return Ok(Retraction { conjugate: Some(f64::from(k + 1) * part), ..found });
             }
@@ -308,22 +328,28 @@ impl<L> ContactExponential<L> {
         start: &VelocityPoint<N, Dual<f64, SVector<f64, N>>>,
         h: f64,
         accuracy: f64,
+        work: &mut Work,
     ) -> Result<Shot<N>, ExactError<N>>
     where
         L: Lagrangian<N>,
     {
         let from = State { q: start.q, v: start.v, z: start.z, b: Dual::constant(0.0) };
-        integrate(&Herglotz(&self.lagrangian), t, &from, h, accuracy)
+        integrate(&Herglotz(&self.lagrangian), t, &from, h, accuracy, work)
     }
 
     /// The inverse of `dq1/dv0` along the motion from a start, to the accuracy of a guess; none where it is nearly singular, or the
     /// motion not defined.
-    fn slope_inverse<const N: usize>(&self, t: f64, start: &VelocityPoint<N>) -> Option<SMatrix<f64, N, N>>
+    fn slope_inverse<const N: usize>(
+        &self,
+        t: f64,
+        start: &VelocityPoint<N>,
+        work: &mut Work,
+    ) -> Option<SMatrix<f64, N, N>>
     where
         L: Lagrangian<N>,
     {
-        let shot = self.shot(t, &seeded(start), self.h, ROUGH).ok()?;
-        slope(&shot).try_inverse().filter(|inverse| smallest(inverse) > NEARLY * self.h)
+        let shot = self.shot(t, &seeded(start), self.h, ROUGH, work).ok()?;
+        slope(&shot).try_inverse().filter(|inverse| regularity(&shot, inverse, self.h) > NEARLY)
     }
 
     /// Newton's method on `exp_h`: to some digits first; the rest by collocation with the slope found, or else to the end.
@@ -332,20 +358,21 @@ impl<L> ContactExponential<L> {
         t: f64,
         x: &DiscretePoint<N>,
         guess: &SVector<f64, N>,
+        work: &mut Work,
     ) -> Result<Retraction<N>, ExactError<N>>
     where
         L: Lagrangian<N>,
     {
-        let rough = self.shoot(t, x, guess, self.h, ROUGH)?;
+        let rough = self.shoot(t, x, guess, (self.h, ROUGH), work)?;
         let near = rough.retraction.start.v;
-        let regular = smallest(&rough.inverse) > NEARLY * self.h;
+        let regular = rough.regularity > NEARLY;
         if regular && let Some((found, _)) = self.by_collocation(t, x, &mut { near }, &rough.inverse, 1.0)? {
             // Still the motion that Newton's method has found, not another one.
             if (found.start.v - near).amax() <= ROUGH.sqrt() * near.amax() {
                 return Ok(Retraction { route: Route::Newton, ..found });
             }
         }
-        Ok(self.shoot(t, x, &near, self.h, ACCURACY)?.retraction)
+        Ok(self.shoot(t, x, &near, (self.h, ACCURACY), work)?.retraction)
     }
 
     /// Newton's method on `exp_h` with the slope `dq1/dv0` of the variational equation. A change that takes the motion out of
@@ -355,8 +382,8 @@ impl<L> ContactExponential<L> {
         t: f64,
         x: &DiscretePoint<N>,
         guess: &SVector<f64, N>,
-        h: f64,
-        accuracy: f64,
+        (h, accuracy): (f64, f64),
+        work: &mut Work,
     ) -> Result<Found<N>, ExactError<N>>
     where
         L: Lagrangian<N>,
@@ -367,9 +394,9 @@ impl<L> ContactExponential<L> {
         let mut last = None;
         for _ in 0..ITERATIONS {
             let start = VelocityPoint { q: x.q0, v, z: x.z0 };
-            let shot = match self.shot(t, &seeded(&start), h, accuracy) {
+            let shot = match self.shot(t, &seeded(&start), h, accuracy, work) {
                 Ok(shot) => shot,
-                Err(error) if last.is_none() => return Err(error),
+                Err(error) if last.is_none() || work.is_done() => return Err(error),
                 Err(_) => {
                     change *= 0.5;
                     v -= change;
@@ -385,7 +412,7 @@ impl<L> ContactExponential<L> {
                 continue;
             }
             nearest = nearest.min(residual);
-            last = Some((start, residual, slope));
+            last = Some((start, residual, slope, shot));
             change = -missed;
             let (mut matrix, size) = (slope, v.amax());
             if solve(&mut matrix, &mut change).is_err() {
@@ -397,22 +424,26 @@ impl<L> ContactExponential<L> {
             let resolution = 2.0 * accuracy * (x.q0.amax().max(x.q1.amax()) / h.abs()).max(size);
             let stagnant = now >= 0.5 * before && now <= 64.0 * resolution;
             if residual == 0.0 || (before.is_finite() && (predicted || stagnant)) {
-                let Some(inverse) = slope.try_inverse().filter(|i| smallest(i) > CONJUGATE * h.abs()) else { break };
-                return Ok(Found { retraction: moved(x, &start, &shot, &change), inverse });
+                let Some(inverse) = slope.try_inverse() else { break };
+                let regularity = regularity(&shot, &inverse, h);
+                if regularity.is_nan() || regularity <= CONJUGATE {
+                    break;
+                }
+                return Ok(Found { retraction: moved(x, &start, &shot, &change), inverse, regularity });
             }
             v += change;
             before = now;
         }
-        let Some((start, residual, slope)) = last else {
+        let Some((start, residual, slope, shot)) = last else {
             return Err(ExactError::NotConverged {
                 last: VelocityPoint { q: x.q0, v: *guess, z: x.z0 },
                 residual: f64::INFINITY,
                 smallest: 0.0,
             });
         };
-        let smallest = singular_values(&slope).smallest;
+        let (smallest, fold) = (singular_values(&slope).smallest, fold(&shot, h));
         // Newton's method is slow, and its limit ill determined, where the slope nearly vanishes.
-        Err(if smallest <= f64::EPSILON.sqrt() * h.abs() {
+        Err(if fold.sine <= f64::EPSILON.sqrt() && !fold.decayed {
             ExactError::ConjugatePoint { last: start, residual, smallest }
         } else {
             ExactError::NotConverged { last: start, residual, smallest }
@@ -421,16 +452,17 @@ impl<L> ContactExponential<L> {
 
     /// Continuation: the motions in the times `s h` to the points `q0 + s (q1 - q0)`, for s from small to 1, each the guess for
     /// the next.
-    fn lead<const N: usize>(&self, t: f64, x: &DiscretePoint<N>) -> Option<Found<N>>
+    fn lead<const N: usize>(&self, t: f64, x: &DiscretePoint<N>, work: &mut Work) -> Option<Found<N>>
     where
         L: Lagrangian<N>,
     {
         let (mut s, mut step) = (0.0, 0.125);
         let mut v = (x.q1 - x.q0) / self.h;
-        while step > 1e-3 {
+        while step > 1e-3 && !work.is_done() {
             let next = f64::min(s + step, 1.0);
             let target = DiscretePoint { q1: x.q0 + (x.q1 - x.q0) * next, ..*x };
-            match self.shoot(t, &target, &v, next * self.h, if next < 1.0 { ROUGH } else { ACCURACY }) {
+            let accuracy = if next < 1.0 { ROUGH } else { ACCURACY };
+            match self.shoot(t, &target, &v, (next * self.h, accuracy), work) {
                 Ok(found) if next == 1.0 => return Some(found),
                 Ok(found) => {
                     v = found.retraction.start.v;

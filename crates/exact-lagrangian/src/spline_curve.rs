@@ -66,8 +66,15 @@ impl<const N: usize> Curve<N> for SplineCurve<N> {
         if !inside {
             return Err(GeometryError::Undefined { what: "the spline" });
         }
-        let each = |of: fn(&Spline<f64>, f64) -> f64| SVector::from_iterator(self.coordinates.iter().map(|c| of(c, s)));
-        Ok((each(Spline::eval), each(Spline::eval_derivative)))
+        let each = |of: fn(&Spline<f64>, f64) -> f64| {
+            SVector::<f64, N>::from_iterator(self.coordinates.iter().map(|c| of(c, s)))
+        };
+        let (q, v) = (each(Spline::eval), each(Spline::eval_derivative));
+        // Nodes near the largest number overflow between them.
+        if !q.iter().chain(v.iter()).all(|c| c.is_finite()) {
+            return Err(GeometryError::Undefined { what: "the spline" });
+        }
+        Ok((q, v))
     }
 
     fn breaks(&self) -> &[f64] {

@@ -10,6 +10,9 @@
 //! its start, as when it passes near a collision. Where a velocity is recovered from two rounded positions, the residual is given
 //! in units of what that loses; see [`condition`].
 
+// In a check `f64::max` and `amax` would lose a NaN.
+#![deny(clippy::disallowed_methods)]
+
 use crate::exponential::HerglotzFlow;
 use crate::gauss::collocations;
 use crate::{
@@ -19,8 +22,8 @@ use crate::{
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::systems::System;
 use contact_geom::{
-    DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Smooth, Triple,
-    VelocityPoint, herglotz_rates, legendre, seed,
+    DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, Larger, Largest, PhasePoint, Scalar, SecondDiscreteJet,
+    Smooth, Triple, VelocityPoint, herglotz_rates, larger, legendre, seed,
 };
 use discrete_herglotz::{
     DiscreteLagrangian, InputError, StepError, derived_jet, derived_second_jet, discrete_flow, legendre_minus_inverse,
@@ -70,8 +73,8 @@ pub fn condition<const N: usize>(
     h: f64,
 ) -> Result<f64, ExactError<N>> {
     let differential = ContactExponential::new(lagrangian, h)?.differential(t, x)?;
-    let position = x.q.amax().max(differential.image.q1.amax());
-    Ok((position / (differential.regularity().smallest * x.v.amax())).max(1.0))
+    let position = x.q.largest().larger(differential.image.q1.largest());
+    Ok((position / (differential.regularity().smallest * x.v.largest())).larger(1.0))
 }
 
 /// How far a motion of a discrete Lagrangian's own equations is from the exact one: the discrete Herglotz equations of
@@ -91,15 +94,15 @@ pub fn follows_motion<const N: usize>(
     let exact = ByEquations(ExactLagrangian::new(lagrangian, h)?);
     let mut at = herglotz_flow(lagrangian, t, x, h)?.end;
     let mut pair = DiscretePoint { q0: x.q, q1: at.q, z0: x.z };
-    let (mut worst, mut size): (f64, f64) = (0.0, x.q.amax().max(x.z.abs()));
+    let (mut worst, mut size): (f64, f64) = (0.0, x.q.largest().larger(x.z.abs()));
     for k in 1..=steps {
         let time = t + k as f64 * h;
         pair = discrete_flow(&exact, time - h, &pair).map_err(|e| ExactError::Input(InputError::FirstStep(e)))?;
         let z = at.z;
         at = herglotz_flow(lagrangian, time, &at, h)?.end;
-        size = size.max(at.q.amax()).max(at.z.abs());
+        size = size.larger(at.q.largest()).larger(at.z.abs());
         let growth = ((k + 1) * (k + 1)) as f64;
-        worst = worst.max((pair.q1 - at.q).amax().max((pair.z0 - z).abs()) / (size * growth));
+        worst = worst.larger((pair.q1 - at.q).largest().larger((pair.z0 - z).abs()) / (size * growth));
     }
     Ok(worst)
 }
@@ -135,7 +138,7 @@ struct Place<'a, S, const N: usize> {
 /// The difference of two elements relative to the larger of them.
 fn relative<const N: usize>(a: impl Into<Triple<N>>, b: impl Into<Triple<N>>) -> f64 {
     let (a, b) = (a.into(), b.into());
-    a.minus(b).amax() / a.amax().max(b.amax())
+    a.minus(b).largest() / a.largest().larger(b.largest())
 }
 
 /// The difference of two numbers relative to a size.
@@ -154,8 +157,8 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
     fn growth(&self) -> Result<f64, ExactError<N>> {
         let end = self.exponential.varied(self.t, self.x)?.end;
         let of =
-            |c: &SVector<_, N>| c.iter().map(|e: &contact_geom::Dual<f64, Triple<N>>| e.d.amax()).fold(1.0, f64::max);
-        Ok(of(&end.q).max(of(&end.v)).max(end.z.d.amax()))
+            |c: &SVector<_, N>| c.iter().map(|e: &contact_geom::Dual<f64, Triple<N>>| e.d.largest()).fold(1.0, larger);
+        Ok(of(&end.q).larger(of(&end.v)).larger(end.z.d.largest()))
     }
 
     fn step_error(e: StepError) -> ExactError<N> {
@@ -178,14 +181,14 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let span = (t, h);
         let motion = herglotz_flow(system, t, x, h)?;
         // The terms that cancel: L_v times the variation's velocity, over the time, grown by sigma.
-        let p = legendre(system, t, x).p.amax().max(legendre(system, t + h, &motion.end).p.amax());
+        let p = legendre(system, t, x).p.largest().larger(legendre(system, t + h, &motion.end).p.largest());
         let mut worst: f64 = 0.0;
         for i in 0..N {
             for k in [1.0, 2.0] {
                 let variation = wave(i, k);
                 let slope = action_derivative(system, &curve, &variation, span, (x.z, 0.0))?;
-                let size = (1.0 + p) * k * std::f64::consts::PI * motion.sigma().max(1.0);
-                worst = worst.max(slope.abs() / size);
+                let size = (1.0 + p) * k * std::f64::consts::PI * motion.sigma().larger(1.0);
+                worst = worst.larger(slope.abs() / size);
             }
             let bent = VariedCurve { curve: &curve, variation: &wave(i, 1.0), by: 0.01 * h };
             let slope = action_derivative(system, &bent, &wave(i, 1.0), span, (x.z, 0.0))?;
@@ -198,7 +201,11 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let growth = action_derivative(system, &curve, &still, span, (x.z, 1.0))?;
         let along = action(system, &curve, span, x.z)?;
         let end = apart(along.z, motion.end.z, 1.0 + motion.end.z.abs());
-        Ok(worst.max(end).max(apart(growth, along.b.exp(), growth)).max(apart(along.b, motion.b, 1.0 + motion.b.abs())))
+        Ok(worst.larger(end).larger(apart(growth, along.b.exp(), growth)).larger(apart(
+            along.b,
+            motion.b,
+            1.0 + motion.b.abs(),
+        )))
     }
 
     /// Statement 27: Chetaev's multiplier is `-L_z`, and the accelerations are Herglotz'.
@@ -207,8 +214,8 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let chetaev = NonHolonomic::new(system);
         let solved = chetaev.chetaev(t, &chetaev.lift(t, x))?;
         let (field, rate) = herglotz_rates(system, t, x)?;
-        let size = 1.0 + field.y.amax().max(rate.abs());
-        Ok(((solved.a - field.y).amax() / size).max(apart(solved.multiplier, -rate, size)))
+        let size = 1.0 + field.y.largest().larger(rate.abs());
+        Ok(((solved.a - field.y).largest() / size).larger(apart(solved.multiplier, -rate, size)))
     }
 
     /// Statement 28: `T pi (Gamma) = xi_L o pi`, and the flows are pi-related; the constraint is kept.
@@ -221,7 +228,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let field = relative(projected, HerglotzField { lagrangian: system, t }.at(&(*x).into())?);
         let along = chetaev.flow(t, &start, h)?;
         let flow = relative(along.end.project(), herglotz_flow(system, t, x, h)?.end) / self.growth()?;
-        Ok(field.max(flow).max(along.defect))
+        Ok(field.larger(flow).larger(along.defect))
     }
 
     /// Statement 29: `exp_h` is a local diffeomorphism: `T exp_h` and the derivative of the retraction, by duals through the
@@ -239,8 +246,8 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
             _ => start.z.d.component(j),
         });
         let jacobian = forward.jacobian();
-        let defect = (&back * &jacobian - DMatrix::identity(2 * N + 1, 2 * N + 1)).amax();
-        Ok(defect / (back.amax() * jacobian.amax()).max(self.growth()?))
+        let defect = (&back * &jacobian - DMatrix::identity(2 * N + 1, 2 * N + 1)).largest();
+        Ok(defect / (back.largest() * jacobian.largest()).larger(self.growth()?))
     }
 
     /// Statement 30: `exp_h^xi = pr~_1 o exp_h^Gamma o (pi|M_L)^-1`.
@@ -264,7 +271,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let graph = apart(smallest, slope.sqrt().recip(), smallest);
         // The basis is known to round-off times the condition of the differential that it spans.
         let condition = self.exponential.differential(t, x)?.jacobian().singular_values();
-        let graph = graph / (condition.max() / condition.min());
+        let graph = graph / (condition.largest() / condition.min());
         // Rows q0, z0, q1 of the differential, in the order q0, q1, z0.
         let differential = chetaev.exponential_differential(t, x, h)?;
         let row = |i: usize| match i {
@@ -274,7 +281,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         };
         let projected = DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| differential[(row(i), j)]);
         let jacobian = self.exponential.differential(t, x)?.jacobian();
-        Ok(graph.max((&projected - &jacobian).amax() / jacobian.amax()) / self.growth()?)
+        Ok(graph.larger((&projected - &jacobian).largest() / jacobian.largest()) / self.growth()?)
     }
 
     /// Statement 32: `R_h^(e-) o exp_h = id`, `exp_h o R_h^(e-) = id`, `R_h^(e+) = phi_h o R_h^(e-)`; velocities in units of the
@@ -283,11 +290,11 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let (exact, y) = self.exact()?;
         let found = exact.retract(self.t, &y)?;
         let condition = condition(self.system, self.t, self.x, self.h)?;
-        let back = (found.start.v - self.x.v).amax() / (self.x.v.amax() * condition);
+        let back = (found.start.v - self.x.v).largest() / (self.x.v.largest() * condition);
         let forth = relative(self.exponential.at(self.t, &found.start)?, y);
         let moved = HerglotzFlow { lagrangian: self.system, t: self.t, duration: self.h };
         let end = relative(moved.at(&found.start.into())?, found.end);
-        Ok(back.max(forth.max(end) / self.growth()?))
+        Ok(back.larger(forth.larger(end) / self.growth()?))
     }
 
     /// Statement 33: along the motion a variation of z obeys `y' = a + b' y`, and is
@@ -310,7 +317,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
                 for i in 0..N {
                     let (by_q, by_v) = (at.end.q[i].d.scale(d.x[i] * decay), at.end.v[i].d.scale(d.y[i] * decay));
                     integrals = integrals.plus(by_q).plus(by_v);
-                    sizes += by_q.amax() + by_v.amax();
+                    sizes += by_q.largest() + by_v.largest();
                 }
                 action += system.value(from + c * part, &point.q, &point.v, point.z) * weight * part;
             }
@@ -320,22 +327,22 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         }
         let growth = end.b.re.exp();
         let formula = Triple { z: integrals.z + 1.0, ..integrals }.scale(growth);
-        let size = formula.amax().max(end.end.z.d.amax()).max(sizes * growth);
-        let formula = formula.minus(end.end.z.d).amax() / size;
+        let size = formula.largest().larger(end.end.z.d.largest()).larger(sizes * growth);
+        let formula = formula.minus(end.end.z.d).largest() / size;
         let (exact, y) = self.exact()?;
         let value = exact.retract(t, &y)?.action;
         // The two positions are rounded, and the action depends on them by the momenta.
-        let terms = action.abs().max(end.action.re.abs());
-        let rounded = terms.max(self.momenta()? * y.q0.amax().max(y.q1.amax()));
-        let along = apart(end.action.re, action, terms.max(self.momenta()? * h));
-        Ok(formula.max(along).max(apart(value, action, rounded)) / self.growth()?)
+        let terms = action.abs().larger(end.action.re.abs());
+        let rounded = terms.larger(self.momenta()? * y.q0.largest().larger(y.q1.largest()));
+        let along = apart(end.action.re, action, terms.larger(self.momenta()? * h));
+        Ok(formula.larger(along).larger(apart(value, action, rounded)) / self.growth()?)
     }
 
     /// The size of the momenta at both ends of the motion.
     fn momenta(&self) -> Result<f64, ExactError<N>> {
         let end = herglotz_flow(self.system, self.t, self.x, self.h)?.end;
-        let p0 = legendre(self.system, self.t, self.x).p.amax();
-        Ok(p0.max(legendre(self.system, self.t + self.h, &end).p.amax()))
+        let p0 = legendre(self.system, self.t, self.x).p.largest();
+        Ok(p0.larger(legendre(self.system, self.t + self.h, &end).p.largest()))
     }
 
     /// Statement 34: `D1 L_h^e = -p0 e^b`, `D2 L_h^e = p1`, `Dz L_h^e = e^b - 1`, against the derivatives by duals; the second
@@ -345,17 +352,19 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let of = |jet: DiscreteJet<N>| Triple { x: jet.d1, y: jet.d2, z: jet.dz };
         let formula = exact.jet(self.t, &y).map_err(Self::step_error)?;
         let derived = derived_jet(&exact, self.t, &y).map_err(Self::step_error)?;
-        let first = relative(of(formula), of(derived)).max(apart(formula.dz, derived.dz, derived.dz.abs().max(self.h)));
+        let first =
+            relative(of(formula), of(derived)).larger(apart(formula.dz, derived.dz, derived.dz.abs().larger(self.h)));
         let sigma =
             apart(formula.sigma(), herglotz_flow(self.system, self.t, self.x, self.h)?.sigma(), formula.sigma());
         let closed = exact.second_jet(self.t, &y).map_err(Self::step_error)?;
         let duals = derived_second_jet(&exact, self.t, &y).map_err(Self::step_error)?;
-        let size = duals.d11.amax().max(duals.d12.amax()).max(duals.d22.amax()).max(duals.d1z.amax());
-        let blocks = (closed.d11 - duals.d11).amax().max((closed.d12 - duals.d12).amax());
-        let blocks = blocks.max((closed.d22 - duals.d22).amax()).max((closed.d1z - duals.d1z).amax());
-        let blocks = blocks.max((closed.d2z - duals.d2z).amax()).max((closed.dzz - duals.dzz).abs());
+        let size =
+            duals.d11.largest().larger(duals.d12.largest()).larger(duals.d22.largest()).larger(duals.d1z.largest());
+        let blocks = (closed.d11 - duals.d11).largest().larger((closed.d12 - duals.d12).largest());
+        let blocks = blocks.larger((closed.d22 - duals.d22).largest()).larger((closed.d1z - duals.d1z).largest());
+        let blocks = blocks.larger((closed.d2z - duals.d2z).largest()).larger((closed.dzz - duals.dzz).abs());
         let growth = self.growth()?;
-        Ok(first.max(sigma).max(blocks / (size * growth)) / growth)
+        Ok(first.larger(sigma).larger(blocks / (size * growth)) / growth)
     }
 
     /// The transforms `F-L_h^e` and `F+L_h^e` by their definition, the derivatives by duals.
@@ -372,7 +381,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let found = self.exact()?.0.retract(self.t, &y)?;
         let start = legendre(self.system, self.t, &found.start);
         let end = legendre(self.system, self.t + self.h, &found.end);
-        Ok(relative(minus, start).max(relative(plus, end)) / self.growth()?)
+        Ok(relative(minus, start).larger(relative(plus, end)) / self.growth()?)
     }
 
     /// Statement 36: `L_h^e` is regular, `F+L_h^e = phi_h^{X_H} o F-L_h^e`, and one step of the discrete flow by the discrete
@@ -389,7 +398,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let step = exact.forward(t, &minus, &guess, &mut Default::default()).map_err(Self::step_error)?;
         let flow = relative(step.end, plus);
         let solved = legendre_minus_inverse(&ByEquations(exact), t, &minus, &guess).map_err(Self::step_error)?;
-        Ok(flow.max(relative(solved, y)) / self.growth()?)
+        Ok(flow.larger(relative(solved, y)) / self.growth()?)
     }
 }
 
@@ -411,15 +420,15 @@ pub fn composition<const N: usize>(
     let first = ExactLagrangian::new(lagrangian, h1)?.near(x.v);
     let second = ExactLagrangian::new(lagrangian, h2)?.near(middle.v);
     let ends = [x.q, whole.end.q];
-    let aside = |by: f64| middle.q + SVector::from_element(by * (h1 + h2) * (1.0 + x.v.amax()));
+    let aside = |by: f64| middle.q + SVector::from_element(by * (h1 + h2) * (1.0 + x.v.largest()));
     let found = compose(&first, &second, t, (&ends, x.z), &aside(1e-3)).map_err(failed)?;
     let beside = through(&first, &second, t, (&ends, x.z), &aside(1e-2)).map_err(failed)?;
-    let p = lagrangian.gradient(t, x).y.amax().max(lagrangian.gradient(t + h1, &middle).y.amax());
-    if beside.slope.amax() < 1e-4 * p || beside.value == found.value {
+    let p = lagrangian.gradient(t, x).y.largest().larger(lagrangian.gradient(t + h1, &middle).y.largest());
+    if beside.slope.largest() < 1e-4 * p || beside.value == found.value {
         return Ok(f64::INFINITY);
     }
-    let size = x.q.amax().max(whole.end.q.amax()).max(middle.q.amax());
+    let size = x.q.largest().larger(whole.end.q.largest()).larger(middle.q.largest());
     // The rounding of the ends moves the value by p times it.
     let value = apart(found.value, whole.action, whole.action.abs() + p * size);
-    Ok(value.max((found.q1 - middle.q).amax() / size))
+    Ok(value.larger((found.q1 - middle.q).largest() / size))
 }

@@ -76,6 +76,16 @@ pub enum Failure {
         /// One line for each that fails.
         list: String,
     },
+    /// Figures are above their bounds: exit code 1.
+    #[error("{count} of {total} figures are above their bounds:\n{list}")]
+    Bounds {
+        /// How many are.
+        count: usize,
+        /// How many there are.
+        total: usize,
+        /// One line for each of them.
+        list: String,
+    },
 }
 
 impl<const N: usize> From<ExactError<N>> for Failure {
@@ -97,7 +107,11 @@ impl Failure {
             | Failure::Terminal(_)
             | Failure::Input(_)
             | Failure::Geometry(_) => 2,
-            Failure::Run { .. } | Failure::Step(_) | Failure::Exact(_) | Failure::Statements { .. } => 1,
+            Failure::Run { .. }
+            | Failure::Step(_)
+            | Failure::Exact(_)
+            | Failure::Statements { .. }
+            | Failure::Bounds { .. } => 1,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What is found of a Lagrangian at the start of a run.
 
+use crate::step_equations::{inverted, kept_mass_matrix, mass_matrix};
 use crate::{InputError, StepError, last_correction, verified};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint, largest, linear};
@@ -9,8 +10,8 @@ pub(super) struct Beginning<const N: usize> {
     pub start: VelocityPoint<N>,
     pub structure: Structure,
     /// W and its inverse.
-    pub w: SMatrix<f64, N, N>,
-    pub inverse: SMatrix<f64, N, N>,
+    pub w: Box<SMatrix<f64, N, N>>,
+    pub inverse: Box<SMatrix<f64, N, N>>,
 }
 
 impl<const N: usize> Beginning<N> {
@@ -27,17 +28,10 @@ impl<const N: usize> Beginning<N> {
         let v = velocity(lagrangian, t0, state, guess)?;
         let start = VelocityPoint { q: state.q, v, z: state.z };
         let structure = verified(lagrangian, t0, &start)?;
-        let identity = SMatrix::<f64, N, N>::identity();
-        let w = lagrangian.hessian(t0, &start).vv;
-        let mut inverse = identity;
-        for j in 0..N {
-            let mut column = SVector::from_fn(|i, _| identity[(i, j)]);
-            linear::solve(&mut w.clone(), &mut column)
-                .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
-            inverse.set_column(j, &column);
-        }
+        let w = kept_mass_matrix(lagrangian, t0, &start);
+        let inverse = inverted(&w).map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
         // Rows of different units are no matter: |W^-1| |W| is 1 for every diagonal W.
-        let condition = largest((inverse.abs() * w.abs()).column_sum().iter().copied());
+        let condition = condition_of(&inverse, &w);
         if condition.is_nan() || condition > 0.1 / f64::EPSILON {
             return Err(InputError::FirstStep(StepError::Singular { pivot: 1.0 / condition }));
         }
@@ -45,7 +39,14 @@ impl<const N: usize> Beginning<N> {
     }
 }
 
+/// The largest row sum of `|W^-1| |W|`; entry by entry, for the sake of the stack.
+fn condition_of<const N: usize>(inverse: &SMatrix<f64, N, N>, w: &SMatrix<f64, N, N>) -> f64 {
+    let product = |i: usize, j: usize| (0..N).map(|k| inverse[(i, k)].abs() * w[(k, j)].abs()).sum::<f64>();
+    largest((0..N).map(|i| (0..N).map(|j| product(i, j)).sum()))
+}
+
 /// The velocity that belongs to a momentum, `L_v(t, q, v, z) = p`, by Newton's method.
+#[inline(never)]
 pub(crate) fn velocity<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,
@@ -57,9 +58,10 @@ pub(crate) fn velocity<const N: usize>(
     for _ in 0..crate::ITERATION_LIMIT {
         let momenta = lagrangian.gradient(t, &x).y;
         let mut change = momenta - state.p;
-        let mut w = lagrangian.hessian(t, &x).vv;
+        let mut w = mass_matrix(lagrangian, t, &x);
         // To the round-off of its terms: where W is ill conditioned the velocity is determined no better.
-        let terms = w.abs() * x.v.abs() + state.p.abs();
+        let of = |i: usize| (0..N).map(|j| (w[(i, j)] * x.v[j]).abs()).sum::<f64>() + state.p[i].abs();
+        let terms: SVector<f64, N> = SVector::from_fn(|i, _| of(i));
         let held = change.iter().zip(&terms).all(|(off, term)| off.abs() <= 2.0 * N as f64 * f64::EPSILON * term);
         linear::solve(&mut w, &mut change)
             .map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;

@@ -6,6 +6,7 @@ use super::extension::{Extension, Fictitious, Values};
 use super::general::{General, Mass};
 use super::sweeps::Progress;
 use super::table::Table;
+use crate::lanes::forget_branches;
 use crate::{Halt, ITERATION_LIMIT, InputError, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Clock, Lagrangian, PhasePoint};
@@ -62,6 +63,9 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
             return Err(InputError::Clock { rate });
         }
         let energy = start.v.dot(&state.p) - lagrangian.value(t0, &start.q, &start.v, start.z);
+        if !energy.is_finite() {
+            return Err(InputError::FirstStep(StepError::NonFinite));
+        }
         let extension = Extension::new(Fictitious(clock), t0, -energy);
         let (table, mass) = (Table::new(gauss.stages(), h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, &state, &start.v));
@@ -141,6 +145,7 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for Advance<'_, '_,
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        forget_branches();
         for taken in 0..self.steps {
             // L does not depend on it.
             let t = self.general.extension.t.value;

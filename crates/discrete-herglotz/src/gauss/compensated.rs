@@ -7,7 +7,7 @@ use std::ops::{Add, Mul};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Compensated {
     pub value: f64,
-    rest: f64,
+    pub rest: f64,
 }
 
 impl From<f64> for Compensated {

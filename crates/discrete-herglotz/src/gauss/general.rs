@@ -12,7 +12,7 @@ use super::simplified::{CorrectStages, StageNewton};
 use super::stages::{Stages, blocks};
 use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use super::table::Table;
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, branched};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
     Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint, larger, linear,
@@ -26,14 +26,14 @@ const FALLEN: f64 = 0.2;
 /// How velocities are found from momenta.
 pub(super) enum Mass<const N: usize> {
     /// `W^-1`, the same everywhere.
-    Constant(SMatrix<f64, N, N>),
+    Constant(Box<SMatrix<f64, N, N>>),
     /// `W^-1` at the stages, taken anew in each step.
     Stages(Box<[[Stages; N]; N]>),
 }
 
 impl<const N: usize> Mass<N> {
     /// From `W^-1` at the start.
-    pub fn new(structure: &Structure, inverse: SMatrix<f64, N, N>) -> Self {
+    pub fn new(structure: &Structure, inverse: Box<SMatrix<f64, N, N>>) -> Self {
         if structure.constant_mass || structure.separable {
             Mass::Constant(inverse)
         } else {
@@ -531,6 +531,9 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             dq[d] = single(self.moved[d].sum::<S>(s));
             let pushed = self.force[d].sum::<S>(s);
             dp[d] = Twofold { head: pushed, tail: grow * (pushed + self.p[d].value) };
+        }
+        if branched() {
+            return Progress::Branched;
         }
         // The largest change over lanes may hide a NaN; one of `fallen` is in `dp`.
         if !finite(&dq, &dp, single(dz)) {

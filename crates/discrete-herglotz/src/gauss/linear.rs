@@ -40,6 +40,7 @@ pub(super) struct Linear<const N: usize> {
 
 impl<const N: usize> Linear<N> {
     /// For `a = M^-1 L_q = -K q + f`; `None` where the stage equations have no solution.
+    #[inline(never)]
     pub fn new<L: Lagrangian<N>>(
         lagrangian: &L,
         table: &Condensed,
@@ -47,7 +48,7 @@ impl<const N: usize> Linear<N> {
         t: f64,
         start: &VelocityPoint<N>,
         wants_z: bool,
-    ) -> Option<Self> {
+    ) -> Option<Box<Self>> {
         let (s, zero, one) = (table.s, Quad::zero(), Quad::one());
         let origin = VelocityPoint::new([0.0; N], [0.0; N], 0.0);
         let Hessian { qq, qv, vv, .. } = lagrangian.hessian(t, start);
@@ -109,7 +110,7 @@ impl<const N: usize> Linear<N> {
             }
         });
         let entries = |f: &dyn Fn(usize, usize) -> Quad| from_fn(|d| from_fn(|e| f(d, e).into()));
-        Some(Linear {
+        Some(Box::new(Linear {
             qq: entries(&|d, e| sum(&exact.end_b, d, e)),
             qv: entries(&|d, e| unit(d, e, exact.end_u) + sum(&exact.end_b, d, N + e)),
             vq: entries(&|d, e| sum(&exact.end_v, d, e)),
@@ -122,7 +123,7 @@ impl<const N: usize> Linear<N> {
             q: from_fn(|i| start.q[i].into()),
             v: from_fn(|i| start.v[i].into()),
             z: start.z.into(),
-        })
+        }))
     }
 
     /// Takes steps until one is not finite; the state is then that before it. Returns how many, and where the last one began.

@@ -9,7 +9,7 @@ use super::resolution::{FORETOLD, Tail};
 use super::simplified::SlopeNewton;
 use super::stages::{Stages, blocks};
 use super::sweeps::{AGE, Progress, SLOW, Sweeps};
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, branched};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, VelocityPoint, largest};
 use pulp::{Arch, Simd};
@@ -17,13 +17,16 @@ use pulp::{Arch, Simd};
 /// The steps after which a matrix is expected to last.
 const LASTING: usize = 32;
 
+/// The largest relative change of a sweep after which its values are near enough for the parts that matrices' rounding leaves out.
+const NEAR: f64 = 1e-3;
+
 /// The state and the workspace of the condensed step.
 pub(super) struct Separable<'a, L, const N: usize> {
     pub lagrangian: &'a L,
     pub table: Condensed,
     pub left: Preconditioned,
     /// `M^-1`; `None` where M is the identity.
-    inverse_mass: Option<SMatrix<f64, N, N>>,
+    inverse_mass: Option<Box<SMatrix<f64, N, N>>>,
     pub wants_z: bool,
     pub q: [Compensated; N],
     pub v: [Compensated; N],
@@ -35,6 +38,8 @@ pub(super) struct Separable<'a, L, const N: usize> {
     x: [Stages; N],
     /// What the positions begin with: what comes of the state, and of the parts that the matrices' rounding leaves out.
     base: [Stages; N],
+    /// Whether guesses are far from the solution.
+    far: bool,
     /// Whether `rest` belongs to the step before.
     warm: bool,
     /// Corrects the sweeps where they do not contract by themselves.
@@ -59,7 +64,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         lagrangian: &'a L,
         table: Condensed,
         left: Preconditioned,
-        inverse_mass: Option<SMatrix<f64, N, N>>,
+        inverse_mass: Option<Box<SMatrix<f64, N, N>>>,
         start: &VelocityPoint<N>,
         wants_z: bool,
     ) -> Self {
@@ -77,6 +82,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             a: [Stages::ZERO; N],
             x: [Stages::ZERO; N],
             base: [Stages::ZERO; N],
+            far: false,
             warm: false,
             newton: None,
             parked: None,
@@ -100,7 +106,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             self.newton = self.parked.take().or_else(|| Some(Box::new(SlopeNewton::new(&self.table))));
             self.forget();
         }
-        let slope = self.inverse_mass.map_or(*qq, |inverse| inverse * qq);
+        let slope = self.inverse_mass.as_ref().map_or(*qq, |inverse| **inverse * qq);
         self.newton.as_mut().is_some_and(|newton| newton.factorise(&slope))
     }
 
@@ -120,7 +126,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
     pub fn accept(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, SVector<f64, N>)>) {
         self.rest = [Stages::ZERO; N];
         for (i, (force, q)) in stages.enumerate() {
-            let a = self.inverse_mass.map_or(force, |inverse| inverse * force);
+            let a = self.inverse_mass.as_ref().map_or(force, |inverse| **inverse * force);
             for d in 0..N {
                 // Beyond the last stage it is repeated.
                 self.rest[d].0[i..].fill(a[d] + self.left.kappa * q[d]);
@@ -180,12 +186,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         if let Some(newton) = &mut self.newton {
             newton.a = self.rest;
         }
+        // The tails of the matrices act on the guess, or on the values of a later sweep where the guess is poor.
+        let mut due = self.far && !solved && self.newton.is_none();
+        self.begin::<S>(!due);
+        self.far = false;
         let mut sweeps = Sweeps::default();
         let outcome = loop {
-            // Where Newton's method is needed the guess may be too far off for the tails of the matrices.
-            if sweeps.count() == 0 || self.newton.is_some() {
-                self.begin::<S>();
-            }
             for d in 0..N {
                 let base = &self.base[d];
                 self.left.head.b.apply(&self.rest[d], s, &mut self.x[d], |r| base.block::<S>(r));
@@ -214,6 +220,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
                 sweeps.still = moved <= 4.0 * f64::EPSILON * position;
             }
             match sweeps.judge(change, size) {
+                // Where Newton's method is needed the tails follow each of its corrections.
+                Progress::Going if self.newton.is_some() => self.begin::<S>(true),
+                Progress::Going if change > NEAR * size => (due, self.far) = (true, true),
+                Progress::Going if due => {
+                    due = false;
+                    self.begin::<S>(true);
+                }
                 Progress::Going => {}
                 done => break done,
             }
@@ -255,23 +268,25 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         }
     }
 
-    /// What the positions begin with. The tails of the matrices act on the accelerations so far: they are near enough for them, and
-    /// so the sweeps of a step have this in common.
+    /// What the sweeps of a step have in common, with or without the tails of the matrices; with the rests of the state, which
+    /// are not free of its direction.
     #[inline(always)]
-    fn begin<S: Simd>(&mut self) {
+    fn begin<S: Simd>(&mut self, with_tail: bool) {
         let (head, s) = (&self.left.head, self.table.s);
         for d in 0..N {
             let (q, v) = (Lanes::<S>::splat(self.q[d].value), Lanes::<S>::splat(self.v[d].value));
+            let (q_rest, v_rest) = (Lanes::<S>::splat(self.q[d].rest), Lanes::<S>::splat(self.v[d].rest));
             let base = &mut self.base[d];
+            let rests = |r| head.u.block::<S>(r).mul_add(v_rest, head.q.block::<S>(r) * q_rest);
             match &self.left.tail {
-                Some(tail) => {
-                    tail.b.apply::<S>(&self.rest[d], s, base, |r| tail.u.block(r).mul_add(v, tail.q.block(r) * q))
-                }
-                None => *base = Stages::ZERO,
+                Some(tail) if with_tail => tail.b.apply::<S>(&self.rest[d], s, base, |r| {
+                    tail.u.block(r).mul_add(v, tail.q.block(r).mul_add(q, rests(r)))
+                }),
+                _ => (0..blocks::<S>(s)).for_each(|r| base.set(r, rests(r))),
             }
             for r in 0..blocks::<S>(s) {
-                let rest = head.u.block::<S>(r).mul_add(v, base.block(r));
-                base.set(r, head.q.block::<S>(r).mul_add(q, rest));
+                let small = head.u.block::<S>(r).mul_add(v, base.block(r));
+                base.set(r, head.q.block::<S>(r).mul_add(q, small));
             }
         }
     }
@@ -285,9 +300,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             dz = table.grow * self.z.value + table.end_v.sum::<S>(&self.action::<S>(t), s);
         }
         for d in 0..N {
-            let v = self.v[d].value;
-            dq[d] = table.end_b.sum::<S>(&self.a[d], s) + table.end_u * v;
-            dv[d] = table.end_v.sum::<S>(&self.a[d], s) + table.grow * v;
+            let v = self.v[d];
+            dq[d] = table.end_b.sum::<S>(&self.a[d], s) + table.end_u.times(v);
+            dv[d] = table.end_v.sum::<S>(&self.a[d], s) + table.grow.times(v);
+        }
+        if branched() {
+            return Progress::Branched;
         }
         // The largest change over lanes may hide a NaN.
         if !finite(&dq, &dv, dz) {

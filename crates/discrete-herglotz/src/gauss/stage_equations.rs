@@ -2,6 +2,7 @@
 
 use super::coefficients::{Coefficients, MOST};
 use crate::solver::DenseLu;
+use crate::step_equations::BLOCK;
 use crate::{ITERATION_LIMIT, StepError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, seed};
@@ -125,7 +126,13 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         l.clear();
         l.extend((0..self.products.s).map(|i| {
             let y = VelocityPoint { q: self.position(given, x, i), v: x.v[i], z: x.z[i] };
-            self.lagrangian.along(T::from(self.t + self.products.c[i]), &seed(&Triple::from(y)).into())
+            let t = T::from(self.t + self.products.c[i]);
+            // The numbers of many directions would not fit on the stack.
+            if const { N > BLOCK } {
+                let (re, d) = self.lagrangian.with_gradient(t, &y);
+                return Dual { re, d };
+            }
+            self.lagrangian.along(t, &seed(&Triple::from(y)).into())
         }));
     }
 
@@ -193,7 +200,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         let (row_z, row_r) = (s * N, s * (N + 1));
         for k in 0..s {
             let y = VelocityPoint { q: self.position(given, x, k), v: x.v[k], z: x.z[k] };
-            let Hessian { qq, qv, vv, qz, vz, zz } = self.lagrangian.hessian(self.t + c[k], &y);
+            let Hessian { qq, qv, vv, qz, vz, zz } = &self.lagrangian.hessian(self.t + c[k], &y);
             let (rho, g) = (x.rho[k], &l[k].d);
             // What stage k adds to the equations of stage i, through its own velocity, action and factor.
             for i in 0..s {

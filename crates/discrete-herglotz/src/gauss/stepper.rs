@@ -13,6 +13,8 @@ use super::separable::Separable;
 use super::stage_equations::{Given, Products, StageEquations, Workspace};
 use super::sweeps::Progress;
 use super::table::Table;
+use crate::lanes::forget_branches;
+use crate::step_equations::is_identity;
 use crate::{Halt, InputError, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
@@ -31,13 +33,20 @@ pub enum GaussRoute {
     General,
 }
 
+/// The largest dimension whose linear motion is advanced by one matrix.
+const MOST_LINEAR: usize = 32;
+
 /// The state and the workspace of a route.
 #[allow(clippy::large_enum_variant)] // One is made for a run, in a box.
 enum Route<'a, L, const N: usize> {
-    Linear(Linear<N>, Condensed),
+    /// In a box of its own: its matrices are larger than all that others hold.
+    Linear(Box<Linear<N>>, Condensed),
     Condensed(Separable<'a, L, N>),
     General(General<'a, L, Physical, N>),
 }
+
+/// The misfit between the nodes from which a step does not resolve the motion: momenta are off by as much as they are.
+const UNRESOLVED: f64 = 1.0;
 
 /// How the stages of a step are solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,7 +67,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     lagrangian: &'a L,
     products: &'a Products,
     route: Box<Route<'a, L, N>>,
-    mass: Option<SMatrix<f64, N, N>>,
+    mass: Option<Box<SMatrix<f64, N, N>>>,
     arch: Arch,
     t0: f64,
     k: usize,
@@ -93,9 +102,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let (mut mass, mut of_sigma) = (None, 0.0);
         let route = if condensed {
             let table = Condensed::new(s, h, lagrangian.gradient(t0, &start).z)?;
+            let unit = is_identity(&w);
             mass = Some(w);
             of_sigma = resolution::of_sigma(1.0 + table.grow.head, table.gamma * h);
-            let linear = if structure.quadratic && structure.autonomous {
+            // Of many coordinates the matrix costs more than the sweeps that it spares, and more room than the stack has.
+            let linear = if structure.quadratic && structure.autonomous && const { N <= MOST_LINEAR } {
                 Linear::new(lagrangian, &table, &inverse, t0, &start, wants_z)
             } else {
                 None
@@ -104,7 +115,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
                 Some(linear) => Route::Linear(linear, table),
                 None => {
                     let left = table.preconditioned(0.0).ok_or(InputError::Step { h })?;
-                    let inverse = (w != SMatrix::<f64, N, N>::identity()).then_some(inverse);
+                    let inverse = (!unit).then_some(inverse);
                     Route::Condensed(Separable::new(lagrangian, table, left, inverse, &start, wants_z))
                 }
             }
@@ -161,7 +172,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let (s, h) = (self.products.s, self.products.h);
         let t = self.t0 + self.k.checked_sub(1)? as f64 * h;
         let condensed = |table: &Condensed, a, wants_z| {
-            let mass = self.mass.unwrap_or_else(SMatrix::identity);
+            let mass = self.mass.as_deref().copied().unwrap_or_else(SMatrix::identity);
             Solved::from_accelerations(self.lagrangian, table, &mass, t, &self.from, a, wants_z)
         };
         if !self.solved {
@@ -200,7 +211,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     /// With momenta for the velocities of the condensed routes.
     fn phase(&self, x: &Start<N>) -> PhasePoint<N> {
         let y = SVector::from(x.y);
-        PhasePoint { q: SVector::from(x.q), p: self.mass.map_or(y, |mass| mass * y), z: x.z }
+        PhasePoint { q: SVector::from(x.q), p: self.mass.as_ref().map_or(y, |mass| **mass * y), z: x.z }
     }
 
     /// Has the refused step tried again: by simplified Newton iteration, with the Jacobian at its start if that is not so
@@ -351,7 +362,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Stages<'_, '_, L, N> {
         match &**route {
             Route::Linear(..) => return None,
             Route::Condensed(run) => {
-                curve.of_accelerations::<S>(&run.table, self.run.mass.as_ref(), &from.y, &run.a);
+                curve.of_accelerations::<S>(&run.table, self.run.mass.as_deref(), &from.y, &run.a);
             }
             Route::General(run) => curve.of_solved(&run.solved()),
         }
@@ -371,6 +382,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let Advance { run, steps } = self;
+        forget_branches();
         let (t0, h) = (run.t0, run.products.h);
         if let Route::Linear(linear, _) = &mut *run.route {
             let (taken, from) = linear.advance(steps);
@@ -425,12 +437,16 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
                 tried = Tried::default();
             }
             let Some(refused) = refused else { continue };
-            let of_sigma = matches!(refused, StepError::SigmaVanished { .. } | StepError::StageFactor { .. });
-            if !of_sigma && self.try_again(&mut tried, refused).is_ok() {
+            // What branches on the value of lanes would do so however the stages are found.
+            let final_cause = matches!(
+                refused,
+                StepError::SigmaVanished { .. } | StepError::StageFactor { .. } | StepError::Branched
+            );
+            if !final_cause && self.try_again(&mut tried, refused).is_ok() {
                 continue;
             }
             // The first reason: that of the last resort tells less, unless it is the integrating factor.
-            let cause = if of_sigma { refused } else { tried.refused.unwrap_or(refused) };
+            let cause = if final_cause { refused } else { tried.refused.unwrap_or(refused) };
             return Err(Halt { taken: done, cause });
         }
         Ok(())
@@ -461,10 +477,19 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
         }
     }
 
+    /// What was seen along the steps; else what a look at the last step alone shows, between its nodes: a run that wants more asks
+    /// more often.
     fn suspicion(&self) -> Option<Suspicion> {
         if self.of_sigma > 1.0 && self.k > 0 {
             return Some(Suspicion { step: 0, misfit: self.of_sigma });
         }
-        self.suspicion
+        self.suspicion.or_else(|| {
+            let Look { misfit, .. } = self.look(1)?;
+            // Not `misfit > ..`: that would let a NaN pass.
+            if misfit <= UNRESOLVED { None } else { Some(Suspicion { step: self.k - 1, misfit: misfit / UNRESOLVED }) }
+        })
     }
 }
+
+#[cfg(test)]
+mod tests;

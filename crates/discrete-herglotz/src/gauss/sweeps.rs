@@ -15,6 +15,8 @@ pub(super) enum Progress {
     NonFinite,
     /// The integrating factor of a stage is not positive.
     StageFactor { rho: f64 },
+    /// The Lagrangian branches on a value of its own, other than lane by lane.
+    Branched,
     /// The step is not conformally contact.
     SigmaVanished { sigma: f64 },
 }
@@ -25,6 +27,7 @@ impl From<Progress> for StepError {
             Progress::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
             Progress::StageFactor { rho } => StepError::StageFactor { rho },
             Progress::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
+            Progress::Branched => StepError::Branched,
             _ => StepError::NonFinite,
         }
     }
@@ -40,11 +43,15 @@ pub(super) const SLOW: u32 = 18;
 /// steps.
 pub(super) const AGE: u32 = 16;
 
+/// The part of round-off that an iteration may leave. What it leaves has the same direction in every step, and so it adds up
+/// like the number of steps, where round-off adds up like its root.
+const LEFT: f64 = 1.0 / 32.0;
+
 /// The changes of the sweeps of one step.
 ///
-/// The iteration ends when the next change, predicted from the last two, is below the round-off of the terms, or when changes
-/// near round-off, or that move nothing, no longer fall. It is given up when larger changes have not fallen three times, or at the limit: so it
-/// neither stalls nor loops.
+/// The iteration ends when the next change, predicted from the last two, is a small part of the round-off of the terms, or when
+/// changes near round-off, or that move nothing, no longer fall. It is given up when larger changes have not fallen three times, or
+/// at the limit: so it neither stalls nor loops.
 #[derive(Default)]
 pub(super) struct Sweeps {
     count: u32,
@@ -55,6 +62,8 @@ pub(super) struct Sweeps {
     /// Whether the last sweep has not moved the positions but for their round-off: where forces are stiff that alone changes
     /// the accelerations by more than theirs.
     pub still: bool,
+    /// Whether this sweep is the last: its change is round-off.
+    last: bool,
 }
 
 impl Sweeps {
@@ -75,7 +84,7 @@ impl Sweeps {
             self.first = change / size;
         }
         let round_off = 0.5 * f64::EPSILON * size;
-        if change <= round_off {
+        if change <= round_off || self.last && change <= 256.0 * round_off {
             return Progress::Done;
         }
         if !(change.is_finite() && size.is_finite()) {
@@ -85,9 +94,11 @@ impl Sweeps {
             // The slower of the last two contractions: the first is often that of components which die out at once.
             let ratio = change / self.before;
             let expected = if self.count > 2 { f64::max(ratio, self.ratio) } else { f64::max(ratio, 0.1) };
-            if change * expected <= round_off {
+            let next = change * expected;
+            if next <= LEFT * round_off {
                 return Progress::Done;
             }
+            self.last = next * expected <= LEFT * round_off;
             if ratio >= 1.0 {
                 if change <= 256.0 * round_off || self.still {
                     return Progress::Done;

@@ -1,7 +1,7 @@
 //! The integrator and the number of steps for a wanted error.
 
 use super::pilot::{BUDGET, Ending, Pilots, Track};
-use super::{Integrator, Scene};
+use super::{Integrator, MOST_STEPS, Scene};
 use crate::{InputError, Obstacle};
 use contact_geom::{Lagrangian, Structure};
 
@@ -105,6 +105,9 @@ fn converge<L: Lagrangian<N>, const N: usize>(
     let mut known: Vec<(usize, Track<N>)> = Vec::new();
     let mut cause = Obstacle::Unresolved { t: t0 };
     'search: for _ in 0..ATTEMPTS {
+        if 3.0 * k as f64 > MOST_STEPS {
+            break;
+        }
         // Ten common times, where there are as many steps.
         let marks = k.min(10);
         k = k.div_ceil(marks) * marks;
@@ -236,6 +239,9 @@ fn by_reference<L: Lagrangian<N>, const N: usize>(
     // The fewest steps that were seen to be enough.
     let mut enough: Option<Choice> = None;
     for _ in 0..ATTEMPTS {
+        if count as f64 > MOST_STEPS {
+            break;
+        }
         let factor = match pilots.own(integrator, count, marks)? {
             Ending::Followed(track) => {
                 let error = track.distance(&found.truth);

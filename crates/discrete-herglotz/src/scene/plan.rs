@@ -162,11 +162,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         &self.items
     }
 
-    /// A stepper at the start, for those who drive it themselves.
+    /// A stepper at the start, for those who drive it themselves. A splitting's does not watch whether its steps resolve the motion:
+    /// that costs up to a third of its time, and is for runs whose steps were not found by pilot runs.
     ///
     /// # Errors
     /// Those of the method's start.
     pub fn stepper(&self) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
+        self.make_stepper(false)
+    }
+
+    fn make_stepper(&self, watched: bool) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
         let (t0, start, action) = (self.t0, self.start, self.wanted.action || !self.z_decouples);
         Ok(match (&self.engine, &self.integrator) {
             (Engine::Discrete(ld), _) => Box::new(Flow::with_guess(ld, t0, start, self.guess)?),
@@ -177,6 +182,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             }
             (Engine::Explicit, Integrator::Splitting(scheme)) => {
                 let splitting = Splitting::new(self.lagrangian, scheme, self.h, t0, start)?;
+                let splitting = if watched { splitting.watched() } else { splitting };
                 if action { Box::new(splitting) } else { Box::new(splitting.without_action()) }
             }
             (Engine::Explicit, Integrator::Composition(method, scheme)) => {
@@ -193,7 +199,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
     /// # Errors
     /// Those of [`stepper`](Self::stepper). Bad luck in mid-run is the outcome's status.
     pub fn run(&self) -> Result<Outcome<N>, InputError> {
-        let mut stepper = self.stepper()?;
+        let mut stepper = self.make_stepper(self.error.is_none())?;
         let Wanted { conformal_factor, rows: stride, .. } = &self.wanted;
         // The logarithm of the product of the sigma_d; in single steps only where they differ.
         let (mut log_factor, single) = (0.0, *conformal_factor && !self.constant_rate);
@@ -206,7 +212,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             }
             rows.push(self.row(&*stepper));
         }
-        let (mut taken, mut status) = (0, Status::Completed);
+        let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
         while taken < self.count {
             let next_row = stride.map_or(self.count, |stride| (taken / stride + 1) * stride);
             let chunk = if single { 1 } else { next_row.min(next_probe(taken)).min(self.count) - taken };
@@ -226,6 +232,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 rows.push(self.row(&*stepper));
             }
             if taken == self.count || taken == next_probe(taken - 1) {
+                suspicion = suspicion.or_else(|| stepper.suspicion());
                 if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
                     status = Status::FalseClaim { step: taken, claim, size };
                     break;
@@ -238,7 +245,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         let end = self.row(&*stepper);
         Ok(Outcome {
             status,
-            suspicion: stepper.suspicion(),
+            suspicion: suspicion.or_else(|| stepper.suspicion()),
             steps: taken,
             t: end.t,
             q: end.q,

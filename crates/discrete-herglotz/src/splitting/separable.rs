@@ -1,20 +1,21 @@
 //! Lagrangians `v.Mv/2 - V(t, q) + f(z)`, as splittings read them.
 
+use crate::step_equations::{inverted, is_identity, kept_mass_matrix};
 use crate::verified::PROBE;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Defect, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint, linear};
+use contact_geom::{Defect, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
 /// What is left of a false claim's derivative by the rounding of a true one, with some margin.
 pub(super) const FALSE_CLAIM: f64 = 1e-9;
 
 /// A separable Lagrangian with its mass matrix, read once.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Separable<L, const N: usize> {
     pub(crate) lagrangian: L,
-    mass: SMatrix<f64, N, N>,
+    mass: Box<SMatrix<f64, N, N>>,
     /// `None` for the identity: a product with it would cost a third of a step of the oscillator.
-    inverse: Option<SMatrix<f64, N, N>>,
+    inverse: Option<Box<SMatrix<f64, N, N>>>,
 }
 
 impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
@@ -39,8 +40,12 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
             }
         }
         let rest = VelocityPoint { q: state.q, v: SVector::zeros(), z: state.z };
-        let mass = lagrangian.hessian(t, &rest).vv;
-        let inverse = if mass == SMatrix::<f64, N, N>::identity() { None } else { Some(inverted(&mass)?) };
+        let mass = kept_mass_matrix(&lagrangian, t, &rest);
+        let inverse = if is_identity(&mass) {
+            None
+        } else {
+            Some(inverted(&mass).map_err(|e| e.of("the mass matrix L_vv", "take a regular Lagrangian"))?)
+        };
         Ok(Separable { lagrangian, mass, inverse })
     }
 
@@ -99,7 +104,7 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
     pub(crate) fn velocity(&self, p: &SVector<f64, N>) -> SVector<f64, N> {
         match &self.inverse {
             None => *p,
-            Some(inverse) => inverse * p,
+            Some(inverse) => **inverse * p,
         }
     }
 }
@@ -110,16 +115,6 @@ fn probes<const N: usize>(state: &PhasePoint<N>) -> [VelocityPoint<N>; 2] {
     let beside =
         SVector::from_fn(|i, _| state.q[i] * (1.0 + 0.01 * without_symmetry(i)) + 1e-3 * without_symmetry(N + i));
     [VelocityPoint { q: state.q, v, z: state.z }, VelocityPoint { q: beside, v, z: state.z + without_symmetry(2 * N) }]
-}
-
-/// `M^-1`, column by column.
-fn inverted<const N: usize>(mass: &SMatrix<f64, N, N>) -> Result<SMatrix<f64, N, N>, InputError> {
-    let mut inverse = SMatrix::<f64, N, N>::identity();
-    for mut column in inverse.column_iter_mut() {
-        linear::solve(&mut mass.clone_owned(), &mut column)
-            .map_err(|e| e.of("the mass matrix L_vv", "take a regular Lagrangian"))?;
-    }
-    Ok(inverse)
 }
 
 /// Numbers between 0.3 and 1.3 without special relation.

@@ -4,7 +4,7 @@ use contact_examples::{Axis, Checks, Curve, Directory, Failure, Line, Panel, Sub
 use contact_geom::systems::{CoupledInZ, System, SystemVisitor, visit_catalogue};
 use contact_geom::{VelocityPoint, legendre};
 use discrete_herglotz::Method;
-use exact_lagrangian::{ErrorOrders, ExactError, MeasuredOrder, error_orders};
+use exact_lagrangian::{ErrorOrders, ExactError, MeasuredOrder, Order, error_orders};
 
 /// The band around the documented order.
 const BAND: f64 = 0.15;
@@ -38,7 +38,11 @@ struct Walk<'a> {
 
 /// How far a measured order is from the documented one. A method may be exact, as the Strang splitting is for a free particle.
 fn off(measured: &MeasuredOrder, documented: u32) -> f64 {
-    if measured.order == f64::INFINITY { 0.0 } else { (measured.order - f64::from(documented)).abs() }
+    match measured.order {
+        Order::Measured(order) => (order - f64::from(documented)).abs(),
+        Order::Exact => 0.0,
+        Order::Unclear => f64::INFINITY,
+    }
 }
 
 /// The orders at a point without symmetry; where a leading error all but vanishes there, which hides the order, at another.
@@ -92,7 +96,7 @@ pub fn write(out: &Directory, checks: &mut Checks) -> Result<String, Failure> {
         &columns,
         rows.iter().map(|row| {
             let smallest = row.measured.fitted.last().map_or(f64::NAN, |(h, _)| *h);
-            let (measured, count) = (format!("{:.3}", row.measured.order), row.measured.fitted.len());
+            let (measured, count) = (row.measured.order.to_string(), row.measured.fitted.len());
             let names = [row.system, row.method, row.quantity].map(String::from);
             let numbers = [row.documented.to_string(), measured, format!("{smallest:.3e}"), count.to_string()];
             names.into_iter().chain(numbers)
@@ -110,7 +114,11 @@ pub fn write(out: &Directory, checks: &mut Checks) -> Result<String, Failure> {
     for method in methods {
         text += &format!("  {method:<16}");
         for quantity in ["value", "legendre_minus", "legendre_plus", "flow"] {
-            let of = || rows.iter().filter(|r| r.method == method && r.quantity == quantity).map(|r| r.measured.order);
+            let slope = |row: &Row| match row.measured.order {
+                Order::Measured(order) => Some(order),
+                Order::Exact | Order::Unclear => None,
+            };
+            let of = || rows.iter().filter(|r| r.method == method && r.quantity == quantity).filter_map(slope);
             let (low, high) = (of().fold(f64::INFINITY, f64::min), of().fold(0.0, f64::max));
             text += &format!("{:>16}", format!("{low:.2} .. {high:.2}"));
         }

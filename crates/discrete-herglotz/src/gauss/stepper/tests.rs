@@ -1,0 +1,118 @@
+//! Lagrangians that choose by a value, in every instruction set that this processor has.
+
+use super::*;
+use crate::{DiscreteLagrangian, Solver, Transition};
+use contact_geom::Scalar;
+
+/// How a spring that pulls where `q > 0`, and only there, says so.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum How {
+    /// `max(0, q)^2`.
+    Max,
+    /// Two values, one of them chosen.
+    Select,
+    /// `(q + |q|)^2 / 4`.
+    Abs,
+    /// By `if` on the value of q.
+    Branch,
+}
+
+/// `v^2/2 - 2 max(0, q)^2 - 0.3 q - 0.1 z`: a mass that falls onto a spring. The force has a kink, no jump.
+#[derive(Clone, Copy, Debug)]
+struct OneSided {
+    how: How,
+    claims: Structure,
+}
+
+impl Lagrangian<1> for OneSided {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        let (q, zero) = (q[0], T::zero());
+        let square = match self.how {
+            How::Max => q.max(zero).powi(2),
+            How::Select => zero.if_less(q, q * q, zero),
+            How::Abs => (q + q.abs()).powi(2) * 0.25,
+            How::Branch => {
+                if q.re() > 0.0 {
+                    q * q
+                } else {
+                    zero
+                }
+            }
+        };
+        v[0] * v[0] * 0.5 - square * 2.0 + q * 0.3 - z * 0.1
+    }
+    fn structure(&self) -> Structure {
+        self.claims
+    }
+}
+
+/// By accelerations, and by velocities with W at the stages.
+fn routes() -> [(GaussRoute, Structure); 2] {
+    let condensed = Structure { autonomous: true, separable: true, z_affine: true, ..Structure::default() };
+    [(GaussRoute::Condensed, condensed), (GaussRoute::General, Structure::default())]
+}
+
+fn instruction_sets() -> Vec<Arch> {
+    let mut sets = vec![Arch::Scalar];
+    #[cfg(target_arch = "x86_64")]
+    {
+        sets.extend(pulp::x86::V3::try_new().map(Arch::V3));
+        sets.extend(pulp::x86::V4::try_new().map(Arch::V4));
+    }
+    sets
+}
+
+/// Follows steps from below the spring, each compared with the step that plain numbers give. Returns how many had the spring's
+/// end among their stages, and how many were solved in plain numbers.
+fn follow(gauss: &Gauss<OneSided>, set: Arch, route: GaussRoute) -> (usize, u64) {
+    let start = PhasePoint::new([-0.4], [0.0], 0.0);
+    let mut run = gauss.stepper(0.0, start, SVector::zeros()).unwrap();
+    assert_eq!(run.route(), route);
+    run.arch = set;
+    let mut across = 0;
+    for _ in 0..100 {
+        let (t, from) = (run.time(), run.state());
+        run.advance(1).unwrap();
+        let Transition { end, .. } = gauss.forward(t, &from, &from.p, &mut Solver::default()).unwrap();
+        let found = run.state();
+        // Some rounding of positions, momenta and actions, all below 2.
+        for (a, b) in [(found.q[0], end.q[0]), (found.p[0], end.p[0]), (found.z, end.z)] {
+            assert!((a - b).abs() <= 32.0 * f64::EPSILON, "{set:?}, {gauss:?} at t = {t}: {a} and {b}");
+        }
+        across += usize::from(from.q[0] * found.q[0] < 0.0);
+    }
+    (across, run.newton_steps())
+}
+
+#[test]
+fn what_is_chosen_lane_by_lane_is_what_numbers_choose() {
+    for ((route, claims), how) in routes().into_iter().flat_map(|r| [How::Max, How::Select, How::Abs].map(|h| (r, h))) {
+        for stages in [2, 5, 8] {
+            let gauss = Gauss::new(OneSided { how, claims }, stages, 0.2).unwrap();
+            for set in instruction_sets() {
+                let (across, by_newton) = follow(&gauss, set, route);
+                assert!(across >= 4, "{across} steps go across the kink");
+                assert_eq!(by_newton, 0, "{how:?} {route:?} {set:?}");
+            }
+        }
+    }
+}
+
+/// A step that would branch on the value of lanes is refused, and says why; with a single lane there is a value.
+#[test]
+fn lanes_have_no_value_to_branch_on() {
+    for (route, claims) in routes() {
+        let gauss = Gauss::new(OneSided { how: How::Branch, claims }, 8, 0.2).unwrap();
+        for set in instruction_sets() {
+            if matches!(set, Arch::Scalar) {
+                assert!(follow(&gauss, set, route).0 >= 4);
+                continue;
+            }
+            let mut run = gauss.stepper(0.0, PhasePoint::new([-0.4], [0.0], 0.0), SVector::zeros()).unwrap();
+            run.arch = set;
+            assert_eq!(run.advance(3), Err(Halt { taken: 0, cause: StepError::Branched }), "{set:?}");
+        }
+    }
+    assert!(StepError::Branched.to_string().contains("if_less"));
+}

@@ -1,0 +1,187 @@
+//! What is narrow, what is not smooth, what comes to rest, and what is hardly a number.
+
+use super::*;
+use contact_geom::systems::Duffing;
+
+/// A free particle that meets something.
+#[derive(Clone, Copy)]
+enum Thing {
+    /// A hill in its way.
+    Hill,
+    /// The same of compact support.
+    Bump,
+    /// A pulse of force in time.
+    Kick,
+    /// A pulse of drag in time.
+    Drag,
+    /// A step of the potential.
+    Step,
+    /// The potential `c |q|`.
+    Kink,
+    /// The potential `c |q|^3`.
+    Cusp,
+}
+
+/// A thing of a height and a width at a place, or time.
+struct Meeting {
+    thing: Thing,
+    c: f64,
+    at: f64,
+    w: f64,
+}
+
+impl Lagrangian<1> for Meeting {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        let (kinetic, q) = (v[0] * v[0] * 0.5, q[0]);
+        let square = |x: T| ((x - self.at) / self.w).powi(2);
+        let modulus = (q * q).sqrt();
+        kinetic
+            + match self.thing {
+                Thing::Hill => (-square(q)).exp() * -self.c,
+                Thing::Bump if square(q).re() >= 1.0 => T::zero(),
+                Thing::Bump => (-(-square(q) + 1.0).recip()).exp() * -self.c,
+                Thing::Kick => q * (-square(t)).exp() * self.c,
+                Thing::Drag => z * (-square(t)).exp() * -self.c,
+                Thing::Step => (((q - self.at) / self.w).tanh() + 1.0) * (-0.5 * self.c),
+                Thing::Kink => modulus * -self.c,
+                Thing::Cusp => modulus * q * q * -self.c,
+            }
+    }
+}
+
+fn motion(system: &impl Lagrangian<1>, [q, v, z]: [f64; 3], duration: f64) -> Result<Motion<1>, ExactError<1>> {
+    herglotz_flow(system, 0.0, &VelocityPoint::new([q], [v], z), duration)
+}
+
+/// Places that no grid has.
+fn place(k: u32) -> f64 {
+    1.0 + 8.0 * (f64::from(k) * std::f64::consts::SQRT_2).fract()
+}
+
+/// Forces and drags of widths down to a thousandth of the span, at a hundred places each: all are met but at most one, and none is
+/// refused. From a hill higher than its energy the particle comes back with the speed it had.
+#[test]
+fn what_is_narrow_is_met() {
+    let root_pi = std::f64::consts::PI.sqrt();
+    for w in [0.1, 0.03, 0.01] {
+        for thing in [Thing::Hill, Thing::Bump, Thing::Kick, Thing::Drag] {
+            let (mut missed, mut worst) = (0, 0.0);
+            for k in 0..100 {
+                let v = 1.0 + 0.01 * f64::from(k);
+                // Over ten units of position or of time.
+                let (c, end, duration) = match thing {
+                    Thing::Hill | Thing::Bump => (40.0, -v, 10.0 / v),
+                    Thing::Kick => (1.0, v + w * root_pi, 10.0),
+                    _ => (1.0, v * (-w * root_pi).exp(), 10.0),
+                };
+                let system = Meeting { thing, c, at: place(k), w };
+                let found = motion(&system, [0.0, v, 0.3], duration).unwrap().end.v[0];
+                if (found - v).abs() < 1e-12 { missed += 1 } else { worst = larger(worst, (found - end).abs()) }
+            }
+            // A velocity turned round in a part w of the span is known to the rounding of the positions there: c / w of it.
+            assert!(missed <= 1 && worst < 64.0 * f64::EPSILON * 9.0 * 40.0 / w, "w = {w}: {missed} missed, {worst:e}");
+        }
+    }
+}
+
+/// A known limit: what is a hundred thousandth of the span lies between two places that are looked at.
+#[test]
+fn what_is_too_narrow_is_not_met() {
+    let system = Meeting { thing: Thing::Hill, c: 40.0, at: 5.0 + 1e-3, w: 1e-5 };
+    assert_eq!(motion(&system, [0.0, 1.0, 0.0], 10.0).unwrap().end.v[0], 1.0);
+}
+
+/// Jumps of a force are passed at round-off: falls under `|q|` are parabolas of period `4 sqrt 2`.
+#[test]
+fn kinks_are_found() {
+    let system = Meeting { thing: Thing::Kink, c: 1.0, at: 0.0, w: 1.0 };
+    for periods in [0.25, 0.5, 1.0, 10.0] {
+        let found = motion(&system, [1.0, 0.0, 0.0], periods * 32f64.sqrt());
+        let [q, v] = match periods {
+            0.25 => [0.0, -2f64.sqrt()],
+            0.5 => [-1.0, 0.0],
+            _ => [1.0, 0.0],
+        };
+        // A dozen roundings in each half of a period, of a time that grows.
+        let found = found.unwrap();
+        let apart = larger((found.end.q[0] - q).abs(), (found.end.v[0] - v).abs());
+        assert!(apart < 128.0 * f64::EPSILON * (1.0 + periods), "{periods}: {apart:e}");
+        assert!(found.evaluations < 6000 + 6000 * periods as u64, "{periods}: {}", found.evaluations);
+    }
+    let system = Meeting { thing: Thing::Cusp, ..system };
+    let found = motion(&system, [1.0, 0.0, 0.0], 10.0).unwrap().end;
+    let energy = 0.5 * found.v[0].powi(2) + found.q[0].abs().powi(3);
+    assert!((energy - 1.0).abs() < 64.0 * f64::EPSILON, "{energy}");
+}
+
+/// A step that a rounded position does not resolve is refused, with the time; a wider one is climbed.
+#[test]
+fn a_step_within_rounding_is_refused() {
+    let step = |w: f64, c: f64| motion(&Meeting { thing: Thing::Step, c, at: 5.0, w }, [0.0, 1.0, 0.0], 10.0);
+    for c in [0.3, 3.0] {
+        match step(1e-12, c) {
+            Err(ExactError::OutsideDomain { t, .. } | ExactError::Unfinished { t, .. }) => {
+                assert!((t - 5.0).abs() < 1e-9, "{t}")
+            }
+            other => unreachable!("{other:?}"),
+        }
+    }
+    // Its acceleration is known to the rounding of the position in units of its width.
+    let climbed = step(1e-4, 0.3).unwrap().end.v[0];
+    assert!((climbed - 0.4f64.sqrt()).abs() < 5.0 * f64::EPSILON / 1e-4, "{climbed}");
+}
+
+/// `v^2/2 - q^2/2 - z^2/2 + 1`, which comes to rest at `z = sqrt 2`.
+struct Settling;
+impl Lagrangian<1> for Settling {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        (v[0] * v[0] - q[0] * q[0] - z * z) * 0.5 + 1.0
+    }
+}
+
+/// A motion that comes to rest away from the origin ends, with a number of evaluations that grows with the time alone.
+#[test]
+fn a_motion_comes_to_rest() {
+    for time in [15.8, 80.0, 300.0, 1000.0] {
+        let found = motion(&Settling, [0.5, 0.5, -0.2], time).unwrap();
+        // The slow decay of the action, by e^(-sqrt 2 t), and of the oscillation.
+        let left = (-0.7 * time).exp() + 4.0 * f64::EPSILON;
+        assert!((found.end.z - 2f64.sqrt()).abs() < left && found.end.q[0].abs() < left, "{time}: {:?}", found.end);
+        assert!(found.evaluations < 3000 + 500 * time as u64, "{time}: {}", found.evaluations);
+    }
+    let duffing = Duffing::default();
+    for time in [100.0, 1000.0] {
+        let found = motion(&duffing, [1.5, 0.0, 0.0], time).unwrap();
+        assert!((found.end.q[0].abs() - 1.0).abs() < 1e-5 && found.evaluations < 200_000, "{time}: {found:?}");
+    }
+}
+
+/// `v^2/2 - q^2/2`.
+struct Spring;
+impl Lagrangian<1> for Spring {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        (v[0] * v[0] - q[0] * q[0]) * 0.5
+    }
+}
+
+/// From normal numbers into those below, relative to the smallest normal one there; and beyond the largest.
+#[test]
+fn hardly_numbers() {
+    for size in [1e-150, 1e-160, 1e-290, 1e-305, 1e-310, 5e-324] {
+        let found = motion(&Spring, [size, 0.0, 0.0], 10.0).unwrap();
+        let apart = (found.end.q[0] - size * 10f64.cos()).abs();
+        // Changes below the smallest normal number are none; over ten units of time that may be some of it.
+        assert!(apart <= 1e-13 * size + 100.0 * f64::MIN_POSITIVE, "{size:e}: {apart:e}");
+        assert!(found.evaluations < 2000);
+    }
+    let found = motion(&Spring, [1e150, 0.0, 0.0], 10.0).unwrap();
+    assert!((found.end.q[0] / 1e150 - 10f64.cos()).abs() < 1e-13);
+    assert!(motion(&Spring, [1e200, 0.0, 0.0], 10.0).is_err());
+}
+
+/// However long the time, the work is bounded.
+#[test]
+fn the_work_is_bounded() {
+    let found = motion(&Spring, [1.0, 0.0, 0.0], 1e9);
+    assert!(matches!(found, Err(ExactError::Unfinished { t, .. }) if t > 1e3), "{found:?}");
+}

@@ -1,0 +1,105 @@
+//! The library under stress: what no tame motion shows.
+//!
+//! ```text
+//! cargo run --release --bin stress [-- --case NAME|all --quick --out DIR]
+//! ```
+//!
+//! Ten cases attack the numerics where they are weakest: the growth of round-off, runs of 1e9 steps, strong damping, tiny and huge
+//! numbers, singularities, things hidden between steps, chaos, conformality, solvers with poor starts, and whether an accuracy that
+//! is asked for is kept. Each figure has a bound. No result may be wrong in silence: a run that is marked, halted or refused is
+//! no failure, one that is completed and wrong is.
+//!
+//! Writes a table of each case, diagrams of those with a shape, `verdicts.csv` and `stability_tables.md`. The same bytes in every
+//! run: times are printed, not written. Ends with 1 if a figure is above its bound, with 2 if a name is unknown or the output
+//! cannot be written.
+
+mod accuracy;
+mod chaos;
+mod conformal;
+mod damping;
+mod formula;
+mod hidden;
+mod long_runs;
+mod motion;
+mod near_singular;
+mod parallel;
+mod probe;
+mod random;
+mod report;
+mod round_off;
+mod scales;
+mod solvers;
+mod statistics;
+
+use clap::Parser;
+use contact_examples::{Directory, Failure, finish, print};
+use indicatif::{ProgressBar, ProgressStyle};
+use report::Report;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Attacks the numerics of the library where they are weakest.
+#[derive(Parser)]
+struct Arguments {
+    /// The cases, separated by commas.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "all")]
+    case: Vec<String>,
+    /// Short forms of all cases, for a minute instead of half an hour.
+    #[arg(long)]
+    quick: bool,
+    /// The directory for tables and figures; created where it does not exist.
+    #[arg(long, value_name = "DIR", default_value = "out/stress")]
+    out: PathBuf,
+    /// Makes one call that may never end, for the case that watches it from outside.
+    #[arg(long, value_name = "CALL", hide = true)]
+    probe: Option<String>,
+}
+
+/// A case: its name, what it is about, and what it does.
+type Case = (&'static str, &'static str, fn(&mut Report) -> Result<(), Failure>);
+
+const CASES: [Case; 10] = [
+    ("round_off", "how the round-off of what is conserved grows", round_off::run),
+    ("long_runs", "a thousand million steps, and decay to zero", long_runs::run),
+    ("damping", "damping, stiffness and unequal masses", damping::run),
+    ("scales", "tiny and huge steps, states and times", scales::run),
+    ("near_singular", "beside what is singular", near_singular::run),
+    ("hidden", "what is hidden between the steps", hidden::run),
+    ("chaos", "forward and back, and the same bits", chaos::run),
+    ("conformal", "conformality for ever", conformal::run),
+    ("solvers", "solvers where they have it hard", solvers::run),
+    ("accuracy", "whether an accuracy that is asked for is kept", accuracy::run),
+];
+
+fn main() -> ExitCode {
+    finish(run(&Arguments::parse()))
+}
+
+fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(name) = &arguments.probe {
+        return print(&probe::answer(name).unwrap_or_else(|| "no such call".into()));
+    }
+    let names = CASES.map(|(name, ..)| name);
+    let unknown = |name: &&String| name.as_str() != "all" && !names.contains(&name.as_str());
+    if let Some(name) = arguments.case.iter().find(unknown) {
+        return Err(Failure::Unknown { what: "case", name: name.clone(), known: names.join(", ") });
+    }
+    let out = Directory::create(&arguments.out)?;
+    let style = ProgressStyle::with_template("{msg:>14} {bar:30} {pos}/{len}");
+    let bar = ProgressBar::new(1).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    // A panic that a case provokes is a finding of it; one line is enough.
+    let above = bar.clone();
+    std::panic::set_hook(Box::new(move |panic| above.suspend(|| eprintln!("note: {panic}"))));
+    let mut report = Report::new(out, arguments.quick, bar);
+    for (name, title, case) in CASES {
+        if arguments.case.iter().any(|wanted| wanted == "all" || wanted == name) {
+            let clock = Instant::now();
+            report.begin(name, title)?;
+            case(&mut report)?;
+            report.say(&format!("  {:.1} s\n", clock.elapsed().as_secs_f64()))?;
+        }
+    }
+    report.bar.finish_and_clear();
+    report.finish()
+}

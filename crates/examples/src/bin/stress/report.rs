@@ -1,0 +1,131 @@
+//! What the cases find: figures with their bounds, tables, diagrams.
+
+use contact_examples::{Directory, Failure, number, print};
+use indicatif::ProgressBar;
+
+/// A figure that must not be above a bound.
+struct Finding {
+    case: &'static str,
+    what: String,
+    figure: f64,
+    bound: f64,
+    /// Whether it is a ratio of times, which no two runs share: judged, and not written.
+    timed: bool,
+}
+
+impl Finding {
+    /// A NaN does not pass.
+    fn passes(&self) -> bool {
+        self.figure <= self.bound
+    }
+}
+
+/// All findings of a run, and where they are written.
+pub struct Report {
+    out: Directory,
+    /// Whether the cases are to be short.
+    pub quick: bool,
+    /// How far the case at work is.
+    pub bar: ProgressBar,
+    case: &'static str,
+    findings: Vec<Finding>,
+    markdown: String,
+}
+
+/// A number as it is printed: short, and whole where it is a count.
+pub fn short(x: f64) -> String {
+    // Without the sign of a zero.
+    if x == x.round() && x.abs() < 1e6 { format!("{:.0}", x + 0.0) } else { format!("{x:.2e}") }
+}
+
+impl Report {
+    pub fn new(out: Directory, quick: bool, bar: ProgressBar) -> Self {
+        Report { out, quick, bar, case: "", findings: Vec::new(), markdown: String::new() }
+    }
+
+    /// Begins a case.
+    pub fn begin(&mut self, case: &'static str, title: &str) -> Result<(), Failure> {
+        self.case = case;
+        self.bar.set_message(case);
+        self.markdown += &format!("\n### {case}: {title}\n");
+        self.say(&format!("\n{case}: {title}\n"))
+    }
+
+    /// Prints, above the bar.
+    pub fn say(&self, text: &str) -> Result<(), Failure> {
+        self.bar.suspend(|| print(text))
+    }
+
+    /// A figure with its bound.
+    pub fn at_most(&mut self, what: &str, figure: f64, bound: f64) -> Result<(), Failure> {
+        self.find(Finding { case: self.case, what: what.into(), figure, bound, timed: false })
+    }
+
+    /// A ratio of times with its bound.
+    pub fn at_most_timed(&mut self, what: &str, figure: f64, bound: f64) -> Result<(), Failure> {
+        self.find(Finding { case: self.case, what: what.into(), figure, bound, timed: true })
+    }
+
+    fn find(&mut self, finding: Finding) -> Result<(), Failure> {
+        let Finding { what, figure, bound, .. } = &finding;
+        let verdict = if finding.passes() { "pass" } else { "FAIL" };
+        self.say(&format!("  {verdict}  {:>9} <= {:<9} {what}\n", short(*figure), short(*bound)))?;
+        self.findings.push(finding);
+        Ok(())
+    }
+
+    /// A CSV file of the case.
+    pub fn table(&self, columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Result<(), Failure> {
+        self.out.table(&format!("{}.csv", self.case), columns, rows)
+    }
+
+    /// A figure of the case.
+    pub fn figure(&self, svg: &str) -> Result<(), Failure> {
+        self.out.text(&format!("{}.svg", self.case), svg)
+    }
+
+    /// A figure of times, which no two runs share.
+    pub fn timed_figure(&self, svg: &str) -> Result<(), Failure> {
+        self.out.text(&format!("{}_times.svg", self.case), svg)
+    }
+
+    /// A table for the page of figures.
+    pub fn markdown(&mut self, columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) {
+        self.markdown += &format!("\n| {} |\n|{}\n", columns.join(" | "), "---|".repeat(columns.len()));
+        for row in rows {
+            self.markdown += &format!("| {} |\n", row.join(" | "));
+        }
+    }
+
+    /// Writes what all cases share; fails where a figure is above its bound.
+    pub fn finish(self) -> Result<(), Failure> {
+        let verdict = |finding: &Finding| if finding.passes() { "pass" } else { "fail" };
+        self.out.table(
+            "verdicts.csv",
+            &["case", "what", "figure", "bound", "verdict"],
+            self.findings.iter().map(|f| {
+                vec![
+                    f.case.into(),
+                    f.what.clone(),
+                    if f.timed { String::new() } else { number(f.figure) },
+                    number(f.bound),
+                    verdict(f).into(),
+                ]
+            }),
+        )?;
+        let mut text = String::from("| case | what | figure | bound | verdict |\n|---|---|---|---|---|\n");
+        for f in &self.findings {
+            text +=
+                &format!("| {} | {} | {} | {} | {} |\n", f.case, f.what, short(f.figure), short(f.bound), verdict(f));
+        }
+        self.out.text("stability_tables.md", &(text + &self.markdown))?;
+        let failing: Vec<&Finding> = self.findings.iter().filter(|f| !f.passes()).collect();
+        print(&format!("\nTables and figures are in {}.\n", self.out.path().display()))?;
+        if failing.is_empty() {
+            return Ok(());
+        }
+        let line = |f: &&Finding| format!("  {}: {}: {} > {}", f.case, f.what, short(f.figure), short(f.bound));
+        let list: Vec<String> = failing.iter().map(line).collect();
+        Err(Failure::Bounds { count: failing.len(), total: self.findings.len(), list: list.join("\n") })
+    }
+}

@@ -1,0 +1,114 @@
+//! The public entries of a library, read off its sources.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The functions that a user of a crate can call: free ones by their name (with the module where it is public), methods and
+/// constructors as `Type::function`, those of traits as `Trait::function`. Sources are taken as rustfmt leaves them: what
+/// starts a line is at the top level.
+pub fn of_crate(name: &str) -> BTreeSet<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates").join(name).join("src");
+    let lib = fs::read_to_string(root.join("lib.rs")).unwrap();
+    let exported = exported(&lib);
+    let modules: BTreeSet<&str> = lib.lines().filter_map(|l| l.strip_prefix("pub mod ")?.strip_suffix(';')).collect();
+    let mut entries = BTreeSet::new();
+    for file in sources(&root) {
+        let relative = file.strip_prefix(&root).unwrap().with_extension("");
+        let module = relative.iter().next().and_then(|m| m.to_str()).filter(|m| modules.contains(m));
+        // Tests stand at the end of a file, or in one of their own.
+        let text = fs::read_to_string(&file).unwrap();
+        let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+        if relative.ends_with("tests") || relative.ends_with("order_conditions") {
+            continue;
+        }
+        read(text, module, &exported, &mut entries);
+    }
+    entries
+}
+
+/// The names of `pub use`.
+fn exported(lib: &str) -> BTreeSet<&str> {
+    let uses = lib.split("\npub use ").skip(1).filter_map(|u| u.split(';').next());
+    uses.flat_map(|u| u.split(|c: char| !c.is_alphanumeric() && c != '_')).filter(|name| !name.is_empty()).collect()
+}
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(sources(&path));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// Where a line stands.
+enum Within {
+    File,
+    /// The inherent functions of a type.
+    Type(String),
+    Trait(String),
+    Module(String),
+    /// The implementation of a trait, a private type: nothing of its own.
+    Other,
+}
+
+fn read(text: &str, module: Option<&str>, exported: &BTreeSet<&str>, entries: &mut BTreeSet<String>) {
+    let mut within = Within::File;
+    // What a macro makes stands deeper; its blocks are as good as others.
+    for line in text.lines() {
+        let code = line.trim_start();
+        let deep = line.len() - code.len();
+        let is_public = |name: &str| module.is_some() || name.starts_with('$') || exported.contains(name);
+        if let Some(header) = code.strip_prefix("impl").filter(|h| deep % 8 == 0 && h.starts_with(['<', ' '])) {
+            let (name, of_trait) = implemented(header);
+            within = if of_trait || !is_public(&name) { Within::Other } else { Within::Type(name) };
+        } else if let Some(header) = line.strip_prefix("pub trait ") {
+            let name = identifier(header);
+            within = if is_public(&name) { Within::Trait(name) } else { Within::Other };
+        } else if let Some(header) = line.strip_prefix("pub mod ").filter(|h| h.ends_with('{')) {
+            within = Within::Module(identifier(header));
+        } else if line.starts_with('}') {
+            within = Within::File;
+        } else if let Some(function) = function(code, matches!(within, Within::Trait(_))) {
+            let qualified = match (&within, module) {
+                (Within::Type(of) | Within::Trait(of), _) => format!("{of}::{function}"),
+                (Within::Module(of), _) => format!("{of}::{function}"),
+                (Within::File, Some(of)) if deep == 0 => format!("{of}::{function}"),
+                (Within::File, None) if deep == 0 && exported.contains(function.as_str()) => function,
+                _ => continue,
+            };
+            entries.insert(qualified);
+        }
+    }
+}
+
+/// The name of a function that a line declares, a public one unless it is a trait's.
+fn function(code: &str, of_trait: bool) -> Option<String> {
+    let public = ["pub fn ", "pub const fn "].iter().find_map(|start| code.strip_prefix(start));
+    let declared = if of_trait { code.strip_prefix("fn ") } else { public };
+    declared.map(identifier)
+}
+
+/// The type of an `impl` block by what follows the word, and whether it is that of a trait.
+fn implemented(header: &str) -> (String, bool) {
+    let mut rest = header;
+    if rest.starts_with('<') {
+        let mut depth = 0;
+        let end = rest.char_indices().find(|(_, c)| {
+            depth += i32::from(*c == '<') - i32::from(*c == '>');
+            depth == 0
+        });
+        rest = &rest[end.map_or(0, |(i, _)| i + 1)..];
+    }
+    (identifier(rest.trim_start().trim_start_matches('&')), rest.contains(" for "))
+}
+
+fn identifier(text: &str) -> String {
+    let path: String = text.chars().take_while(|c| c.is_alphanumeric() || "_$:".contains(*c)).collect();
+    path.rsplit("::").next().unwrap_or_default().trim_end_matches(':').to_owned()
+}

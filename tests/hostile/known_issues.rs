@@ -1,0 +1,165 @@
+//! The limits that `KNOWN_ISSUES.md` lists, each asserted as it is; one that no longer holds leaves both.
+
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Pendulum};
+use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use discrete_herglotz::{
+    Composition, Event, Flow, Gauss, Integrator, Method, Midpoint, Rectangle, Scene, SplittingScheme, Status, Stepper,
+    Steps, Wanted, run_with_events,
+};
+use std::fs;
+use std::path::Path;
+
+/// The page names these tests, and no others.
+#[test]
+fn the_page_names_its_tests() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let page = fs::read_to_string(root.join("KNOWN_ISSUES.md")).unwrap();
+    let here = fs::read_to_string(root.join("tests/hostile/known_issues.rs")).unwrap();
+    let tests: Vec<&str> = here.lines().filter_map(|l| l.strip_prefix("fn ")?.strip_suffix("() {")).collect();
+    assert!(tests.len() > 5);
+    for test in tests.iter().filter(|t| **t != "the_page_names_its_tests") {
+        assert!(page.contains(&format!("`{test}`")), "KNOWN_ISSUES.md does not name {test}");
+    }
+    let named = page.split("(`").skip(1).filter_map(|rest| rest.split_once("`)").map(|(name, _)| name));
+    for name in named {
+        assert!(tests.contains(&name), "KNOWN_ISSUES.md names {name}, which is no test here");
+    }
+}
+
+/// An oscillator with a pulse of force.
+struct Pulse {
+    height: f64,
+    width: f64,
+}
+
+impl Lagrangian<1> for Pulse {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        let u = (t - 1.01) / self.width;
+        v[0] * v[0] * 0.5 - q[0] * q[0] * 0.5 + (-(u * u)).exp() * q[0] * self.height - z * 0.1
+    }
+    fn structure(&self) -> Structure {
+        Structure { z_affine: true, constant_rate: true, separable: true, constant_mass: true, ..Structure::default() }
+    }
+}
+
+/// The position after two units of time.
+fn position(system: &Pulse, integrator: Integrator, steps: usize) -> f64 {
+    let scene =
+        Scene::new(system, VelocityPoint::new([1.0], [0.0], 0.0), 2.0).by(integrator).steps(Steps::Count(steps));
+    let outcome = scene.plan().unwrap().run().unwrap();
+    assert_eq!(outcome.status, Status::Completed);
+    outcome.q[0]
+}
+
+#[test]
+fn fixed_steps_pass_over_what_is_narrower() {
+    let pulse = Pulse { height: 300.0, width: 1e-3 };
+    let quiet = Pulse { height: 0.0, ..pulse };
+    for integrator in [Integrator::Gauss { stages: 4 }, Integrator::Splitting(SplittingScheme::STRANG)] {
+        // Four steps: none of their points within forty widths of the pulse. It turns the motion by half a unit.
+        assert_eq!(position(&pulse, integrator, 4), position(&quiet, integrator, 4));
+        let seen = position(&pulse, integrator, 20_000) - position(&quiet, integrator, 20_000);
+        assert!(seen.abs() > 0.3, "{seen}");
+    }
+}
+
+#[test]
+fn two_changes_of_sign_in_a_part_of_a_step_are_not_seen() {
+    let gauss = Gauss::new(Pendulum::default(), 2, 0.4).unwrap();
+    let narrow = |t: f64| (t - 0.45) * (t - 0.46);
+    let found = |h: f64| {
+        let gauss = Gauss::new(Pendulum::default(), 2, h).unwrap();
+        let mut stepper = gauss.stepper(0.0, PhasePoint::new([1.0], [0.0], 0.0), [0.0].into()).unwrap();
+        run_with_events(&mut stepper, (0.8 / h).round() as usize, &mut [Event::new(|t, _| narrow(t))])
+            .unwrap()
+            .crossings
+            .len()
+    };
+    assert_eq!(gauss.stages(), 2);
+    assert_eq!(found(0.4), 0);
+    assert_eq!(found(0.02), 2);
+}
+
+#[test]
+fn dense_output_has_the_order_of_the_stages_between_the_ends() {
+    let oscillator = HarmonicOscillator { gamma: 0.0 };
+    let error = |h: f64, at: f64| {
+        let gauss = Gauss::new(oscillator, 3, h).unwrap();
+        let mut stepper = gauss.stepper(0.0, PhasePoint::new([1.0], [0.0], 0.0), [0.0].into()).unwrap();
+        stepper.advance(1).unwrap();
+        (stepper.dense().unwrap().at(at * h).q[0] - (at * h).cos()).abs()
+    };
+    // Order 6 at the ends, so 7 for one step; 3 between, so 4.
+    let order = |at: f64| (error(0.4, at) / error(0.2, at)).log2();
+    assert!((order(1.0) - 8.0).abs() < 0.5 || (order(1.0) - 7.0).abs() < 0.5, "{}", order(1.0));
+    assert!((order(0.3) - 4.0).abs() < 0.5, "{}", order(0.3));
+}
+
+#[test]
+fn a_composition_takes_its_rule_on_trust() {
+    // Order 1 and not symmetric: no composition raises it, and nothing says so.
+    let oscillator = HarmonicOscillator { gamma: 0.0 };
+    let error = |steps: usize| {
+        let h = 1.0 / steps as f64;
+        let start = PhasePoint::new([1.0], [0.0], 0.0);
+        let rule = |h| Rectangle::new(oscillator, h);
+        let mut run = Composition::new(rule, &SplittingScheme::YOSHIDA_4, h, 0.0, start).unwrap();
+        run.advance(steps).unwrap();
+        (run.state().q[0] - 1.0f64.cos()).abs()
+    };
+    let order = (error(100) / error(200)).log2();
+    assert!(order < 3.0, "{order}");
+}
+
+#[test]
+fn two_points_lose_the_digits_that_their_difference_loses() {
+    let ld = Midpoint::new(Pendulum::default(), 1e-8).unwrap();
+    let start = PhasePoint::new([1.0], [0.5], 0.0);
+    let mut flow = Flow::new(&ld, 0.0, start).unwrap();
+    flow.step().unwrap();
+    let x = DiscretePoint { q0: start.q, q1: flow.state().q, z0: start.z };
+    let again = Flow::from_points(&ld, 0.0, x).unwrap();
+    let lost = (again.state().p[0] - start.p[0]).abs();
+    // eps / h = 2e-8, against some 1e-16 in momentum form.
+    assert!(lost > 1e-10 && lost < 1e-7, "{lost:e}");
+}
+
+#[test]
+fn quadrature_rules_have_a_rational_rate() {
+    let pendulum = Pendulum { gamma: -3.0 };
+    let factor = |integrator| {
+        let wanted = Wanted { conformal_factor: true, ..Wanted::default() };
+        let scene = Scene::new(&pendulum, VelocityPoint::new([1.0], [0.0], 0.0), 1.0).by(integrator);
+        let outcome = scene.steps(Steps::Count(10)).wanting(wanted).plan().unwrap().run().unwrap();
+        outcome.conformal_factor.unwrap()
+    };
+    let exact = (-3.0f64).exp();
+    let off = |integrator| (factor(integrator) / exact - 1.0).abs();
+    assert!(off(Integrator::Splitting(SplittingScheme::STRANG)) < 1e-14);
+    // (1 + h gamma/2)/(1 - h gamma/2) ten times, and 1 + h gamma ten times.
+    assert!((off(Integrator::Discrete(Method::Midpoint)) - 0.0229).abs() < 1e-3);
+    assert!(off(Integrator::Discrete(Method::LeftMidpoint)) > 0.4);
+}
+
+#[test]
+fn the_conformal_factor_of_a_long_run_is_below_all_numbers() {
+    let pendulum = Pendulum { gamma: -1.0 };
+    let wanted = Wanted { conformal_factor: true, ..Wanted::default() };
+    let scene = Scene::new(&pendulum, VelocityPoint::new([1.0], [0.0], 0.0), 800.0).wanting(wanted);
+    let outcome = scene.by(Integrator::Gauss { stages: 4 }).steps(Steps::Count(8000)).plan().unwrap().run().unwrap();
+    assert_eq!((outcome.status, outcome.conformal_factor), (Status::Completed, Some(0.0)));
+}
+
+#[test]
+fn chaos_outgrows_any_accuracy() {
+    // Not a limit of the library, but of every one: over the time of 40 e-foldings a unit in the last place is everything.
+    let run = |q: f64| {
+        let pendulum = DoublePendulum { gamma: 0.0, ..DoublePendulum::default() };
+        let start = VelocityPoint::new([q, 2.0], [0.0, 0.0], 0.0);
+        let scene = Scene::new(&pendulum, start, 150.0).by(Integrator::Gauss { stages: 8 });
+        scene.steps(Steps::Count(6000)).plan().unwrap().run().unwrap().q
+    };
+    let apart = (run(2.5) - run(2.5 + 4.0 * f64::EPSILON)).amax();
+    assert!(apart > 1e-9, "{apart:e}");
+}

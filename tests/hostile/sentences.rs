@@ -1,0 +1,369 @@
+//! Every variant of every error, triggered through the public API: its sentence has the value and the remedy.
+
+use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, Pendulum};
+use contact_geom::{
+    Clock, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint,
+    herglotz_field, linear,
+};
+use discrete_herglotz::{
+    Composition, DiscreteLagrangian, Event, EventStatus, Every, FinalOnly, Flow, Gauss, InputError, Integrator,
+    LeftMidpoint, Method, Midpoint, Obstacle, Rectangle, Scene, Solver, SplittingScheme, Status, StepError, Stepper,
+    Steps, Strang, Suspicion, UnknownIntegrator, UnknownMethod, run_with_events,
+};
+use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow};
+use std::ops::ControlFlow;
+
+/// The variants of an error, each with what triggers it and words of its sentence. A variant that is not here does not
+/// compile.
+macro_rules! every {
+    ($Error:ty { $($variant:pat => $trigger:expr, $words:expr;)* }) => {
+        // No wildcard: that is the check of completeness.
+        let _: fn(&$Error) = |error| match error { $($variant => (),)* };
+        $(
+            let error: $Error = $trigger;
+            assert!(matches!(error, $variant), "not {}: {error:?}", stringify!($variant));
+            let sentence = error.to_string();
+            for word in $words {
+                assert!(sentence.contains(word), "no {word:?} in {sentence:?}");
+            }
+        )*
+    };
+}
+
+fn pendulum_at(p: f64) -> PhasePoint<1> {
+    PhasePoint::new([0.3], [p], 0.1)
+}
+
+/// A drag that turns the factor of a step of 0.1 negative.
+fn strong() -> LeftMidpoint<FreeParticle> {
+    LeftMidpoint::new(FreeParticle { gamma: -20.0 }, 0.1).unwrap()
+}
+
+/// `z' = z^2` leaves the real line at t = 1.
+struct Explosive;
+
+impl Lagrangian<1> for Explosive {
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 + z * z
+    }
+}
+
+/// No W.
+struct Massless;
+
+impl Lagrangian<1> for Massless {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * q[0] + z
+    }
+}
+
+/// A spring that is harder on one side, by a look at a number.
+struct Branching;
+
+impl Lagrangian<1> for Branching {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        let k = if q[0].re() > 0.3 { 2.0 } else { 1.0 };
+        v[0] * v[0] * 0.5 - q[0] * q[0] * (0.5 * k)
+    }
+}
+
+/// Claims to be quadratic, and is not.
+struct Liar;
+
+impl Lagrangian<1> for Liar {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 + q[0].powi(3) - z * 0.1
+    }
+    fn structure(&self) -> Structure {
+        Structure { quadratic: true, ..Structure::default() }
+    }
+}
+
+/// Claims to be quadratic, which it is to its last digit where its motion starts.
+struct Later;
+
+impl Lagrangian<1> for Later {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 - (q[0] - 2.0).max(T::from(0.0)).powi(3) - z * 0.1
+    }
+    fn structure(&self) -> Structure {
+        Structure { quadratic: true, autonomous: true, ..Structure::default() }
+    }
+}
+
+struct Stopped;
+
+impl Clock<2> for Stopped {
+    fn rate<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
+        q[0] * 0.0
+    }
+}
+
+struct Nothing;
+
+impl Lagrangian<0> for Nothing {
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 0>, _v: &SVector<T, 0>, z: T) -> T {
+        z
+    }
+}
+
+/// The length of the step to a power: singular on the diagonal.
+struct Length;
+
+impl DiscreteLagrangian<1> for Length {
+    fn step_size(&self) -> f64 {
+        0.1
+    }
+    fn value<T: Scalar>(&self, _t: f64, x: &DiscretePoint<1, T>) -> Result<T, StepError> {
+        let d = x.q1[0] - x.q0[0];
+        Ok(d * d.sqrt() - x.z0 * 0.01)
+    }
+}
+
+#[test]
+fn input_errors() {
+    let (pendulum, start) = (Pendulum::default(), VelocityPoint::new([0.3], [0.5], 0.1));
+    let kepler = Kepler::<2>::default();
+    let circle = PhasePoint::new([1.0, 0.0], [0.0, 1.0], 0.0);
+    every!(InputError {
+        InputError::Step { .. } => Midpoint::new(pendulum, -0.25).unwrap_err(), ["-0.25", "positive finite"];
+        InputError::Span { .. } => Scene::new(&pendulum, start, -3.5).plan().err().unwrap(), ["-3.5", "positive and finite"];
+        InputError::Accuracy { .. } => {
+            let scene = Scene::new(&pendulum, start, 5.0).by(Integrator::Gauss { stages: 8 });
+            scene.steps(Steps::Accuracy(1e-17)).plan().err().unwrap()
+        }, ["1e-17", "ask for less"];
+        InputError::Tolerance { .. } => {
+            Scene::new(&pendulum, start, 5.0).steps(Steps::Accuracy(-0.5)).plan().err().unwrap()
+        }, ["-0.5", "positive and finite"];
+        InputError::TooMany { .. } => {
+            Scene::new(&pendulum, start, 5.0).steps(Steps::Size(1e-300)).plan().err().unwrap()
+        }, ["the number of steps", "e300", "longer steps"];
+        InputError::Undefined => Scene::new(&Odd::Kicked, VelocityPoint::new([f64::MAX], [0.0], 0.0), 1.0).plan().err().unwrap(), ["not finite at the start", "inside its domain"];
+        InputError::Stages { .. } => Gauss::new(pendulum, 17, 0.1).err().unwrap(), ["17", "from 1 to 16"];
+        InputError::Clock { .. } => {
+            let gauss = Gauss::new(kepler, 3, 0.1).unwrap();
+            gauss.clocked_stepper(Stopped, 0.0, circle, circle.p).err().unwrap()
+        }, ["is 0", "positive and finite"];
+        InputError::Dimension => Midpoint::new(Nothing, 0.1).err().unwrap(), ["dimension 0", "at least one"];
+        InputError::Count { .. } => Every::new(0, FinalOnly).unwrap_err(), ["stride", "= 0", "at least 1"];
+        InputError::Geometry(_) => {
+            Flow::new(&Midpoint::new(pendulum, 0.1).unwrap(), 0.0, pendulum_at(f64::NAN)).err().unwrap()
+        }, ["p[0] = NaN", "finite"];
+        InputError::Sigma { .. } => Flow::new(&strong(), 0.0, pendulum_at(0.5)).err().unwrap(), ["sigma_d = -1", "smaller step"];
+        InputError::EqualPoints => {
+            Flow::from_points(&Length, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).err().unwrap()
+        }, ["q0 = q1", "two different points"];
+        InputError::Unclaimed { .. } => {
+            Strang::new(CoupledInZ::default(), 0.1, 0.0, &pendulum_at(0.5)).err().unwrap()
+        }, ["separable", "claim it", "another method"];
+        InputError::FalseClaim { .. } => Scene::new(&Liar, start, 1.0).steps(Steps::Count(3)).plan().err().unwrap(), ["quadratic", "is not", "size"];
+        InputError::Hypothesis { .. } => {
+            let rule = |h| Midpoint::new(pendulum, h);
+            Composition::new(rule, &SplittingScheme::BLANES_MOAN_6, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()
+        }, ["needs a composition", "another method"];
+        InputError::FirstStep(_) => {
+            let centre = PhasePoint::new([0.0, 0.0], [0.0, 1.0], 0.0);
+            Flow::new(&Rectangle::new(kepler, 0.1).unwrap(), 0.0, centre).err().unwrap()
+        }, ["no first step", "not finite"];
+    });
+}
+
+/// Systems on which accuracies are not reached; of one type, since each is compiled with every integrator.
+enum Odd {
+    /// A force that jumps at q = 0.
+    Jumping,
+    /// A drive faster than any step that can be tried.
+    Kicked,
+    /// `z' = z^2`.
+    Explosive,
+    /// Duffing's, driven into chaos.
+    Chaotic,
+}
+
+impl Lagrangian<1> for Odd {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        let (kinetic, square) = (v[0] * v[0] * 0.5, q[0] * q[0]);
+        match self {
+            Odd::Jumping => kinetic - q[0].abs(),
+            Odd::Kicked => kinetic - square * square + (t * 1e12).sin() * q[0] * 1e12,
+            Odd::Explosive => kinetic + z * z,
+            Odd::Chaotic => kinetic + square * 0.5 - square * square * 0.25 + (t * 1.4).cos() * q[0] * 0.35 - z * 0.1,
+        }
+    }
+}
+
+/// What stands in the way of an accuracy, and the sentence that says so.
+#[test]
+fn obstacles() {
+    let start = VelocityPoint::new([1.0], [0.0], 1.0);
+    let obstacle = |system: &Odd, by: &str, span: f64, wanted: f64| {
+        let scene = Scene::new(system, start, span).by(by.parse().unwrap()).steps(Steps::Accuracy(wanted));
+        match scene.plan().err() {
+            Some(InputError::Accuracy { cause, .. }) => cause,
+            other => panic!("{other:?}"),
+        }
+    };
+    every!(Obstacle {
+        Obstacle::RoundOff => obstacle(&Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "ask for less"];
+        Obstacle::Chaos { .. } => obstacle(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "ask for less"];
+        Obstacle::Order { .. } => obstacle(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "ask for less"];
+        Obstacle::Halted { .. } => obstacle(&Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
+        Obstacle::Unresolved { .. } => obstacle(&Odd::Kicked, "gauss_8", 1.0, 1e-6), ["near t = ", "shorter span"];
+        Obstacle::Budget => obstacle(&Odd::Chaotic, "rectangle", 10.0, 1e-12), ["too many", "higher order", "give a step"];
+    });
+}
+
+#[test]
+fn step_errors() {
+    let forward = |ld: &dyn Fn(&mut Solver<1>) -> Option<StepError>| ld(&mut Solver::default()).unwrap();
+    let guess = SVector::from([0.5]);
+    every!(StepError {
+        StepError::NotConverged { .. } => {
+            let gauss = Gauss::new(Pendulum { gamma: 0.0 }, 2, 50.0).unwrap();
+            let mut stepper = gauss.stepper(0.0, pendulum_at(0.5), guess).unwrap().without_newton();
+            stepper.advance(1).unwrap_err().cause
+        }, ["residual of", "iterations", "smaller step"];
+        StepError::Singular { .. } => {
+            let ld = Midpoint::new(Massless, 0.1).unwrap();
+            forward(&|solver| ld.forward(0.0, &pendulum_at(0.5), &guess, solver).err())
+        }, ["pivot", "not regular", "smaller step"];
+        StepError::SigmaVanished { .. } => {
+            forward(&|solver| strong().forward(0.0, &pendulum_at(0.5), &guess, solver).err())
+        }, ["sigma_d = -1", "smaller step"];
+        StepError::OutsideDomain { .. } => {
+            let ld = ExactLagrangian::<_, 1>::new(Explosive, 2.0).unwrap();
+            let from = PhasePoint::new([0.0], [0.0], 1.0);
+            forward(&|solver| ld.forward(0.0, &from, &guess, solver).err())
+        }, ["only until t = ", "smaller step"];
+        StepError::ConjugatePoint { .. } => {
+            let ld = ExactLagrangian::<_, 1>::new(HarmonicOscillator { gamma: 0.0 }, std::f64::consts::PI).unwrap();
+            ld.jet(0.0, &DiscretePoint::new([0.3], [0.5], 0.0)).unwrap_err()
+        }, ["conjugate", "singular value", "another step"];
+        StepError::StageFactor { .. } => {
+            let gauss = Gauss::new(FreeParticle { gamma: -40.0 }, 3, 1.0).unwrap();
+            match gauss.stepper(0.0, pendulum_at(0.5), guess).err() {
+                Some(InputError::FirstStep(cause)) => cause,
+                other => panic!("{other:?}"),
+            }
+        }, ["stage", "smaller step"];
+        StepError::Branched => {
+            let gauss = Gauss::new(Branching, 4, 0.5).unwrap();
+            let start = PhasePoint::new([0.0], [1.0], 0.0);
+            gauss.stepper(0.0, start, [1.0].into()).unwrap().without_newton().advance(3).unwrap_err().cause
+        }, ["lanes that differ", "if_less"];
+        StepError::NonFinite => {
+            let ld = Rectangle::new(Kepler::<2>::default(), 0.1).unwrap();
+            let centre = PhasePoint::new([0.0, 0.0], [0.0, 1.0], 0.0);
+            ld.forward(0.0, &centre, &[0.0, 1.0].into(), &mut Solver::default()).unwrap_err()
+        }, ["not finite", "leaves the domain"];
+    });
+}
+
+#[test]
+fn statuses() {
+    let ld = Midpoint::new(Pendulum::default(), 0.1).unwrap();
+    let mut flow = Flow::new(&ld, 0.0, pendulum_at(0.5)).unwrap();
+    every!(Status {
+        Status::Completed => flow.run(3, &mut FinalOnly).unwrap(), ["completed"];
+        Status::Stopped { .. } => {
+            flow.run(3, &mut |_: &discrete_herglotz::Step<1>| ControlFlow::Break(())).unwrap()
+        }, ["stopped", "after step 4"];
+        Status::FalseClaim { .. } => {
+            // A cubic force that is nothing before q = 2, where the motion comes to after the steps that are tried before a run.
+            let start = VelocityPoint::new([0.5], [1.0], 0.0);
+            Scene::new(&Later, start, 10.0).steps(Steps::Count(1000)).plan().unwrap().run().unwrap().status
+        }, ["unreliable: after step ", "not quadratic", "correct its structure"];
+        Status::Failed { .. } => {
+            let ld = LeftMidpoint::new(Explosive, 0.01).unwrap();
+            let mut flow = Flow::new(&ld, 0.0, PhasePoint::new([0.0], [0.1], 1.0)).unwrap();
+            flow.run(4000, &mut FinalOnly).unwrap()
+        }, ["failed in step", "without bound"];
+    });
+    // It has no sentence of its own.
+    let gauss = Gauss::new(Explosive, 2, 0.1).unwrap();
+    let run = |event: Event<'_, 1>, steps| {
+        let mut stepper = gauss.stepper(0.0, PhasePoint::new([0.0], [0.1], 1.0), [0.1].into()).unwrap();
+        run_with_events(&mut stepper, steps, &mut [event]).unwrap().status
+    };
+    let _: fn(&EventStatus) = |status| match status {
+        EventStatus::Completed
+        | EventStatus::Terminated { event: _ }
+        | EventStatus::Undefined { event: _, t: _ }
+        | EventStatus::Failed(_) => (),
+    };
+    assert_eq!(run(Event::new(|_, _| 1.0), 2), EventStatus::Completed);
+    assert_eq!(run(Event::new(|t, _| t - 0.15).terminal(), 2), EventStatus::Terminated { event: 0 });
+    assert!(matches!(run(Event::new(|t, _| (0.15 - t).sqrt()), 3), EventStatus::Undefined { event: 0, .. }));
+    assert!(matches!(run(Event::new(|_, _| 1.0), 4000), EventStatus::Failed(_)));
+}
+
+#[test]
+fn geometry_errors() {
+    every!(GeometryError {
+        GeometryError::WrongSize { .. } => PhasePoint::<2>::from_slices(&[1.0], &[1.0, 2.0], 0.0).unwrap_err(), ["q has 1", "pass 2"];
+        GeometryError::NonFinite { .. } => {
+            VelocityPoint::<2>::from_slices(&[1.0, 2.0], &[1.0, f64::INFINITY], 0.0).unwrap_err()
+        }, ["v[1] = inf", "finite number"];
+        GeometryError::Singular { .. } => {
+            herglotz_field(&Massless, 0.0, &VelocityPoint::new([0.1], [0.2], 0.0)).unwrap_err()
+        }, ["singular", "pivot 0e0"];
+        GeometryError::Undefined { .. } => {
+            let ld = Rectangle::new(Explosive, 0.1).unwrap();
+            let outside = DiscretePoint::new([0.0], [f64::NAN], 0.0);
+            discrete_herglotz::statements::residual(13, &ld, &[], 0.0, &outside).unwrap_err()
+        }, ["not defined", "inside its domain"];
+    });
+    // The remedy is named, not left to the reader.
+    let sentence = Symmetry::<2>::rotation(0, 2).unwrap_err().to_string();
+    assert!(sentence.contains("plane of rotation") && sentence.contains("dimension 2"), "{sentence}");
+    let mut singular = (DMatrix::<f64>::zeros(2, 2), contact_geom::nalgebra::DVector::zeros(2));
+    let error = linear::solve(&mut singular.0, &mut singular.1).unwrap_err();
+    assert!(error.to_string().contains("singular matrix (pivot 0e0)"), "{error}");
+    let named = error.of("the mass matrix", "take another").to_string();
+    assert!(named.contains("the mass matrix") && named.contains("take another"), "{named}");
+}
+
+#[test]
+fn exact_errors() {
+    struct Bratu;
+    impl Lagrangian<1> for Bratu {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+            v[0] * v[0] * 0.5 - q[0].exp() * 6.0 - z * 0.01
+        }
+    }
+    let oscillator = HarmonicOscillator { gamma: 0.0 };
+    every!(ExactError<1> {
+        ExactError::Input(_) => ContactExponential::new(oscillator, -0.5).map_err(ExactError::from).unwrap_err(), ["-0.5", "positive finite"];
+        ExactError::OutsideDomain { .. } => {
+            herglotz_flow(&Explosive, 0.0, &VelocityPoint::new([0.0], [0.0], 1.0), 2.0).unwrap_err()
+        }, ["only until t = ", "smaller h", "another start"];
+        ExactError::Unfinished { .. } => {
+            herglotz_flow(&oscillator, 0.0, &VelocityPoint::new([1.0], [0.0], 0.0), 1e9).unwrap_err()
+        }, ["t = ", "go on from there"];
+        ExactError::NotConverged { .. } => {
+            let exp = ContactExponential::new(Bratu, 0.8).unwrap();
+            exp.retract(0.0, &DiscretePoint::new([0.0], [0.1], 0.0)).unwrap_err()
+        }, ["no motion", "misses", "pass a guess"];
+        ExactError::ConjugatePoint { .. } => {
+            let exp = ContactExponential::new(oscillator, std::f64::consts::PI).unwrap();
+            exp.retract(0.0, &DiscretePoint::new([0.3], [0.5], 0.0)).unwrap_err()
+        }, ["conjugate", "singular value", "another h"];
+    });
+}
+
+#[test]
+fn names_that_are_none() {
+    let UnknownMethod { name } = "mid-point".parse::<Method>().unwrap_err();
+    let sentence = UnknownMethod { name }.to_string();
+    assert!(sentence.contains("\"mid-point\"") && sentence.contains("left_midpoint, midpoint"), "{sentence}");
+    let UnknownIntegrator { name } = "gauss_17".parse::<Integrator>().unwrap_err();
+    let sentence = UnknownIntegrator { name }.to_string();
+    assert!(sentence.contains("\"gauss_17\"") && sentence.contains("gauss_16"), "{sentence}");
+    let sentence = Suspicion { step: 7, misfit: 12.5 }.to_string();
+    assert!(
+        sentence.contains("step 7") && sentence.contains("1.2e1") && sentence.contains("smaller step"),
+        "{sentence}"
+    );
+}

@@ -1,0 +1,59 @@
+//! Scenes that ask for an accuracy: the true error is at most ten times what was asked for, or the scene is refused.
+
+use super::dice::Dice;
+use super::problem::Problem;
+use super::truth::{NoTruth, truth};
+use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
+use discrete_herglotz::{Integrator, Scene, Status, Steps, Wanted};
+
+/// The most steps that a case may take.
+const STEPS: usize = 200_000;
+
+pub fn accurate<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
+    let Problem { system, t0, start, span } = problem;
+    // A rule of order 1 or 2 to twelve digits has no end; by order, what is reasonable.
+    let integrator = dice.pick(&Integrator::all());
+    let least: f64 = if integrator.order() <= 2 { 1e-4 } else { 1e-10 };
+    let tolerance = dice.scale(least, 1e-2);
+    let wanted = Wanted { action: dice.chance(0.5), ..Wanted::default() };
+    let scene = Scene::new(system, *start, *span).from_time(*t0).by(integrator).steps(Steps::Accuracy(tolerance));
+    let plan = match scene.wanting(wanted).plan() {
+        Ok(plan) => plan,
+        Err(error) => return Ok(refused(&error)),
+    };
+    if plan.count() > STEPS {
+        return Ok(Verdict::NoReference);
+    }
+    let outcome = match plan.run() {
+        Ok(outcome) => outcome,
+        Err(error) => return Ok(refused(&error)),
+    };
+    let numbers = outcome.q.iter().chain(&outcome.p).copied().chain(outcome.z);
+    ensure(numbers.into_iter().all(f64::is_finite), Kind::NotFinite, || format!("{outcome:?}"))?;
+    if let Status::Failed { cause, .. } = outcome.status {
+        return Ok(ended(&cause));
+    }
+    let truth = match truth(system, *t0, start, *span) {
+        Ok(truth) => truth,
+        Err(NoTruth::Ends(t)) if t < t0 + span * (1.0 - 1e-6) => {
+            let what = format!("{integrator} to {tolerance:.1e}: the motion ends at t = {t}, the run at {}", outcome.t);
+            return Err(Wrong { kind: Kind::BeyondTheEnd, what });
+        }
+        Err(_) => return Ok(Verdict::NoReference),
+    };
+    let error = truth.error_at_end(&outcome.q, &outcome.p);
+    let floor = truth.rounding(*t0, plan.count());
+    if 10.0 * tolerance < floor {
+        return Ok(Verdict::NoReference);
+    }
+    ensure(error <= 10.0 * tolerance, Kind::AboveTolerance, || {
+        format!(
+            "{integrator}: error {error:.1e} where {tolerance:.1e} was asked for, {} steps, condition {:.1e}, lie {:?}, patience {:.1e}",
+            plan.count(),
+            truth.condition,
+            system.lie,
+            system.patience(start),
+        )
+    })?;
+    Ok(Verdict::Right)
+}

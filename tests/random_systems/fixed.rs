@@ -1,0 +1,190 @@
+//! Scenes with fixed steps: by every integrator, judged by the motion itself and by runs with shorter steps.
+
+use super::dice::Dice;
+use super::problem::Problem;
+use super::truth::{NoTruth, truth};
+use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
+use contact_geom::{Symmetry, Triple, VelocityPoint, legendre};
+use discrete_herglotz::{DiscreteLagrangian, Integrator, Outcome, Scene, Solver, Status, Steps, Wanted};
+use exact_lagrangian::ExactLagrangian;
+
+/// The error, relative to the size of the motion, below which a run has found its motion.
+const FOUND: f64 = 0.1;
+
+/// The error of a single step that is one of order one.
+const ORDER_ONE: f64 = 1.0;
+
+/// The condition above which a motion has no answer to compare with.
+const CHAOTIC: f64 = 1e7;
+
+/// The most steps of a run here, and of one to compare with it.
+const STEPS: usize = 200;
+const REFINED: usize = 1 << 12;
+
+/// Draws what is asked of a scene, runs it and judges it.
+pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
+    let Problem { system, t0, start, span } = problem;
+    let integrator = dice.pick(&Integrator::all());
+    let count = (dice.scale(1.0, STEPS as f64).round() as usize).max(1);
+    let h = span / count as f64;
+    let steps = if dice.chance(0.5) { Steps::Count(count) } else { Steps::Size(h) };
+    let momentum = if N == 2 && dice.chance(0.2) { Symmetry::rotation(0, 1).ok() } else { None };
+    let wanted = Wanted {
+        action: dice.chance(0.6),
+        conformal_factor: dice.chance(0.3),
+        rows: dice.chance(0.3).then(|| 1 + dice.below(20)),
+        momentum,
+    };
+    let scene = Scene::new(system, *start, *span).from_time(*t0).by(integrator).steps(steps).wanting(wanted.clone());
+    let plan = match scene.plan() {
+        Ok(plan) => plan,
+        Err(error) => return Ok(refused(&error)),
+    };
+    let mut stepper = match plan.stepper() {
+        Ok(stepper) => stepper,
+        Err(error) => return Ok(refused(&error)),
+    };
+    let outcome = match plan.run() {
+        Ok(outcome) => outcome,
+        Err(error) => return Ok(refused(&error)),
+    };
+    finite(&outcome)?;
+    let Outcome { status, q, p, z, .. } = outcome;
+    if let Status::Failed { cause, step } = status {
+        ensure(step == outcome.steps, Kind::RoutesDiffer, || format!("step {step} failed after {}", outcome.steps))?;
+        return Ok(ended(&cause));
+    }
+    ensure(outcome.steps == plan.count(), Kind::RoutesDiffer, || {
+        format!("{} steps of {}", outcome.steps, plan.count())
+    })?;
+    let late = (outcome.t - (t0 + span)).abs();
+    ensure(late <= 4.0 * f64::EPSILON * (t0.abs() + span), Kind::RoutesDiffer, || format!("ends {late:e} late"))?;
+
+    // The same run with nothing observed.
+    let halted = stepper.advance(plan.count());
+    let bare = stepper.state();
+    let same = halted.is_ok() && bare.q == q && bare.p == p && z.is_none_or(|z| z == bare.z);
+    ensure(same, Kind::ObservedDiffers, || {
+        let apart = larger_of(&(bare.q - q), &(bare.p - p));
+        format!("{integrator}: {apart:e} between a run with {wanted:?} and one without, {halted:?}")
+    })?;
+    if stepper.suspicion().is_some() {
+        return Ok(Verdict::Marked);
+    }
+
+    let truth = match truth(system, *t0, start, *span) {
+        Ok(truth) if truth.condition < CHAOTIC => truth,
+        Err(NoTruth::Ends(t)) if t < t0 + span * (1.0 - 1e-6) => {
+            let what = format!("{integrator} with {count} steps: the motion ends at t = {t}, the run at {}", outcome.t);
+            return Err(Wrong { kind: Kind::BeyondTheEnd, what });
+        }
+        Ok(_) | Err(_) => return Ok(Verdict::NoReference),
+    };
+    let error = truth.error(&q, &p, z);
+    // What rounding does in a run that solves nonlinear equations, or carries a momentum, to some hundred units a run.
+    let floor = truth.rounding(*t0, count);
+    if error <= floor {
+        return Ok(Verdict::Right);
+    }
+    // The order cannot be asked of a step that is too long; that the error falls can.
+    let finer = Wanted { action: wanted.action, ..Wanted::default() };
+    let mut ends = vec![Some((q, p, z))];
+    let mut errors = vec![error];
+    let mut refined = 2 * count;
+    let small_enough = |error: f64, first: f64| error <= 0.7 * first.min(FOUND) || error <= floor;
+    while refined <= REFINED && (errors.len() == 1 || !small_enough(errors[errors.len() - 1], error)) {
+        let scene = Scene::new(system, *start, *span).from_time(*t0).by(integrator).steps(Steps::Count(refined));
+        // A poor step may go where a good one refuses to.
+        let run = scene.wanting(finer.clone()).plan().and_then(|plan| plan.run()).ok();
+        let end = run.filter(|o| o.status == Status::Completed).map(|o| (o.q, o.p, o.z));
+        errors.push(end.as_ref().map_or(f64::INFINITY, |(q, p, z)| truth.error(q, p, *z)));
+        ends.push(end);
+        refined *= 2;
+    }
+    let last = errors[errors.len() - 1];
+    if !small_enough(last, error) {
+        // Where the runs agree with each other, and not with the motion, they converge to something else.
+        let settled = match &ends[ends.len() - 2..] {
+            [Some((q, p, _)), Some((fine_q, fine_p, _))] => {
+                truth.error(&(fine_q - q + truth.end.q), &(fine_p - p + truth.end.p), None) <= 0.1 * last
+            }
+            _ => false,
+        };
+        ensure(!settled, Kind::DoesNotConverge, || {
+            format!(
+                "{integrator} from {count} steps, doubled: errors {errors:?}, condition {:.1e}, lie {:?}, patience {:.1e}",
+                truth.condition,
+                system.lie,
+                system.patience(start),
+            )
+        })?;
+        return Ok(Verdict::NoReference);
+    }
+    if error <= FOUND {
+        return Ok(Verdict::Right);
+    }
+    let (step, worst) = worst_step(problem, &scene, truth.size)?;
+    ensure(worst <= ORDER_ONE, Kind::UnmarkedStep, || {
+        format!(
+            "{integrator}, h = {h:.2e}: step {step} of {count} is wrong by {worst:.1e} sizes of the motion; at the end {error:.1e}"
+        )
+    })?;
+    Ok(Verdict::Coarse)
+}
+
+fn larger_of<const N: usize>(
+    a: &contact_geom::nalgebra::SVector<f64, N>,
+    b: &contact_geom::nalgebra::SVector<f64, N>,
+) -> f64 {
+    contact_geom::largest(a.iter().chain(b).copied())
+}
+
+/// Refuses an outcome with a number that is not finite; a factor may be too small or too large for a number.
+fn finite<const N: usize>(outcome: &Outcome<N>) -> Result<(), Wrong> {
+    let end = outcome.q.iter().chain(&outcome.p).copied().chain(outcome.z).chain([outcome.t]);
+    let rows =
+        outcome.rows.iter().flat_map(|r| r.q.iter().chain(&r.p).copied().chain(r.z).chain(r.momentum).chain([r.t]));
+    let good = end.chain(rows).all(f64::is_finite) && outcome.conformal_factor.is_none_or(|f| f >= 0.0);
+    ensure(good, Kind::NotFinite, || format!("{outcome:?}"))
+}
+
+/// The step of a run that is farthest from the motion through its start, in sizes of the motion.
+fn worst_step<const N: usize>(
+    problem: &Problem<N>,
+    scene: &Scene<'_, super::system::RandomSystem<N>, N>,
+    [size_q, size_p, _]: [f64; 3],
+) -> Result<(usize, f64), Wrong> {
+    let none = (0, 0.0);
+    let Ok(plan) = scene.plan() else { return Ok(none) };
+    let (Ok(mut stepper), Ok(exact)) =
+        (plan.stepper(), ExactLagrangian::<_, N>::new(&problem.system, plan.step_size()))
+    else {
+        return Ok(none);
+    };
+    let start: VelocityPoint<N> = problem.start;
+    let (mut from, mut guess, mut worst) = (legendre(&problem.system, problem.t0, &start), start.v, none);
+    for k in 0..plan.count() {
+        let t = stepper.time();
+        if stepper.advance(1).is_err() {
+            return Ok(worst);
+        }
+        let to = stepper.state();
+        // Where the motion from a step's start is not defined up to its end, no step should be there.
+        let error = match exact.forward(t, &from, &guess, &mut Solver::default()) {
+            Ok(motion) => {
+                guess = motion.velocity;
+                let apart = Triple::from(motion.end).minus(to.into());
+                contact_geom::larger(
+                    contact_geom::largest(apart.x.iter().copied()) / size_q,
+                    contact_geom::largest(apart.y.iter().copied()) / size_p,
+                )
+            }
+            Err(_) => 0.0,
+        };
+        if error > worst.1 {
+            worst = (k, error);
+        }
+        from = to;
+    }
+    Ok(worst)
+}

@@ -1,0 +1,147 @@
+//! Flows of discrete Lagrangians: each step solves its equations, is conformally contact, and has a way back.
+
+use super::dice::Dice;
+use super::problem::Problem;
+use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{DiscreteJet, DiscretePoint, PhasePoint, Triple, larger, largest, legendre};
+use discrete_herglotz::{
+    DiscreteLagrangian, DiscretePath, Flow, Method, Record, Solver, Status, Transition, legendre_minus, legendre_plus,
+};
+
+pub fn flow<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
+    let Problem { system, t0, start, .. } = problem;
+    let method = dice.pick(Method::ALL);
+    let (h, steps) = (dice.scale(1e-4, 1.0), 1 + dice.below(40));
+    let state = legendre(system, *t0, start);
+    let ld = match method.discretise(system, h, *t0, &state) {
+        Ok(ld) => ld,
+        Err(error) => return Ok(refused(&error)),
+    };
+    let mut flow = match Flow::with_guess(&ld, *t0, state, start.v) {
+        Ok(flow) => flow,
+        Err(error) => return Ok(refused(&error)),
+    };
+    let mut record = Record::default();
+    let status = match flow.run(steps, &mut record) {
+        Ok(status) => status,
+        Err(error) => return Ok(refused(&error)),
+    };
+    let rows = &record.rows;
+    let finite = rows.iter().all(|(t, x)| t.is_finite() && x.check().is_ok());
+    ensure(finite, Kind::NotFinite, || format!("{method}: {:?}", rows.last()))?;
+    for pair in rows.windows(2) {
+        step_solves_its_equations(&ld, pair[0].0, &pair[0].1, &pair[1].1).map_err(|wrong| named(wrong, method))?;
+    }
+    if rows.len() > 1 {
+        let k = dice.below(rows.len() - 1);
+        let guess = (rows[k + 1].1.q - rows[k].1.q) / h;
+        is_conformal(&ld, rows[k].0, &rows[k].1, &guess).map_err(|wrong| named(wrong, method))?;
+        let points = rows.iter().map(|(_, x)| x.q).collect();
+        let path = DiscretePath::new(points).map_err(|e| Wrong { kind: Kind::RoutesDiffer, what: e.to_string() })?;
+        if let Ok(residuals) = path.herglotz_residuals(&ld, *t0, state.z) {
+            let finite = residuals.iter().flatten().all(|r| r.is_finite());
+            ensure(finite, Kind::NotFinite, || format!("{method}: residuals {residuals:?}"))?;
+        }
+        // Back to where the last step has come from, or to another point that the step leads from.
+        let to = *flow.state();
+        if flow.step_back().is_ok() {
+            let back = *flow.state();
+            let t = rows[0].0 + (rows.len() - 2) as f64 * h;
+            ensure(back.check().is_ok(), Kind::NotFinite, || format!("{method}: back to {back:?}"))?;
+            step_solves_its_equations(&ld, t, &back, &to).map_err(|wrong| named(wrong, "back"))?;
+        }
+        if let Ok(again) = Flow::from_points(&ld, *t0, DiscretePoint { q0: rows[0].1.q, q1: rows[1].1.q, z0: state.z })
+        {
+            let finite = again.state().check().is_ok();
+            ensure(finite, Kind::NotFinite, || format!("{method}: from points {:?}", again.state()))?;
+        }
+    }
+    match status {
+        Status::Failed { cause, .. } => Ok(ended(&cause)),
+        Status::Completed => Ok(Verdict::Right),
+        other => Err(Wrong { kind: Kind::RoutesDiffer, what: format!("{other}") }),
+    }
+}
+
+fn named(wrong: Wrong, name: impl std::fmt::Display) -> Wrong {
+    Wrong { what: format!("{name}: {}", wrong.what), ..wrong }
+}
+
+/// The discrete Herglotz equations of a step, `F-L_d` at its start and `F+L_d` at its end, to the rounding of the positions
+/// times the slope of the momenta in them.
+pub fn step_solves_its_equations<const N: usize>(
+    ld: &impl DiscreteLagrangian<N>,
+    t: f64,
+    from: &PhasePoint<N>,
+    to: &PhasePoint<N>,
+) -> Result<(), Wrong> {
+    let x = DiscretePoint { q0: from.q, q1: to.q, z0: from.z };
+    let (Ok(jet), Ok(minus), Ok(plus)) = (ld.second_jet(t, &x), legendre_minus(ld, t, &x), legendre_plus(ld, t, &x))
+    else {
+        return Ok(());
+    };
+    let max = |m: &[f64]| largest(m.iter().copied());
+    let slope = max(jet.d11.as_slice()) + max(jet.d12.as_slice()) + max(jet.d22.as_slice());
+    let by_action = max(jet.d1z.as_slice()) + max(jet.d2z.as_slice()) + jet.dzz.abs();
+    let DiscreteJet { value, d1, d2, dz, .. } = jet.first;
+    let (places, momenta) = (max(from.q.as_slice()) + max(to.q.as_slice()), max(d1.as_slice()) + max(d2.as_slice()));
+    let sigma = jet.first.sigma();
+    let actions = from.z.abs() + to.z.abs() + value.abs();
+    let sizes = momenta * (1.0 + dz.abs()) + slope * places + by_action * actions * (1.0 + momenta);
+    // 1e3 roundings of each term: Newton's method ends some units above round-off, and L sums up to a dozen terms. Rounding of
+    // one equation moves the solution by its inverse, and the other by the slope.
+    let condition = larger(1.0, slope / jet.regularity().smallest) * larger(1.0, 1.0 / sigma);
+    let bound = 1e3 * f64::EPSILON * sizes * condition + f64::MIN_POSITIVE;
+    let bound_z =
+        1e3 * f64::EPSILON * (actions + momenta * places) * condition * larger(1.0, sigma) + f64::MIN_POSITIVE;
+    let (at_start, at_end) = (max((minus.p - from.p).as_slice()), max((plus.p - to.p).as_slice()));
+    let action = (plus.z - to.z).abs();
+    // Where the slopes overflow there is no bound to hold.
+    let applies = bound.is_finite() && bound_z.is_finite();
+    let good = at_start <= bound && at_end <= bound && action <= bound_z;
+    ensure(!applies || good, Kind::Residual, || {
+        format!(
+            "h = {:.1e}: {at_start:.1e}, {at_end:.1e} for {bound:.1e}; {action:.1e} for {bound_z:.1e}; {from:?} to {to:?}",
+            ld.step_size()
+        )
+    })
+}
+
+/// That a step contracts the contact form by its sigma_d: by differences of the step in all coordinates of its start.
+pub fn is_conformal<const N: usize>(
+    ld: &impl DiscreteLagrangian<N>,
+    t: f64,
+    from: &PhasePoint<N>,
+    guess: &SVector<f64, N>,
+) -> Result<(), Wrong> {
+    let take = |from: &PhasePoint<N>| ld.forward(t, from, guess, &mut Solver::default());
+    let Ok(Transition { end, sigma, .. }) = take(from) else { return Ok(()) };
+    let start = Triple::from(*from);
+    let mut worst = 0.0f64;
+    for i in 0..Triple::<N>::DIMENSION {
+        // The third root of round-off is the best for differences of the third order.
+        let step = 6e-6 * larger(start.component(i).abs(), 1e-2 * larger(start.amax(), Triple::from(end).amax()));
+        let aside = |s: f64| take(&start.plus(Triple::from_fn(|j| if i == j { s } else { 0.0 })).into());
+        let (Ok(up), Ok(down), Ok(up_2), Ok(down_2)) =
+            (aside(step), aside(-step), aside(2.0 * step), aside(-2.0 * step))
+        else {
+            return Ok(());
+        };
+        let difference = |a: &PhasePoint<N>, b: &PhasePoint<N>| Triple::from(*a).minus((*b).into()).scale(0.5 / step);
+        let (narrow, wide) = (difference(&up.end, &down.end), difference(&up_2.end, &down_2.end).scale(0.5));
+        // Where two differences do not agree the step is not smooth at this scale: nothing can be said.
+        if narrow.minus(wide).amax() > 1e-4 * narrow.amax() {
+            return Ok(());
+        }
+        let unit = |j: usize| f64::from(u8::from(i == j));
+        let direction = Triple::<N>::from_fn(unit);
+        let at_end = narrow.z - end.p.dot(&narrow.x);
+        let at_start = sigma * (direction.z - from.p.dot(&direction.x));
+        // And the noise of the differences, 1e-10 of all of them, which the terms may be below.
+        let noise = 1e-7 * narrow.amax() * (1.0 + end.p.amax());
+        let size = narrow.z.abs() + end.p.abs().dot(&narrow.x.abs()) + at_start.abs() + noise;
+        worst = larger(worst, (at_end - at_start).abs() / size);
+    }
+    ensure(worst <= 1e-3, Kind::NotConformal, || format!("defect {worst:.1e}, sigma_d = {sigma:e} at {from:?}"))
+}

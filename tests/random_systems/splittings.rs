@@ -1,0 +1,80 @@
+//! Splittings and compositions by their own doors: in chunks, with compensated sums, without the action.
+
+use super::dice::Dice;
+use super::problem::Problem;
+use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
+use contact_geom::{PhasePoint, Triple, legendre};
+use discrete_herglotz::{ActionSplitting, Halt, InputError, Splitting, SplittingScheme, Stepper};
+
+pub fn splitting<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
+    let Problem { system, t0, start, .. } = problem;
+    let scheme = dice.pick(&SplittingScheme::ALL);
+    let (h, steps) = (dice.scale(1e-4, 1.0), 1 + dice.below(60));
+    let state = legendre(system, *t0, start);
+    let chunks: Vec<usize> = (0..steps).map(|_| 1 + dice.below(5)).collect();
+    let linear = |compensated: bool, action: bool| {
+        Splitting::new(system, &scheme, h, *t0, state).map(|s| {
+            let s = if compensated { s.compensated() } else { s };
+            if action { s } else { s.without_action() }
+        })
+    };
+    match (linear(false, true), linear(true, true), linear(false, false)) {
+        (Ok(plain), Ok(compensated), Ok(bare)) => judge([plain.clone(), plain, compensated, bare], steps, &chunks),
+        (Err(error), ..) => {
+            let of = |compensated| {
+                let made = ActionSplitting::new(system, &scheme, h, *t0, state)?;
+                Ok::<_, InputError>(if compensated { made.compensated() } else { made })
+            };
+            match (of(false), of(true)) {
+                (Ok(plain), Ok(compensated)) => {
+                    judge([plain.clone(), plain.clone(), compensated, plain], steps, &chunks)
+                }
+                _ => Ok(refused(&error)),
+            }
+        }
+        _ => Err(Wrong { kind: Kind::RoutesDiffer, what: "a splitting that exists only plain".into() }),
+    }
+}
+
+/// Of four steppers from one start, the first in one go, the second in chunks, the third with compensated sums, the last
+/// perhaps without the action.
+fn judge<S: Stepper<N>, const N: usize>(mut four: [S; 4], steps: usize, chunks: &[usize]) -> Checked {
+    let start = four[0].state();
+    let all = four[0].advance(steps);
+    let (mut taken, mut halted) = (0, Ok(()));
+    for chunk in chunks {
+        let chunk = (*chunk).min(steps - taken);
+        if chunk > 0 && halted.is_ok() {
+            halted = four[1].advance(chunk).map_err(|halt| Halt { taken: taken + halt.taken, ..halt });
+            taken += chunk;
+        }
+    }
+    let compensated = four[2].advance(steps);
+    let bare = four[3].advance(steps);
+    let ends: [PhasePoint<N>; 4] = std::array::from_fn(|i| four[i].state());
+    let finite = ends.iter().all(|e| e.check().is_ok()) && four.iter().all(|s| s.sigma() >= 0.0);
+    ensure(finite, Kind::NotFinite, || format!("{ends:?}"))?;
+    ensure(halted == all && ends[0] == ends[1], Kind::ObservedDiffers, || {
+        format!("{all:?} in one go, {halted:?} in chunks: {:?} and {:?}", ends[0], ends[1])
+    })?;
+    // z may end what a run without it survives.
+    let same = match (all, bare) {
+        (Ok(()), Ok(())) => ends[0].q == ends[3].q && ends[0].p == ends[3].p,
+        (Ok(()), Err(_)) => false,
+        _ => true,
+    };
+    ensure(same, Kind::ObservedDiffers, || format!("without the action {bare:?}, {:?} and {:?}", ends[0], ends[3]))?;
+    if let (Ok(()), Ok(())) = (all, compensated) {
+        let apart = Triple::from(ends[0]).minus(ends[2].into()).amax();
+        let size = Triple::from(start).amax() + Triple::from(ends[0]).amax();
+        // What rounding is grown by is not known here: only that it stays rounding.
+        ensure(apart <= 1e-3 * size, Kind::RoutesDiffer, || {
+            format!("compensated sums move the end by {apart:.1e} of {size:.1e}")
+        })?;
+    }
+    Ok(match all {
+        _ if four[0].suspicion().is_some() => Verdict::Marked,
+        Ok(()) => Verdict::Right,
+        Err(halt) => ended(&halt.cause),
+    })
+}
