@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{DiscreteLagrangian, Solver, Transition};
-use contact_geom::Scalar;
+use contact_geom::{Scalar, Structure};
 
 /// How a spring that pulls where `q > 0`, and only there, says so.
 #[derive(Clone, Copy, Debug, PartialEq)]
