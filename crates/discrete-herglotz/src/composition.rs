@@ -1,6 +1,7 @@
 //! Symmetric compositions of discrete flows.
 
-use crate::{DiscreteLagrangian, Halt, InputError, Solver, SplittingScheme, StepError, Stepper};
+use crate::watch::{Watch, turning};
+use crate::{DiscreteLagrangian, Halt, InputError, Solver, SplittingScheme, StepError, Stepper, Suspicion, Transition};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
@@ -34,6 +35,10 @@ pub struct Composition<D, const N: usize> {
     sigma: f64,
     evaluations: u64,
     solver: Solver<N>,
+    /// The difference quotient of the last two mean velocities, and its last change over a substep.
+    acceleration: SVector<f64, N>,
+    change: SVector<f64, N>,
+    watch: Watch,
 }
 
 /// One substep: its rule by index, and the earlier of its two times after the step's start.
@@ -42,6 +47,10 @@ struct Substep {
     rule: usize,
     start: f64,
     back: bool,
+    /// Its length, with the sign of what the middle of two mean velocities moves by.
+    length: f64,
+    /// The time from the middle of the substep before to the middle of this one.
+    apart: f64,
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
@@ -49,7 +58,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
     ///
     /// # Errors
     /// [`InputError::Step`] unless h is positive and finite; [`InputError::Hypothesis`] for a scheme that is no composition;
-    /// [`InputError::Geometry`] where the time or the state is not finite; those of `rule`.
+    /// [`InputError::Geometry`] where the time or the state is not finite, or the Lagrangian singular; [`InputError::Sigma`] and
+    /// [`InputError::FirstStep`] where the first substep cannot be taken; those of `rule`.
     pub fn new(
         mut rule: impl FnMut(f64) -> Result<D, InputError>,
         scheme: &SplittingScheme,
@@ -68,16 +78,27 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             });
         };
         let (mut rules, mut substeps, mut time) = (Vec::new(), Vec::new(), 0.0);
+        // Symmetric: the last two middles are as far apart as the first two.
+        let mut last_apart = match lengths[..] {
+            [first, second, ..] => 0.5 * (first + second) * h,
+            _ => h,
+        };
         for (i, &g) in lengths.iter().enumerate() {
             // The second half of the substeps mirrors the first, and shares its rules.
             let index = i.min(lengths.len() - 1 - i);
             if index == i {
                 rules.push(rule(g.abs() * h)?);
             }
-            substeps.push(Substep { rule: index, start: f64::min(time, time + g) * h, back: g < 0.0 });
+            let before = if i == 0 { lengths[lengths.len() - 1] } else { lengths[i - 1] };
+            let start = f64::min(time, time + g) * h;
+            let apart = 0.5 * (before + g) * h;
+            // Forward or back, as the middle of the last two mean velocities moves.
+            let length = (g * h).abs().copysign(apart + last_apart);
+            last_apart = apart;
+            substeps.push(Substep { rule: index, start, back: g < 0.0, length, apart });
             time += g;
         }
-        Ok(Composition {
+        let mut composition = Composition {
             rules,
             substeps,
             h,
@@ -88,21 +109,43 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             sigma: 1.0,
             evaluations: 0,
             solver: Solver::default(),
-        })
+            acceleration: SVector::zeros(),
+            change: SVector::zeros(),
+            watch: Watch::default(),
+        };
+        if let Some(first) = composition.substeps.first().copied() {
+            let guess = SVector::zeros();
+            let taken = composition.substep(&first, &state, &guess);
+            let velocity = taken.map_or(guess, |step| step.velocity);
+            composition.rules[first.rule].check_start(t0, &state, &velocity)?;
+            taken.map_err(InputError::first_step)?;
+        }
+        Ok(composition)
+    }
+
+    /// One substep of the step that is at work.
+    fn substep(
+        &mut self,
+        substep: &Substep,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+    ) -> Result<Transition<N>, StepError> {
+        let (rule, at) = (&self.rules[substep.rule], self.time() + substep.start);
+        if substep.back {
+            rule.backward(at, from, guess, &mut self.solver)
+        } else {
+            rule.forward(at, from, guess, &mut self.solver)
+        }
     }
 
     /// One step; the state changes only if each substep can be taken.
     fn step(&mut self) -> Result<(), StepError> {
-        let (t, mut state, mut velocity, mut sigma) = (self.time(), self.state, self.velocity, 1.0);
-        for substep in &self.substeps {
-            let rule = &self.rules[substep.rule];
-            let at = t + substep.start;
-            let next = if substep.back {
-                rule.backward(at, &state, &velocity, &mut self.solver)?
-            } else {
-                rule.forward(at, &state, &velocity, &mut self.solver)?
-            };
+        let (mut state, mut velocity, mut sigma) = (self.state, self.velocity, 1.0);
+        for i in 0..self.substeps.len() {
+            let substep = self.substeps[i];
+            let next = self.substep(&substep, &state, &velocity)?;
             sigma *= if substep.back { 1.0 / next.sigma } else { next.sigma };
+            self.watch(&substep, &velocity, &next);
             // Newton's method evaluates once for each iteration, and once where it ends.
             self.evaluations += u64::from(next.iterations) + 1;
             (state, velocity) = (next.end, next.velocity);
@@ -110,6 +153,32 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         (self.state, self.velocity, self.sigma) = (state, velocity, sigma);
         self.taken += 1;
         Ok(())
+    }
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
+    /// Looks whether a substep resolves the motion: by its rule's factor, and by the second differences of the mean velocities
+    /// along a time as long as the substep. The first step has nothing before it to compare with.
+    #[inline(always)]
+    fn watch(&mut self, substep: &Substep, before: &SVector<f64, N>, next: &Transition<N>) {
+        let now = &next.velocity;
+        let acceleration = (now - before) / substep.apart;
+        let last = std::mem::replace(&mut self.acceleration, acceleration);
+        let change = (acceleration - last) * substep.length;
+        let last = std::mem::replace(&mut self.change, change);
+        if self.taken > 0 {
+            let found = if change.dot(&last) < 0.0 {
+                turning([&last, &change], [before, now, now], &next.end.q, substep.length)
+            } else {
+                None
+            };
+            if let Some(misfit) = found {
+                self.watch.note(self.taken, misfit);
+            }
+        }
+        if let Some(misfit) = self.rules[substep.rule].misfit([now; 4], &next.end, next.sigma) {
+            self.watch.note(self.taken, misfit);
+        }
     }
 }
 
@@ -132,5 +201,9 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
 
     fn evaluations(&self) -> u64 {
         self.evaluations
+    }
+
+    fn suspicion(&self) -> Option<Suspicion> {
+        self.watch.first
     }
 }

@@ -1,7 +1,7 @@
 //! Discrete Lagrangians on Q x Q x R.
 
 use crate::newton::{Linearised, Start, newton};
-use crate::{Solver, StepError};
+use crate::{InputError, Solver, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed};
 
@@ -19,6 +19,22 @@ pub trait DiscreteLagrangian<const N: usize> {
     /// # Errors
     /// A [`StepError`] where it is not defined, or where an implicit definition cannot be solved.
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError>;
+
+    /// What must hold at the start of a run beside the regularity of `L_d`: that of the Lagrangian behind it, where there is one.
+    ///
+    /// # Errors
+    /// An [`InputError`] that names what does not hold.
+    fn check_start(&self, _t: f64, _from: &PhasePoint<N>, _velocity: &SVector<f64, N>) -> Result<(), InputError> {
+        Ok(())
+    }
+
+    /// How far a step is from one that resolves its motion, in units of the largest misfit that such a step can have; `None` where
+    /// it is below one, and where nothing is known, as by default: a discrete Lagrangian may be exact for long steps.
+    /// `velocities` are the mean velocities of the last four steps, the latest last, `to` and `sigma` the latest one's end.
+    #[inline(always)]
+    fn misfit(&self, _velocities: [&SVector<f64, N>; 4], _to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
+        None
+    }
 
     /// Value and first derivatives `D1 L_d, D2 L_d, Dz L_d`.
     ///
@@ -51,7 +67,7 @@ pub trait DiscreteLagrangian<const N: usize> {
     ) -> Result<Transition<N>, StepError> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>| DiscretePoint { q0: from.q, q1: from.q + u * h, z0: from.z };
-        let start = Start { u: *guess, z: 0.0, resolution: from.q.amax() / h };
+        let start = Start { u: *guess, z: 0.0, resolution: from.q.amax() / h, impulse: from.p.amax() * h };
         let root = newton(start, solver, |u, _| {
             let jet = self.second_jet(t, &point(u))?;
             Ok(Linearised {
@@ -83,7 +99,7 @@ pub trait DiscreteLagrangian<const N: usize> {
     ) -> Result<Transition<N>, StepError> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>, z0: f64| DiscretePoint { q0: from.q - u * h, q1: from.q, z0 };
-        let start = Start { u: *guess, z: from.z, resolution: from.q.amax() / h };
+        let start = Start { u: *guess, z: from.z, resolution: from.q.amax() / h, impulse: from.p.amax() * h };
         let root = newton(start, solver, |u, z0| {
             let jet = self.second_jet(t, &point(u, z0))?;
             let defect = z0 + jet.first.value - from.z;
@@ -111,6 +127,13 @@ impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
     }
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
         (**self).value(t, x)
+    }
+    fn check_start(&self, t: f64, from: &PhasePoint<N>, velocity: &SVector<f64, N>) -> Result<(), InputError> {
+        (**self).check_start(t, from, velocity)
+    }
+    #[inline(always)]
+    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
+        (**self).misfit(velocities, to, sigma)
     }
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
         (**self).jet(t, x)

@@ -1,7 +1,8 @@
 //! A discrete Lagrangian by any of the methods.
 
 use crate::{
-    DiscreteLagrangian, LeftMidpoint, Midpoint, Rectangle, Solver, StepError, Strang, Transition, Trapezoidal,
+    DiscreteLagrangian, InputError, LeftMidpoint, Midpoint, Rectangle, Solver, StepError, Strang, Transition,
+    Trapezoidal,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet};
@@ -46,6 +47,14 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Discretised<L, 
 
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
         each!(self, ld => ld.value(t, x))
+    }
+
+    fn check_start(&self, t: f64, from: &PhasePoint<N>, velocity: &SVector<f64, N>) -> Result<(), InputError> {
+        each!(self, ld => ld.check_start(t, from, velocity))
+    }
+
+    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
+        each!(self, ld => ld.misfit(velocities, to, sigma))
     }
 
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {

@@ -97,6 +97,16 @@ pub enum InputError {
     FirstStep(StepError),
 }
 
+impl InputError {
+    /// Of a first step that cannot be taken.
+    pub(crate) fn first_step(cause: StepError) -> Self {
+        match cause {
+            StepError::SigmaVanished { sigma } => InputError::Sigma { sigma },
+            cause => InputError::FirstStep(cause),
+        }
+    }
+}
+
 /// Why a step could not be taken: bad luck, not bad input.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum StepError {

@@ -34,6 +34,8 @@ mod momentum;
 mod newton;
 mod path;
 mod quadrature;
+#[cfg(test)]
+mod round_off_tests;
 pub mod rules;
 mod run;
 mod scene;
@@ -44,6 +46,9 @@ mod step_equations;
 mod stepper;
 mod unknowns;
 mod verified;
+mod watch;
+#[cfg(test)]
+mod watch_tests;
 
 pub use composition::Composition;
 pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};

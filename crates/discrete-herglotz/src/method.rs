@@ -133,11 +133,13 @@ impl Method {
 
     /// The discrete Lagrangian of this method for a Lagrangian, or a reference to one, with the time step `h`. The form of
     /// the Lagrangian is verified at a time and a state, and its constants are read there, by the methods that rest on it;
-    /// of the state they take position and action. Others leave both alone.
+    /// of the state they take position and action. Whether it is regular shows where a run starts, as at
+    /// [`Flow::new`](crate::Flow::new).
     ///
     /// # Errors
-    /// Those of the method's constructor: [`InputError::Step`] unless `h` is positive and finite,
-    /// [`InputError::Dimension`] if `N = 0`, and those of [`Strang::new`].
+    /// [`InputError::Geometry`] where the time or the state is not finite, and those of the method's constructor:
+    /// [`InputError::Step`] unless `h` is positive and finite, [`InputError::Dimension`] if `N = 0`, and those of
+    /// [`Strang::new`].
     pub fn discretise<const N: usize, L: Lagrangian<N>>(
         self,
         lagrangian: L,
@@ -145,6 +147,8 @@ impl Method {
         t: f64,
         state: &PhasePoint<N>,
     ) -> Result<Discretised<L, N>, InputError> {
+        crate::run::check_time(t)?;
+        state.check()?;
         Ok(match self {
             Method::Rectangle => Discretised::Rectangle(Quadrature::new(lagrangian, h)?),
             Method::LeftMidpoint => Discretised::LeftMidpoint(Quadrature::new(lagrangian, h)?),

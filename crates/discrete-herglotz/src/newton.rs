@@ -29,6 +29,8 @@ pub(crate) struct Start<const N: usize> {
     /// The size of the known position divided by the step: `eps` times this is the velocity below which a correction does
     /// not move the position.
     pub resolution: f64,
+    /// The known momentum times the step, so that its product with the velocity is an action of the size of a step's.
+    pub impulse: f64,
 }
 
 /// The solution of the step equations.
@@ -61,8 +63,8 @@ pub fn last_correction(now: f64, before: f64, tolerance: f64) -> bool {
 /// Solves the step equations for `(u, z)` from a guess.
 ///
 /// Stopping rule, the first that holds: the next corrections of `u` and `z`, predicted from the last two, are below their
-/// round-off; the residual and the defect of `z` are below the round-off of their own terms; the corrections stagnate below
-/// what moves the position. An iterate outside the domain (a value that is not finite) is drawn back half-way, which counts
+/// round-off; the residual and the defect of `z` are below the round-off of their own terms; the corrections stagnate, that of
+/// `u` below what moves the position. An iterate outside the domain (a value that is not finite) is drawn back half-way, which counts
 /// as an iteration; after [`ITERATION_LIMIT`] the step fails.
 #[inline(always)]
 pub(crate) fn newton<const N: usize>(
@@ -70,7 +72,7 @@ pub(crate) fn newton<const N: usize>(
     solver: &mut Solver<N>,
     mut linearise: impl FnMut(&SVector<f64, N>, f64) -> Result<Linearised<N>, StepError>,
 ) -> Result<Root<N>, StepError> {
-    let Start { mut u, mut z, resolution } = start;
+    let Start { mut u, mut z, resolution, impulse } = start;
     let (mut last, mut last_z) = (SVector::<f64, N>::zeros(), 0.0f64);
     // The size of the last correction; infinite before the first.
     let (mut last_size, mut last_z_size) = (f64::INFINITY, f64::INFINITY);
@@ -100,8 +102,15 @@ pub(crate) fn newton<const N: usize>(
             && last_correction(size, last_size, f64::EPSILON * u_size)
             && last_correction(z_size, last_z_size, f64::EPSILON * z.abs());
         let round_off = 8.0 * f64::EPSILON;
-        let exact = residual_size <= round_off * at.size && at.z_change.abs() <= round_off * z.abs();
-        let stagnant = size >= 0.5 * last_size && size <= round_off * (resolution + u_size);
+        // The size of the terms that z is the sum of, with what rounding leaves of subnormal ones.
+        let action = z.abs() + start.z.abs() + impulse * u_size + f64::MIN_POSITIVE / f64::EPSILON;
+        // A residual of subnormal numbers is their rounding.
+        let exact = residual_size <= round_off * at.size + f64::MIN_POSITIVE && at.z_change.abs() <= round_off * action;
+        // Where no z solves its equation (beyond a pole of the motion) its corrections stagnate too, but are as large as z: half
+        // of the digits tell that from what a potential's own cancellation leaves.
+        let settled =
+            z_size <= round_off * action || (z_size >= 0.5 * last_z_size && z_size <= f64::EPSILON.sqrt() * action);
+        let stagnant = size >= 0.5 * last_size && size <= round_off * (resolution + u_size) && settled;
         if predicted || exact || stagnant {
             return Ok(Root { u, z, iterations });
         }

@@ -1,12 +1,13 @@
 //! Discrete Lagrangians by quadrature of the action: what the rules of [`crate::rules`] share.
 
 use crate::newton::{Linearised, Start, largest, newton};
-use crate::step_equations::{BLOCK, Frame, Sums, end_directions};
+use crate::step_equations::{BLOCK, Frame, Sums, rates_at};
+use crate::watch::{factor_misfit, misfit};
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
-use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
-    Border, DiscreteJet, DiscretePoint, Dual, Hessian, Lagrangian, Module, PhasePoint, Scalar, SecondDiscreteJet,
-    Triple, VelocityPoint,
+    Border, DiscreteJet, DiscretePoint, Dual, GeometryError, Hessian, Lagrangian, Module, PhasePoint, Regularity,
+    Scalar, SecondDiscreteJet, Triple, VelocityPoint,
 };
 use std::marker::PhantomData;
 
@@ -239,9 +240,10 @@ impl<L, R: Rule> Quadrature<L, R> {
     where
         L: Lagrangian<N>,
     {
-        let start = Start { u: *guess, z: from.z, resolution: (largest(&from.q) / h).abs() };
+        let (resolution, impulse) = ((largest(&from.q) / h).abs(), largest(&from.p) * h.abs());
+        let start = Start { u: *guess, z: from.z, resolution, impulse };
         let root = newton(start, solver, |u, z1| Ok(self.linearise::<N, ADJOINT>(t, h, from, u, z1)))?;
-        let (u, mut p) = (root.u, SVector::<f64, N>::zeros());
+        let (u, mut force) = (root.u, SVector::<f64, N>::zeros());
         let (mut value, mut slope_0, mut slope_1) = (0.0, 0.0, 0.0);
         for node in R::NODES {
             let node = directed::<ADJOINT>(node);
@@ -250,21 +252,24 @@ impl<L, R: Rule> Quadrature<L, R> {
                 v: u,
                 z: if Self::implicit(ADJOINT) { from.z * (1.0 - node.action) + root.z * node.action } else { from.z },
             };
-            let (l, momentum, rate) = end_directions(&self.lagrangian, t + node.place * h, &at, node.place * h);
+            let (l, pull, rate) = rates_at(&self.lagrangian, t + node.place * h, &at);
             value += node.weight * l;
-            p += momentum * node.weight;
+            force += pull * node.weight;
             slope_0 += node.weight * (1.0 - node.action) * rate;
             slope_1 += node.weight * node.action * rate;
         }
         let (q, sigma) = (from.q + u * h, 1.0 + h * slope_0);
+        // The difference of the two momentum equations, `p1 (1 - S_z1) - p0 (1 + S_z0) = h sum w L_q`, as a change of p0: it
+        // holds neither the rounding of u, nor that of `1 + S_z0`, which would be the same in all steps.
+        let change = (force + from.p * (slope_0 + slope_1)) * h;
         if !Self::implicit(ADJOINT) {
-            let end = PhasePoint { q, p, z: from.z + h * value };
+            let end = PhasePoint { q, p: from.p + change, z: from.z + h * value };
             return Ok(Transition { end, velocity: u, sigma, iterations: root.iterations });
         }
         let pivot = 1.0 - h * slope_1;
         // One more Newton step for z1, free here, so that its last digits are those of this evaluation.
         let z = root.z + (from.z - root.z + h * value) / pivot;
-        let end = PhasePoint { q, p: p / pivot, z };
+        let end = PhasePoint { q, p: from.p + change / pivot, z };
         Ok(Transition { end, velocity: u, sigma: sigma / pivot, iterations: root.iterations })
     }
 }
@@ -309,6 +314,25 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
 
     fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
         Ok(self.end_action(t, x)? - x.z0)
+    }
+
+    /// Refuses a Lagrangian whose `W = L_vv` is singular: its motion obeys constraints, of which the rules know nothing. The
+    /// units of the coordinates do not count, so W is scaled by its rows.
+    fn check_start(&self, t: f64, from: &PhasePoint<N>, velocity: &SVector<f64, N>) -> Result<(), InputError> {
+        let w = self.lagrangian.mass_matrix(t, &VelocityPoint { q: from.q, v: *velocity, z: from.z });
+        let rows: Vec<f64> = (0..N).map(|i| contact_geom::largest((0..N).map(|j| w[(i, j)])).sqrt()).collect();
+        let scaled = Regularity::of(DMatrix::from_fn(N, N, |i, j| w[(i, j)] / (rows[i] * rows[j])));
+        // Not `condition() >= 1/eps`: that would let a NaN pass.
+        if scaled.condition() < 1.0 / f64::EPSILON {
+            return Ok(());
+        }
+        let (what, remedy) = ("the matrix L_vv at the start", "take a regular Lagrangian");
+        Err(GeometryError::Singular { what, pivot: scaled.smallest, remedy }.into())
+    }
+
+    #[inline(always)]
+    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
+        factor_misfit(sigma).or_else(|| misfit(velocities, &to.q, self.h))
     }
 
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {

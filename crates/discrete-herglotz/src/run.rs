@@ -1,7 +1,8 @@
 //! Runs: many steps of a discrete Hamiltonian flow, recording only what is asked for.
 
 use crate::legendre::{discrete_regularity, legendre_minus};
-use crate::{DiscreteLagrangian, Halt, InputError, Solver, Status, StepError, Stepper};
+use crate::watch::Watch;
+use crate::{DiscreteLagrangian, Halt, InputError, Solver, Status, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, GeometryError, PhasePoint};
 use std::ops::ControlFlow;
@@ -134,11 +135,12 @@ pub struct Flow<'a, D, const N: usize> {
     k: usize,
     state: PhasePoint<N>,
     /// The mean velocities of the last steps, the latest first: the start of Newton's method is extrapolated from them.
-    velocities: [SVector<f64, N>; 2],
+    velocities: [SVector<f64, N>; 3],
     solver: Solver<N>,
     /// `sigma_d` of the last step.
     sigma: f64,
     evaluations: u64,
+    watch: Watch,
 }
 
 impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
@@ -160,11 +162,12 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
         check_time(t0)?;
         state.check()?;
         let mut solver = Solver::default();
-        let first = ld.forward(t0, &state, &guess, &mut solver).map_err(|cause| match cause {
-            StepError::SigmaVanished { sigma } => InputError::Sigma { sigma },
-            cause => InputError::FirstStep(cause),
-        })?;
-        Ok(Flow { ld, t0, k: 0, state, velocities: [first.velocity; 2], solver, sigma: 1.0, evaluations: 0 })
+        let first = ld.forward(t0, &state, &guess, &mut solver);
+        // A singular Lagrangian is the reason of what goes wrong, where something does.
+        ld.check_start(t0, &state, &first.map_or(guess, |step| step.velocity))?;
+        let first = first.map_err(InputError::first_step)?;
+        let (velocities, watch) = ([first.velocity; 3], Watch::default());
+        Ok(Flow { ld, t0, k: 0, state, velocities, solver, sigma: 1.0, evaluations: 0, watch })
     }
 
     /// A flow from the two positions `q0, q1` and the action `z0`: its state at `t0` is `F-L_d (q0, q1, z0)`.
@@ -190,6 +193,12 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
         Self::with_guess(ld, t0, state, (x.q1 - x.q0) / ld.step_size())
     }
 
+    /// The first step so far that cannot have resolved the motion, where one was seen: as fewer than six steps in a period of
+    /// the velocity, or a conformal factor beyond three.
+    pub fn suspicion(&self) -> Option<Suspicion> {
+        self.watch.first
+    }
+
     /// The current state `(q, p, z)`.
     pub fn state(&self) -> &PhasePoint<N> {
         &self.state
@@ -207,7 +216,7 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
     #[inline(always)]
     pub fn step(&mut self) -> Result<Step<N>, StepError> {
         let t = self.time();
-        let [latest, before] = self.velocities;
+        let [latest, before, earlier] = self.velocities;
         let next = self.ld.forward(t, &self.state, &(latest * 2.0 - before), &mut self.solver)?;
         self.k += 1;
         let step = Step {
@@ -219,7 +228,10 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
             sigma: next.sigma,
             iterations: next.iterations,
         };
-        self.velocities = [next.velocity, latest];
+        if let Some(misfit) = self.ld.misfit([&earlier, &before, &latest, &next.velocity], &next.end, next.sigma) {
+            self.watch.note(self.k - 1, misfit);
+        }
+        self.velocities = [next.velocity, latest, before];
         self.state = next.end;
         self.sigma = next.sigma;
         // A second jet an iteration, and the jet that makes the next momentum.
@@ -259,7 +271,7 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
         let t = self.time() - self.ld.step_size();
         let back = self.ld.backward(t, &self.state, &self.velocities[0], &mut self.solver)?;
         self.state = back.end;
-        self.velocities = [back.velocity; 2];
+        self.velocities = [back.velocity; 3];
         match self.k.checked_sub(1) {
             Some(k) => self.k = k,
             None => self.t0 = t,
@@ -290,6 +302,10 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<'_, D, N> {
 
     fn evaluations(&self) -> u64 {
         self.evaluations
+    }
+
+    fn suspicion(&self) -> Option<Suspicion> {
+        self.watch.first
     }
 }
 

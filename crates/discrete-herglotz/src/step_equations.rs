@@ -96,50 +96,46 @@ impl<const N: usize> Frame<'_, N> {
     }
 }
 
-/// `L`, its derivatives along `(s e_i, e_i, 0)` and its derivative `L_z`: what the end of a step needs of a node.
+/// `L`, `L_q` and `L_z`: what the end of a step needs of a node.
 #[inline(always)]
-pub(crate) fn end_directions<const N: usize>(
+pub(crate) fn rates_at<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,
     at: &VelocityPoint<N>,
-    s: f64,
 ) -> (f64, SVector<f64, N>, f64) {
     if N > BLOCK {
-        return end_by_blocks(lagrangian, t, at, s);
+        return rates_by_blocks(lagrangian, t, at);
     }
     let constant = |re: f64| -> Dual<f64, Border<N>> { Dual::constant(re) };
     let mut x = VelocityPoint { q: at.q.map(constant), v: at.v.map(constant), z: constant(at.z) };
     for i in 0..N {
-        x.q[i].d.x[i] = s;
-        x.v[i].d.x[i] = 1.0;
+        x.q[i].d.x[i] = 1.0;
     }
     x.z.d.z = 1.0;
     let l = lagrangian.along(t, &x);
     (l.re, l.d.x, l.d.z)
 }
 
-/// [`end_directions`] for a large system.
+/// [`rates_at`] for a large system.
 #[inline(never)]
-fn end_by_blocks<const N: usize>(
+fn rates_by_blocks<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,
     at: &VelocityPoint<N>,
-    s: f64,
 ) -> (f64, SVector<f64, N>, f64) {
     let constant = |re: f64| -> Dual<f64, Border<BLOCK>> { Dual::constant(re) };
-    let (mut value, mut momentum, mut rate) = (0.0, SVector::zeros(), 0.0);
+    let (mut value, mut force, mut rate) = (0.0, SVector::zeros(), 0.0);
     for start in (0..N).step_by(BLOCK) {
         let mut x = VelocityPoint { q: at.q.map(constant), v: at.v.map(constant), z: constant(at.z) };
         for i in start..N.min(start + BLOCK) {
-            x.q[i].d.x[i - start] = s;
-            x.v[i].d.x[i - start] = 1.0;
+            x.q[i].d.x[i - start] = 1.0;
         }
         x.z.d.z = 1.0;
         let l = lagrangian.along(t, &x);
         for i in start..N.min(start + BLOCK) {
-            momentum[i] = l.d.x[i - start];
+            force[i] = l.d.x[i - start];
         }
         (value, rate) = (l.re, l.d.z);
     }
-    (value, momentum, rate)
+    (value, force, rate)
 }

@@ -41,6 +41,13 @@ pub trait ActionFlow {
 pub trait ActionMap: Copy + std::fmt::Debug {
     /// `phi_s(z)`; not a number where the flow is not defined up to s.
     fn apply<T: Scalar>(&self, z: T) -> T;
+
+    /// The change `phi_s(z) - z`. To be written without that difference where the flow is slow: the digits that it loses are
+    /// lost to the rate `phi_s'(z) - 1` of the momentum too, in the same direction in all steps.
+    #[inline(always)]
+    fn change<T: Scalar>(&self, z: T) -> T {
+        self.apply(z) - z
+    }
 }
 
 /// The flow of `f(z) = b z + c z^2`, a Riccati equation; a constant belongs to the potential. In closed form, with
@@ -78,14 +85,18 @@ impl ActionFlow for Riccati {
 }
 
 impl ActionMap for RiccatiMap {
-    /// The change of z, not its end, over the denominator: a small step loses no digit.
     #[inline(always)]
     fn apply<T: Scalar>(&self, z: T) -> T {
+        z + self.change(z)
+    }
+
+    #[inline(always)]
+    fn change<T: Scalar>(&self, z: T) -> T {
         let below = -(z * self.bend) + 1.0;
         if below.re() <= 0.0 {
             return T::from(f64::NAN);
         }
-        z + z * (z * self.bend + self.growth) / below
+        z * (z * self.bend + self.growth) / below
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::separable::Separable;
+use crate::watch::misfit;
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
@@ -53,15 +54,19 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionStrang<L, F, N> {
     /// One step from `t`, forward with `h > 0` or back with `h < 0`; its factor is that of the map.
     #[inline(always)]
     fn step(&self, t: f64, from: &PhasePoint<N>, h: f64, map: &F::Map) -> (PhasePoint<N>, SVector<f64, N>, f64) {
-        let (z, first) = with_slope(|z| map.apply(z), from.z);
+        let (change, first) = with_slope(|z| map.change(z), from.z);
+        let z = from.z + change;
         let (value, force) = self.form.kick(t, &from.q, self.rest.0);
-        let p = from.p * first + force * (0.5 * h);
+        // In one sum, as in a linear drag.
+        let p = from.p + (from.p * first + force * (0.5 * h));
         let v = self.form.velocity(&p);
         let q = from.q + v * h;
         let (next, pull) = self.form.kick(t + h, &q, self.rest.0);
         let z = z + 0.5 * h * (p.dot(&v) + (value - self.rest.1) + (next - self.rest.1));
-        let (z, second) = with_slope(|z| map.apply(z), z);
-        (PhasePoint { q, p: (p + pull * (0.5 * h)) * second, z }, v, first * second)
+        let (change, second) = with_slope(|z| map.change(z), z);
+        let pull = pull * (0.5 * h);
+        let p = p + (pull + (p + pull) * second);
+        (PhasePoint { q, p, z: z + change }, v, (1.0 + first) * (1.0 + second))
     }
 }
 
@@ -79,6 +84,11 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> DiscreteLagrangian<N> for 
         let kinetic = self.form.twice_kinetic(&(x.q1 - x.q0)) * (0.5 / self.h);
         let z = self.forth.apply(x.z0) + kinetic + kick(t, &x.q0) + kick(t + self.h, &x.q1);
         Ok(self.forth.apply(z) - x.z0)
+    }
+
+    #[inline(always)]
+    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
+        misfit(velocities, &to.q, self.h)
     }
 
     /// Explicit; the guess and the solver are not needed.

@@ -1,10 +1,11 @@
 //! What every splitting moves: sums that may carry their rounding, a state of them, and a run in chunks.
 
+use crate::watch::{Watch, turning};
 use crate::{Halt, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{PhasePoint, Triple};
 
-/// A vector that many small changes are added to, with what rounding has taken from it so far.
+/// A vector that many small changes are added to, with what rounding has taken from the compensated ones so far.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sum<const N: usize> {
     pub(super) value: SVector<f64, N>,
@@ -40,6 +41,8 @@ pub(super) struct Motion<const N: usize> {
     pub(super) z: Sum<1>,
     pub(super) force: SVector<f64, N>,
     pub(super) value: f64,
+    /// What the last drift changed of the force, times its length: the second difference of the momentum.
+    change: SVector<f64, N>,
     /// `sigma_d` of the last step.
     pub(super) sigma: f64,
 }
@@ -47,7 +50,7 @@ pub(super) struct Motion<const N: usize> {
 impl<const N: usize> Motion<N> {
     pub(super) fn new(state: PhasePoint<N>, (value, force): (f64, SVector<f64, N>)) -> Self {
         let z = Sum::new(SVector::<f64, 1>::new(state.z));
-        Motion { q: Sum::new(state.q), p: Sum::new(state.p), z, force, value, sigma: 1.0 }
+        Motion { q: Sum::new(state.q), p: Sum::new(state.p), z, force, value, change: SVector::zeros(), sigma: 1.0 }
     }
 
     pub(super) fn state(&self) -> PhasePoint<N> {
@@ -63,6 +66,28 @@ impl<const N: usize> Motion<N> {
         }
         self.p.add::<COMPENSATED>(|i, _| s * force[i]);
     }
+
+    /// The misfit of a drift over the time s, between the momentum and the force before it and those that the motion holds; 0
+    /// where it is at most one. That of a [`Watch`], for steps as long as the drift.
+    #[inline(always)]
+    pub(super) fn misfit(&mut self, momentum: &SVector<f64, N>, force: &SVector<f64, N>, s: f64) -> f64 {
+        let now = (self.force - force) * s;
+        let before = std::mem::replace(&mut self.change, now);
+        if now.dot(&before) < 0.0 {
+            let momenta = [momentum, &self.p.value, &(self.p.value + self.force * s)];
+            return turning([&before, &now], momenta, &self.q.value, s).unwrap_or(0.0);
+        }
+        0.0
+    }
+}
+
+/// Where some steps lead.
+pub(super) struct Reached<const N: usize> {
+    pub(super) motion: Motion<N>,
+    /// The state that the motion stands for.
+    pub(super) state: PhasePoint<N>,
+    /// The largest misfit of a step; 0 where none is above one.
+    pub(super) misfit: f64,
 }
 
 /// The steps between two looks whether the motion is finite.
@@ -79,9 +104,14 @@ pub(super) struct Progress<const N: usize> {
     pub(super) motion: Motion<N>,
     /// The state after the steps taken: that of the motion, completed where the next step has a part of the last.
     pub(super) state: PhasePoint<N>,
+    pub(super) watch: Watch,
 }
 
 impl<const N: usize> Progress<N> {
+    pub(super) fn new(h: f64, t0: f64, forces: usize, state: PhasePoint<N>, kick: (f64, SVector<f64, N>)) -> Self {
+        Progress { h, t0, taken: 0, forces, motion: Motion::new(state, kick), state, watch: Watch::default() }
+    }
+
     /// The time after so many steps more.
     #[inline(always)]
     pub(super) fn time_after(&self, steps: usize) -> f64 {
@@ -93,26 +123,30 @@ impl<const N: usize> Progress<N> {
         (self.taken * self.forces) as u64 + 1
     }
 
-    /// Takes steps in chunks; in one that ends with what is not finite, step by step up to the last that is.
-    pub(super) fn advance(
-        &mut self,
-        steps: usize,
-        after: impl Fn(&Self, usize) -> (Motion<N>, PhasePoint<N>),
-    ) -> Result<(), Halt> {
+    /// Takes steps in chunks; one that ends with what is not finite step by step up to the last that is, and one with the first
+    /// misfit step by step up to that.
+    pub(super) fn advance(&mut self, steps: usize, after: impl Fn(&Self, usize) -> Reached<N>) -> Result<(), Halt> {
         let (mut taken, mut longest) = (0, CHUNK);
         while taken < steps {
             let chunk = longest.min(steps - taken);
-            let (motion, state) = after(self, chunk);
-            // What is not finite in the motion is not finite in its end, or in the next.
-            if Triple::from(state).is_finite() && motion.sigma.is_finite() {
-                (self.motion, self.state) = (motion, state);
-                self.taken += chunk;
-                taken += chunk;
-            } else if chunk > 1 {
+            let Reached { motion, state, misfit } = after(self, chunk);
+            // What is not finite in the motion is not finite in its state, or in the next.
+            let finite = Triple::from(state).is_finite() && motion.sigma.is_finite();
+            let misfit = (misfit > 0.0 && self.watch.first.is_none()).then_some(misfit);
+            if chunk > 1 && (!finite || misfit.is_some()) {
                 longest = 1;
-            } else {
+                continue;
+            }
+            if !finite {
                 return Err(Halt { taken, cause: StepError::NonFinite });
             }
+            if let Some(misfit) = misfit {
+                self.watch.note(self.taken, misfit);
+                longest = CHUNK;
+            }
+            (self.motion, self.state) = (motion, state);
+            self.taken += chunk;
+            taken += chunk;
         }
         Ok(())
     }

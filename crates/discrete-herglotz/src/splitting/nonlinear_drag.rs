@@ -1,11 +1,11 @@
 //! Splittings where the drag is not linear in the action.
 
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
-use super::motion::{Motion, Progress};
+use super::motion::{Motion, Progress, Reached};
 use super::separable::Separable;
-use crate::{Halt, InputError, SplittingScheme, Stepper};
+use crate::{Halt, InputError, SplittingScheme, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint};
+use contact_geom::{Lagrangian, PhasePoint, larger};
 
 /// A splitting at work on `L = v.Mv/2 - V(t, q) + f(z)`, in three exact flows: the kinetic part `A`, the kick `B` of `-V`, and
 /// the flow `C` of f, an [`ActionFlow`]. A substep is the symmetric `C B A B C`, each but A over half its length; steps are
@@ -93,8 +93,7 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
         let stages = stages.collect();
         let table = Table { stages, closing: flow.over(0.5 * before * h), rest: (state.z, flow.rate(state.z)) };
         let (value, force) = form.first_kick(t0, &state.q, state.z)?;
-        let motion = Motion::new(state, (value - table.rest.1, force));
-        let progress = Progress { h, t0, taken: 0, forces: scheme.stages(), motion, state };
+        let progress = Progress::new(h, t0, scheme.stages(), state, (value - table.rest.1, force));
         Ok(ActionSplitting { form, table, progress, compensated: false })
     }
 
@@ -129,6 +128,10 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
     fn evaluations(&self) -> u64 {
         self.progress.evaluations()
     }
+
+    fn suspicion(&self) -> Option<Suspicion> {
+        self.progress.watch.first
+    }
 }
 
 /// The motion after some steps more, and its state.
@@ -138,32 +141,36 @@ fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool>(
     table: &Table<C>,
     from: &Progress<N>,
     steps: usize,
-) -> (Motion<N>, PhasePoint<N>) {
-    let (mut m, (z, constant)) = (from.motion, table.rest);
+) -> Reached<N> {
+    let (mut m, mut misfit, (z, constant)) = (from.motion, 0.0, table.rest);
     for k in 0..steps {
         let t = from.time_after(k);
         m.sigma = 1.0;
         for stage in &table.stages {
+            let momentum = m.p.value;
             apply::<C, N, COMPENSATED>(&mut m, &stage.action);
             m.kick::<true, COMPENSATED>(stage.half);
             let p = m.p.value;
             let v: SVector<f64, N> = form.velocity(&p);
             m.z.add::<COMPENSATED>(|_, _| stage.half * p.dot(&v));
             m.q.add::<COMPENSATED>(|i, _| stage.length * v[i]);
+            let force = m.force;
             (m.value, m.force) = form.kick(t + stage.time, &m.q.value, z);
+            misfit = larger(misfit, m.misfit(&momentum, &force, stage.length));
             m.value -= constant;
             m.kick::<true, COMPENSATED>(stage.half);
         }
         apply::<C, N, COMPENSATED>(&mut m, &table.closing);
     }
-    (m, m.state())
+    Reached { motion: m, state: m.state(), misfit }
 }
 
 /// The flow of f, and its factor.
 #[inline(always)]
 fn apply<C: ActionMap, const N: usize, const COMPENSATED: bool>(m: &mut Motion<N>, map: &C) {
-    let (end, slope) = with_slope(|z| map.apply(z), m.z.value[0]);
-    m.z.add::<COMPENSATED>(|_, z| end - z);
-    m.p.add::<COMPENSATED>(|_, p| (slope - 1.0) * p);
-    m.sigma *= slope;
+    let (change, rate) = with_slope(|z| map.change(z), m.z.value[0]);
+    m.z.add::<COMPENSATED>(|_, _| change);
+    // Carried on as in a linear drag.
+    m.p.add::<true>(|_, p| rate * p);
+    m.sigma *= 1.0 + rate;
 }
