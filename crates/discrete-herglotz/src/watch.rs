@@ -61,5 +61,5 @@ const LEAST: f64 = 1.0 / 256.0;
 /// grows by more than three. `(1 + x)/(1 - x)`, which is three at `x = 1/2`, is then off by a tenth or more.
 #[inline(always)]
 pub(crate) fn factor_misfit(sigma: f64) -> Option<f64> {
-    if sigma > 3.0 || sigma < 1.0 / 3.0 { Some(sigma.ln().abs() / 3.0f64.ln()) } else { None }
+    if (1.0 / 3.0..=3.0).contains(&sigma) { None } else { Some(sigma.ln().abs() / 3.0f64.ln()) }
 }

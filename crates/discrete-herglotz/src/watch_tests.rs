@@ -138,7 +138,7 @@ struct Pulse;
 impl Lagrangian<1> for Pulse {
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         let s = t - 5.0;
-        v[0] * v[0] * 0.5 - q[0] * q[0] * 0.5 + (-(s * s)).exp() * q[0] - z * 0.1
+        v[0] * v[0] * 0.5 - q[0] * q[0] * 0.5 + (-(s * s) * 4.0).exp() * q[0] - z * 0.1
     }
     fn structure(&self) -> Structure {
         Structure { separable: true, z_affine: true, constant_rate: true, constant_mass: true, ..Structure::default() }
@@ -156,7 +156,14 @@ fn what_is_resolved_raises_no_suspicion() -> Outcome {
     // Through subnormals to zero.
     assert_resolved(&HarmonicOscillator { gamma: -2.0 }, 0.01, 0.0, start, 1000.0)?;
     // At rest, before a force and after.
-    assert_resolved(&Pulse, 0.01, 0.0, PhasePoint::new([0.0], [0.0], 0.0), 100.0)?;
+    // A known false alarm: the long substeps of a composition of midpoint steps see such a beginning as a turn.
+    let rest = PhasePoint::new([0.0], [0.0], 0.0);
+    for scheme in &SplittingScheme::ALL {
+        let motion = Splitting::new(&Pulse, scheme, 0.01 * scheme.stages() as f64, 0.0, rest)?.watched();
+        assert_unsuspicious(scheme.name(), motion, 10_000 / scheme.stages());
+    }
+    let midpoint = Midpoint::new(&Pulse, 0.01)?;
+    assert_unsuspicious("midpoint", Flow::new(&midpoint, 0.0, rest)?, 10_000);
     // Fast in the units of time, and slow.
     for scale in [1e-6, 1e6] {
         let kepler = Kepler::<2> { mu: scale * scale, gamma: -1e-3 * scale };
@@ -171,7 +178,7 @@ fn what_is_resolved_raises_no_suspicion() -> Outcome {
     assert_rules_resolve(&double, 0.02, 0.0, legendre(&double, 0.0, &double.initial()), 5000)?;
     assert_rules_resolve(&square, 0.05, 0.0, start, 2000)?;
     for scheme in SplittingScheme::ALL.iter().filter(|s| !s.is_nystrom()) {
-        let motion = ActionSplitting::new(&square, scheme, 0.05 * scheme.stages() as f64, 0.0, start)?;
+        let motion = ActionSplitting::new(&square, scheme, 0.02 * scheme.stages() as f64, 0.0, start)?;
         assert_unsuspicious(scheme.name(), motion, 2000 / scheme.stages());
     }
     Ok(())

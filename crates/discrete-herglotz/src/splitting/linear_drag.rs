@@ -98,7 +98,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
     }
 
     /// With a look at each drift whether it resolves the motion, for [`suspicion`](Stepper::suspicion). It costs a sixth of the
-    /// time of a Kepler orbit and a third of a pendulum's, so it is for motions that are not known.
+    /// time of a Kepler orbit, a third of a pendulum's and up to twice an oscillator's more, so it is for motions that are not known.
     pub fn watched(self) -> Self {
         Splitting { watched: true, ..self }
     }
