@@ -90,6 +90,9 @@ pub const ATTACKS: &[Attack] = &[
             "Flow::step",
             "Flow::run",
             "Flow::step_back",
+            "Flow::suspicion",
+            "DiscreteLagrangian::check_start",
+            "DiscreteLagrangian::misfit",
         ],
         run: flows,
     },
@@ -117,10 +120,12 @@ pub const ATTACKS: &[Attack] = &[
             "Splitting::new",
             "Splitting::without_action",
             "Splitting::compensated",
+            "Splitting::watched",
             "ActionSplitting::new",
             "ActionSplitting::with_flow",
             "ActionSplitting::compensated",
             "ActionMap::apply",
+            "ActionMap::change",
         ],
         run: splittings,
     },
@@ -163,6 +168,8 @@ pub const ATTACKS: &[Attack] = &[
             "Scene::plan",
             "Plan::step_size",
             "Plan::count",
+            "Plan::error",
+            "Plan::integrator",
             "Plan::items",
             "Plan::stepper",
             "Plan::run",
@@ -212,7 +219,9 @@ fn compositions(report: &mut Report) {
 fn splittings(report: &mut Report) {
     let scheme = SplittingScheme::BLANES_MOAN_6;
     doors(report, |h, t, x| Splitting::new(&Claiming, &scheme, h, t, x));
-    doors(report, |h, t, x| Splitting::new(&Claiming, &scheme, h, t, x).map(|s| s.compensated().without_action()));
+    doors(report, |h, t, x| {
+        Splitting::new(&Claiming, &scheme, h, t, x).map(|s| s.watched().compensated().without_action())
+    });
     let scheme = SplittingScheme::YOSHIDA_4;
     let system = QuadraticInZ::default();
     doors(report, |h, t, x| ActionSplitting::new(&system, &scheme, h, t, x).map(ActionSplitting::compensated));
@@ -228,6 +237,9 @@ fn splittings(report: &mut Report) {
             fine(Riccati { b: -0.1, c: 0.3 }.over(0.1).apply(value))
                 .map(|z| if value.is_finite() && !z.is_finite() { 0.0 } else { z }),
         );
+        let map = Riccati { b: -0.1, c: 0.3 }.over(0.1);
+        let (change, end) = (map.change(value), map.apply(value));
+        report.check(change.is_nan() == end.is_nan() || !value.is_finite(), || format!("{value} moves by {change}"));
     }
 }
 
@@ -377,6 +389,8 @@ fn flows(report: &mut Report) {
         if let Ok(mut flow) = Flow::new(&ld, t, x) {
             let seen = flow.run(3, &mut FinalOnly).is_ok() && flow.state().check().is_ok() && flow.time().is_finite();
             report.check(seen, || format!("{x:?}: {:?}", flow.state()));
+            let mark = flow.suspicion().is_none_or(|s| s.step < 3 && s.misfit >= 1.0);
+            report.check(mark, || format!("{x:?}: {:?}", flow.suspicion()));
             let back = flow.step_back().is_err() || flow.state().check().is_ok();
             report
                 .check(back && flow.step().map_or(true, |s| s.to.check().is_ok()), || format!("{x:?}: back and forth"));
@@ -386,6 +400,16 @@ fn flows(report: &mut Report) {
     for guess in HOSTILE {
         let made = Flow::with_guess(&ld, 0.0, tame, SVector::from([guess]));
         report.check(made.map_or(true, |f| f.state() == &tame), || format!("the guess {guess}"));
+    }
+    for number in HOSTILE {
+        let (state, v) = (PhasePoint::new([number], [1.0], 0.0), SVector::from([number]));
+        // What is not finite has no regular mass, and resolves nothing.
+        let start = ld.check_start(0.0, &state, &v);
+        report.check(number.is_finite() || start.is_err(), || format!("a start at {number}"));
+        let calm = SVector::from([1.0]);
+        let misfit = ld.misfit([&calm, &calm, &calm, &calm], &tame, number);
+        let regular = (0.5..=2.0).contains(&number);
+        report.check(misfit.is_none() == regular || number.abs() > 1.0, || format!("sigma = {number}: {misfit:?}"));
     }
     report.check(Flow::new(&ld, 0.0, tame).unwrap().run(0, &mut FinalOnly).is_err(), || "no step".into());
 }
@@ -609,9 +633,13 @@ fn scenes(report: &mut Report) {
     for error in HOSTILE {
         let made = scene(0.5).steps(Steps::Accuracy(error));
         let refused = !(error > 0.0 && error.is_finite());
-        report.check(!refused || matches!(run(&made), Err(InputError::Accuracy { .. })), || {
+        report.check(!refused || matches!(run(&made), Err(InputError::Tolerance { .. })), || {
             format!("to an error of {error}")
         });
+        if let Ok(plan) = made.plan() {
+            let kept = plan.error().is_some_and(|found| found <= error) && plan.integrator().order() > 0;
+            report.check(kept, || format!("{:?} where {error} is asked for", plan.error()));
+        }
         report.door(&error, run(&made));
     }
     report.check(run(&scene(0.5).steps(Steps::Count(0))).is_err(), || "no step".into());

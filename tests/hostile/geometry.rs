@@ -7,12 +7,12 @@ use contact_geom::statements::{ActionSquared, AnyFunction};
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField};
 use contact_geom::{
     Border, Clock, Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, Dual, Energy, EtaMinus, EtaPlus,
-    Form, HerglotzField, InfinitesimalConformality, Lagrangian, LagrangianForm, Module, OneParameterGroup, PhasePoint,
-    Regularity, Scalar, SecondDiscreteJet, Smooth, SmoothFunction, Structure, Symmetry, Triple, ValueOnly,
-    VelocityPoint, check_closed_derivatives, conformal_factor_along, conformality, conformality_with_jacobian,
-    derivative_along, derived_gradient, derived_hessian, dissipation_defect, generic, hamiltonian_vector_field,
-    herglotz_field, herglotz_rates, infinitesimal_conformality, jacobi_bracket, larger, largest, legendre,
-    legendre_jacobian, lie_bracket, lie_derivative, linear, regularity, seed, statements,
+    Form, HerglotzField, InfinitesimalConformality, Lagrangian, LagrangianForm, Larger, Largest, Module,
+    OneParameterGroup, PhasePoint, Regularity, Scalar, SecondDiscreteJet, Smooth, SmoothFunction, Structure, Symmetry,
+    Triple, ValueOnly, VelocityPoint, check_closed_derivatives, conformal_factor_along, conformality,
+    conformality_with_jacobian, derivative_along, derived_gradient, derived_hessian, dissipation_defect, generic,
+    hamiltonian_vector_field, herglotz_field, herglotz_rates, infinitesimal_conformality, jacobi_bracket, larger,
+    largest, legendre, legendre_jacobian, lie_bracket, lie_derivative, linear, regularity, seed, statements,
 };
 
 pub const EXCEPTIONS: Exceptions = &[
@@ -108,7 +108,7 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: lagrangians,
     },
-    Attack { on: &["larger", "largest"], run: maxima },
+    Attack { on: &["larger", "largest", "Larger::larger", "Largest::largest"], run: maxima },
     Attack { on: &["SingularMatrix::of", "linear::solve", "linear::solve_in_kernel"], run: systems_of_equations },
     Attack {
         on: &[
@@ -150,7 +150,12 @@ pub const ATTACKS: &[Attack] = &[
     Attack {
         on: &[
             "Scalar::re",
-            "Scalar::modulus",
+            "Scalar::pivot_size",
+            "Scalar::abs",
+            "Scalar::signum",
+            "Scalar::max",
+            "Scalar::min",
+            "Scalar::if_less",
             "Scalar::extent",
             "Scalar::recip",
             "Scalar::sqrt",
@@ -391,7 +396,7 @@ fn lagrangians(report: &mut Report) {
         report.check(gradient.is_none() && hessian.is_none(), || "closed derivatives of what has none".into());
         // A NaN in the comparison of a closed form is not lost.
         let (gradient, _) = check_closed_derivatives(&Pendulum::default(), t, &at);
-        report.formula(&(x.x, x.y), fine(gradient));
+        report.formula(&(t, x), fine(gradient));
     }
 }
 
@@ -401,6 +406,9 @@ fn maxima(report: &mut Report) {
             let most = larger(a, b);
             let good = if a.is_nan() || b.is_nan() { most.is_nan() } else { most >= a && most >= b };
             report.check(good, || format!("larger({a}, {b}) = {most}"));
+            report.check(a.larger(b).to_bits() == most.to_bits() || most.is_nan(), || format!("{a}.larger({b})"));
+            let most = SVector::from([a, 1.0, b]).largest();
+            report.check(most.is_nan() == (a.is_nan() || b.is_nan()), || format!("[{a}, 1, {b}].largest() = {most}"));
             let most = largest([a, 1.0, b]);
             let good = if a.is_nan() || b.is_nan() { most.is_nan() } else { most >= a.abs() && most >= b.abs() };
             report.check(good, || format!("largest([{a}, 1, {b}]) = {most}"));
@@ -580,7 +588,12 @@ fn functions(report: &mut Report) {
     type D = Dual<f64, SVector<f64, 1>>;
     type Function = fn(D) -> D;
     // On the whole line.
-    let whole: [(&str, Function); 13] = [
+    let whole: [(&str, Function); 18] = [
+        ("abs", |x| x.abs()),
+        ("signum", |x| x.signum()),
+        ("max", |x| x.max(D::from(0.5))),
+        ("min", |x| x.min(D::from(0.5))),
+        ("if_less", |x| x.if_less(D::from(0.5), x * x, x)),
         ("powi(0)", |x| x.powi(0)),
         ("powi(3)", |x| x.powi(3)),
         ("exp", |x| x.exp()),
