@@ -123,6 +123,7 @@ fn a_spline_breaks_at_its_nodes() {
             pieces = action(&system, &piece, (from, 0.25 * duration), pieces).map_or(f64::NAN, |a| a.z);
         }
         assert!((whole - pieces).abs() < 1e-15);
-        assert!(counted.count.get() < 600, "{} evaluations", counted.count.get());
+        // Each of the eight panels is looked at between its nodes as well.
+        assert!(counted.count.get() < 1000, "{} evaluations", counted.count.get());
     }
 }

@@ -222,6 +222,8 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
     let mut scale: f64 = 0.0;
     // What rounding makes of the rates, and the largest velocity and action until here.
     let (mut floor, mut units) = (Floor::default(), [Size::default(); 3]);
+    // What the rounding of the time makes of them: far from t = 0 it is all that is known of a force in time.
+    let mut of_time = Floor::default();
     let mut cause = None;
     let mut at = *from;
     let mut ended = duration == 0.0;
@@ -256,7 +258,8 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
         let time = if panels == 0 { duration.abs() } else { scale };
         let at_rest = [units[0].or(Size::of(&at.q).times(1.0 / time)), units[1], units[2]];
         let part = h / duration;
-        let problem = Problem { t, h, from: &at, end: None, accuracy, floor: floor.below(&at_rest, h), part, narrow };
+        let problem =
+            Problem { t, h, from: &at, end: None, accuracy, floor: floor.below(&at_rest, h).or(of_time), part, narrow };
         let mut counted = 0;
         let outcome = collocate(rates, &problem, start, &mut { at.v }, &mut counted);
         match outcome {
@@ -289,7 +292,12 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
                 }
                 if refusals == 0 || refusals >= HALVING {
                     // What rounding makes of the rates here, which no panel can resolve.
-                    counted += 1;
+                    counted += 3;
+                    let later = t + 2.0 * f64::EPSILON * t.abs();
+                    of_time = match (rates.at(t, &at), rates.at(later, &at)) {
+                        (Ok(now), Ok(later)) => Floor::between(&now, &later),
+                        _ => of_time,
+                    };
                     floor = rates.at(t, &with_last_digits_changed(&at)).map_or(floor, |r| Floor::between(&r, &start));
                 }
                 refusals += 1;

@@ -165,6 +165,11 @@ impl Floor {
         Floor(std::array::from_fn(|i| Size(std::array::from_fn(|k| self.0[i].0[k].min(most(i, k))))))
     }
 
+    /// The larger of two.
+    pub fn or(self, other: Self) -> Self {
+        Floor(std::array::from_fn(|i| self.0[i].or(other.0[i])))
+    }
+
     /// A multiple of what rounding makes, and at least what is nothing along a panel of this length.
     #[inline]
     fn over(&self, h: f64, factor: f64) -> [Size; 3] {
