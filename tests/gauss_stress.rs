@@ -5,7 +5,7 @@
 
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{HarmonicOscillator, Kepler, LaneEmden, Pendulum, QuadraticInZ, System};
-use contact_geom::{GeometryError, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
+use contact_geom::{GeometryError, Lagrangian, Largest, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
 use discrete_herglotz::{Gauss, InputError, StepError, Stepper};
 
 /// A Lagrangian with other claims.
@@ -57,7 +57,7 @@ fn stiff_chains_are_solved_by_sweeps() {
                 assert!((3.0..20.0).contains(&sweeps), "s = {s}, k = {k}: {sweeps} sweeps");
                 stepper.state()
             });
-            let off = (ends[0].q - ends[1].q).amax();
+            let off = (ends[0].q - ends[1].q).largest();
             assert!(off <= 50.0 * k * f64::EPSILON, "s = {s}, k = {k}: {off:e}");
         }
     }

@@ -33,6 +33,7 @@ fn assert_random_walk(name: &str, rate: f64, motion: &Start<'_>, undamped: &Star
         a * q * q + b * p * p + (c + share) * q * p
     };
     let mut deviations = [[0.0; 64]; 3];
+    #[allow(clippy::needless_range_loop)] // It seeds the start as well.
     for k in 0..64 {
         // By the golden angle, at amplitudes between one and two.
         let (sin, cos) = (2.399_963 * k as f64).sin_cos();

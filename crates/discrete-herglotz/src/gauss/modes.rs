@@ -145,6 +145,7 @@ fn eigenvector(s: usize, guess: Complex<f64>) -> (Complex<Quad>, [Complex<Quad>;
 }
 
 #[cfg(test)]
+#[allow(clippy::needless_range_loop)] // Several arrays share an index.
 mod tests {
     use super::*;
     use std::array::from_fn;

@@ -202,7 +202,7 @@ fn fewest<L: Lagrangian<N>, const N: usize>(
     while coarse <= 0.01 * target && k % 2 == 0 {
         let Ending::Followed(track) = pilots.gauss(stages, k / 2, (k / 2).min(10), 4, true)? else { break };
         let error = track.distance(&truth);
-        if !(error <= target) {
+        if error > target || error.is_nan() {
             break;
         }
         (fine, coarse, k) = (coarse, error, k / 2);

@@ -107,8 +107,7 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
         let floor = contact_geom::larger(0.1 * self.wanted, 1e-11);
         let bad = |run: &GaussStepper<'_, &L, N>, part: f64| {
             let look = run.look(sets)?;
-            // Not `misfit > ..`: that would let a NaN pass.
-            if !(look.misfit <= RESOLVED) {
+            if look.misfit > RESOLVED || look.misfit.is_nan() {
                 return Some(Ending::Unresolved { part });
             }
             (narrow && look.misfit > NARROW * look.expected + floor).then_some(Ending::Narrow { part })
@@ -139,10 +138,10 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
         let newton = stepper.newton_steps() * (stages * (N + 2)).pow(2) as u64;
         self.left = self.left.saturating_sub(stepper.evaluations() + newton + (looks * stages) as u64);
         // What is met nowhere else may be what a claim denies.
-        if let Some(Ending::Narrow { .. } | Ending::Unresolved { .. }) = ending {
-            if let Some(Defect { claim, size }) = refuted(lagrangian, stepper.time(), &stepper.state(), &start.v) {
-                return Err(InputError::FalseClaim { claim, size });
-            }
+        if let Some(Ending::Narrow { .. } | Ending::Unresolved { .. }) = ending
+            && let Some(Defect { claim, size }) = refuted(lagrangian, stepper.time(), &stepper.state(), &start.v)
+        {
+            return Err(InputError::FalseClaim { claim, size });
         }
         Ok(ending.unwrap_or(Ending::Followed(Track(track))))
     }
