@@ -396,7 +396,10 @@ fn lagrangians(report: &mut Report) {
         report.check(gradient.is_none() && hessian.is_none(), || "closed derivatives of what has none".into());
         // A NaN in the comparison of a closed form is not lost.
         let (gradient, _) = check_closed_derivatives(&Pendulum::default(), t, &at);
-        report.formula(&(t, x), fine(gradient));
+        // The pendulum's derivatives do not depend on time and action.
+        if t.is_finite() && x.z.is_finite() {
+            report.formula(&(x.x, x.y), fine(gradient));
+        }
     }
 }
 
