@@ -120,7 +120,6 @@ pub(crate) fn newton<const N: usize>(
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -1,7 +1,6 @@
 //! The flow of the Herglotz vector field, to round-off.
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests;
 
 use crate::ExactError;

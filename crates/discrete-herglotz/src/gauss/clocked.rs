@@ -3,7 +3,8 @@
 use super::Gauss;
 use super::beginning::Beginning;
 use super::extension::{Extension, Fictitious, Values};
-use super::general::{General, Mass};
+use super::general::General;
+use super::mass::Mass;
 use super::sweeps::Progress;
 use super::table::Table;
 use crate::lanes::forget_branches;

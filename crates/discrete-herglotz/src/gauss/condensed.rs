@@ -246,7 +246,6 @@ impl WithSimd for LeftOut<'_> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use contact_geom::larger;

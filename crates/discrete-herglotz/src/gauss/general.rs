@@ -5,42 +5,18 @@
 
 use super::coefficients::MOST;
 use super::compensated::{Compensated, Twofold, add, finite};
-use super::dense::Solved;
 use super::extension::{Extension, Pace, Values};
-use super::resolution::{FORETOLD, Tail, of_sigma};
+use super::mass::Mass;
+use super::resolution::Tail;
 use super::simplified::{CorrectStages, StageNewton};
 use super::stages::{Stages, blocks};
 use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use super::table::Table;
 use crate::lanes::{Lanes, branched};
-use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{
-    Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint, larger, linear,
-};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
 use pulp::{Arch, Simd};
 use std::array::from_fn;
-
-/// The change of the integrating factor in a step from which on it is compared with the drag's integral.
-const FALLEN: f64 = 0.2;
-
-/// How velocities are found from momenta.
-pub(super) enum Mass<const N: usize> {
-    /// `W^-1`, the same everywhere.
-    Constant(Box<SMatrix<f64, N, N>>),
-    /// `W^-1` at the stages, taken anew in each step.
-    Stages(Box<[[Stages; N]; N]>),
-}
-
-impl<const N: usize> Mass<N> {
-    /// From `W^-1` at the start.
-    pub fn new(structure: &Structure, inverse: Box<SMatrix<f64, N, N>>) -> Self {
-        if structure.constant_mass || structure.separable {
-            Mass::Constant(inverse)
-        } else {
-            Mass::Stages(Box::new([[Stages::ZERO; N]; N]))
-        }
-    }
-}
 
 /// The state and the workspace of the general step.
 ///
@@ -63,17 +39,17 @@ pub(super) struct General<'a, L, P, const N: usize> {
     pub p: [Compensated; N],
     pub z: Compensated,
     /// The stages: velocities and `L_v`.
-    v: [Stages; N],
-    l_v: [Stages; N],
+    pub(super) v: [Stages; N],
+    pub(super) l_v: [Stages; N],
     /// With the weights `h b`, and g where there is a clock: V, `rho L_q`, L and `rho L_z`.
-    moved: [Stages; N],
-    force: [Stages; N],
-    l: Stages,
-    rate: Stages,
+    pub(super) moved: [Stages; N],
+    pub(super) force: [Stages; N],
+    pub(super) l: Stages,
+    pub(super) rate: Stages,
     /// `1 - rho`.
-    falling: Stages,
-    z_stages: Stages,
-    x: [Stages; N],
+    pub(super) falling: Stages,
+    pub(super) z_stages: Stages,
+    pub(super) x: [Stages; N],
     /// `1 - rho` at the end of the last step.
     pub fallen: f64,
     warm: bool,
@@ -81,7 +57,7 @@ pub(super) struct General<'a, L, P, const N: usize> {
     pub newton: Option<Box<StageNewton<N>>>,
     /// The steps that Newton's Jacobian has served.
     age: u32,
-    tail: Tail,
+    pub(super) tail: Tail,
     /// Above one where the last step has not resolved the motion, or its drag.
     pub misfit: f64,
     /// The same while it is not used.
@@ -261,30 +237,17 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         }
     }
 
-    /// Inverts W at the stages; `false` where it is singular.
+    /// Inverts W at the stages where it is not constant; `false` where it is singular.
     #[inline(always)]
     fn invert_mass<S: Simd>(&mut self, t: f64) -> bool {
         if matches!(self.mass, Mass::Constant(_)) {
             return true;
         }
-        let mut inverse: [[Stages; N]; N] = [[Stages::ZERO; N]; N];
-        for r in 0..blocks::<S>(self.table.s) {
+        (0..blocks::<S>(self.table.s)).all(|r| {
             let at = self.table.times.block::<S>(r) + t;
             let w = self.lagrangian.mass_matrix(at, &self.point::<S>(r));
-            for j in 0..N {
-                let mut column = SVector::<Lanes<S>, N>::from_fn(|i, _| Lanes::splat(if i == j { 1.0 } else { 0.0 }));
-                if linear::solve_in_kernel(&mut w.clone(), &mut column).is_err() {
-                    return false;
-                }
-                for i in 0..N {
-                    inverse[i][j].set(r, column[i]);
-                }
-            }
-        }
-        if let Mass::Stages(stored) = &mut self.mass {
-            **stored = inverse;
-        }
-        true
+            self.mass.invert(r, &w)
+        })
     }
 
     /// The positions and the actions of the stages from their velocities and Lagrangians.
@@ -387,49 +350,6 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         }
     }
 
-    /// Judges how well a step has resolved the motion, from how far its start was off what the step before foretold.
-    #[inline(always)]
-    fn judge(&mut self, first: f64) {
-        let resolved = first <= FORETOLD;
-        self.misfit = if resolved && self.fallen.abs() <= FALLEN { 0.0 } else { self.look(resolved) };
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn look(&self, resolved: bool) -> f64 {
-        let s = self.table.s;
-        let integral = (0..s).fold(0.0, |sum, j| sum + self.rate.0[j] / (1.0 - self.falling.0[j]));
-        let of_motion = if resolved {
-            0.0
-        } else {
-            let values = from_fn::<_, N, _>(|d| Stages(self.unweighted(&self.moved[d])));
-            self.tail.misfit(&values, &self.x, self.table.h)
-        };
-        larger(of_motion, of_sigma(1.0 / (1.0 - self.fallen), integral))
-    }
-
-    /// Whether the stages satisfy their equations to round-off, though the velocities still change: where W is ill conditioned
-    /// they are determined no better.
-    #[cold]
-    #[inline(never)]
-    fn holds<S: Simd>(&self) -> bool {
-        let s = self.table.s;
-        // `start + M rates` against what it should be, in units of its terms.
-        let holds = |start: f64, rates: &Stages, sums: &dyn Fn(usize) -> f64| {
-            let mut sum = Stages::ZERO;
-            self.table.m.apply(rates, s, &mut sum, |_| Lanes::<S>::splat(0.0));
-            (0..s).all(|i| {
-                let terms = (0..s).fold(start.abs(), |m, j| m + (self.table.m.0[j].0[i] * rates.0[j]).abs());
-                let off = start + sum.0[i] - sums(i);
-                off.abs() <= 8.0 * f64::EPSILON * larger(terms, sums(i).abs())
-            })
-        };
-        let rho = self.falling.map(|falling| 1.0 - falling);
-        holds(1.0, &self.rate.map(|rate| -rate), &|i| rho.0[i])
-            && holds(self.z.value, &self.l, &|i| self.z_stages.0[i])
-            && (0..N).all(|d| holds(self.p[d].value, &self.force[d], &|i| rho.0[i] * self.l_v[d].0[i]))
-    }
-
     /// A sweep of Newton's method, in the place of [`sweep`](Self::sweep).
     fn correct(&mut self, newton: &StageNewton<N>) -> (f64, f64) {
         Arch::new().dispatch(CorrectStages {
@@ -476,11 +396,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             for i in 0..N {
                 let mut change = zero;
                 for j in 0..N {
-                    let entry = match &self.mass {
-                        Mass::Constant(w) => Lanes::splat(w[(i, j)]),
-                        Mass::Stages(w) => w[i][j].block(r),
-                    };
-                    change = entry.mul_add(excess[j], change);
+                    change = self.mass.inverse(i, j, r).mul_add(excess[j], change);
                 }
                 let v = self.v[i].block::<S>(r) + change;
                 dv = dv.max(change.abs());
@@ -558,20 +474,5 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         self.fallen = fallen;
         self.warm = true;
         Progress::Done
-    }
-
-    /// The stages of the last step, for dense output.
-    pub fn solved(&self) -> Solved<N> {
-        Solved {
-            v: self.v.map(|v| v.0),
-            force: from_fn(|d| self.unweighted(&self.force[d])),
-            rate: self.unweighted(&self.rate),
-            l: self.unweighted(&self.l),
-        }
-    }
-
-    /// What was multiplied with the weights, with 0 beyond the last stage.
-    fn unweighted(&self, x: &Stages) -> [f64; MOST] {
-        from_fn(|i| if i < self.table.s { x.0[i] / self.table.weights.0[i] } else { 0.0 })
     }
 }

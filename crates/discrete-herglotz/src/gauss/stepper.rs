@@ -5,9 +5,10 @@ use super::beginning::{Beginning, velocity};
 use super::condensed::Condensed;
 use super::dense::{DenseStep, Solved, Start};
 use super::extension::{Extension, Physical};
-use super::general::{General, Mass};
+use super::general::General;
 use super::linear::Linear;
 use super::look::{Compare, Curve, Look};
+use super::mass::Mass;
 use super::resolution;
 use super::separable::Separable;
 use super::stage_equations::{Given, Products, StageEquations, Workspace};
@@ -485,8 +486,8 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
         }
         self.suspicion.or_else(|| {
             let Look { misfit, .. } = self.look(1)?;
-            // Not `misfit > ..`: that would let a NaN pass.
-            if misfit <= UNRESOLVED { None } else { Some(Suspicion { step: self.k - 1, misfit: misfit / UNRESOLVED }) }
+            // A NaN is a misfit too.
+            if misfit <= UNRESOLVED { None } else { Some(Suspicion { step: self.k - 1, misfit }) }
         })
     }
 }

@@ -1,6 +1,6 @@
 //! The integrator and the number of steps for a wanted error.
 
-use super::pilot::{BUDGET, Ending, Pilots, Track};
+use super::pilot::{BUDGET, Ending, Pilots, Track, gcd};
 use super::{Integrator, MOST_STEPS, Scene};
 use crate::{InputError, Obstacle};
 use contact_geom::{Lagrangian, Structure};
@@ -18,6 +18,9 @@ const REFERENCE: usize = 12;
 
 /// The stages from which a Gauss method is its own reference.
 const OWN: usize = 6;
+
+/// The times of a span at which runs are compared.
+const MARKS: usize = 10;
 
 /// What is chosen for a scene.
 #[derive(Clone, Copy, Debug)]
@@ -82,7 +85,7 @@ pub(super) fn choose<L: Lagrangian<N>, const N: usize>(
     }
 }
 
-/// The steps of half a radian a stage of the fastest frequency of the motion linearised at its start, or of what drives it there.
+/// The steps of a quarter of a radian a stage of the fastest frequency of the motion linearised at its start.
 fn first_guess<L: Lagrangian<N>, const N: usize>(scene: &Scene<'_, L, N>, stages: usize) -> usize {
     let Scene { lagrangian, start, t0, span, .. } = scene;
     let h = lagrangian.hessian(*t0, start);
@@ -108,8 +111,8 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         if 3.0 * k as f64 > MOST_STEPS {
             break;
         }
-        // Ten common times, where there are as many steps.
-        let marks = k.min(10);
+        // The common times, where there are as many steps.
+        let marks = k.min(MARKS);
         k = k.div_ceil(marks) * marks;
         let mut tracks = Vec::with_capacity(3);
         let before = pilots.left;
@@ -200,7 +203,11 @@ fn fewest<L: Lagrangian<N>, const N: usize>(
     let target = 0.2 * pilots.wanted;
     // Far below what is wanted, fewer steps may do.
     while coarse <= 0.01 * target && k % 2 == 0 {
-        let Ending::Followed(track) = pilots.gauss(stages, k / 2, (k / 2).min(10), 4, true)? else { break };
+        let marks = gcd(k / 2, truth.0.len());
+        if marks < MARKS.min(k / 2) / 2 {
+            break;
+        }
+        let Ending::Followed(track) = pilots.gauss(stages, k / 2, marks, 4, true)? else { break };
         let error = track.distance(&truth);
         if error > target || error.is_nan() {
             break;
@@ -235,7 +242,7 @@ fn by_reference<L: Lagrangian<N>, const N: usize>(
     let refuse = |reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
     let mut count = whole((found.k * REFERENCE) as f64 / order.min(4.0));
     let (mut best, mut strikes) = (f64::INFINITY, 0);
-    let mut cause = Obstacle::Budget;
+    let (mut cause, mut before) = (Obstacle::Budget, None);
     // The fewest steps that were seen to be enough.
     let mut enough: Option<Choice> = None;
     for _ in 0..ATTEMPTS {
@@ -259,7 +266,12 @@ fn by_reference<L: Lagrangian<N>, const N: usize>(
                     break;
                 }
                 strikes = if error < 0.7 * best { 0 } else { strikes + 1 };
-                cause = obstacle(&track.distances(&found.truth), 0.0, wanted, pilots.scene.t0, pilots.scene.span);
+                // The reference is sure, so it is no chaos that keeps a run from it.
+                if let Some((n, other)) = before.replace((count, error)) {
+                    let shown = f64::ln(other / error) / f64::ln(count as f64 / n as f64);
+                    let round_off = error < 1e-9 && shown < 0.5 * order;
+                    cause = if round_off { Obstacle::RoundOff } else { Obstacle::Order { order: shown } };
+                }
                 best = best.min(error);
                 if strikes == 4 {
                     break;

@@ -57,7 +57,8 @@ impl<const N: usize> Track<N> {
     }
 }
 
-fn gcd(a: usize, b: usize) -> usize {
+/// The greatest common divisor.
+pub(super) fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
@@ -112,38 +113,20 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
             }
             (narrow && look.misfit > NARROW * look.expected + floor).then_some(Ending::Narrow { part })
         };
-        let (mut track, mut taken, mut looks) = (Vec::with_capacity(marks), 0, 0);
-        let mut ending = None;
-        while taken < count && ending.is_none() {
-            let next_mark = count / marks * (track.len() + 1);
-            // The first steps are all looked at: what is far too long ends at once.
-            let steps = if taken < 4 { 1 } else { stride.min(next_mark - taken) };
-            let halt = stepper.advance(steps).err();
-            taken += halt.map_or(steps, |halt| halt.taken);
-            let part = taken as f64 / count as f64;
-            ending = match halt {
-                Some(Halt { cause, .. }) => Some(Ending::Halted { part, cause }),
-                None => bad(&stepper, part),
-            };
-            if taken == next_mark {
-                let x = stepper.state();
-                track.push([x.q, x.p]);
-            }
-            looks += sets;
-            let newton = stepper.newton_steps() * (stages * (N + 2)).pow(2) as u64;
-            if stepper.evaluations() + newton + (looks * stages) as u64 > self.left {
-                ending = Some(Ending::Exhausted);
-            }
-        }
-        let newton = stepper.newton_steps() * (stages * (N + 2)).pow(2) as u64;
-        self.left = self.left.saturating_sub(stepper.evaluations() + newton + (looks * stages) as u64);
+        let steps = |taken: usize| if taken < 4 { 1 } else { stride };
+        // A step by Newton's method costs the solution of its equations, a look about a sweep.
+        let (newton, mut looks) = ((stages * (N + 2)).pow(2) as u64, 0);
+        let ending = self.follow(&mut stepper, count, marks, steps, |run, part| {
+            looks += sets * stages;
+            (bad(run, part), run.evaluations() + run.newton_steps() * newton + looks as u64)
+        });
         // What is met nowhere else may be what a claim denies.
-        if let Some(Ending::Narrow { .. } | Ending::Unresolved { .. }) = ending
+        if let Ending::Narrow { .. } | Ending::Unresolved { .. } = ending
             && let Some(Defect { claim, size }) = refuted(lagrangian, stepper.time(), &stepper.state(), &start.v)
         {
             return Err(InputError::FalseClaim { claim, size });
         }
-        Ok(ending.unwrap_or(Ending::Followed(Track(track))))
+        Ok(ending)
     }
 
     /// Follows the motion by the scene's own integrator.
@@ -163,24 +146,41 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
             // Newton's method takes second derivatives.
             Integrator::Discrete(_) | Integrator::Composition(..) => 32,
         };
-        let (mut track, mut taken) = (Vec::with_capacity(marks), 0);
+        let look = |run: &(dyn Stepper<N> + '_), _: f64| (None, run.evaluations().saturating_mul(price));
+        Ok(self.follow(&mut *stepper, count, marks, |_| CHUNK, look))
+    }
+
+    /// Takes `count` steps, which the marks divide, so many at a time as `steps` says after those that are taken; `look` sees the run
+    /// in between with the part that is done, may end it, and says what it has cost. The cost is taken off the budget.
+    fn follow<R: Stepper<N> + ?Sized>(
+        &mut self,
+        run: &mut R,
+        count: usize,
+        marks: usize,
+        steps: impl Fn(usize) -> usize,
+        mut look: impl FnMut(&R, f64) -> (Option<Ending<N>>, u64),
+    ) -> Ending<N> {
+        let (mut track, mut taken, mut spent) = (Vec::with_capacity(marks), 0, 0);
         let mut ending = None;
         while taken < count && ending.is_none() {
             let next_mark = count / marks * (track.len() + 1);
-            let steps = CHUNK.min(next_mark - taken);
-            let halt = stepper.advance(steps).err();
-            taken += halt.map_or(steps, |halt| halt.taken);
-            ending = halt.map(|Halt { cause, .. }| Ending::Halted { part: taken as f64 / count as f64, cause });
+            let chunk = steps(taken).min(next_mark - taken);
+            let halt = run.advance(chunk).err();
+            taken += halt.map_or(chunk, |halt| halt.taken);
+            let part = taken as f64 / count as f64;
+            let seen;
+            (seen, spent) = look(run, part);
+            ending = halt.map(|Halt { cause, .. }| Ending::Halted { part, cause }).or(seen);
             if taken == next_mark {
-                let x = stepper.state();
+                let x = run.state();
                 track.push([x.q, x.p]);
             }
-            if stepper.evaluations().saturating_mul(price) > self.left {
+            if spent > self.left {
                 ending = Some(Ending::Exhausted);
             }
         }
-        self.left = self.left.saturating_sub(stepper.evaluations().saturating_mul(price));
-        Ok(ending.unwrap_or(Ending::Followed(Track(track))))
+        self.left = self.left.saturating_sub(spent);
+        ending.unwrap_or(Ending::Followed(Track(track)))
     }
 }
 

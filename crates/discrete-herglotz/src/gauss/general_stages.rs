@@ -1,0 +1,75 @@
+//! What the stages of a general step say once they are there: whether they satisfy their equations, and resolve the motion.
+
+use super::coefficients::MOST;
+use super::dense::Solved;
+use super::extension::Pace;
+use super::general::General;
+use super::resolution::{FORETOLD, of_sigma};
+use super::stages::Stages;
+use crate::lanes::Lanes;
+use contact_geom::{Lagrangian, larger};
+use pulp::Simd;
+use std::array::from_fn;
+
+/// The change of the integrating factor in a step from which on it is compared with the drag's integral.
+const FALLEN: f64 = 0.2;
+
+impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'_, L, P, N> {
+    /// Judges how well a step has resolved the motion, from how far its start was off what the step before foretold.
+    #[inline(always)]
+    pub(super) fn judge(&mut self, first: f64) {
+        let resolved = first <= FORETOLD;
+        self.misfit = if resolved && self.fallen.abs() <= FALLEN { 0.0 } else { self.look(resolved) };
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn look(&self, resolved: bool) -> f64 {
+        let s = self.table.s;
+        let integral = (0..s).fold(0.0, |sum, j| sum + self.rate.0[j] / (1.0 - self.falling.0[j]));
+        let of_motion = if resolved {
+            0.0
+        } else {
+            let values = from_fn::<_, N, _>(|d| Stages(self.unweighted(&self.moved[d])));
+            self.tail.misfit(&values, &self.x, self.table.h)
+        };
+        larger(of_motion, of_sigma(1.0 / (1.0 - self.fallen), integral))
+    }
+
+    /// Whether the stages satisfy their equations to round-off, though the velocities still change: where W is ill conditioned
+    /// they are determined no better.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn holds<S: Simd>(&self) -> bool {
+        let s = self.table.s;
+        // `start + M rates` against what it should be, in units of its terms.
+        let holds = |start: f64, rates: &Stages, sums: &dyn Fn(usize) -> f64| {
+            let mut sum = Stages::ZERO;
+            self.table.m.apply(rates, s, &mut sum, |_| Lanes::<S>::splat(0.0));
+            (0..s).all(|i| {
+                let terms = (0..s).fold(start.abs(), |m, j| m + (self.table.m.0[j].0[i] * rates.0[j]).abs());
+                let off = start + sum.0[i] - sums(i);
+                off.abs() <= 8.0 * f64::EPSILON * larger(terms, sums(i).abs())
+            })
+        };
+        let rho = self.falling.map(|falling| 1.0 - falling);
+        holds(1.0, &self.rate.map(|rate| -rate), &|i| rho.0[i])
+            && holds(self.z.value, &self.l, &|i| self.z_stages.0[i])
+            && (0..N).all(|d| holds(self.p[d].value, &self.force[d], &|i| rho.0[i] * self.l_v[d].0[i]))
+    }
+
+    /// The stages of the last step, for dense output.
+    pub fn solved(&self) -> Solved<N> {
+        Solved {
+            v: self.v.map(|v| v.0),
+            force: from_fn(|d| self.unweighted(&self.force[d])),
+            rate: self.unweighted(&self.rate),
+            l: self.unweighted(&self.l),
+        }
+    }
+
+    /// What was multiplied with the weights, with 0 beyond the last stage.
+    fn unweighted(&self, x: &Stages) -> [f64; MOST] {
+        from_fn(|i| if i < self.table.s { x.0[i] / self.table.weights.0[i] } else { 0.0 })
+    }
+}

@@ -1,0 +1,54 @@
+//! The inverse mass matrix of the general step.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+use super::stages::Stages;
+use crate::lanes::Lanes;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Structure, linear};
+use pulp::Simd;
+
+/// How velocities are found from momenta.
+pub(super) enum Mass<const N: usize> {
+    /// `W^-1`, the same everywhere.
+    Constant(Box<SMatrix<f64, N, N>>),
+    /// `W^-1` at the stages, taken anew in each step.
+    Stages(Box<[[Stages; N]; N]>),
+}
+
+impl<const N: usize> Mass<N> {
+    /// From `W^-1` at the start.
+    pub fn new(structure: &Structure, inverse: Box<SMatrix<f64, N, N>>) -> Self {
+        if structure.constant_mass || structure.separable {
+            Mass::Constant(inverse)
+        } else {
+            Mass::Stages(Box::new([[Stages::ZERO; N]; N]))
+        }
+    }
+
+    /// Takes `W^-1` at a block of stages; `false` where W is singular there.
+    #[inline(always)]
+    pub fn invert<S: Simd>(&mut self, r: usize, w: &SMatrix<Lanes<S>, N, N>) -> bool {
+        let Mass::Stages(stored) = self else { return true };
+        for j in 0..N {
+            let mut column = SVector::<Lanes<S>, N>::from_fn(|i, _| Lanes::splat(if i == j { 1.0 } else { 0.0 }));
+            if linear::solve_in_kernel(&mut w.clone(), &mut column).is_err() {
+                return false;
+            }
+            for i in 0..N {
+                stored[i][j].set(r, column[i]);
+            }
+        }
+        true
+    }
+
+    /// An entry of `W^-1` at a block of stages.
+    #[inline(always)]
+    pub fn inverse<S: Simd>(&self, i: usize, j: usize, r: usize) -> Lanes<S> {
+        match self {
+            Mass::Constant(w) => Lanes::splat(w[(i, j)]),
+            Mass::Stages(w) => w[i][j].block(r),
+        }
+    }
+}
