@@ -205,7 +205,8 @@ pub enum Obstacle {
     },
     /// Runs approach each other, but more slowly than a smooth motion lets them.
     #[error(
-        "runs converge only with order {order:.1}: the Lagrangian is not smooth along the motion, or the method's order is          low; ask for less, or take a method of higher order if the Lagrangian is smooth"
+        "runs converge only with order {order:.1}: the Lagrangian is not smooth along the motion, or the method's order is \
+         low; ask for less, or take a method of higher order if the Lagrangian is smooth"
     )]
     Order {
         /// The order that the last runs showed.

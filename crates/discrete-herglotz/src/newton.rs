@@ -54,10 +54,11 @@ pub(crate) fn largest<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) ->
 }
 
 /// Whether the correction of a Newton iteration after this one is within a tolerance: convergence is quadratic, so from two
-/// corrections `before > now` the next is about `now^3 / before^2`.
+/// corrections `before > now` the next is about `now^3 / before^2`. The first correction, with an infinite one before, tells nothing
+/// of the next unless it vanishes.
 #[inline]
 pub fn last_correction(now: f64, before: f64, tolerance: f64) -> bool {
-    now == 0.0 || now * (now / before) * (now / before) <= tolerance
+    now == 0.0 || before.is_finite() && now * (now / before) * (now / before) <= tolerance
 }
 
 /// Solves the step equations for `(u, z)` from a guess.

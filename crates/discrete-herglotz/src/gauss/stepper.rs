@@ -7,7 +7,7 @@ use super::dense::{DenseStep, Solved, Start};
 use super::extension::{Extension, Physical};
 use super::general::General;
 use super::linear::Linear;
-use super::look::{Compare, Curve, Look};
+use super::look::{Compare, Curve, Look, SETS};
 use super::mass::Mass;
 use super::resolution;
 use super::separable::Separable;
@@ -16,6 +16,7 @@ use super::sweeps::Progress;
 use super::table::Table;
 use crate::lanes::forget_branches;
 use crate::step_equations::is_identity;
+use crate::watch::misfit;
 use crate::{Halt, InputError, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
@@ -46,8 +47,9 @@ enum Route<'a, L, const N: usize> {
     General(General<'a, L, Physical, N>),
 }
 
-/// The misfit between the nodes from which a step does not resolve the motion: momenta are off by as much as they are.
-const UNRESOLVED: f64 = 1.0;
+/// The misfit between the nodes from which a step of at least three stages does not resolve the motion: of harmonics it then has an
+/// error of its own of 0.01 to 0.1.
+const UNRESOLVED: f64 = 0.1;
 
 /// How the stages of a step are solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,8 +88,19 @@ pub struct GaussStepper<'a, L, const N: usize> {
     newton_steps: u64,
     /// The misfit of a constant conformal factor.
     of_sigma: f64,
+    /// Of steps that tell nothing between their nodes: the last mean velocities.
+    sequence: Option<Box<Sequence<N>>>,
     suspicion: Option<Suspicion>,
 }
+
+/// The mean velocities of the last steps, in sequence.
+struct Sequence<const N: usize> {
+    velocities: [SVector<f64, N>; 4],
+    q: SVector<f64, N>,
+}
+
+/// The stages up to which the nodes of a step do not tell whether it resolves the motion.
+const FEW: usize = 2;
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     pub(super) fn new(
@@ -142,6 +155,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             workspace: None,
             newton_steps: 0,
             of_sigma,
+            sequence: (s <= FEW).then(|| Box::new(Sequence { velocities: [start.v; 4], q: state.q })),
             suspicion: None,
         })
     }
@@ -190,8 +204,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         Some(DenseStep::new(s, t, h, start, &solved))
     }
 
-    /// A look at the last step between its nodes, at some sets of points: the worst of them. `None` where there is no step, or none
-    /// that was iterated.
+    /// A look at the last step between its nodes, at some sets of points: the worst of them. `None` where there is no step.
     pub(crate) fn look(&self, sets: usize) -> Option<Look> {
         let curve = self.arch.dispatch(Stages { run: self })?;
         let at = |set| self.arch.dispatch(Compare { lagrangian: self.lagrangian, curve: &curve, set });
@@ -275,7 +288,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     /// Solves the stages of the next step by Newton's method, from a constant velocity.
     fn solve_stages(&mut self) -> Result<(), StepError> {
         self.solved = false;
-        let (t, from) = (self.time(), self.state());
+        let (t, mut from) = (self.time(), self.state());
+        if let Route::Condensed(_) = &*self.route {
+            // The action does not act back, so that its size must not decide when the iteration ends.
+            from.z = 0.0;
+        }
         let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t };
         let given = Given::Start(from);
         let v = match velocity(self.lagrangian, t, &from, SVector::zeros()) {
@@ -309,6 +326,21 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         }
         self.solved = refused.is_none();
         (taken, refused.map(StepError::from))
+    }
+
+    /// Follows the mean velocities of steps of few stages.
+    #[inline(never)]
+    fn follow(&mut self) {
+        let (q, h) = (SVector::from(self.values().q), self.products.h);
+        let Some(Sequence { velocities, q: before }) = self.sequence.as_deref_mut() else { return };
+        velocities.rotate_left(1);
+        velocities[3] = (q - *before) / h;
+        *before = q;
+        let [a, b, c, d] = &*velocities;
+        if let (Some(misfit), None) = (misfit([a, b, c, d], &q, h), self.suspicion) {
+            // Like those of a rule, from the change of the velocities before.
+            self.suspicion = Some(Suspicion { step: self.k.saturating_sub(1), misfit });
+        }
     }
 
     /// Tries the next cheaper solution once its pause is over.
@@ -361,7 +393,10 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Stages<'_, '_, L, N> {
         let t = t0 + k.checked_sub(1)? as f64 * products.h;
         let mut curve = Curve::new(products.s, t, products.h, &start);
         match &**route {
-            Route::Linear(..) => return None,
+            Route::Linear(run, table) => {
+                let a = run.accelerations(&from.q, &from.y).map(super::stages::Stages);
+                curve.of_accelerations::<S>(table, self.run.mass.as_deref(), &from.y, &a);
+            }
             Route::Condensed(run) => {
                 curve.of_accelerations::<S>(&run.table, self.run.mass.as_deref(), &from.y, &run.a);
             }
@@ -412,6 +447,9 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
             };
             if misfit > 1.0 && run.suspicion.is_none() {
                 run.suspicion = Some(Suspicion { step: run.k, misfit });
+            }
+            if run.sequence.is_some() {
+                run.follow();
             }
             run.k += 1;
         }
@@ -485,9 +523,13 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             return Some(Suspicion { step: 0, misfit: self.of_sigma });
         }
         self.suspicion.or_else(|| {
-            let Look { misfit, .. } = self.look(1)?;
+            // A linear motion that is not resolved is so in every step, and none was looked at on the way.
+            let sets = if let Route::Linear(..) = &*self.route { SETS } else { 1 };
+            let Look { misfit, .. } = self.look(sets)?;
+            // A step of fewer stages is no polynomial between its nodes to speak of.
+            let misfit = if self.products.s > FEW { misfit / UNRESOLVED } else { misfit };
             // A NaN is a misfit too.
-            if misfit <= UNRESOLVED { None } else { Some(Suspicion { step: self.k - 1, misfit }) }
+            if misfit <= 1.0 { None } else { Some(Suspicion { step: self.k - 1, misfit }) }
         })
     }
 }

@@ -1,5 +1,7 @@
 //! The plan of a scene: the route, in code and in words.
 
+mod halved;
+
 use super::accuracy::Choice;
 use super::{Integrator, Scene, Wanted};
 use crate::verified::{refuted, verified};
@@ -42,6 +44,16 @@ const PROBES: usize = 1 << 14;
 /// The step after which the claims are probed next: every power of two, and the multiples of [`PROBES`].
 fn next_probe(taken: usize) -> usize {
     (taken + 1).checked_next_power_of_two().unwrap_or(usize::MAX).min((taken / PROBES + 1) * PROBES)
+}
+
+/// The next step, counted from 0, that is compared with two halves: each that ends at a power of two, and the last.
+fn halved_step(taken: usize, count: usize) -> usize {
+    (taken + 1).checked_next_power_of_two().unwrap_or(count).min(count) - 1
+}
+
+/// The earlier of two.
+fn first(a: Option<Suspicion>, b: Option<Suspicion>) -> Option<Suspicion> {
+    a.into_iter().chain(b).min_by_key(|s| s.step)
 }
 
 /// A scene after its checks, with step and route chosen; made by [`Scene::plan`]. Printed, it says what will be computed and
@@ -173,24 +185,37 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
 
     fn make_stepper(&self, watched: bool) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
         let (t0, start, action) = (self.t0, self.start, self.wanted.action || !self.z_decouples);
-        Ok(match (&self.engine, &self.integrator) {
-            (Engine::Discrete(ld), _) => Box::new(Flow::with_guess(ld, t0, start, self.guess)?),
-            (Engine::Gauss(gauss), _) if action => Box::new(gauss.stepper(t0, start, self.guess)?),
-            (Engine::Gauss(gauss), _) => Box::new(gauss.stepper_without_action(t0, start, self.guess)?),
-            (Engine::Explicit, Integrator::Splitting(scheme)) if !self.z_decouples => {
-                Box::new(ActionSplitting::new(self.lagrangian, scheme, self.h, t0, start)?)
+        Ok(match &self.engine {
+            Engine::Discrete(ld) => Box::new(Flow::with_guess(ld, t0, start, self.guess)?),
+            Engine::Gauss(gauss) if action => Box::new(gauss.stepper(t0, start, self.guess)?),
+            Engine::Gauss(gauss) => Box::new(gauss.stepper_without_action(t0, start, self.guess)?),
+            Engine::Explicit => self.explicit(self.h, t0, start, watched)?,
+        })
+    }
+
+    /// A stepper of a splitting or a composition.
+    pub(super) fn explicit(
+        &self,
+        h: f64,
+        t0: f64,
+        start: PhasePoint<N>,
+        watched: bool,
+    ) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
+        Ok(match &self.integrator {
+            Integrator::Splitting(scheme) if !self.z_decouples => {
+                Box::new(ActionSplitting::new(self.lagrangian, scheme, h, t0, start)?)
             }
-            (Engine::Explicit, Integrator::Splitting(scheme)) => {
-                let splitting = Splitting::new(self.lagrangian, scheme, self.h, t0, start)?;
+            Integrator::Splitting(scheme) => {
+                let splitting = Splitting::new(self.lagrangian, scheme, h, t0, start)?;
                 let splitting = if watched { splitting.watched() } else { splitting };
-                if action { Box::new(splitting) } else { Box::new(splitting.without_action()) }
+                if self.wanted.action { Box::new(splitting) } else { Box::new(splitting.without_action()) }
             }
-            (Engine::Explicit, Integrator::Composition(method, scheme)) => {
+            Integrator::Composition(method, scheme) => {
                 let rule = |h| method.discretise(self.lagrangian, h, t0, &start);
-                Box::new(Composition::new(rule, scheme, self.h, t0, start)?)
+                Box::new(Composition::new(rule, scheme, h, t0, start)?)
             }
-            // `new` makes no other pairs.
-            (Engine::Explicit, _) => return Err(InputError::Dimension),
+            // `new` makes no others.
+            Integrator::Discrete(_) | Integrator::Gauss { .. } => return Err(InputError::Dimension),
         })
     }
 
@@ -213,13 +238,24 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             rows.push(self.row(&*stepper));
         }
         let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
+        // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes.
+        let halves =
+            self.error.is_none() && !matches!(self.integrator, Integrator::Gauss { stages } if stages > halved::FEW);
         while taken < self.count {
             let next_row = stride.map_or(self.count, |stride| (taken / stride + 1) * stride);
-            let chunk = if single { 1 } else { next_row.min(next_probe(taken)).min(self.count) - taken };
+            let halved = if halves { halved_step(taken, self.count) } else { usize::MAX };
+            let before = (taken == halved).then(|| (stepper.time(), stepper.state()));
+            let next_look = if taken == halved { taken + 1 } else { halved };
+            let next = next_row.min(next_probe(taken)).min(next_look).min(self.count);
+            let chunk = if single { 1 } else { next - taken };
             let (done, cause) = match stepper.advance(chunk) {
                 Ok(()) => (chunk, None),
                 Err(halt) => (halt.taken, Some(halt.cause)),
             };
+            if let (Some((t, from)), None) = (before, cause) {
+                let misfit = self.against_halves(t, &from, &stepper.state()).filter(|m| *m > 1.0);
+                suspicion = first(suspicion, misfit.map(|misfit| Suspicion { step: taken, misfit }));
+            }
             taken += done;
             if single {
                 log_factor += done as f64 * stepper.sigma().ln();
@@ -232,7 +268,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 rows.push(self.row(&*stepper));
             }
             if taken == self.count || taken == next_probe(taken - 1) {
-                suspicion = suspicion.or_else(|| stepper.suspicion());
+                suspicion = first(suspicion, stepper.suspicion());
                 if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
                     status = Status::FalseClaim { step: taken, claim, size };
                     break;
@@ -245,7 +281,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         let end = self.row(&*stepper);
         Ok(Outcome {
             status,
-            suspicion: suspicion.or_else(|| stepper.suspicion()),
+            suspicion: first(suspicion, stepper.suspicion()),
             steps: taken,
             t: end.t,
             q: end.q,
