@@ -186,15 +186,22 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         if let Some(newton) = &mut self.newton {
             newton.a = self.rest;
         }
-        // The tails of the matrices act on the guess, or on the values of a later sweep where the guess is poor.
-        let mut due = self.far && !solved && self.newton.is_none();
-        self.begin::<S>(!due);
+        // The tails of the matrices act on the guess, from the second sweep on: beside the first one's forces they cost little. Where
+        // the guess is poor they act on the values of a later sweep.
+        let at_once = solved || self.newton.is_some();
+        let mut due = self.far && !at_once;
+        let mut aside = !self.far && !at_once && self.left.tail.is_some();
+        self.begin::<S>(at_once);
         self.far = false;
         let mut sweeps = Sweeps::default();
         let outcome = loop {
             for d in 0..N {
                 let base = &self.base[d];
                 self.left.head.b.apply(&self.rest[d], s, &mut self.x[d], |r| base.block::<S>(r));
+            }
+            if aside {
+                aside = false;
+                self.begin::<S>(true);
             }
             let (mut change, mut size) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
             for r in 0..m {
@@ -268,25 +275,28 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         }
     }
 
-    /// What the sweeps of a step have in common, with or without the tails of the matrices; with the rests of the state, which
-    /// are not free of its direction.
+    /// What the sweeps of a step have in common: what comes of the state, with its rests, which are not free of its direction; and
+    /// of the tails of the matrices, with or without what these make of the accelerations.
     #[inline(always)]
-    fn begin<S: Simd>(&mut self, with_tail: bool) {
+    fn begin<S: Simd>(&mut self, with_product: bool) {
         let (head, s) = (&self.left.head, self.table.s);
         for d in 0..N {
             let (q, v) = (Lanes::<S>::splat(self.q[d].value), Lanes::<S>::splat(self.v[d].value));
             let (q_rest, v_rest) = (Lanes::<S>::splat(self.q[d].rest), Lanes::<S>::splat(self.v[d].rest));
             let base = &mut self.base[d];
             let rests = |r| head.u.block::<S>(r).mul_add(v_rest, head.q.block::<S>(r) * q_rest);
+            let large = |r, small| head.q.block::<S>(r).mul_add(q, head.u.block::<S>(r).mul_add(v, small));
             match &self.left.tail {
-                Some(tail) if with_tail => tail.b.apply::<S>(&self.rest[d], s, base, |r| {
-                    tail.u.block(r).mul_add(v, tail.q.block(r).mul_add(q, rests(r)))
-                }),
-                _ => (0..blocks::<S>(s)).for_each(|r| base.set(r, rests(r))),
-            }
-            for r in 0..blocks::<S>(s) {
-                let small = head.u.block::<S>(r).mul_add(v, base.block(r));
-                base.set(r, head.q.block::<S>(r).mul_add(q, small));
+                Some(tail) => {
+                    let of_state = |r| tail.u.block(r).mul_add(v, tail.q.block(r).mul_add(q, rests(r)));
+                    if with_product {
+                        tail.b.apply::<S>(&self.rest[d], s, base, of_state);
+                        (0..blocks::<S>(s)).for_each(|r| base.set(r, large(r, base.block(r))));
+                    } else {
+                        (0..blocks::<S>(s)).for_each(|r| base.set(r, large(r, of_state(r))));
+                    }
+                }
+                None => (0..blocks::<S>(s)).for_each(|r| base.set(r, large(r, rests(r)))),
             }
         }
     }

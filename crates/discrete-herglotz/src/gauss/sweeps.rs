@@ -45,7 +45,7 @@ pub(super) const AGE: u32 = 16;
 
 /// The part of round-off that an iteration may leave. What it leaves has the same direction in every step, and so it adds up
 /// like the number of steps, where round-off adds up like its root.
-const LEFT: f64 = 1.0 / 32.0;
+const LEFT: f64 = 1.0 / 4.0;
 
 /// The changes of the sweeps of one step.
 ///

@@ -227,7 +227,7 @@ fn price(report: &mut Report) -> Result<(), Failure> {
     let mut curves = Vec::new();
     for (i, stages) in [4, 8, 16].into_iter().enumerate() {
         let integrator = Integrator::Gauss { stages };
-        let per_step = |time: &dyn Fn(f64) -> f64| {
+        let per_step = |time: &dyn Fn(f64) -> [f64; 2]| {
             let steps = [0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4, 12.8];
             steps.map(|h| (h, time(h)))
         };
@@ -238,17 +238,20 @@ fn price(report: &mut Report) -> Result<(), Failure> {
         for (j, (name, times)) in
             [("pendulum", pendulum), ("pendulum, acting z", general), ("pair", coupled)].into_iter().enumerate()
         {
-            let contracting = times[..4].iter().map(|t| t.1).fold(0.0, larger);
-            let dearest = times.iter().map(|t| t.1).fold(0.0, larger);
-            report.at_most_timed(
-                &format!("{integrator}, {name}: dearest step over the dearest that contracts"),
-                dearest / contracting,
-                PRICE,
-            )?;
+            let contracting = times[..4].iter().map(|(_, [taken, _])| *taken).fold(0.0, larger);
+            // Zero where there is none.
+            let dearest = |which: usize| times.iter().map(|(_, of)| of[which]).fold(0.0, larger);
+            for (which, of) in ["step that is taken", "step that is given up"].into_iter().enumerate() {
+                report.at_most_timed(
+                    &format!("{integrator}, {name}: dearest {of} over the dearest that contracts"),
+                    dearest(which) / contracting,
+                    PRICE,
+                )?;
+            }
             curves.push(Curve::new(
                 &format!("{integrator}, {name}").replace('_', " "),
                 Line::Coloured(3 * i + j),
-                times,
+                times.map(|(h, [taken, given_up])| (h, larger(taken, given_up))),
             ));
         }
     }
@@ -264,25 +267,28 @@ fn price(report: &mut Report) -> Result<(), Failure> {
     report.timed_figure(&svg)
 }
 
-/// The time of a step, from a run that goes on as long as it can.
-fn of_step<const N: usize>(system: Formula<N>, start: VelocityPoint<N>, integrator: Integrator, h: f64) -> f64 {
+/// The time of a step, from a run that goes on as long as it can, and of one that is given up; zero where there is none.
+fn of_step<const N: usize>(system: Formula<N>, start: VelocityPoint<N>, integrator: Integrator, h: f64) -> [f64; 2] {
     let problem = Problem { system, t0: 0.0, start, span: h };
     let Ok(plan) = problem.scene().by(integrator).steps(Steps::Count(1)).plan() else {
-        return f64::NAN;
+        return [f64::NAN; 2];
     };
-    let mut least = f64::INFINITY;
+    let mut least = [f64::INFINITY; 2];
     for _ in 0..3 {
-        let Ok(mut stepper) = plan.stepper() else { return f64::NAN };
+        let Ok(mut stepper) = plan.stepper() else { return [f64::NAN; 2] };
         let clock = Instant::now();
-        let (mut tried, mut goes_on) = (0, true);
-        while goes_on && tried < 200 && clock.elapsed() < Duration::from_millis(50) {
-            // A step that is given up has its price, too.
-            (tried, goes_on) = match stepper.advance(5) {
-                Ok(()) => (tried + 5, true),
-                Err(halt) => (tried + halt.taken + 1, false),
-            };
+        let (mut tried, mut given_up, mut until) = (0, 0.0, 0.0);
+        while given_up == 0.0 && tried < 200 && until < 0.05 {
+            let taken = stepper.advance(5);
+            let now = clock.elapsed().as_secs_f64();
+            match taken {
+                Ok(()) => (tried, until) = (tried + 5, now),
+                // With up to four steps before it.
+                Err(_) => given_up = now - until,
+            }
         }
-        least = least.min(clock.elapsed().as_secs_f64() / tried as f64);
+        let per_step = if tried == 0 { 0.0 } else { until / f64::from(tried) };
+        least = [least[0].min(per_step), least[1].min(given_up)];
     }
     least
 }
