@@ -46,7 +46,9 @@ impl<const N: usize> Truth<N> {
     /// The error of `(q, p)` relative to its size at the end, as `Steps::Accuracy` promises it.
     pub fn error_at_end(&self, q: &SVector<f64, N>, p: &SVector<f64, N>) -> f64 {
         let norm = |q: &SVector<f64, N>, p: &SVector<f64, N>| larger(largest(q), largest(p));
-        norm(&(q - self.end.q), &(p - self.end.p)) / norm(&self.end.q, &self.end.p)
+        // A motion at rest at the origin has no size, and no error if it stays there.
+        let error = norm(&(q - self.end.q), &(p - self.end.p));
+        if error == 0.0 { 0.0 } else { error / norm(&self.end.q, &self.end.p) }
     }
 }
 

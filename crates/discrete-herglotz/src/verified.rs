@@ -50,10 +50,7 @@ pub(crate) fn refuted<const N: usize>(
     lagrangian.structure().defects(lagrangian, t, &x)?.find(|d| d.size > PROBE)
 }
 
-/// The times of a span at which claims are probed before a run, beside the start: claims on time are seen at any but special ones.
-const TIMES: usize = 16;
-
-/// Probes the claims at times of a whole span, at a start.
+/// Probes the claims at so many times of a whole span, at a start: claims on time are seen at any but special ones.
 ///
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold.
@@ -62,9 +59,10 @@ pub(crate) fn verified_over<const N: usize>(
     t0: f64,
     span: f64,
     start: &VelocityPoint<N>,
+    times: usize,
 ) -> Result<(), InputError> {
     let structure = lagrangian.structure();
-    for i in 1..=TIMES {
+    for i in 1..=times {
         // Fractions without a period, so that they do not meet the zeros of what is periodic.
         let t = t0 + span * (i as f64 * 0.618_033_988_749_894_9).fract();
         let defects = structure.defects(lagrangian, t, start).into_iter().flatten();

@@ -15,8 +15,10 @@ pub(super) struct Beginning<const N: usize> {
 }
 
 impl<const N: usize> Beginning<N> {
+    /// With the structure that has been probed there, or after a probe.
     pub fn of(
         lagrangian: &impl Lagrangian<N>,
+        probed: Option<Structure>,
         t0: f64,
         state: &PhasePoint<N>,
         guess: SVector<f64, N>,
@@ -27,7 +29,7 @@ impl<const N: usize> Beginning<N> {
         }
         let v = velocity(lagrangian, t0, state, guess)?;
         let start = VelocityPoint { q: state.q, v, z: state.z };
-        let structure = verified(lagrangian, t0, &start)?;
+        let structure = probed.map_or_else(|| verified(lagrangian, t0, &start), Ok)?;
         let w = kept_mass_matrix(lagrangian, t0, &start);
         let inverse = inverted(&w).map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
         // Rows of different units are no matter: |W^-1| |W| is 1 for every diagonal W.

@@ -55,7 +55,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         guess: SVector<f64, N>,
     ) -> Result<Self, InputError> {
         let (lagrangian, h) = (&gauss.lagrangian, gauss.forward.h);
-        let Beginning { start, structure, inverse, .. } = Beginning::of(lagrangian, t0, &state, guess)?;
+        let Beginning { start, structure, inverse, .. } = Beginning::of(lagrangian, None, t0, &state, guess)?;
         if !structure.autonomous {
             return Err(InputError::Unclaimed { claim: "autonomous" });
         }

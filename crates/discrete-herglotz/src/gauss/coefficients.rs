@@ -22,6 +22,11 @@ pub(crate) struct Coefficients {
     pub a: [[Quad; MOST]; MOST],
     /// The values at the next step's nodes of the polynomial through the values at this step's: `[i][j]` for node i.
     pub ahead: [[f64; MOST]; MOST],
+    /// The weights of the stages in the last two coefficients of the polynomial through them, in Legendre polynomials: of
+    /// `P_(s-1)(2 x - 1)` and the one before, where there is one.
+    pub last: [[f64; MOST]; 2],
+    /// The values at the step's start and end of the Lagrange polynomials of the nodes.
+    pub ends: [[f64; MOST]; 2],
 }
 
 /// The Legendre polynomials `P_0(x) .. P_s(x)` on `[-1, 1]`.
@@ -40,13 +45,6 @@ impl Coefficients {
     pub fn of(s: usize) -> &'static Coefficients {
         static TABLES: [OnceLock<Box<Coefficients>>; MOST] = [const { OnceLock::new() }; MOST];
         TABLES[s.clamp(1, MOST) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MOST))))
-    }
-
-    /// The weight of stage j in the coefficient of `P_k(2 x - 1)` of the polynomial through the stages: Gauss' weights integrate
-    /// its products with the Legendre polynomials exactly.
-    pub fn legendre_weight(&self, s: usize, j: usize, k: usize) -> f64 {
-        let at = legendre(s, self.c[j] + self.c[j] - Quad::one());
-        (2 * k + 1) as f64 * self.b[j].0 * at[k].0
     }
 
     fn new(s: usize) -> Self {
@@ -84,7 +82,20 @@ impl Coefficients {
                 if i < s { (b[j] * sum).0 } else { 0.0 }
             })
         });
-        Coefficients { c, b, a, ahead }
+        // Gauss' weights integrate products with the Legendre polynomials exactly.
+        let last = from_fn(|i| {
+            let k = (s - 1).saturating_sub(i);
+            from_fn(|j| if j < s { (odd(k) * b[j] * at[j][k]).0 } else { 0.0 })
+        });
+        // P_k(-1) = (-1)^k and P_k(1) = 1.
+        let ends = [-one, one].map(|end| {
+            let p = legendre(s, end);
+            from_fn(|j| {
+                let sum = (0..s).fold(Quad::zero(), |sum, k| sum + odd(k) * at[j][k] * p[k]);
+                if j < s { (b[j] * sum).0 } else { 0.0 }
+            })
+        });
+        Coefficients { c, b, a, ahead, last, ends }
     }
 }
 
@@ -127,8 +138,14 @@ mod tests {
                 assert!((value - x.powi(degree)).abs() <= 64.0 * f64::EPSILON * (size + 1.0), "s = {s}, {x}");
                 let exact = x.powi(s as i32) / s as f64;
                 assert!((integral - exact).abs() <= 64.0 * f64::EPSILON * (size_of + 1.0), "s = {s}, {x}");
+                // 0^(s-1) and 1 at the ends.
+                let ends = g.ends.map(|row| apply(&row));
+                let at_start = if degree == 0 { 1.0 } else { 0.0 };
+                for ((end, size), expected) in ends.into_iter().zip([at_start, 1.0]) {
+                    assert!((end - expected).abs() <= 64.0 * f64::EPSILON * (size + 1.0), "s = {s}");
+                }
                 // The last coefficient of x^(s-1) in P_(s-1)(2x - 1) is 1 over that of the highest power there.
-                let last: f64 = (0..s).map(|j| g.legendre_weight(s, j, s - 1) * g.c[j].0.powi(degree)).sum();
+                let last: f64 = (0..s).map(|j| g.last[0][j] * g.c[j].0.powi(degree)).sum();
                 let central = (1..s).fold(1.0, |b, k| b * (s - 1 + k) as f64 / k as f64);
                 assert!((last * central - 1.0).abs() <= 1e-15 * central * s as f64, "s = {s}: {last}");
             }

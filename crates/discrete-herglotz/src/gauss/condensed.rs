@@ -5,7 +5,8 @@
 
 use super::coefficients::{Coefficients, MOST};
 use super::compensated::{Twofold, exact_sum};
-use super::stages::{Exact, StageMap, Stages, Weights, padded, solve_exactly};
+use super::double_double::{Row, solve_exactly};
+use super::stages::{Exact, StageMap, Stages, Weights, padded};
 use crate::{InputError, StepError};
 use num_traits::{One, Zero};
 use pulp::{Arch, Simd, WithSimd};
@@ -59,17 +60,18 @@ impl Condensed {
     pub fn new(s: usize, h: f64, gamma: f64) -> Result<Self, InputError> {
         let g = Coefficients::of(s);
         let (one, zero, step, rate) = (Quad::one(), Quad::zero(), Quad::from(h), Quad::from(gamma));
-        // (1 + gamma h A) rho = 1.
-        let mut rows: Vec<Vec<Quad>> = (0..s)
-            .map(|i| {
-                let entry = |j: usize| if i == j { one } else { zero } + rate * step * g.a[i][j];
-                (0..s).map(entry).chain([one]).collect()
-            })
-            .collect();
-        if !solve_exactly(&mut rows) {
-            return Err(InputError::Sigma { sigma: f64::NAN });
+        let mut rho: Exact = [one; MOST];
+        if gamma != 0.0 {
+            // (1 + gamma h A) rho = 1.
+            let factor = rate * step;
+            let entry = |i: usize, j: usize| if i == j { one + factor * g.a[i][j] } else { factor * g.a[i][j] };
+            let row = |i: usize| (0..s).map(|j| entry(i, j)).chain([one]).collect();
+            let mut rows: Vec<Vec<Quad>> = (0..s).map(row).collect();
+            if !solve_exactly(&mut rows) {
+                return Err(InputError::Sigma { sigma: f64::NAN });
+            }
+            rho = from_fn(|i| if i < s { rows[i][s] } else { one });
         }
-        let rho: Exact = from_fn(|i| if i < s { rows[i][s] } else { one });
         let sum = |f: &dyn Fn(usize) -> Quad| (0..s).fold(zero, |sum, j| sum + f(j));
         let fallen = step * rate * sum(&|j| g.b[j] * rho[j]);
         let end_rho = one - fallen;
@@ -80,24 +82,24 @@ impl Condensed {
         if !(end_rho.0 > 0.0 && end_rho.0.is_finite()) {
             return Err(InputError::Sigma { sigma: 1.0 / end_rho.0 });
         }
-        let velocity: [Exact; MOST] = from_fn(|i| from_fn(|j| step * g.a[i][j] * rho[j] / rho[i]));
-        let b = from_fn(|i| from_fn(|k| step * sum(&|j| g.a[i][j] * velocity[j][k])));
-        let u = from_fn(|i| step * sum(&|j| g.a[i][j] / rho[j]));
+        let Products { velocity, positions } = Arch::new().dispatch(Multiply { s, h, rho: &rho });
         let exact = ExactEnd {
-            d: velocity,
-            inverse_rho: rho.map(|r| one / r),
-            end_u: step * sum(&|j| g.b[j] / rho[j]),
-            end_b: from_fn(|k| if k < s { step * sum(&|j| g.b[j] * velocity[j][k]) } else { zero }),
+            d: velocity.map(|row| from_fn(|j| row.at(j))),
+            inverse_rho: rho.map(|r| if gamma == 0.0 { one } else { one / r }),
+            end_u: positions[s].at(MOST),
+            end_b: from_fn(|k| positions[s].at(k)),
             grow: fallen / end_rho,
             end_v: from_fn(|j| if j < s { step * g.b[j] * rho[j] / end_rho } else { zero }),
         };
+        let b = from_fn(|i| from_fn(|k| positions[i].at(k)));
+        let u = from_fn(|i| positions[i].at(MOST));
         Ok(Condensed {
             s,
             h,
             gamma,
             b,
             u,
-            d: StageMap::from_exact(&velocity, s),
+            d: StageMap::from_exact(&exact.d, s),
             inverse_rho: padded(&exact.inverse_rho, s),
             times: padded(&g.c.map(|c| c * step), s),
             end_u: exact.end_u.into(),
@@ -107,6 +109,13 @@ impl Condensed {
             ahead: StageMap::new(&g.ahead, s),
             exact: Box::new(exact),
         })
+    }
+
+    /// The positions of the stages, `q0 + u v0 + B a`.
+    pub fn positions<const N: usize>(&self, q: &[f64; N], v: &[f64; N], a: &[[f64; MOST]; N]) -> [[f64; MOST]; N] {
+        let at = |d: usize, i: usize| (0..self.s).fold(q[d] + self.u[i].0 * v[d], |x, j| x + self.b[i][j].0 * a[d][j]);
+        // Beyond the last stage it is repeated.
+        from_fn(|d| from_fn(|i| at(d, i.min(self.s - 1))))
     }
 
     /// The step's equations with the linear force `-kappa q` taken to the left: `Q = left q0 + left_u v0 + left_b (a + kappa Q)`.
@@ -196,6 +205,51 @@ impl Condensed {
     }
 }
 
+/// A matrix of stages, and beside it the column of what multiplies the velocity; padded to whole registers.
+type Wide = Row<{ MOST + 8 }>;
+
+/// What a [`Condensed`] step multiplies its accelerations with.
+struct Products {
+    /// `D`, and beside it `1 / rho`.
+    velocity: [Wide; MOST],
+    /// `B` and `u`, and in row `s` those of the step's end.
+    positions: [Wide; MOST + 1],
+}
+
+/// The [`Products`] from the stages of the integrating factor, in the instructions of the processor.
+struct Multiply<'a> {
+    s: usize,
+    h: f64,
+    rho: &'a Exact,
+}
+
+impl WithSimd for Multiply<'_> {
+    type Output = Products;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Products {
+        let Multiply { s, h, rho } = self;
+        let (g, step, zero) = (Coefficients::of(s), Quad::from(h), Quad::zero());
+        let factors = Wide::from_fn(|j| if j < s { step * rho[j] } else { zero });
+        let mut velocity = [Wide::ZERO; MOST];
+        for i in 0..s {
+            let inverse = rho[i].recip();
+            let unit = Wide::from_fn(|j| if j == MOST { inverse } else { zero });
+            let row = Wide::from_fn(|j| if j < s { g.a[i][j] } else { zero }).times(&factors);
+            velocity[i].add(inverse, &row);
+            velocity[i].add(Quad::one(), &unit);
+        }
+        let mut positions = [Wide::ZERO; MOST + 1];
+        for i in 0..=s {
+            for j in 0..s {
+                let weight = if i < s { g.a[i][j] } else { g.b[j] };
+                positions[i].add(step * weight, &velocity[j]);
+            }
+        }
+        Products { velocity, positions }
+    }
+}
+
 /// Rows of `left_b` with those of `left` and `left_u` at the end.
 type Rows = [[f64; MOST + 2]; MOST];
 
@@ -249,6 +303,29 @@ impl WithSimd for LeftOut<'_> {
 mod tests {
     use super::*;
     use contact_geom::larger;
+
+    /// The products are those of sums term by term, to double-double round-off: 1e-30 for up to sixteen terms below one.
+    #[test]
+    fn products_are_exact_in_two_parts() {
+        for (s, h, gamma) in [(16, 0.7, -0.3), (8, 1.3, 0.0), (5, 0.01, 2.0), (1, 0.1, -1.0)] {
+            let (table, g, step) = (Condensed::new(s, h, gamma).unwrap(), Coefficients::of(s), Quad::from(h));
+            let exact = &table.exact;
+            let small = |x: Quad| assert!(x.0.abs() <= 1e-30, "{s} stages: {:e}", x.0);
+            let sum = |f: &dyn Fn(usize) -> Quad| (0..s).fold(Quad::zero(), |sum, j| sum + f(j));
+            for i in 0..s {
+                // rho = 1 - h A gamma rho
+                let rho = |j: usize| exact.inverse_rho[j].recip();
+                small(rho(i) + step * Quad::from(gamma) * sum(&|j| g.a[i][j] * rho(j)) - Quad::one());
+                small(table.u[i] - step * sum(&|j| g.a[i][j] * exact.inverse_rho[j]));
+                for k in 0..s {
+                    small(exact.d[i][k] - step * g.a[i][k] * rho(k) * exact.inverse_rho[i]);
+                    small(table.b[i][k] - step * sum(&|j| g.a[i][j] * exact.d[j][k]));
+                }
+                small(exact.end_b[i] - step * sum(&|j| g.b[j] * exact.d[j][i]));
+            }
+            small(exact.end_u - step * sum(&|j| g.b[j] * exact.inverse_rho[j]));
+        }
+    }
 
     /// The matrices of the left in two parts satisfy their equations in double-double precision: to 1e-28 times the sizes, the
     /// square of the round-off with room for sums of sixteen terms.

@@ -4,7 +4,7 @@ use super::coefficients::MOST;
 use super::compensated::{Compensated, Twofold};
 use super::condensed::Condensed;
 use super::dense::Start;
-use super::stages::solve_exactly;
+use super::double_double::solve_exactly;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Hessian, Lagrangian, VelocityPoint};
 use num_traits::{One, Zero};

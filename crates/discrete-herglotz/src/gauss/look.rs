@@ -9,18 +9,40 @@ use super::dense::Solved;
 use super::stages::{StageMap, Stages, blocks};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint, larger, largest};
 use pulp::{Simd, WithSimd};
 use std::sync::OnceLock;
 
 /// What a look at a step has found.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Look {
     /// The largest misfit of the curve: of `p' = L_q + L_z p` and `z' = L`, over the length of the step, and of `p = L_v`; relative to
     /// the momenta and actions. Infinite where something is not finite.
     pub misfit: f64,
+    /// The momenta that it is relative to.
+    pub size: f64,
     /// The misfit that the last two coefficients of the step's polynomials let expect.
     pub expected: f64,
+    /// The largest misfit of the values of L themselves, beyond their round-off: what jumps between two points and has no gradient at
+    /// either is seen in the values alone.
+    pub of_value: f64,
+    /// The largest `|p.v| + |z L_z|`, which such a misfit changes.
+    pub kinetic: f64,
+    /// The values of L at the start and at the end of the step's curve.
+    ends: [f64; 2],
+}
+
+impl Look {
+    /// The jump of the values of L to the next step, beyond their round-off.
+    pub fn jump_to(&self, next: &Look) -> f64 {
+        let (before, after) = (self.ends[1], next.ends[0]);
+        beyond_rounding((after - before).abs(), larger(before.abs(), after.abs()))
+    }
+
+    /// Together with one at other points of the step.
+    pub fn and(self, other: Look) -> Look {
+        Look { misfit: larger(self.misfit, other.misfit), of_value: larger(self.of_value, other.of_value), ..self }
+    }
 }
 
 /// A step as it was solved: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L.
@@ -34,8 +56,9 @@ pub(super) struct Curve<const N: usize> {
     pub v: [Stages; N],
     pub force: [Stages; N],
     pub rate: Stages,
-    /// `None` where the action is not computed.
-    pub l: Option<Stages>,
+    pub l: Stages,
+    /// Whether z is part of the step; else `L` is that at `z = 0`.
+    pub acts: bool,
 }
 
 impl<const N: usize> Curve<N> {
@@ -52,25 +75,28 @@ impl<const N: usize> Curve<N> {
             v: zero,
             force: zero,
             rate: Stages::ZERO,
-            l: None,
+            l: Stages::ZERO,
+            acts: true,
         }
     }
 
     /// From the stages of a general step.
     pub fn of_solved(&mut self, solved: &Solved<N>) {
         (self.v, self.force) = (solved.v.map(Stages), solved.force.map(Stages));
-        (self.rate, self.l) = (Stages(solved.rate), Some(Stages(solved.l)));
+        (self.rate, self.l) = (Stages(solved.rate), Stages(solved.l));
     }
 
-    /// From the accelerations of a condensed step that began with the velocity v0.
+    /// From the accelerations and positions of a condensed step that began with the velocity v0.
     #[inline(always)]
-    pub fn of_accelerations<S: Simd>(
+    pub fn of_accelerations<S: Simd, L: Lagrangian<N>>(
         &mut self,
+        lagrangian: &L,
         table: &Condensed,
         mass: Option<&SMatrix<f64, N, N>>,
         v0: &[f64; N],
-        a: &[Stages; N],
+        [a, x]: [&[Stages; N]; 2],
     ) {
+        (self.acts, self.z) = (false, 0.0);
         for d in 0..N {
             let v0 = Lanes::<S>::splat(v0[d]);
             table.d.apply(&a[d], table.s, &mut self.v[d], |r| table.inverse_rho.block(r) * v0);
@@ -86,6 +112,10 @@ impl<const N: usize> Curve<N> {
                 }
                 self.force[i].set(r, force * rho);
             }
+            let q = SVector::from_fn(|d, _| x[d].block::<S>(r));
+            let v = SVector::from_fn(|d, _| self.v[d].block::<S>(r));
+            let t = table.times.block::<S>(r) + self.t;
+            self.l.set(r, lagrangian.value(t, &q, &v, Lanes::splat(0.0)));
         }
     }
 }
@@ -97,8 +127,14 @@ struct Between {
     /// The values of the polynomial, and its integral from 0.
     value: StageMap,
     integral: StageMap,
-    /// Its last coefficients in Legendre polynomials.
-    last: [[f64; MOST]; 2],
+}
+
+/// The round-off of a value of L, relative to its size: some hundred units for the sums that it is made of.
+const ROUNDED: f64 = 256.0 * f64::EPSILON;
+
+fn beyond_rounding(misfit: f64, size: f64) -> f64 {
+    // A NaN stays one.
+    if misfit <= ROUNDED * size { 0.0 } else { misfit - ROUNDED * size }
 }
 
 /// The sets of points that there are.
@@ -125,18 +161,13 @@ impl Between {
             _ => (i.min(s - 1) as f64 + (set as f64 * golden).fract()) / s as f64,
         });
         let [value, integral] = lagrange_rows(s, &points);
-        let last = std::array::from_fn(|i| {
-            // Of one stage there is no polynomial to expect anything of but its one value.
-            let k = (s - 1).saturating_sub(i);
-            std::array::from_fn(|j| if j < s { g.legendre_weight(s, j, k) } else { 0.0 })
-        });
-        Between { points: Stages(points), value: StageMap::new(&value, s), integral: StageMap::new(&integral, s), last }
+        Between { points: Stages(points), value: StageMap::new(&value, s), integral: StageMap::new(&integral, s) }
     }
+}
 
-    /// The sizes of the last two coefficients together.
-    fn tail(&self, y: &Stages) -> f64 {
-        self.last.iter().map(|row| row.iter().zip(&y.0).map(|(w, y)| w * y).sum::<f64>().abs()).sum()
-    }
+/// The sum of the stages with weights, which are 0 beyond the last.
+fn weighted(weights: &[f64; MOST], y: &Stages) -> f64 {
+    weights.iter().zip(&y.0).map(|(w, y)| w * y).sum()
 }
 
 /// The look, in the lanes of an instruction set.
@@ -172,10 +203,11 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Compare<'_, L, N> {
         }
         value(&curve.rate, &mut rate);
         grown(&curve.rate, 0.0, &mut fallen);
-        if let Some(of_l) = &curve.l {
-            value(of_l, &mut l);
-            grown(of_l, curve.z, &mut z);
+        value(&curve.l, &mut l);
+        if curve.acts {
+            grown(&curve.l, curve.z, &mut z);
         }
+        let (mut of_value, mut kinetic, mut largest_l) = (zero, zero, zero);
         let (mut misfit, mut size, mut of_z, mut size_z, mut all) = (zero, zero, zero, zero, zero);
         for r in 0..blocks::<S>(s) {
             let x = VelocityPoint {
@@ -185,6 +217,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Compare<'_, L, N> {
             };
             let (value, g) = lagrangian.with_gradient(between.points.block::<S>(r) * h + t, &x);
             let inverse = (Lanes::<S>::splat(1.0) - fallen.block::<S>(r)).recip();
+            let mut work = zero;
             let drag = (rate.block::<S>(r) * inverse - g.z) * h;
             for d in 0..N {
                 let p = y[d].block::<S>(r) * inverse;
@@ -194,30 +227,42 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Compare<'_, L, N> {
                 misfit = misfit.max(of_force.abs()).max(of_momentum.abs());
                 size = size.max(p.abs()).max(force.abs());
                 all += of_force * 0.0 + of_momentum * 0.0;
+                work = p.mul_add(x.v[d], work);
             }
-            if curve.l.is_some() {
-                let misfit = (l.block::<S>(r) - value) * h;
-                of_z = of_z.max(misfit.abs());
+            let apart = l.block::<S>(r) - value;
+            of_value = of_value.max(apart.abs());
+            kinetic = kinetic.max(work.abs() + (g.z * x.z).abs());
+            largest_l = largest_l.max(value.abs());
+            all += apart * 0.0;
+            if curve.acts {
+                of_z = of_z.max((apart * h).abs());
                 size_z = size_z.max(z.block::<S>(r).abs()).max((value * h).abs());
-                all += misfit * 0.0;
             }
         }
         // The largest over lanes may hide a NaN; a NaN or an infinity times 0 is not 0.
         if all.sum() != 0.0 {
-            return Look { misfit: f64::INFINITY, expected: 0.0 };
+            return Look { misfit: f64::INFINITY, of_value: f64::INFINITY, ..Look::default() };
         }
         let relative = |misfit: f64, size: f64| if misfit > 0.0 { misfit / size } else { 0.0 };
         let (size, size_z) = (size.largest(), size_z.largest());
-        let fastest = v.iter().flat_map(|v| v.0).fold(0.0, |m: f64, v| if v.abs() > m { v.abs() } else { m });
-        let mut expected = between.tail(&curve.rate) * h;
-        for d in 0..N {
-            expected +=
-                relative(between.tail(&curve.force[d]) * h, size) + relative(between.tail(&curve.v[d]), fastest);
-        }
-        if let Some(of_l) = &curve.l {
-            expected += relative(between.tail(of_l) * h, size_z);
-        }
         let misfit = relative(misfit.largest(), size) + relative(of_z.largest(), size_z);
-        Look { misfit, expected }
+        let of_value = beyond_rounding(of_value.largest(), largest_l.largest());
+        // The coefficients are the same for all points.
+        if set > 0 {
+            return Look { misfit, of_value, ..Look::default() };
+        }
+        let fastest = largest(v.iter().flat_map(|v| v.0));
+        let g = Coefficients::of(s);
+        // The sizes of the last two coefficients together.
+        let tail = |y: &Stages| g.last.iter().map(|row| weighted(row, y).abs()).sum::<f64>();
+        let mut expected = tail(&curve.rate) * h;
+        for d in 0..N {
+            expected += relative(tail(&curve.force[d]) * h, size) + relative(tail(&curve.v[d]), fastest);
+        }
+        if curve.acts {
+            expected += relative(tail(&curve.l) * h, size_z);
+        }
+        let ends = g.ends.each_ref().map(|row| weighted(row, &curve.l));
+        Look { misfit, size, expected, of_value, kinetic: kinetic.largest(), ends }
     }
 }

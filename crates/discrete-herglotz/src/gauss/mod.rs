@@ -6,6 +6,7 @@ pub(crate) mod coefficients;
 mod compensated;
 mod condensed;
 mod dense;
+mod double_double;
 mod extension;
 mod general;
 mod general_stages;
@@ -25,14 +26,14 @@ mod table;
 pub(crate) use beginning::velocity;
 pub use clocked::ClockedStepper;
 pub use dense::DenseStep;
-pub(crate) use look::SETS;
+pub(crate) use look::{Look, SETS};
 pub use stepper::{GaussRoute, GaussStepper};
 
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use coefficients::MOST;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    Clock, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed,
+    Clock, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Structure, Triple, seed,
 };
 use stage_equations::{Given, Products, StageEquations, Workspace};
 
@@ -107,7 +108,7 @@ impl<L> Gauss<L> {
     where
         L: Lagrangian<N>,
     {
-        GaussStepper::new(self, t0, state, guess, true)
+        GaussStepper::new(self, None, t0, state, guess, true)
     }
 
     /// Like [`stepper`](Self::stepper) for a run of which nobody wants the action: where z decouples it is not computed.
@@ -123,7 +124,22 @@ impl<L> Gauss<L> {
     where
         L: Lagrangian<N>,
     {
-        GaussStepper::new(self, t0, state, guess, false)
+        GaussStepper::new(self, None, t0, state, guess, false)
+    }
+
+    /// Like [`stepper`](Self::stepper), with or without the action, where the structure has been probed at this start.
+    pub(crate) fn verified_stepper<const N: usize>(
+        &self,
+        structure: Structure,
+        t0: f64,
+        state: PhasePoint<N>,
+        guess: SVector<f64, N>,
+        wants_z: bool,
+    ) -> Result<GaussStepper<'_, L, N>, InputError>
+    where
+        L: Lagrangian<N>,
+    {
+        GaussStepper::new(self, Some(structure), t0, state, guess, wants_z)
     }
 
     /// A stepper of variable steps from a state at a time, for autonomous Lagrangians: the method's step is one of the time tau

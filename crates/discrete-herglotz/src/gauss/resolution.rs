@@ -33,9 +33,7 @@ pub(super) struct Tail {
 
 impl Tail {
     pub fn new(s: usize) -> Self {
-        let g = Coefficients::of(s);
-        let weights = std::array::from_fn(|j| if j < s { g.legendre_weight(s, j, s - 1) } else { 0.0 });
-        Tail { s, weights: Stages(weights) }
+        Tail { s, weights: Stages(Coefficients::of(s).last[0]) }
     }
 
     /// The misfit of a step: above one where the values at its stages are not those of a polynomial. `time` turns them to

@@ -35,7 +35,7 @@ pub(super) struct Separable<'a, L, const N: usize> {
     rest: [Stages; N],
     /// The accelerations of the last sweep.
     pub a: [Stages; N],
-    x: [Stages; N],
+    pub x: [Stages; N],
     /// What the positions begin with: what comes of the state, and of the parts that the matrices' rounding leaves out.
     base: [Stages; N],
     /// Whether guesses are far from the solution.

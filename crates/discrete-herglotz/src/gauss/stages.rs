@@ -122,24 +122,3 @@ impl StageMap {
         }
     }
 }
-
-/// Solves `M X = R` for `columns` right-hand sides in double-double precision, by Gauss and Jordan with row pivoting; rows of
-/// `n` unknowns followed by the right-hand sides, which are left as the solution. `false` where M is singular.
-pub(super) fn solve_exactly(rows: &mut [Vec<Quad>]) -> bool {
-    let n = rows.len();
-    for k in 0..n {
-        let pivot = (k..n).max_by(|i, j| rows[*i][k].0.abs().total_cmp(&rows[*j][k].0.abs())).unwrap_or(k);
-        rows.swap(k, pivot);
-        if !(rows[k][k].0.abs() > 0.0 && rows[k][k].0.is_finite()) {
-            return false;
-        }
-        let above = rows[k].clone();
-        for (i, row) in rows.iter_mut().enumerate() {
-            let factor = if i == k { Quad::from(1.0) - above[k].recip() } else { row[k] / above[k] };
-            for (e, a) in row.iter_mut().zip(&above).skip(k) {
-                *e -= factor * *a;
-            }
-        }
-    }
-    true
-}

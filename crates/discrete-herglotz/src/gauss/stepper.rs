@@ -19,7 +19,7 @@ use crate::step_equations::is_identity;
 use crate::watch::misfit;
 use crate::{Halt, InputError, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint};
 use pulp::{Arch, Simd, WithSimd};
 
 /// How the steps of contact Gauss collocation are computed.
@@ -105,13 +105,14 @@ const FEW: usize = 2;
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     pub(super) fn new(
         gauss: &'a Gauss<L>,
+        probed: Option<Structure>,
         t0: f64,
         state: PhasePoint<N>,
         guess: SVector<f64, N>,
         wants_z: bool,
     ) -> Result<Self, InputError> {
         let (lagrangian, s, h) = (&gauss.lagrangian, gauss.stages(), gauss.forward.h);
-        let Beginning { start, structure, w, inverse } = Beginning::of(lagrangian, t0, &state, guess)?;
+        let Beginning { start, structure, w, inverse } = Beginning::of(lagrangian, probed, t0, &state, guess)?;
         let condensed = structure.separable && structure.has_constant_rate();
         let (mut mass, mut of_sigma) = (None, 0.0);
         let route = if condensed {
@@ -204,11 +205,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         Some(DenseStep::new(s, t, h, start, &solved))
     }
 
-    /// A look at the last step between its nodes, at some sets of points: the worst of them. `None` where there is no step.
+    /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step.
     pub(crate) fn look(&self, sets: usize) -> Option<Look> {
         let curve = self.arch.dispatch(Stages { run: self })?;
         let at = |set| self.arch.dispatch(Compare { lagrangian: self.lagrangian, curve: &curve, set });
-        (0..sets).map(at).reduce(|a, b| if a.misfit >= b.misfit { a } else { b })
+        (0..sets).map(at).reduce(Look::and)
     }
 
     /// The state as the route holds it.
@@ -394,11 +395,15 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Stages<'_, '_, L, N> {
         let mut curve = Curve::new(products.s, t, products.h, &start);
         match &**route {
             Route::Linear(run, table) => {
-                let a = run.accelerations(&from.q, &from.y).map(super::stages::Stages);
-                curve.of_accelerations::<S>(table, self.run.mass.as_deref(), &from.y, &a);
+                let a = run.accelerations(&from.q, &from.y);
+                let x = table.positions(&from.q, &from.y, &a);
+                let [a, x] = [a, x].map(|y| y.map(super::stages::Stages));
+                let mass = self.run.mass.as_deref();
+                curve.of_accelerations::<S, L>(self.run.lagrangian, table, mass, &from.y, [&a, &x]);
             }
             Route::Condensed(run) => {
-                curve.of_accelerations::<S>(&run.table, self.run.mass.as_deref(), &from.y, &run.a);
+                let mass = self.run.mass.as_deref();
+                curve.of_accelerations::<S, L>(self.run.lagrangian, &run.table, mass, &from.y, [&run.a, &run.x]);
             }
             Route::General(run) => curve.of_solved(&run.solved()),
         }

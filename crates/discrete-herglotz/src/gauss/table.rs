@@ -1,10 +1,11 @@
 //! Coefficients of the general step of contact Gauss collocation.
 
-use super::coefficients::Coefficients;
+use super::coefficients::{Coefficients, MOST};
 use super::stages::{StageMap, Stages, padded};
 use qd::Quad;
 use std::array::from_fn;
 use std::cmp::Ordering;
+use std::sync::OnceLock;
 
 /// The coefficients of a step: `h a_ij = m_ij h b_j`.
 ///
@@ -16,14 +17,49 @@ pub(super) struct Table {
     pub s: usize,
     pub h: f64,
     /// `M`.
-    pub m: StageMap,
+    pub m: &'static StageMap,
     /// `h b`, 0 beyond the last stage.
     pub weights: Stages,
     /// The times of the stages after the step's start.
     pub times: Stages,
     /// From the stages of one step to those of the next, and the same for what is multiplied with the weights.
-    pub ahead: StageMap,
-    pub ahead_weighted: StageMap,
+    pub ahead: &'static StageMap,
+    pub ahead_weighted: &'static StageMap,
+}
+
+/// What does not depend on the step.
+struct Maps {
+    m: StageMap,
+    ahead: StageMap,
+    ahead_weighted: StageMap,
+}
+
+impl Maps {
+    /// For a number of stages from 1 to 16, made once.
+    fn of(s: usize) -> &'static Maps {
+        static TABLES: [OnceLock<Box<Maps>>; MOST] = [const { OnceLock::new() }; MOST];
+        TABLES[s.clamp(1, MOST) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MOST))))
+    }
+
+    fn new(s: usize) -> Self {
+        let g = Coefficients::of(s);
+        // From the transposed where it is the larger, about 1: the difference is exact.
+        let ratio = |i: usize, j: usize| (g.a[i][j] / g.b[j]).0;
+        let entry = |i: usize, j: usize| match i.cmp(&j) {
+            _ if i.max(j) >= s => 0.0,
+            Ordering::Less => 1.0 - ratio(j, i),
+            Ordering::Equal => 0.5,
+            Ordering::Greater => ratio(i, j),
+        };
+        let weighted = |i: usize, j: usize| {
+            if i.max(j) < s { g.b[i].0 * g.ahead[i][j] / g.b[j].0 } else { 0.0 }
+        };
+        Maps {
+            m: StageMap::new(&from_fn(|i| from_fn(|j| entry(i, j))), s),
+            ahead: StageMap::new(&g.ahead, s),
+            ahead_weighted: StageMap::new(&from_fn(|i| from_fn(|j| weighted(i, j))), s),
+        }
+    }
 }
 
 impl Table {
@@ -36,25 +72,7 @@ impl Table {
             weights[0] = (Quad::from(0.5) * (step - inner)).0;
             weights[s - 1] = weights[0];
         }
-        // From the transposed where it is the larger, about 1: the difference is exact.
-        let ratio = |i: usize, j: usize| (g.a[i][j] / g.b[j]).0;
-        let entry = |i: usize, j: usize| match i.cmp(&j) {
-            _ if i.max(j) >= s => 0.0,
-            Ordering::Less => 1.0 - ratio(j, i),
-            Ordering::Equal => 0.5,
-            Ordering::Greater => ratio(i, j),
-        };
-        let weighted = |i: usize, j: usize| {
-            if i.max(j) < s { g.b[i].0 * g.ahead[i][j] / g.b[j].0 } else { 0.0 }
-        };
-        Table {
-            s,
-            h,
-            m: StageMap::new(&from_fn(|i| from_fn(|j| entry(i, j))), s),
-            weights: Stages(weights),
-            times: padded(&g.c.map(|c| step * c), s),
-            ahead: StageMap::new(&g.ahead, s),
-            ahead_weighted: StageMap::new(&from_fn(|i| from_fn(|j| weighted(i, j))), s),
-        }
+        let Maps { m, ahead, ahead_weighted } = Maps::of(s);
+        Table { s, h, m, weights: Stages(weights), times: padded(&g.c.map(|c| step * c), s), ahead, ahead_weighted }
     }
 }

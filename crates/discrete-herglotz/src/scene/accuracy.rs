@@ -1,16 +1,17 @@
 //! The integrator and the number of steps for a wanted error.
 
-use super::pilot::{BUDGET, Ending, Pilots, Track, gcd};
+use super::pilot::{BUDGET, Ending, Marks, Pilots, Track};
 use super::{Integrator, MOST_STEPS, Scene};
 use crate::{InputError, Obstacle};
-use contact_geom::{Lagrangian, Structure};
+use contact_geom::{Lagrangian, Structure, larger};
 
 /// The searches that may follow each other: each makes the steps shorter, or ends.
 const ATTEMPTS: usize = 64;
 
-/// The refinements after which a step that still cannot be taken at the same time cannot be taken at all, and those after which
-/// something narrow that is still between the nodes is left to the comparison of runs.
-const HALTS: usize = 16;
+/// The refinements, of so many steps, after which a step that still cannot be taken, or is not resolved, at the same time never will be, and those after
+/// which something narrow that is still between the nodes is left to the comparison of runs.
+const HALTS: usize = 8;
+const LONG: usize = 512;
 const NARROWS: usize = 10;
 
 /// The stages of the reference for other methods.
@@ -18,9 +19,6 @@ const REFERENCE: usize = 12;
 
 /// The stages from which a Gauss method is its own reference.
 const OWN: usize = 6;
-
-/// The times of a span at which runs are compared.
-const MARKS: usize = 10;
 
 /// What is chosen for a scene.
 #[derive(Clone, Copy, Debug)]
@@ -31,152 +29,182 @@ pub(super) struct Choice {
     pub error: Option<f64>,
 }
 
-/// A motion that runs with k, 2k and 3k steps agree on.
+/// A motion that runs with k and 2k steps agree on.
 struct Converged<const N: usize> {
     k: usize,
-    /// The errors of the runs with k and 2k steps.
+    /// The error of the run with k steps, and what is predicted of that with 2k.
     errors: [f64; 2],
-    /// The order that the two show.
-    order: f64,
+    /// The largest misfit between the nodes of the run with k steps.
+    misfit: f64,
     truth: Track<N>,
+    marks: Marks,
     /// Whether something narrow was met on the way.
     narrow: bool,
 }
 
-/// The stages of Gauss collocation for an error, where no integrator is named: the more the smaller the error, since a stage in the
-/// lanes of a register costs little; fewer where z drives the motion, as the iteration then contracts more slowly.
-fn stages_for(structure: &Structure, wanted: f64) -> usize {
-    let condensed = structure.separable && structure.has_constant_rate();
-    match wanted {
-        _ if structure.quadratic && structure.autonomous && condensed => 16,
-        e if condensed && e < 1e-9 => 16,
-        e if condensed && e < 1e-4 => 12,
-        e if !condensed && e < 1e-10 => 12,
-        _ => 8,
-    }
+/// The stages of Gauss collocation for an error, where no integrator is named: few steps of many stages cost their tables, many steps of
+/// few stages their number.
+fn stages_for(wanted: f64) -> usize {
+    if wanted < 1e-10 { 12 } else { 8 }
 }
 
 /// Chooses the steps, and the integrator where the scene names none, so that the error of (q, p), relative to their size, is at most
 /// `wanted` at ten times along the motion.
 ///
-/// A reference is found first: contact Gauss collocation with k, 2k and 3k steps, whose agreement must show an order, and whose
-/// curves must solve Herglotz' equations between their nodes. It ends as soon as a step does not resolve the motion, so that runs that
-/// are far too coarse cost nothing. The error of the integrator's own runs is then their distance from the reference.
+/// A reference is found first: contact Gauss collocation with k and 2k steps. They must agree; and between the nodes their curves must
+/// solve Herglotz' equations up to a misfit that falls from the one to the other as it does where the motion is smooth. The search ends
+/// a run at the first step that does not resolve the motion, so that runs that are far too coarse cost nothing. The error of the
+/// integrator's own runs is then their distance from the reference.
 pub(super) fn choose<L: Lagrangian<N>, const N: usize>(
     scene: &Scene<'_, L, N>,
+    structure: Structure,
     wanted: f64,
 ) -> Result<Choice, InputError> {
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
-    let mut pilots = Pilots { scene, left: BUDGET, wanted };
-    let structure = scene.lagrangian.structure();
-    let integrator = scene.integrator.unwrap_or(Integrator::Gauss { stages: stages_for(&structure, wanted) });
+    choose_with(&mut Pilots { scene, structure, left: BUDGET, wanted })
+}
+
+/// The same with a budget.
+pub(super) fn choose_with<L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, '_, L, N>,
+) -> Result<Choice, InputError> {
+    let wanted = pilots.wanted;
+    let integrator = pilots.scene.integrator.unwrap_or(Integrator::Gauss { stages: stages_for(wanted) });
     match integrator {
         Integrator::Gauss { stages } if stages >= OWN => {
-            let found = converge(&mut pilots, stages, wanted)?;
-            let (count, error) = fewest(&mut pilots, stages, found)?;
+            let found = converge(pilots, stages, wanted, false)?;
+            let (count, error) = fewest(stages, wanted, &found);
             Ok(Choice { integrator, count, error: Some(error) })
         }
         _ => {
-            let found = converge(&mut pilots, REFERENCE, wanted / 8.0)?;
-            by_reference(&mut pilots, integrator, &found)
+            let found = converge(pilots, REFERENCE, wanted / 8.0, true)?;
+            by_reference(pilots, integrator, &found)
         }
     }
 }
 
-/// The steps of a quarter of a radian a stage of the fastest frequency of the motion linearised at its start.
-fn first_guess<L: Lagrangian<N>, const N: usize>(scene: &Scene<'_, L, N>, stages: usize) -> usize {
+/// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.
+fn first_guess<L: Lagrangian<N>, const N: usize>(scene: &Scene<'_, L, N>, stages: usize, goal: f64) -> usize {
     let Scene { lagrangian, start, t0, span, .. } = scene;
     let h = lagrangian.hessian(*t0, start);
-    let squared = h.vv.try_inverse().map_or(0.0, |inverse| (inverse * h.qq).norm());
-    let count = span.abs() * squared.sqrt() * 4.0 / stages as f64;
+    let frequency = h.vv.try_inverse().map_or(0.0, |inverse| (inverse * h.qq).norm()).sqrt();
+    // The error of a step of x radians is about x^(2s+1) s!^4 / (2s)!^3.
+    let s = stages as f64;
+    let logarithm = |n: usize| (1..=n).map(|i| (i as f64).ln()).sum::<f64>();
+    let constant = 4.0 * logarithm(stages) - 3.0 * logarithm(2 * stages);
+    let radians = ((goal.ln() - constant) / (2.0 * s + 1.0)).exp();
+    let count = span.abs() * frequency / (0.5 * radians).min(s / 3.0);
     // What is stiff at its start need not be resolved, and what is free there may be anything later.
     if count.is_finite() { (count.ceil() as usize).clamp(1, 1 << 20) } else { 1 }
 }
 
-/// Finds the runs that agree.
+/// Finds the runs that agree, with numbers of steps that tenths divide or any.
 fn converge<L: Lagrangian<N>, const N: usize>(
     pilots: &mut Pilots<'_, '_, L, N>,
     stages: usize,
     goal: f64,
+    tenths: bool,
 ) -> Result<Converged<N>, InputError> {
-    let mut k = first_guess(pilots.scene, stages);
     let refuse = |wanted, reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
     let (wanted, t0, span) = (pilots.wanted, pilots.scene.t0, pilots.scene.span);
+    let s = stages as f64;
+    let marks_of = |k: usize| if tenths { Marks::equal(k) } else { Marks::of(k) };
+    let mut k = first_guess(pilots.scene, stages, goal);
+    let mut marks = marks_of(k);
     let (mut best, mut strikes, mut narrows, mut halts) = (f64::INFINITY, 0, 0, (0, 0.0));
-    let mut known: Vec<(usize, Track<N>)> = Vec::new();
     let mut cause = Obstacle::Unresolved { t: t0 };
+    // The finer of the last two runs, and their distance.
+    let (mut known, mut before): (Option<Track<N>>, f64) = (None, f64::NAN);
+    let mut guessed = false;
     'search: for _ in 0..ATTEMPTS {
-        if 3.0 * k as f64 > MOST_STEPS {
+        if 2.0 * k as f64 > MOST_STEPS {
             break;
         }
-        // The common times, where there are as many steps.
-        let marks = k.min(MARKS);
-        k = k.div_ceil(marks) * marks;
-        let mut tracks = Vec::with_capacity(3);
-        let before = pilots.left;
-        for (multiple, stride) in [(1, 8), (2, 4), (3, 1)] {
-            let count = multiple * k;
-            if let Some((_, track)) = known.iter().find(|(n, track)| *n == count && track.0.len() == marks) {
-                tracks.push(track.clone());
+        if known.is_none() {
+            marks = marks_of(k);
+            k = marks.whole(k as f64);
+        }
+        let left = pilots.left;
+        let mut tracks = Vec::with_capacity(2);
+        for (multiple, closely) in [(1, false), (2, true)] {
+            if let Some(track) = known.take() {
+                tracks.push(track);
                 continue;
             }
-            let ending = pilots.gauss(stages, count, marks, stride, narrows < NARROWS)?;
-            match ending {
+            let ending = pilots.gauss(stages, multiple * k, &marks, closely, narrows < NARROWS)?;
+            let stopped = match ending {
                 Ending::Followed(track) => {
-                    known.push((count, track.clone()));
+                    // The error is about the square of the misfit: what is far too large need not be halved again and again.
+                    let more = (track.misfit.powi(2) / goal).powf(0.5 / s) / 1.4;
+                    if multiple == 1 && !guessed && more > 1.2 {
+                        guessed = true;
+                        k = (k as f64 * more.min(4.0)).ceil() as usize;
+                        continue 'search;
+                    }
                     tracks.push(track);
                     continue;
-                }
-                Ending::Unresolved { part } => cause = Obstacle::Unresolved { t: t0 + part * span },
-                Ending::Narrow { part } => {
-                    cause = Obstacle::Unresolved { t: t0 + part * span };
-                    narrows += 1;
-                }
-                Ending::Halted { part, cause: halt } => {
-                    let same = (part - halts.1).abs() <= 0.01;
-                    halts = (if same { halts.0 + 1 } else { 1 }, part);
-                    cause = Obstacle::Halted { t: t0 + part * span, cause: halt };
-                    if halts.0 == HALTS {
-                        break 'search;
-                    }
                 }
                 Ending::Exhausted => {
                     return refuse(wanted, best, if best.is_finite() { Obstacle::Budget } else { cause });
                 }
+                Ending::Narrow { part } => {
+                    narrows += 1;
+                    (part, Obstacle::Unresolved { t: t0 + part * span })
+                }
+                Ending::Unresolved { part } => (part, Obstacle::Unresolved { t: t0 + part * span }),
+                Ending::Halted { part, cause: halt } => (part, Obstacle::Halted { t: t0 + part * span, cause: halt }),
+            };
+            let (part, obstacle) = stopped;
+            // What is narrow may need many halvings, what is singular has no end of them.
+            let same = (part - halts.1).abs() <= 0.01 && k > LONG;
+            (halts, cause) = ((if same { halts.0 + 1 } else { 1 }, part), obstacle);
+            if halts.0 == HALTS {
+                break 'search;
             }
             k *= 2;
             continue 'search;
         }
-        let [first, second, truth] = tracks.as_slice() else { break };
-        let [coarse, fine] = [first.distance(truth), second.distance(truth)];
-        if !(coarse + fine).is_finite() {
-            k *= 2;
-            continue;
+        let [coarse, fine] = tracks.as_slice() else { break };
+        let error = coarse.distance(fine);
+        // A misfit of a smooth motion falls with the order s. What jumps has one that does not; what is rounded has none to speak of.
+        let falls = fine.misfit <= larger(coarse.misfit / 8.0, larger(0.01 * wanted, 1e-11));
+        let order = (coarse.misfit / fine.misfit).log2().clamp(0.0, s);
+        let order = if order.is_nan() { s } else { order };
+        // What is left of the error in the finer run: it is of the order 2s, where the misfit is of the order s.
+        let beyond = error / 2.0f64.powf(1.5 * order);
+        let distances = coarse.distances(fine);
+        // Round-off does not fall; it grows like the distances of the runs.
+        let growth = distances.last().copied().unwrap_or(0.0) / distances.first().copied().unwrap_or(0.0);
+        let rounded = 2e-15 * larger(growth, 1.0) * (k as f64).sqrt();
+        let agreed = error <= 0.25 * goal || (error <= 1e-2 && beyond <= 0.1 * goal && rounded <= 0.1 * goal);
+        if falls && agreed {
+            return Ok(Converged {
+                k,
+                errors: [error, beyond],
+                misfit: coarse.misfit,
+                truth: fine.clone(),
+                marks,
+                narrow: narrows > 0,
+            });
         }
-        let order = if fine > 0.0 { (coarse / fine).log2() } else { 2.0 * stages as f64 };
-        // What is left of the error in the finest run, if it goes on like this.
-        let beyond = fine / (1.5f64.powf(order.max(0.5)) - 1.0);
-        let agreed = order >= 0.5 && fine + beyond <= 0.5 * goal;
-        // Where runs differ by their round-off only, they show no order.
-        let settled = coarse <= 0.5 * wanted && fine <= 0.5 * wanted && order < 2.0;
-        if agreed || settled {
-            return Ok(Converged { k, errors: [coarse, fine], order, truth: truth.clone(), narrow: narrows > 0 });
-        }
-        strikes = if fine < 0.5 * best { 0 } else { strikes + 1 };
-        best = best.min(fine);
-        cause = obstacle(&second.distances(truth), order, wanted, t0, span);
-        if strikes == 3 {
+        strikes = if error < 0.5 * best { 0 } else { strikes + 1 };
+        cause = if !falls {
+            Obstacle::Order { order }
+        } else if before.is_nan() {
+            // The first two runs show no order, and are the last if others would cost too much.
+            Obstacle::Budget
+        } else {
+            obstacle(&distances, (before / error).log2(), wanted, t0, span)
+        };
+        (best, before) = (if error < best { error } else { best }, error);
+        // Not begun, if it cannot end.
+        if strikes == 3 || 2 * (left - pilots.left) > pilots.left {
             break;
         }
-        let factor = if order < 0.5 { 1.6 } else { (1.2 * (fine / (0.2 * goal)).powf(1.0 / order)).clamp(1.3, 4.0) };
-        // Not begun, if it cannot end: the cost of the last search, made longer.
-        let spent = (before - pilots.left) as f64;
-        if order >= 0.5 && spent * (fine / goal).powf(1.0 / order) > 4.0 * pilots.left as f64 {
-            break;
-        }
-        k = (k as f64 * factor).ceil() as usize;
+        known = Some(fine.clone());
+        k *= 2;
     }
     refuse(wanted, best, cause)
 }
@@ -194,40 +222,23 @@ fn obstacle(distances: &[f64], order: f64, wanted: f64, t0: f64, span: f64) -> O
 }
 
 /// The fewest steps of a Gauss method that the converged runs allow, with the error that they predict.
-fn fewest<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, '_, L, N>,
-    stages: usize,
-    found: Converged<N>,
-) -> Result<(usize, f64), InputError> {
-    let Converged { mut k, errors: [mut coarse, mut fine], mut order, truth, narrow } = found;
-    let target = 0.2 * pilots.wanted;
-    // Far below what is wanted, fewer steps may do.
-    while coarse <= 0.01 * target && k % 2 == 0 {
-        let marks = gcd(k / 2, truth.0.len());
-        if marks < MARKS.min(k / 2) / 2 {
-            break;
-        }
-        let Ending::Followed(track) = pilots.gauss(stages, k / 2, marks, 4, true)? else { break };
-        let error = track.distance(&truth);
-        if error > target || error.is_nan() {
-            break;
-        }
-        (fine, coarse, k) = (coarse, error, k / 2);
-        order = if fine > 0.0 { (coarse / fine).log2() } else { order };
+fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>) -> (usize, f64) {
+    let Converged { k, errors: [error, beyond], misfit, narrow, .. } = *found;
+    let order = 2.0 * stages as f64;
+    // Ten times as exactly as wanted between the runs and beyond them, as errors of neighbouring steps may differ so much.
+    let (target, predicted) = (0.2 * wanted, 0.02 * wanted);
+    let change = (larger(error, 1e-14) / predicted).powf(1.0 / order);
+    let steps = (k as f64 * change).ceil();
+    if narrow {
+        return if error <= target { (k, error) } else { (2 * k, beyond) };
     }
-    if coarse <= target {
-        return Ok((k, coarse));
+    if error <= target {
+        // Coarser than what was followed only where the misfit says that steps still resolve the motion.
+        let fewer = steps.max((0.6 * k as f64).ceil());
+        let coarser = misfit * (k as f64 / fewer).powf(stages as f64);
+        return if fewer < k as f64 && coarser <= 1e-2 { (fewer as usize, predicted) } else { (k, error) };
     }
-    // Between two runs whose errors are known and small, by the order that they show where it is nearly the method's; ten times as
-    // exactly, as errors of neighbouring steps may differ so much.
-    let predicted = 0.1 * target;
-    if coarse <= 1e-2 && order >= stages as f64 && !narrow {
-        let longer = (coarse / predicted).powf(1.0 / order);
-        if longer < 2.0 {
-            return Ok(((k as f64 * longer).ceil() as usize, predicted.max(fine)));
-        }
-    }
-    Ok((2 * k, fine))
+    if steps < 2.0 * k as f64 { (steps as usize, larger(predicted, beyond)) } else { (2 * k, beyond) }
 }
 
 /// The steps of any integrator, whose runs are compared with the reference.
@@ -237,8 +248,8 @@ fn by_reference<L: Lagrangian<N>, const N: usize>(
     found: &Converged<N>,
 ) -> Result<Choice, InputError> {
     let wanted = pilots.wanted;
-    let (order, marks) = (f64::from(integrator.order()), found.truth.0.len());
-    let whole = |count: f64| (count / marks as f64).ceil().max(1.0) as usize * marks;
+    let (order, marks) = (f64::from(integrator.order()), &found.marks);
+    let whole = |count: f64| marks.whole(count);
     let refuse = |reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
     let mut count = whole((found.k * REFERENCE) as f64 / order.min(4.0));
     let (mut best, mut strikes) = (f64::INFINITY, 0);

@@ -1,6 +1,8 @@
 //! Scenes: what is to be computed, and nothing else.
 
 mod accuracy;
+#[cfg(test)]
+mod accuracy_tests;
 mod integrator;
 mod pilot;
 mod plan;
@@ -9,7 +11,7 @@ pub use integrator::{Integrator, UnknownIntegrator};
 pub use plan::{Item, Outcome, Plan, Row};
 
 use crate::run::check_time;
-use crate::verified::verified_over;
+use crate::verified::{verified, verified_over};
 use crate::{InputError, StepError};
 use accuracy::Choice;
 use contact_geom::nalgebra::{DMatrix, SVector};
@@ -132,12 +134,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
         if let Some(0) = self.wanted.rows {
             return Err(InputError::Count { what: "the steps between two rows", least: 1, found: 0 });
         }
-        let structure = self.lagrangian.structure();
         if let Some(integrator) = self.integrator {
-            integrator.check(&structure)?;
+            integrator.check(&self.lagrangian.structure())?;
         }
         self.check_start()?;
-        verified_over(self.lagrangian, self.t0, self.span, &self.start)?;
+        let structure = verified(self.lagrangian, self.t0, &self.start)?;
+        // Pilot runs look at the equations of motion along the whole span.
+        let times = if matches!(self.steps, Steps::Accuracy(_)) { 4 } else { 16 };
+        verified_over(self.lagrangian, self.t0, self.span, &self.start, times)?;
         let given = |count| Choice { integrator: self.integrator.unwrap_or(DEFAULT), count, error: None };
         let choice = match self.steps {
             Steps::Count(0) => return Err(InputError::Count { what: "the number of steps", least: 1, found: 0 }),
@@ -149,10 +153,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
                 check_count(count)?;
                 given(count as usize)
             }
-            Steps::Accuracy(error) => accuracy::choose(self, error)?,
+            Steps::Accuracy(error) => accuracy::choose(self, structure, error)?,
         };
         check_count(choice.count as f64)?;
-        let plan = Plan::new(self, &choice)?;
+        let plan = Plan::new(self, structure, &choice)?;
         // Pilot runs have looked already.
         if plan.error().is_none() {
             plan.probe_first_steps()?;

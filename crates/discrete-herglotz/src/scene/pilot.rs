@@ -2,17 +2,26 @@
 
 use super::accuracy::Choice;
 use super::{Integrator, Plan, Scene};
-use crate::gauss::SETS;
+use crate::gauss::{Look, SETS};
 use crate::verified::refuted;
-use crate::{Gauss, GaussRoute, GaussStepper, Halt, InputError, StepError, Stepper};
+use crate::{Gauss, GaussRoute, Halt, InputError, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Defect, Lagrangian};
+use contact_geom::{Defect, Lagrangian, Structure, larger};
 
-/// The evaluations of L that all pilot runs of a plan may take together: some seconds.
-pub(super) const BUDGET: u64 = 1 << 28;
+/// What all pilot runs of a plan may cost together, in evaluations of L at one stage: some seconds.
+pub(super) const BUDGET: u64 = 1 << 26;
 
 /// The misfit between the nodes beyond which a step does not resolve the motion: its momenta would be off by a twentieth.
 const RESOLVED: f64 = 0.05;
+
+/// The misfit in units of the largest momentum that is round-off: some hundred units for the sums that forces are made of.
+const AT_REST: f64 = 1e-13;
+
+/// The same of the values of L, whose polynomials follow twice the frequencies.
+const RESOLVED_VALUE: f64 = 0.2;
+
+/// Products of two numbers that are smaller have lost digits.
+const UNDERFLOWN: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
 /// How many times the expected misfit is more than a smooth motion has: something narrow lies between the nodes.
 const NARROW: f64 = 30.0;
@@ -23,9 +32,41 @@ const POINTS: usize = 2000;
 /// The steps between two looks at budget and progress.
 const CHUNK: usize = 1024;
 
-/// A motion at the ends of the `marks` equal parts of its span: (q, p).
+/// The parts of a span at whose ends runs are compared.
+const PARTS: usize = 10;
+
+/// The times of a span at which runs are compared: ends of steps of a run with `base` steps, which divides the steps of all others.
 #[derive(Clone, Debug)]
-pub(super) struct Track<const N: usize>(pub Vec<[SVector<f64, N>; 2]>);
+pub(super) struct Marks {
+    base: usize,
+    at: Vec<usize>,
+}
+
+impl Marks {
+    /// The ends of the tenths of a span, each moved to the end of the step in which it lies; of all steps where they are fewer.
+    pub fn of(base: usize) -> Self {
+        let parts = base.min(PARTS);
+        Marks { base, at: (1..=parts).map(|i| (i * base).div_ceil(parts)).collect() }
+    }
+
+    /// Equal parts of a span, as many as tenths and as steps.
+    pub fn equal(steps: usize) -> Self {
+        Marks::of(steps.min(PARTS))
+    }
+
+    /// The fewest steps from a number on that they divide.
+    pub fn whole(&self, steps: f64) -> usize {
+        (steps / self.base as f64).ceil().max(1.0) as usize * self.base
+    }
+}
+
+/// A motion at some marks: (q, p).
+#[derive(Clone, Debug)]
+pub(super) struct Track<const N: usize> {
+    states: Vec<[SVector<f64, N>; 2]>,
+    /// The largest misfit that was seen between the nodes of its steps.
+    pub misfit: f64,
+}
 
 /// A 2-norm that neither overflows nor underflows.
 fn norm<const N: usize>(x: &[SVector<f64, N>; 2]) -> f64 {
@@ -37,29 +78,21 @@ fn norm<const N: usize>(x: &[SVector<f64, N>; 2]) -> f64 {
 }
 
 impl<const N: usize> Track<N> {
-    /// The distances of the states of two tracks at the times that both have, relative to the size of the second's at that time, or at
-    /// the end where that is larger. Not a number where a state is not.
+    /// The distances of the states of two tracks at the same marks, relative to the size of the second's at that time, or at the end
+    /// where that is larger. Not a number where a state is not.
     pub fn distances(&self, of: &Self) -> Vec<f64> {
-        let marks = gcd(self.0.len(), of.0.len());
-        let at = |track: &Self, i: usize| track.0[(i + 1) * track.0.len() / marks - 1];
-        let last = of.0.last().map_or(0.0, norm);
-        let relative = |i: usize| {
-            let (a, b) = (at(self, i), at(of, i));
-            let (apart, size) = (norm(&[a[0] - b[0], a[1] - b[1]]), contact_geom::larger(norm(&b), last));
+        let last = of.states.last().map_or(0.0, norm);
+        let relative = |(a, b): (&[SVector<f64, N>; 2], &[SVector<f64, N>; 2])| {
+            let (apart, size) = (norm(&[a[0] - b[0], a[1] - b[1]]), larger(norm(b), last));
             if apart == 0.0 { 0.0 } else { apart / size }
         };
-        (0..marks).map(relative).collect()
+        self.states.iter().zip(&of.states).map(relative).collect()
     }
 
     /// The largest of the [`distances`](Self::distances).
     pub fn distance(&self, of: &Self) -> f64 {
         contact_geom::largest(self.distances(of))
     }
-}
-
-/// The greatest common divisor.
-pub(super) fn gcd(a: usize, b: usize) -> usize {
-    if b == 0 { a } else { gcd(b, a % b) }
 }
 
 /// How a pilot run has ended.
@@ -77,48 +110,81 @@ pub(super) enum Ending<const N: usize> {
     Exhausted,
 }
 
+/// What the looks at a run have seen.
+#[derive(Default)]
+struct Seen {
+    before: Option<Look>,
+    /// The largest momentum, and the largest of what misfits of values change, on the way.
+    size: f64,
+    kinetic: f64,
+    /// The largest misfit, in units of these: of a motion that comes to rest only round-off is left.
+    misfit: f64,
+}
+
+impl Seen {
+    /// Takes in a look at the next step, and says whether the step resolves the motion.
+    fn resolves(&mut self, look: &Look) -> bool {
+        let jump = self.before.replace(*look).map_or(0.0, |before| before.jump_to(look));
+        (self.size, self.kinetic) = (larger(self.size, look.size), larger(self.kinetic, look.kinetic));
+        let of_value = larger(look.of_value, jump);
+        // What does not move crosses nothing, and values of L that have underflowed tell nothing.
+        let told = of_value != 0.0 && (self.kinetic >= UNDERFLOWN || self.kinetic.is_nan());
+        let of_value = if told { of_value / self.kinetic } else { 0.0 };
+        let of_run = look.misfit * if self.size > 0.0 { look.size / self.size } else { 1.0 };
+        self.misfit = larger(self.misfit, larger(of_run, of_value));
+        // A NaN resolves nothing.
+        (look.misfit <= RESOLVED || of_run <= AT_REST) && of_value <= RESOLVED_VALUE
+    }
+}
+
 /// Pilot runs of a scene, with what is left of their budget.
 pub(super) struct Pilots<'s, 'a, L, const N: usize> {
     pub scene: &'s Scene<'a, L, N>,
+    /// What the Lagrangian claims, probed at the start.
+    pub structure: Structure,
     pub left: u64,
     /// The error that is wanted.
     pub wanted: f64,
 }
 
 impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
-    /// Follows the motion by contact Gauss collocation, with a look at one in `stride` steps, for what is narrow too or not.
+    /// Follows the motion by contact Gauss collocation, with a look between the nodes of each step: closely, at so many points of the
+    /// span that nothing is narrower, or at a few of each step; and for what is narrow beside the steps or not.
     pub fn gauss(
         &mut self,
         stages: usize,
         count: usize,
-        marks: usize,
-        stride: usize,
+        marks: &Marks,
+        closely: bool,
         narrow: bool,
     ) -> Result<Ending<N>, InputError> {
         let Scene { lagrangian, start, t0, span, .. } = *self.scene;
         let gauss = Gauss::new(lagrangian, stages, span / count as f64)?;
         let state = contact_geom::legendre(lagrangian, t0, &start);
-        let mut stepper = match gauss.stepper_without_action(t0, state, start.v) {
+        let mut stepper = match gauss.verified_stepper(self.structure, t0, state, start.v, false) {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),
         };
-        // A linear motion is not iterated, and nothing is to be seen.
-        let stride = if stepper.route() == GaussRoute::Linear { CHUNK } else { stride };
-        let sets = POINTS.div_ceil(stages * count.div_ceil(stride)).min(SETS);
-        let floor = contact_geom::larger(0.1 * self.wanted, 1e-11);
-        let bad = |run: &GaussStepper<'_, &L, N>, part: f64| {
-            let look = run.look(sets)?;
-            if look.misfit > RESOLVED || look.misfit.is_nan() {
-                return Some(Ending::Unresolved { part });
-            }
-            (narrow && look.misfit > NARROW * look.expected + floor).then_some(Ending::Narrow { part })
+        // Of a linear motion nothing is to be seen between the nodes that the order does not show.
+        let linear = stepper.route() == GaussRoute::Linear;
+        let stride = if linear { CHUNK } else { 1 };
+        let sets = match closely {
+            _ if linear => 0,
+            true => POINTS.div_ceil(stages * count).min(SETS),
+            false => 1,
         };
-        let steps = |taken: usize| if taken < 4 { 1 } else { stride };
-        // A step by Newton's method costs the solution of its equations, a look about a sweep.
-        let (newton, mut looks) = ((stages * (N + 2)).pow(2) as u64, 0);
-        let ending = self.follow(&mut stepper, count, marks, steps, |run, part| {
-            looks += sets * stages;
-            (bad(run, part), run.evaluations() + run.newton_steps() * newton + looks as u64)
+        let floor = larger(0.1 * self.wanted, 1e-11);
+        let price = Price::of::<N>(stages);
+        let (mut looks, mut seen) = (0, Seen::default());
+        let ending = self.follow(&mut stepper, count, marks, stride, |run, part| {
+            let ending = run.look(sets).and_then(|look| {
+                looks += sets as u64 + 1;
+                if !seen.resolves(&look) {
+                    return Some(Ending::Unresolved { part });
+                }
+                (narrow && look.misfit > NARROW * look.expected + floor).then_some(Ending::Narrow { part })
+            });
+            (ending, run.evaluations() + run.newton_steps() * price.newton + looks * price.look)
         });
         // What is met nowhere else may be what a claim denies.
         if let Ending::Narrow { .. } | Ending::Unresolved { .. } = ending
@@ -126,13 +192,16 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
         {
             return Err(InputError::FalseClaim { claim, size });
         }
-        Ok(ending)
+        Ok(match ending {
+            Ending::Followed(track) => Ending::Followed(Track { misfit: seen.misfit, ..track }),
+            other => other,
+        })
     }
 
     /// Follows the motion by the scene's own integrator.
-    pub fn own(&mut self, integrator: Integrator, count: usize, marks: usize) -> Result<Ending<N>, InputError> {
+    pub fn own(&mut self, integrator: Integrator, count: usize, marks: &Marks) -> Result<Ending<N>, InputError> {
         let scene = self.scene.bare();
-        let plan = match Plan::new(&scene, &Choice { integrator, count, error: None }) {
+        let plan = match Plan::new(&scene, self.structure, &Choice { integrator, count, error: None }) {
             Ok(plan) => plan,
             Err(error) => return halted_at_the_start(error),
         };
@@ -144,43 +213,61 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
             Integrator::Gauss { .. } => 1,
             Integrator::Splitting(_) => 4,
             // Newton's method takes second derivatives.
-            Integrator::Discrete(_) | Integrator::Composition(..) => 32,
+            Integrator::Discrete(_) | Integrator::Composition(..) => 32 * N as u64,
         };
         let look = |run: &(dyn Stepper<N> + '_), _: f64| (None, run.evaluations().saturating_mul(price));
-        Ok(self.follow(&mut *stepper, count, marks, |_| CHUNK, look))
+        Ok(self.follow(&mut *stepper, count, marks, CHUNK, look))
     }
 
-    /// Takes `count` steps, which the marks divide, so many at a time as `steps` says after those that are taken; `look` sees the run
-    /// in between with the part that is done, may end it, and says what it has cost. The cost is taken off the budget.
+    /// Takes `count` steps, at most `stride` at a time; `look` sees the run in between with the part that is done, may end it, and says
+    /// what it has cost. The cost is taken off the budget.
     fn follow<R: Stepper<N> + ?Sized>(
         &mut self,
         run: &mut R,
         count: usize,
-        marks: usize,
-        steps: impl Fn(usize) -> usize,
+        marks: &Marks,
+        stride: usize,
         mut look: impl FnMut(&R, f64) -> (Option<Ending<N>>, u64),
     ) -> Ending<N> {
-        let (mut track, mut taken, mut spent) = (Vec::with_capacity(marks), 0, 0);
+        let (mut states, mut taken, mut spent) = (Vec::with_capacity(marks.at.len()), 0, 0);
         let mut ending = None;
-        while taken < count && ending.is_none() {
-            let next_mark = count / marks * (track.len() + 1);
-            let chunk = steps(taken).min(next_mark - taken);
+        while ending.is_none()
+            && let Some(mark) = marks.at.get(states.len())
+        {
+            let mark = mark * (count / marks.base);
+            let chunk = stride.min(mark - taken);
             let halt = run.advance(chunk).err();
             taken += halt.map_or(chunk, |halt| halt.taken);
             let part = taken as f64 / count as f64;
             let seen;
             (seen, spent) = look(run, part);
             ending = halt.map(|Halt { cause, .. }| Ending::Halted { part, cause }).or(seen);
-            if taken == next_mark {
+            if taken == mark {
                 let x = run.state();
-                track.push([x.q, x.p]);
+                states.push([x.q, x.p]);
             }
             if spent > self.left {
                 ending = Some(Ending::Exhausted);
             }
         }
         self.left = self.left.saturating_sub(spent);
-        ending.unwrap_or(Ending::Followed(Track(track)))
+        ending.unwrap_or(Ending::Followed(Track { states, misfit: 0.0 }))
+    }
+}
+
+/// What parts of a run cost, in evaluations of L at one stage.
+struct Price {
+    /// A step that Newton's method solves: a few solutions of the dense equations of all stages, with second derivatives at each.
+    newton: u64,
+    /// A look at as many points as there are stages, maps included.
+    look: u64,
+}
+
+impl Price {
+    fn of<const N: usize>(stages: usize) -> Self {
+        let (unknowns, stages) = ((stages * (N + 2)) as u64, stages as u64);
+        // An evaluation takes as long as about 32 products; second derivatives are not in lanes.
+        Price { newton: 4 * (unknowns.pow(3) / 96 + 8 * stages * (2 * N as u64 + 1)), look: 2 * stages }
     }
 }
 

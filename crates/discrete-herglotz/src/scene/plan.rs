@@ -4,7 +4,7 @@ mod halved;
 
 use super::accuracy::Choice;
 use super::{Integrator, Scene, Wanted};
-use crate::verified::{refuted, verified};
+use crate::verified::refuted;
 use crate::{
     ActionSplitting, Composition, Discretised, Flow, Gauss, GaussRoute, InputError, Method, Splitting, Status, Stepper,
     Suspicion,
@@ -69,6 +69,7 @@ pub struct Plan<'a, L, const N: usize> {
     integrator: Integrator,
     wanted: Wanted<N>,
     engine: Engine<'a, L, N>,
+    structure: Structure,
     /// Whether `sigma_d` is the same in all steps.
     constant_rate: bool,
     /// Whether z can be left out.
@@ -117,13 +118,12 @@ pub struct Outcome<const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
-    /// A plan of a scene whose start has been checked.
-    pub(super) fn new(scene: &Scene<'a, L, N>, choice: &Choice) -> Result<Self, InputError> {
+    /// A plan of a scene whose start has been checked, and the structure probed there.
+    pub(super) fn new(scene: &Scene<'a, L, N>, structure: Structure, choice: &Choice) -> Result<Self, InputError> {
         let Scene { lagrangian, start, t0, span, .. } = scene;
         let Choice { integrator, count, error } = choice;
         let (lagrangian, count): (&'a L, usize) = (lagrangian, *count);
         let state = PhasePoint { q: start.q, p: start.v, z: start.z };
-        let structure = verified(lagrangian, *t0, start)?;
         let h = span / count as f64;
         let engine = match integrator {
             Integrator::Discrete(method) => Engine::Discrete(method.discretise(lagrangian, h, *t0, &state)?),
@@ -141,11 +141,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             integrator: *integrator,
             wanted: scene.wanted.clone(),
             engine,
+            structure,
             constant_rate: false,
             z_decouples: false,
             items: Vec::new(),
         };
-        plan.explain(&structure, start)?;
+        plan.explain(start)?;
         Ok(plan)
     }
 
@@ -187,8 +188,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         let (t0, start, action) = (self.t0, self.start, self.wanted.action || !self.z_decouples);
         Ok(match &self.engine {
             Engine::Discrete(ld) => Box::new(Flow::with_guess(ld, t0, start, self.guess)?),
-            Engine::Gauss(gauss) if action => Box::new(gauss.stepper(t0, start, self.guess)?),
-            Engine::Gauss(gauss) => Box::new(gauss.stepper_without_action(t0, start, self.guess)?),
+            Engine::Gauss(gauss) => Box::new(gauss.verified_stepper(self.structure, t0, start, self.guess, action)?),
             Engine::Explicit => self.explicit(self.h, t0, start, watched)?,
         })
     }
@@ -325,13 +325,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
     }
 
     /// Finds the route and puts it in words.
-    fn explain(&mut self, structure: &Structure, start: &VelocityPoint<N>) -> Result<(), InputError> {
+    fn explain(&mut self, start: &VelocityPoint<N>) -> Result<(), InputError> {
+        let structure = self.structure;
         let drag = structure.is_affine_in_z();
         let mut items = Vec::new();
         let mut say = |what, computed, why: &str| items.push(Item { what, computed, why: why.into() });
         match (&self.engine, &self.integrator) {
             (Engine::Gauss(gauss), _) => {
-                let route = gauss.stepper(self.t0, self.start, start.v)?.route();
+                let route = gauss.verified_stepper(structure, self.t0, self.start, start.v, false)?.route();
                 self.constant_rate = matches!(route, GaussRoute::Linear | GaussRoute::Condensed);
                 self.z_decouples = self.constant_rate;
                 match route {

@@ -243,6 +243,22 @@ pub fn dop853<const N: usize, const D: usize>(
     Some(legendre(system, t0 + span, &end))
 }
 
+/// The same, started anew in each of so many equal parts of the span.
+pub fn dop853_in<const N: usize, const D: usize>(
+    problem: &Problem<N>,
+    parts: usize,
+    tolerance: f64,
+    absolute: f64,
+) -> Option<PhasePoint<N>> {
+    let mut x = problem.state();
+    for part in 0..parts {
+        let [t0, t1] = [part, part + 1].map(|i| problem.t0 + problem.span * (i as f64 / parts as f64));
+        let start = VelocityPoint { q: x.q, v: problem.system.velocity(&x.q, &x.p), z: x.z };
+        x = dop853::<N, D>(&Problem { t0, start, span: t1 - t0, ..*problem }, tolerance, absolute)?;
+    }
+    Some(x)
+}
+
 /// A few integrators of every kind: a rule, splittings, a composition, Gauss methods from low to high order.
 pub const FAMILIES: [Integrator; 9] = [
     Integrator::Discrete(Method::Midpoint),
