@@ -2,7 +2,7 @@
 //! status, or marked; never a panic, a number that is none, a run without end or a wrong answer in silence.
 //!
 //! `RANDOM_SYSTEMS=1000000 cargo test --release --test random_systems` for more than the thousand cases of every run;
-//! `RANDOM_SYSTEM=12345` for one of them.
+//! `RANDOM_SYSTEM=12345` for one of them; `RANDOM_DOORS=Motion,Fixed` for those of some doors alone.
 
 #![allow(missing_docs)]
 // What a test cannot go on without is a failure of it.
@@ -42,32 +42,22 @@ use std::time::{Duration, Instant};
 use verdict::{Checked, Kind, Verdict, Wrong};
 
 /// The cases of an ordinary run.
-const CASES: u64 = 1_000;
+const CASES: u64 = 3_000;
 
-/// The time after which a case is one without end.
-const LIMIT: Duration = Duration::from_secs(10);
+/// The time after which a case is one without end: ten seconds, and three times as long in the test profile, whose code is that
+/// much slower.
+const LIMIT: Duration = Duration::from_secs(if cfg!(debug_assertions) { 30 } else { 10 });
 
-/// What is known to be wrong, with the most cases among [`CASES`]: twice what was seen. A repair lowers a number or takes the
-/// line away; nothing is added.
-const KNOWN: [(Kind, Door, u64); 13] = [
-    // A step that is too long for what it crosses (a pole, stiffness, growth beyond all numbers) is not marked.
-    (Kind::BeyondTheEnd, Door::Fixed, 100),
-    (Kind::UnmarkedStep, Door::Fixed, 100),
-    // Claims are probed at one time, at which a cosine has no slope.
-    (Kind::DoesNotConverge, Door::Fixed, 40),
-    (Kind::RoutesDiffer, Door::Gauss, 20),
-    // Kicks that two steps share are one within a chunk.
-    (Kind::ObservedDiffers, Door::Fixed, 120),
-    (Kind::ObservedDiffers, Door::Splitting, 740),
-    // An accuracy is taken from one agreement of two runs, and tried for without a budget.
-    (Kind::AboveTolerance, Door::Accurate, 40),
-    (Kind::BeyondTheEnd, Door::Accurate, 20),
-    (Kind::Hang, Door::Accurate, 60),
-    // The exact flow is blind between its nodes, and takes all its panels where a motion comes to rest.
-    (Kind::RoutesDiffer, Door::Motion, 40),
-    (Kind::BeyondTheEnd, Door::Motion, 20),
-    (Kind::Hang, Door::Motion, 60),
-    (Kind::Hang, Door::Fixed, 40),
+/// The cases among which [`KNOWN`] counts.
+const COUNTED: u64 = 10_000;
+
+/// What is known to be wrong, with the cases among [`COUNTED`] in which it is seen. A repair lowers a number or takes the line away;
+/// nothing is added.
+const KNOWN: [(Kind, Door, u64); 2] = [
+    // A coarse step past the end of a motion that blows up has a solution of its equations beyond it (8707).
+    (Kind::BeyondTheEnd, Door::Fixed, 1),
+    // A dozen motions from afar, each within its budget of evaluations, in the test profile (1831, 2776).
+    (Kind::Hang, Door::BetweenPoints, 2),
 ];
 
 /// A door of the library, by what it costs: the numbers are parts of a hundred.
@@ -162,12 +152,20 @@ impl Clock {
 
 /// A thread that takes the next number until there is none.
 fn worker(id: usize, next: &'static AtomicU64, cases: u64, tell: Sender<Told>) {
+    let doors = std::env::var("RANDOM_DOORS").ok();
+    let asked = move |number| {
+        let door = format!("{:?}", Door::draw(&mut Dice::of(number)));
+        doors.as_ref().is_none_or(|doors| doors.split(',').any(|asked| asked == door))
+    };
     std::thread::spawn(move || {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             if number >= cases {
                 let _ = tell.send(Told::Finished(id));
                 return;
+            }
+            if !asked(number) {
+                continue;
             }
             let clock = Clock::here();
             let _ = tell.send(Told::Began(id, number, clock.clone()));
@@ -208,11 +206,13 @@ impl Tally {
     }
 
     /// Fails on what is wrong in more than the cases that are known.
-    fn judge(&self, cases: u64) {
+    fn judge(&self) {
+        let cases =
+            self.verdicts.values().sum::<usize>() as u64 + self.wrong.values().map(Vec::len).sum::<usize>() as u64;
         for ((kind, door), found) in &self.wrong {
             let known = KNOWN.iter().find(|known| known.0 == *kind && known.1 == *door).map_or(0, |known| known.2);
             // Of fewer cases a smaller part; what is rare may be there or not.
-            let most = (known * cases).div_ceil(CASES);
+            let most = (known * cases).div_ceil(COUNTED);
             assert!(found.len() as u64 <= most, "{} of {cases} cases: {kind:?} by {door:?}, not {most}", found.len());
         }
         // The checks have something to say: at least two results in five are found to be right.
@@ -240,7 +240,7 @@ fn run(cases: u64) -> Tally {
                 *tally.cost.entry(door).or_default() += cost;
                 tally.slowest.push((cost, number));
                 tally.slowest.sort_by(|a, b| b.cmp(a));
-                tally.slowest.truncate(5);
+                tally.slowest.truncate(8);
                 match checked {
                     Ok(verdict) => *tally.verdicts.entry((door, verdict)).or_default() += 1,
                     Err(wrong) => tally.wrong(number, door, wrong),
@@ -282,5 +282,5 @@ fn nothing_wrong_in_silence() {
     drop(std::panic::take_hook());
     tally.print();
     println!("{cases} cases in {:?}", began.elapsed());
-    tally.judge(cases);
+    tally.judge();
 }

@@ -10,7 +10,7 @@ use discrete_herglotz::{Integrator, Scene, Status, Steps, Wanted};
 const STEPS: usize = 200_000;
 
 pub fn accurate<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
-    let Problem { system, t0, start, span } = problem;
+    let Problem { system, t0, start, span, .. } = problem;
     // A rule of order 1 or 2 to twelve digits has no end; by order, what is reasonable.
     let integrator = dice.pick(&Integrator::all());
     let least: f64 = if integrator.order() <= 2 { 1e-4 } else { 1e-10 };

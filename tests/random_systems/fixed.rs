@@ -23,7 +23,7 @@ const REFINED: usize = 1 << 12;
 
 /// Draws what is asked of a scene, runs it and judges it.
 pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
-    let Problem { system, t0, start, span } = problem;
+    let Problem { system, t0, start, span, .. } = problem;
     let integrator = dice.pick(&Integrator::all());
     let count = (dice.scale(1.0, STEPS as f64).round() as usize).max(1);
     let h = span / count as f64;
@@ -68,7 +68,7 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         let apart = larger_of(&(bare.q - q), &(bare.p - p));
         format!("{integrator}: {apart:e} between a run with {wanted:?} and one without, {halted:?}")
     })?;
-    if stepper.suspicion().is_some() {
+    if outcome.suspicion.is_some() {
         return Ok(Verdict::Marked);
     }
 
@@ -148,7 +148,11 @@ fn finite<const N: usize>(outcome: &Outcome<N>) -> Result<(), Wrong> {
     ensure(good, Kind::NotFinite, || format!("{outcome:?}"))
 }
 
-/// The step of a run that is farthest from the motion through its start, in sizes of the motion.
+/// The steps of a run whose motion may have no end, or more than can be followed, before no more are looked at.
+const LOST: usize = 4;
+
+/// The step of a run that is farthest from the motion through its start, in sizes of the motion, up to the first that is
+/// [wrong](ORDER_ONE): what runs away after it takes the motion long to follow.
 fn worst_step<const N: usize>(
     problem: &Problem<N>,
     scene: &Scene<'_, super::system::RandomSystem<N>, N>,
@@ -162,7 +166,7 @@ fn worst_step<const N: usize>(
         return Ok(none);
     };
     let start: VelocityPoint<N> = problem.start;
-    let (mut from, mut guess, mut worst) = (legendre(&problem.system, problem.t0, &start), start.v, none);
+    let (mut from, mut guess, mut worst, mut lost) = (legendre(&problem.system, problem.t0, &start), start.v, none, 0);
     for k in 0..plan.count() {
         let t = stepper.time();
         if stepper.advance(1).is_err() {
@@ -179,10 +183,16 @@ fn worst_step<const N: usize>(
                     contact_geom::largest(apart.y.iter().copied()) / size_p,
                 )
             }
-            Err(_) => 0.0,
+            Err(_) => {
+                lost += 1;
+                0.0
+            }
         };
         if error > worst.1 {
             worst = (k, error);
+        }
+        if worst.1 > ORDER_ONE || lost > LOST {
+            return Ok(worst);
         }
         from = to;
     }

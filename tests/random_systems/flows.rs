@@ -49,7 +49,8 @@ pub fn flow<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
             let back = *flow.state();
             let t = rows[0].0 + (rows.len() - 2) as f64 * h;
             ensure(back.check().is_ok(), Kind::NotFinite, || format!("{method}: back to {back:?}"))?;
-            step_solves_its_equations(&ld, t, &back, &to).map_err(|wrong| named(wrong, "back"))?;
+            step_solves_its_equations(&ld, t, &back, &to)
+                .map_err(|wrong| named(wrong, format_args!("{method}, back")))?;
         }
         if let Ok(again) = Flow::from_points(&ld, *t0, DiscretePoint { q0: rows[0].1.q, q1: rows[1].1.q, z0: state.z })
         {
@@ -92,9 +93,16 @@ pub fn step_solves_its_equations<const N: usize>(
     // 1e3 roundings of each term: Newton's method ends some units above round-off, and L sums up to a dozen terms. Rounding of
     // one equation moves the solution by its inverse, and the other by the slope.
     let condition = larger(1.0, slope / jet.regularity().smallest) * larger(1.0, 1.0 / sigma);
-    let bound = 1e3 * f64::EPSILON * sizes * condition + f64::MIN_POSITIVE;
-    let bound_z =
-        1e3 * f64::EPSILON * (actions + momenta * places) * condition * larger(1.0, sigma) + f64::MIN_POSITIVE;
+    // And what the equations change by in the rounding of the time, far from t = 0.
+    let later = t + 16.0 * f64::EPSILON * t.abs();
+    let (Ok(minus_later), Ok(plus_later)) = (legendre_minus(ld, later, &x), legendre_plus(ld, later, &x)) else {
+        return Ok(());
+    };
+    let of_time = max((minus_later.p - minus.p).as_slice()) + max((plus_later.p - plus.p).as_slice());
+    let bound = (1e3 * f64::EPSILON * sizes + of_time) * condition + f64::MIN_POSITIVE;
+    let of_time = (plus_later.z - plus.z).abs() + of_time * places;
+    let bound_z = (1e3 * f64::EPSILON * (actions + momenta * places) + of_time) * condition * larger(1.0, sigma)
+        + f64::MIN_POSITIVE;
     let (at_start, at_end) = (max((minus.p - from.p).as_slice()), max((plus.p - to.p).as_slice()));
     let action = (plus.z - to.z).abs();
     // Where the slopes overflow there is no bound to hold.
@@ -102,8 +110,10 @@ pub fn step_solves_its_equations<const N: usize>(
     let good = at_start <= bound && at_end <= bound && action <= bound_z;
     ensure(!applies || good, Kind::Residual, || {
         format!(
-            "h = {:.1e}: {at_start:.1e}, {at_end:.1e} for {bound:.1e}; {action:.1e} for {bound_z:.1e}; {from:?} to {to:?}",
-            ld.step_size()
+            "h = {:.1e}, sigma {sigma:.1e}, slope {slope:.1e}, smallest {:.1e}: {at_start:.1e}, {at_end:.1e} for {bound:.1e}; \
+             {action:.1e} for {bound_z:.1e}; {from:?} to {to:?}",
+            ld.step_size(),
+            jet.regularity().smallest
         )
     })
 }
@@ -119,9 +129,16 @@ pub fn is_conformal<const N: usize>(
     let Ok(Transition { end, sigma, .. }) = take(from) else { return Ok(()) };
     let start = Triple::from(*from);
     let mut worst = 0.0f64;
+    let end_at = Triple::from(end);
     for i in 0..Triple::<N>::DIMENSION {
-        // The third root of round-off is the best for differences of the third order.
-        let step = 6e-6 * larger(start.component(i).abs(), 1e-2 * larger(start.amax(), Triple::from(end).amax()));
+        // The third root of round-off is the best for differences of the third order; in units of what is like the coordinate.
+        let like = |x: &Triple<N>| match i / N {
+            0 => largest(x.x.iter().copied()),
+            1 => largest(x.y.iter().copied()),
+            _ => x.z.abs(),
+        };
+        let unit = larger(start.component(i).abs(), 1e-2 * larger(like(&start), like(&end_at)));
+        let step = 6e-6 * if unit == 0.0 { 1e-2 } else { unit };
         let aside = |s: f64| take(&start.plus(Triple::from_fn(|j| if i == j { s } else { 0.0 })).into());
         let (Ok(up), Ok(down), Ok(up_2), Ok(down_2)) =
             (aside(step), aside(-step), aside(2.0 * step), aside(-2.0 * step))
@@ -131,17 +148,21 @@ pub fn is_conformal<const N: usize>(
         let difference = |a: &PhasePoint<N>, b: &PhasePoint<N>| Triple::from(*a).minus((*b).into()).scale(0.5 / step);
         let (narrow, wide) = (difference(&up.end, &down.end), difference(&up_2.end, &down_2.end).scale(0.5));
         // Where two differences do not agree the step is not smooth at this scale: nothing can be said.
-        if narrow.minus(wide).amax() > 1e-4 * narrow.amax() {
+        let off = narrow.minus(wide);
+        if off.amax() > 1e-4 * narrow.amax() {
             return Ok(());
         }
         let unit = |j: usize| f64::from(u8::from(i == j));
         let direction = Triple::<N>::from_fn(unit);
         let at_end = narrow.z - end.p.dot(&narrow.x);
         let at_start = sigma * (direction.z - from.p.dot(&direction.x));
-        // And the noise of the differences, 1e-10 of all of them, which the terms may be below.
-        let noise = 1e-7 * narrow.amax() * (1.0 + end.p.amax());
-        let size = narrow.z.abs() + end.p.abs().dot(&narrow.x.abs()) + at_start.abs() + noise;
-        worst = larger(worst, (at_end - at_start).abs() / size);
+        // And the noise of the differences, as large as that by which two of them differ, or as the rounding of the ends; which the
+        // terms may be below.
+        let rounding = 8.0 * (f64::EPSILON * (end.z.abs() + end.p.abs().dot(&end.q.abs())) + f64::MIN_POSITIVE) / step;
+        let noise = off.z.abs() + end.p.abs().dot(&off.x.abs()) + rounding;
+        let size = narrow.z.abs() + end.p.abs().dot(&narrow.x.abs()) + at_start.abs();
+        let defect = ((at_end - at_start).abs() - 4.0 * noise) / size;
+        worst = larger(worst, if size == 0.0 { 0.0 } else { defect });
     }
     ensure(worst <= 1e-3, Kind::NotConformal, || format!("defect {worst:.1e}, sigma_d = {sigma:e} at {from:?}"))
 }

@@ -12,6 +12,8 @@ pub struct Problem<const N: usize> {
     pub t0: f64,
     pub start: VelocityPoint<N>,
     pub span: f64,
+    /// How much faster than others the motion may be, for it starts so far away, where a quartic well is as many times steeper.
+    pub pace: f64,
 }
 
 impl<const N: usize> Problem<N> {
@@ -34,6 +36,6 @@ impl<const N: usize> Problem<N> {
         let (q, v) = (vector(0.05), vector(0.15));
         let z = if dice.chance(0.3) { 0.0 } else { reach * dice.between(-1.0, 1.0) };
         let span = dice.scale(0.05, 20.0);
-        Problem { system, t0, start: VelocityPoint { q, v, z }, span }
+        Problem { system, t0, start: VelocityPoint { q, v, z }, span, pace: if reach > 1.0 { reach } else { 1.0 } }
     }
 }

@@ -9,6 +9,9 @@ use exact_lagrangian::{ExactError, herglotz_flow};
 /// The pieces that a reference may take: what needs more is left alone.
 const PIECES: usize = 2000;
 
+/// The evaluations of the vector field that a reference may take in all, about half a second's.
+const WORK: u64 = 1_000_000;
+
 /// A motion with its end, its size and its condition.
 pub struct Truth<const N: usize> {
     pub end: PhasePoint<N>,
@@ -30,7 +33,6 @@ impl<const N: usize> Truth<N> {
     /// The distance of a state from the end: the largest of position, momentum and (where it is there) action, each relative
     /// to its size on the way.
     pub fn error(&self, q: &SVector<f64, N>, p: &SVector<f64, N>, z: Option<f64>) -> f64 {
-        let relative = |difference: f64, size: f64| if difference == 0.0 { 0.0 } else { difference / size };
         let [size_q, size_p, size_z] = self.size;
         let (dq, dp) = (largest(&(q - self.end.q)), largest(&(p - self.end.p)));
         let dz = z.map_or(0.0, |z| (z - self.end.z).abs());
@@ -46,10 +48,13 @@ impl<const N: usize> Truth<N> {
     /// The error of `(q, p)` relative to its size at the end, as `Steps::Accuracy` promises it.
     pub fn error_at_end(&self, q: &SVector<f64, N>, p: &SVector<f64, N>) -> f64 {
         let norm = |q: &SVector<f64, N>, p: &SVector<f64, N>| larger(largest(q), largest(p));
-        // A motion at rest at the origin has no size, and no error if it stays there.
-        let error = norm(&(q - self.end.q), &(p - self.end.p));
-        if error == 0.0 { 0.0 } else { error / norm(&self.end.q, &self.end.p) }
+        relative(norm(&(q - self.end.q), &(p - self.end.p)), norm(&self.end.q, &self.end.p))
     }
+}
+
+/// No difference is none of a size of nothing either: a motion may rest at the origin.
+fn relative(difference: f64, size: f64) -> f64 {
+    if difference == 0.0 { 0.0 } else { difference / size }
 }
 
 fn largest<const N: usize>(x: &SVector<f64, N>) -> f64 {
@@ -63,7 +68,7 @@ fn pieces<const N: usize>(
     start: &VelocityPoint<N>,
     span: f64,
 ) -> Result<(VelocityPoint<N>, [f64; 3]), NoTruth> {
-    let (mut x, mut done, mut size) = (*start, 0.0, [0.0; 3]);
+    let (mut x, mut done, mut size, mut work) = (*start, 0.0, [0.0; 3], 0);
     for _ in 0..PIECES {
         let at = legendre(system, t0 + done, &x);
         for (size, now) in size.iter_mut().zip([largest(&at.q), largest(&at.p), at.z.abs()]) {
@@ -74,11 +79,11 @@ fn pieces<const N: usize>(
         }
         let piece = system.patience(&x).min(span / 4.0);
         let (next, piece) = if done + piece >= span { (span, span - done) } else { (done + piece, piece) };
-        if next == done {
+        if next == done || work > WORK {
             return Err(NoTruth::TooLong);
         }
         match herglotz_flow(system, t0 + done, &x, piece) {
-            Ok(motion) => (x, done) = (motion.end, next),
+            Ok(motion) => (x, done, work) = (motion.end, next, work + motion.evaluations),
             Err(ExactError::OutsideDomain { t, .. }) => return Err(NoTruth::Ends(t)),
             Err(_) => return Err(NoTruth::TooLong),
         }

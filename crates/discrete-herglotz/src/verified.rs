@@ -9,7 +9,8 @@ use contact_geom::{Defect, GeometryError, Lagrangian, PhasePoint, Structure, Vel
 /// Lagrangians whose constants are themselves rounded.
 pub(crate) const PROBE: f64 = 1e-12;
 
-/// The structure that a Lagrangian claims, after a probe at two points near a start: what a method that skips work relies on.
+/// The structure that a Lagrangian claims, after a probe at two points near a start, the second also at a time near that of the
+/// start: what a method that skips work relies on.
 ///
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold; [`InputError::Geometry`] where L is defined at neither
@@ -20,14 +21,14 @@ pub fn verified<const N: usize>(
     start: &VelocityPoint<N>,
 ) -> Result<Structure, InputError> {
     let structure = lagrangian.structure();
-    // At the start derivatives may vanish by symmetry, as at an equilibrium; beside it they do not.
+    // At the start derivatives may vanish by symmetry, as at an equilibrium or a cosine's at t = 0; beside it they do not.
     let aside = |x: f64, i: usize| x + (0.01 + 0.003 * i as f64) * (1.0 + x.abs());
     let beside = VelocityPoint {
         q: start.q.map_with_location(|i, _, q| aside(q, i)),
         v: start.v.map_with_location(|i, _, v| aside(v, N + i)),
         z: aside(start.z, 2 * N),
     };
-    let at_both = [start, &beside].map(|x| structure.defects(lagrangian, t, x));
+    let at_both = [(t, start), (aside(t, 2 * N + 1), &beside)].map(|(t, x)| structure.defects(lagrangian, t, x));
     if at_both.iter().all(Option::is_none) {
         return Err(GeometryError::Undefined { what: "the Lagrangian" }.into());
     }
@@ -71,4 +72,41 @@ pub(crate) fn verified_over<const N: usize>(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contact_geom::Scalar;
+
+    /// `v^2/2 - q^2/2` with a term that has no slope in time at t = 0.
+    enum Even {
+        Drag,
+        Spring,
+    }
+
+    impl Lagrangian<1> for Even {
+        fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+            let oscillator = (v[0] * v[0] - q[0] * q[0]) * 0.5;
+            oscillator + t.cos() * if let Even::Drag = self { z * -0.3 } else { q[0] * q[0] * 0.4 }
+        }
+        fn structure(&self) -> Structure {
+            match self {
+                Even::Drag => Structure { z_affine: true, constant_rate: true, ..Structure::default() },
+                Even::Spring => Structure { quadratic: true, autonomous: true, ..Structure::default() },
+            }
+        }
+    }
+
+    #[test]
+    fn a_slope_in_time_that_vanishes_at_the_start_is_seen() {
+        for (system, false_claim) in [(Even::Drag, "constant_rate"), (Even::Spring, "autonomous")] {
+            for t in [0.0, std::f64::consts::PI] {
+                let found = verified(&system, t, &VelocityPoint::new([1.0], [0.5], 0.2));
+                let refused =
+                    matches!(found, Err(InputError::FalseClaim { claim, size }) if claim == false_claim && size > 1e-3);
+                assert!(refused, "{false_claim} at t = {t}: {found:?}");
+            }
+        }
+    }
 }

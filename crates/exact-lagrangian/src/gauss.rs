@@ -34,8 +34,8 @@ pub(crate) struct Gauss {
     pub refine: [[f64; MOST]; MOST],
     /// The value at 0 of the polynomial with given values at the nodes.
     pub start: [f64; MOST],
-    /// Places apart from the nodes at which a solution is compared with its equations: the end, and then those of the golden
-    /// ratio's multiples, of which any number of the first are spread evenly.
+    /// Places apart from the nodes at which a solution is compared with its equations: the end; the Gauss points of one node more;
+    /// and those of the golden ratio's multiples, of which any number of the first are spread evenly.
     pub probes: Vec<Probe>,
 }
 
@@ -43,6 +43,8 @@ pub(crate) struct Gauss {
 pub(crate) struct Probe {
     /// The place.
     pub c: f64,
+    /// Its weight in Gauss' quadrature with one node more; 0 apart from that.
+    pub weight: f64,
     /// Of the rates themselves.
     pub value: [f64; MOST],
     /// Of their integral from 0.
@@ -58,8 +60,8 @@ pub(crate) const PROBES: usize = 128;
 pub(crate) const PROBES_STILL: usize = 1024;
 
 /// The Legendre polynomials `P_0(x) .. P_s(x)` on `[-1, 1]`.
-fn legendre(s: usize, x: f64) -> [f64; MOST + 1] {
-    let mut p = [1.0; MOST + 1];
+fn legendre(s: usize, x: f64) -> [f64; MOST + 2] {
+    let mut p = [1.0; MOST + 2];
     p[1] = x;
     for k in 1..s {
         let n = k as f64;
@@ -68,9 +70,15 @@ fn legendre(s: usize, x: f64) -> [f64; MOST + 1] {
     p
 }
 
+/// Gauss' weight for `[0, 1]` of a node x among s on `[-1, 1]`.
+fn weight(s: usize, x: f64) -> f64 {
+    let below = s as f64 * legendre(s, x)[s - 1];
+    (1.0 - x * x) / (below * below)
+}
+
 impl Gauss {
     /// The nodes on `[-1, 1]`, 0 beyond the last.
-    fn nodes(s: usize) -> [f64; MOST] {
+    fn nodes(s: usize) -> [f64; MOST + 1] {
         let n = s as f64;
         from_fn(|i| {
             if i >= s {
@@ -87,13 +95,10 @@ impl Gauss {
     }
 
     fn new(s: usize, next: usize) -> Self {
-        let (n, nodes, beyond) = (s as f64, Self::nodes(s), Self::nodes(next));
-        let polynomials = nodes.map(|x| legendre(s, x));
-        let c = nodes.map(|x| (1.0 + x) * 0.5);
-        let rough: [f64; MOST] = from_fn(|j| {
-            let below = n * polynomials[j][s - 1];
-            if j < s { (1.0 - nodes[j] * nodes[j]) / (below * below) } else { 0.0 }
-        });
+        let (nodes, beyond, between) = (Self::nodes(s), Self::nodes(next), Self::nodes(s + 1));
+        let polynomials: [_; MOST] = from_fn(|j| legendre(s, nodes[j]));
+        let c = from_fn(|j| (1.0 + nodes[j]) * 0.5);
+        let rough: [f64; MOST] = from_fn(|j| if j < s { weight(s, nodes[j]) } else { 0.0 });
         // The closed formula amplifies the nodes' rounding. One correction by the Legendre polynomials, whose integrals the
         // weights must give, brings all of them to the last digit.
         let defects: [f64; MOST] = from_fn(|k| {
@@ -125,10 +130,14 @@ impl Gauss {
             })
         };
         let probe = |k: usize| {
-            let c = if k == 0 { 1.0 } else { (k as f64 * GOLDEN).fract() };
+            let (c, weight) = match k {
+                0 => (1.0, 0.0),
+                _ if k <= s + 1 => (0.5 * (1.0 + between[k - 1]), weight(s + 1, between[k - 1])),
+                _ => (((k - s - 1) as f64 * GOLDEN).fract(), 0.0),
+            };
             let once: [f64; MOST] = integrals(2.0 * c - 1.0);
             let twice = from_fn(|j| (0..s).map(|k| once[k] * a[k][j]).sum());
-            Probe { c, value: lagrange(2.0 * c - 1.0), once, twice }
+            Probe { c, weight, value: lagrange(2.0 * c - 1.0), once, twice }
         };
         let refine = from_fn(|i| if i < next { lagrange(beyond[i]) } else { [0.0; MOST] });
         Gauss {
@@ -177,6 +186,18 @@ mod tests {
                 if k + 1 < g.s {
                     assert!((row(&g.aa) - once * g.c[i] / (n * (n + 1.0))).abs() < eps, "twice: {i}, {k}");
                 }
+            }
+        }
+    }
+
+    /// The weights between the nodes integrate what the collocation cannot see: the polynomial of degree s that vanishes at its
+    /// nodes, and all to degree `2s + 1`. Their closed formula amplifies the rounding of the nodes, some hundred times.
+    #[test]
+    fn the_weights_between_the_nodes_integrate_polynomials() {
+        for g in collocations() {
+            for k in 0..=2 * g.s + 1 {
+                let sum: f64 = g.probes.iter().map(|p| p.weight * p.c.powi(k as i32)).sum();
+                assert!((sum - 1.0 / (k + 1) as f64).abs() < 512.0 * f64::EPSILON, "s = {}, degree {k}: {sum}", g.s);
             }
         }
     }

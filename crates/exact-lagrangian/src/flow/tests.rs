@@ -164,19 +164,52 @@ impl Lagrangian<1> for Spring {
     }
 }
 
-/// From normal numbers into those below, relative to the smallest normal one there; and beyond the largest.
+/// From normal numbers into those below, whose last digit is the smallest number; and beyond the largest.
 #[test]
 fn hardly_numbers() {
-    for size in [1e-150, 1e-160, 1e-290, 1e-305, 1e-310, 5e-324] {
+    for size in [1e-150, 1e-160, 1e-290, 1e-305, 1e-310, 1e-320, 5e-324] {
         let found = motion(&Spring, [size, 0.0, 0.0], 10.0).unwrap();
         let apart = (found.end.q[0] - size * 10f64.cos()).abs();
-        // Changes below the smallest normal number are none; over ten units of time that may be some of it.
-        assert!(apart <= 1e-13 * size + 100.0 * f64::MIN_POSITIVE, "{size:e}: {apart:e}");
-        assert!(found.evaluations < 2000);
+        // A dozen last digits a panel, of which there are a dozen.
+        assert!(apart <= 1e-13 * size + 128.0 * SMALLEST, "{size:e}: {apart:e}");
+        assert!(found.evaluations < 4000, "{size:e}: {}", found.evaluations);
     }
     let found = motion(&Spring, [1e150, 0.0, 0.0], 10.0).unwrap();
     assert!((found.end.q[0] / 1e150 - 10f64.cos()).abs() < 1e-13);
     assert!(motion(&Spring, [1e200, 0.0, 0.0], 10.0).is_err());
+}
+
+/// `v^2/2 - k q^2/2 + cos q`: a spring with a ripple, which far from the origin is felt as a small part of the force.
+struct Rippled {
+    k: f64,
+}
+impl Lagrangian<1> for Rippled {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        v[0] * v[0] * 0.5 - q[0] * q[0] * (0.5 * self.k) + q[0].cos()
+    }
+}
+
+/// A fast force that is small beside another is resolved, over a hundred of its periods and over ten thousand: where it is a part in a
+/// million of the other, and where it is less than what a polynomial of the other misses between its nodes.
+#[test]
+fn a_ripple_on_a_spring_is_met() {
+    let (q, v) = (5e5, 8e5);
+    for (k, longest) in [(1.0, 0.1), (1e3, 0.01)] {
+        let system = Rippled { k };
+        for duration in [0.01 * longest, 0.1 * longest, longest] {
+            let whole = motion(&system, [-q, v, 0.0], duration).unwrap().end;
+            // Parts of a sixth of a period of the ripple and less.
+            let (fastest, mut x) = (v + q * k.sqrt(), [-q, v]);
+            let parts = (duration * fastest).ceil();
+            for _ in 0..parts as u32 {
+                let end = motion(&system, [x[0], x[1], 0.0], duration / parts).unwrap().end;
+                x = [end.q[0], end.v[0]];
+            }
+            let apart = larger((whole.q[0] - x[0]).abs() / q, (whole.v[0] - x[1]).abs() / fastest);
+            // Roundings of the parts' sums, which add up like a random walk; neighbours part no faster than q k.sqrt() a time.
+            assert!(apart < 4.0 * f64::EPSILON * parts.sqrt(), "{k}, {duration}: {apart:e}");
+        }
+    }
 }
 
 /// However long the time, the work is bounded.

@@ -1,0 +1,277 @@
+//! Attacks on what takes steps: flows, Gauss collocation, splittings, compositions, and what looks at them.
+
+use super::{STEPS, starts};
+use crate::Attack;
+use crate::numbers::{Claiming, Everything, Grade, HOSTILE, Numbers, Report, fine, grade, triples};
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::{Kepler, QuadraticInZ};
+use contact_geom::{DiscretePoint, PhasePoint, Triple};
+use discrete_herglotz::{
+    ActionFlow, ActionMap, ActionSplitting, Composition, DiscreteLagrangian, Event, EventStatus, FinalOnly, Flow,
+    Gauss, GaussRoute, InputError, Midpoint, Riccati, Splitting, SplittingScheme, Stepper, run_with_events,
+};
+
+pub const ATTACKS: &[Attack] = &[
+    Attack { on: &["Composition::new"], run: compositions },
+    Attack {
+        on: &[
+            "Flow::new",
+            "Flow::with_guess",
+            "Flow::from_points",
+            "Flow::state",
+            "Flow::time",
+            "Flow::step",
+            "Flow::run",
+            "Flow::step_back",
+            "Flow::suspicion",
+            "DiscreteLagrangian::check_start",
+            "DiscreteLagrangian::misfit",
+        ],
+        run: flows,
+    },
+    Attack {
+        on: &[
+            "Gauss::stepper",
+            "Gauss::stepper_without_action",
+            "GaussStepper::without_newton",
+            "GaussStepper::route",
+            "GaussStepper::newton_steps",
+            "GaussStepper::dense",
+            "DenseStep::span",
+            "DenseStep::at",
+            "DenseStep::velocity",
+        ],
+        run: gauss,
+    },
+    Attack {
+        on: &["Gauss::clocked_stepper", "ClockedStepper::time_momentum", "ClockedStepper::advance_to"],
+        run: clocked,
+    },
+    Attack { on: &["Event::new", "Event::in_direction", "Event::terminal", "run_with_events"], run: events },
+    Attack {
+        on: &[
+            "Splitting::new",
+            "Splitting::without_action",
+            "Splitting::compensated",
+            "Splitting::watched",
+            "ActionSplitting::new",
+            "ActionSplitting::with_flow",
+            "ActionSplitting::compensated",
+            "ActionMap::apply",
+            "ActionMap::change",
+        ],
+        run: splittings,
+    },
+    Attack {
+        on: &[
+            "Stepper::advance",
+            "Stepper::state",
+            "Stepper::time",
+            "Stepper::sigma",
+            "Stepper::evaluations",
+            "Stepper::suspicion",
+        ],
+        run: steppers,
+    },
+];
+
+/// A door that makes a stepper: it refuses a start that is not finite, and its states are finite.
+fn drive<S: Stepper<1>>(report: &mut Report, input: &(impl Numbers + std::fmt::Debug), made: Result<S, InputError>) {
+    let driven = made.map(|mut stepper| {
+        let _ = stepper.advance(3);
+        (stepper.state(), stepper.time(), if stepper.sigma() >= 0.0 { 0.0 } else { f64::NAN })
+    });
+    report.door(input, driven);
+}
+
+/// The constructor of a stepper under attack by its start and its step.
+fn doors<S: Stepper<1>>(report: &mut Report, make: impl Fn(f64, f64, PhasePoint<1>) -> Result<S, InputError>) {
+    for (t, x) in starts() {
+        drive(report, &(t, x), make(0.1, t, x));
+    }
+    let tame: PhasePoint<1> = triples()[0].into();
+    for h in HOSTILE.into_iter().chain(STEPS) {
+        let made = make(h, 0.4, tame);
+        let refused = !(h > 0.0 && h.is_finite());
+        report.check(!refused || matches!(made, Err(InputError::Step { .. })), || format!("the step {h} is taken"));
+        drive(report, &h, made);
+    }
+}
+
+fn compositions(report: &mut Report) {
+    let scheme = SplittingScheme::YOSHIDA_4;
+    doors(report, |h, t, x| Composition::new(|h| Midpoint::new(Everything, h), &scheme, h, t, x));
+}
+
+fn splittings(report: &mut Report) {
+    let scheme = SplittingScheme::BLANES_MOAN_6;
+    doors(report, |h, t, x| Splitting::new(&Claiming, &scheme, h, t, x));
+    doors(report, |h, t, x| {
+        Splitting::new(&Claiming, &scheme, h, t, x).map(|s| s.watched().compensated().without_action())
+    });
+    let scheme = SplittingScheme::YOSHIDA_4;
+    let system = QuadraticInZ::default();
+    doors(report, |h, t, x| ActionSplitting::new(&system, &scheme, h, t, x).map(ActionSplitting::compensated));
+    let flow = Riccati { b: -0.1, c: 0.0 };
+    doors(report, |h, t, x| ActionSplitting::with_flow(&Claiming, &flow, &scheme, h, t, x));
+    for value in HOSTILE {
+        // A flow that is none of the Lagrangian's, or none at all.
+        let flow = Riccati { b: value, c: value };
+        let made = ActionSplitting::with_flow(&Claiming, &flow, &scheme, 0.1, 0.0, triples()[0].into());
+        report.check(made.is_err(), || format!("the flow {flow:?} is taken"));
+        report.formula(
+            &value,
+            fine(Riccati { b: -0.1, c: 0.3 }.over(0.1).apply(value))
+                .map(|z| if value.is_finite() && !z.is_finite() { 0.0 } else { z }),
+        );
+        let map = Riccati { b: -0.1, c: 0.3 }.over(0.1);
+        let (change, end) = (map.change(value), map.apply(value));
+        report.check(change.is_nan() == end.is_nan() || !value.is_finite(), || format!("{value} moves by {change}"));
+    }
+}
+
+fn steppers(report: &mut Report) {
+    let start: PhasePoint<1> = triples()[0].into();
+    let gauss = Gauss::new(Everything, 4, 0.1).unwrap();
+    let ld = Midpoint::new(Everything, 0.1).unwrap();
+    let steppers: [Box<dyn Stepper<1> + '_>; 4] = [
+        Box::new(gauss.stepper(0.0, start, start.p).unwrap()),
+        Box::new(Flow::new(&ld, 0.0, start).unwrap()),
+        Box::new(Splitting::new(&Claiming, &SplittingScheme::STRANG, 0.1, 0.0, start).unwrap()),
+        Box::new(
+            Composition::new(|h| Midpoint::new(Everything, h), &SplittingScheme::YOSHIDA_4, 0.1, 0.0, start).unwrap(),
+        ),
+    ];
+    for mut stepper in steppers {
+        // No step is no change.
+        report.check(stepper.advance(0).is_ok() && stepper.state() == start && stepper.time() == 0.0, || {
+            "no step".into()
+        });
+        report.check(stepper.sigma() == 1.0 && stepper.suspicion().is_none(), || "before the first step".into());
+        report.check(stepper.advance(2).is_ok() && stepper.evaluations() > 0, || "two steps".into());
+    }
+}
+
+fn flows(report: &mut Report) {
+    let ld = Midpoint::new(Everything, 0.1).unwrap();
+    for (t, x) in starts() {
+        drive(report, &(t, x), Flow::new(&ld, t, x));
+        drive(report, &(t, x), Flow::from_points(&ld, t, DiscretePoint::from(Triple::from(x))));
+        if let Ok(mut flow) = Flow::new(&ld, t, x) {
+            let seen = flow.run(3, &mut FinalOnly).is_ok() && flow.state().check().is_ok() && flow.time().is_finite();
+            report.check(seen, || format!("{x:?}: {:?}", flow.state()));
+            let mark = flow.suspicion().is_none_or(|s| s.step < 3 && s.misfit >= 1.0);
+            report.check(mark, || format!("{x:?}: {:?}", flow.suspicion()));
+            let back = flow.step_back().is_err() || flow.state().check().is_ok();
+            report
+                .check(back && flow.step().map_or(true, |s| s.to.check().is_ok()), || format!("{x:?}: back and forth"));
+        }
+    }
+    let tame: PhasePoint<1> = triples()[0].into();
+    for guess in HOSTILE {
+        let made = Flow::with_guess(&ld, 0.0, tame, SVector::from([guess]));
+        report.check(made.map_or(true, |f| f.state() == &tame), || format!("the guess {guess}"));
+    }
+    for number in HOSTILE {
+        let (state, v) = (PhasePoint::new([number], [1.0], 0.0), SVector::from([number]));
+        // What is not finite has no regular mass, and resolves nothing.
+        let start = ld.check_start(0.0, &state, &v);
+        report.check(number.is_finite() || start.is_err(), || format!("a start at {number}"));
+        let calm = SVector::from([1.0]);
+        let misfit = ld.misfit([&calm, &calm, &calm, &calm], &tame, number);
+        let regular = (0.5..=2.0).contains(&number);
+        report.check(misfit.is_none() == regular || number.abs() > 1.0, || format!("sigma = {number}: {misfit:?}"));
+    }
+    report.check(Flow::new(&ld, 0.0, tame).unwrap().run(0, &mut FinalOnly).is_err(), || "no step".into());
+}
+
+fn gauss(report: &mut Report) {
+    let general = Gauss::new(Everything, 5, 0.1).unwrap();
+    let condensed = Gauss::new(Claiming, 5, 0.1).unwrap();
+    let one = SVector::from([1.0]);
+    for (t, x) in starts() {
+        drive(report, &(t, x), general.stepper(t, x, one));
+        drive(report, &(t, x), condensed.stepper(t, x, one));
+        drive(report, &(t, x), condensed.stepper_without_action(t, x, one));
+        drive(report, &(t, x), general.stepper(t, x, one).map(|s| s.without_newton()));
+    }
+    for h in STEPS {
+        let gauss = Gauss::new(Everything, 5, h).unwrap();
+        drive(report, &h, gauss.stepper(0.0, triples()[0].into(), one));
+        let gauss = Gauss::new(Claiming, 5, h).unwrap();
+        drive(report, &h, gauss.stepper(0.0, triples()[0].into(), one));
+    }
+    for guess in HOSTILE {
+        let made = general.stepper(0.0, triples()[0].into(), SVector::from([guess]));
+        report.check(made.map_or(true, |s| grade(&s.state()) != Grade::Bad), || format!("the guess {guess}"));
+    }
+    let mut stepper = general.stepper(0.0, triples()[0].into(), one).unwrap();
+    report.check(stepper.route() == GaussRoute::General && stepper.newton_steps() == 0, || "route".into());
+    report
+        .check(stepper.dense().is_none() && stepper.advance(2).is_ok(), || "dense output before the first step".into());
+    let curve = stepper.dense().unwrap();
+    report.check(curve.span() == (0.1, 0.2), || format!("the span {:?}", curve.span()));
+    for t in HOSTILE {
+        report.formula(&t, fine(curve.at(t)));
+        report.formula(&t, fine(curve.velocity(t)));
+    }
+}
+
+fn clocked(report: &mut Report) {
+    let kepler = Kepler::<2>::default();
+    let gauss = Gauss::new(kepler, 4, 0.2).unwrap();
+    for value in HOSTILE {
+        for x in [[value, 0.0, 0.0, 1.0], [1.0, value, 0.0, 1.0], [1.0, 0.0, value, 1.0], [value; 4]] {
+            let start = PhasePoint::<2>::new([x[0], x[1]], [x[2], x[3]], 0.0);
+            let made = gauss.clocked_stepper(kepler.clock(), 0.0, start, start.p).map(|mut stepper| {
+                let _ = stepper.advance(3);
+                (stepper.state(), stepper.time(), stepper.time_momentum())
+            });
+            report.door(&start, made);
+        }
+        let start = PhasePoint::<2>::new([1.0, 0.0], [0.0, 1.0], 0.0);
+        report
+            .check(value.is_finite() || gauss.clocked_stepper(kepler.clock(), value, start, start.p).is_err(), || {
+                format!("from t = {value}")
+            });
+        // A time that is far away is not asked for: that many steps are what it takes.
+        if !value.is_finite() || value.abs() < 1.0 {
+            let mut stepper = gauss.clocked_stepper(kepler.clock(), 0.0, start, start.p).unwrap();
+            let done = stepper.advance_to(value);
+            let at = if value > 0.0 { value } else { 0.0 };
+            // Of a time too short for its steps it says so, and stays.
+            let there = done.is_ok() && (stepper.time() - at).abs() <= 1e-15;
+            let refused = done.is_err() && stepper.time() == 0.0;
+            let good = if value.is_finite() { there || refused && value < 1e-12 } else { refused };
+            report.check(good, || format!("up to t = {value}: {done:?} at {}", stepper.time()));
+        }
+    }
+}
+
+fn events(report: &mut Report) {
+    let gauss = Gauss::new(Everything, 4, 0.1).unwrap();
+    let stepper = || gauss.stepper(0.0, triples()[0].into(), [0.5].into()).unwrap();
+    for value in HOSTILE {
+        let mut stepper = stepper();
+        let run = run_with_events(&mut stepper, 5, &mut [Event::new(|_, _: &PhasePoint<1>| value).terminal()]).unwrap();
+        let good = match run.status {
+            EventStatus::Undefined { event: 0, .. } => !value.is_finite(),
+            EventStatus::Completed => value.is_finite(),
+            _ => false,
+        };
+        report.check(good && run.crossings.is_empty(), || format!("an event {value}: {:?}", run.status));
+    }
+    // One that is not a number in mid-run keeps what was found before.
+    let late = Event::new(|t, _: &PhasePoint<1>| if t > 0.35 { f64::NAN } else { 0.25 - t });
+    let run = run_with_events(&mut stepper(), 100, &mut [late]).unwrap();
+    let good = matches!(run.status, EventStatus::Undefined { event: 0, t } if t > 0.35) && run.crossings.len() == 1;
+    report.check(good && run.t <= 0.4 && run.state.check().is_ok(), || format!("{run:?}"));
+    report.check(run_with_events(&mut stepper(), 0, &mut []).is_err(), || "no step".into());
+    report.check(run_with_events(&mut stepper(), 3, &mut []).is_ok_and(|r| r.t > 0.29), || "no event".into());
+    // As many steps as there are, ended by the event.
+    let end = Event::new(|t, _: &PhasePoint<1>| t - 0.55).in_direction(discrete_herglotz::Direction::Rising).terminal();
+    let run = run_with_events(&mut stepper(), usize::MAX, &mut [end]).unwrap();
+    report.check(run.status == EventStatus::Terminated { event: 0 } && (run.t - 0.55).abs() < 1e-15, || {
+        format!("{run:?}")
+    });
+}

@@ -1,0 +1,187 @@
+//! Attacks on Lagrangians: their derivatives, fields, claims and closed motions.
+
+use crate::Attack;
+use crate::numbers::{Everything, HOSTILE, Report, fine, places, triples};
+use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::statements::ActionSquared;
+use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField};
+use contact_geom::{
+    Clock, Dual, Lagrangian, Regularity, Structure, ValueOnly, VelocityPoint, check_closed_derivatives,
+    derived_gradient, derived_hessian, herglotz_field, herglotz_rates, legendre, legendre_jacobian, regularity,
+    statements,
+};
+
+pub const ATTACKS: &[Attack] = &[
+    Attack { on: &["legendre", "legendre_jacobian", "herglotz_field", "herglotz_rates"], run: herglotz },
+    Attack { on: &["regularity", "Regularity::of", "Regularity::condition"], run: regularities },
+    Attack {
+        on: &[
+            "derived_gradient",
+            "derived_hessian",
+            "check_closed_derivatives",
+            "Lagrangian::value",
+            "Lagrangian::along",
+            "Lagrangian::with_gradient",
+            "Lagrangian::with_force",
+            "Lagrangian::mass_matrix",
+            "Lagrangian::gradient",
+            "Lagrangian::hessian",
+        ],
+        run: lagrangians,
+    },
+    Attack { on: &["Structure::defects"], run: structures },
+    Attack {
+        on: &["statements::residual", "statements::known_hamiltonian", "statements::conformal_flow"],
+        run: residuals,
+    },
+    Attack {
+        on: &[
+            "FreeParticle::solution",
+            "FreeParticle::velocity_through",
+            "HarmonicOscillator::solution",
+            "HarmonicOscillator::velocity_through",
+            "UniformField::solution",
+            "UniformField::velocity_through",
+            "LaneEmden::solution",
+        ],
+        run: closed_forms,
+    },
+    Attack { on: &["Kepler::clock", "Clock::rate"], run: clocks },
+];
+
+fn herglotz(report: &mut Report) {
+    for (t, x) in places() {
+        let at = VelocityPoint::from(x);
+        report.formula(&(t, x), fine(legendre(&Everything, t, &at)));
+        report.formula(&(t, x), fine(legendre_jacobian(&Everything, t, &at)));
+        report.formula(&(t, x), herglotz_field(&Everything, t, &at));
+        report.formula(&(t, x), herglotz_rates(&Everything, t, &at));
+        report.formula(&(t, x), herglotz_field(&ValueOnly(Everything), t, &at));
+    }
+}
+
+fn regularities(report: &mut Report) {
+    for (t, x) in places() {
+        let w = regularity(&Everything, t, &x.into());
+        report.formula(&(t, x), fine((w.smallest, w.condition())));
+    }
+    for value in HOSTILE {
+        let w = Regularity::of(DMatrix::from_row_slice(2, 2, &[1.0, value, 0.5, 2.0]));
+        let good = w.condition() >= 1.0 && (value.is_finite() || w.condition() == f64::INFINITY);
+        report.check(good, || format!("{value}: {w:?}"));
+    }
+    let none = Regularity::of(DMatrix::zeros(0, 0)).condition();
+    report.check(none.is_nan() || none >= 1.0, || format!("of an empty matrix {none}"));
+}
+
+fn lagrangians(report: &mut Report) {
+    for (t, x) in places() {
+        let at = VelocityPoint::from(x);
+        let l = Everything;
+        report.formula(&(t, x), fine(l.value(t, &at.q, &at.v, at.z)));
+        report.formula(&(t, x), fine(l.with_gradient(t, &at)));
+        report.formula(&(t, x), fine(l.with_force(t, &at)));
+        report.formula(&(t, x), fine(l.mass_matrix(t, &at)));
+        report.formula(&(t, x), fine(l.gradient(t, &at)));
+        report.formula(&(t, x), fine(derived_gradient(&l, t, &at)));
+        for h in [l.hessian(t, &at), derived_hessian(&l, t, &at)] {
+            report.formula(&(t, x), fine((h.qq, (h.qv, h.vv), ((h.qz, h.vz), h.zz))));
+        }
+        let moving = VelocityPoint {
+            q: at.q.map(|re| Dual { re, d: SVector::from([1.0]) }),
+            v: at.v.map(Dual::constant),
+            z: Dual::constant(at.z),
+        };
+        report.formula(&(t, x), fine(l.along(t, &moving)));
+        let (gradient, hessian) = check_closed_derivatives(&l, t, &at);
+        report.check(gradient.is_none() && hessian.is_none(), || "closed derivatives of what has none".into());
+        // A NaN in the comparison of a closed form is not lost.
+        let (gradient, _) = check_closed_derivatives(&Pendulum::default(), t, &at);
+        // The pendulum's derivatives do not depend on time and action.
+        if t.is_finite() && x.z.is_finite() {
+            report.formula(&(x.x, x.y), fine(gradient));
+        }
+    }
+}
+
+/// Claims at a place that is none: each is as wrong as can be.
+fn structures(report: &mut Report) {
+    let all = Structure {
+        autonomous: true,
+        z_free: true,
+        z_affine: true,
+        constant_rate: true,
+        separable: true,
+        quadratic: true,
+        constant_mass: true,
+    };
+    for (t, x) in places() {
+        // Where L is not defined nothing is said; elsewhere every claim gets a number.
+        let Some(defects) = all.defects(&Everything, t, &x.into()) else { continue };
+        report.check(t.is_finite() && x.is_finite(), || format!("claims are judged at t = {t}, {x:?}"));
+        let defects: Vec<_> = defects.collect();
+        report.check(defects.len() == 7, || format!("{} defects", defects.len()));
+        for defect in defects {
+            report.check(defect.size >= 0.0, || {
+                format!("{} at t = {t}, {x:?} has the defect {}", defect.claim, defect.size)
+            });
+        }
+    }
+}
+
+fn residuals(report: &mut Report) {
+    for (t, x) in places() {
+        for statement in statements::STATEMENTS.into_iter().chain([0, 5, 1000, u32::MAX]) {
+            let known = statements::STATEMENTS.contains(&statement);
+            let residual = statements::residual(statement, &CoupledInZ::default(), t, &x.into());
+            // The system does not know the time, nor a symmetry or a Hamiltonian in closed form.
+            let good = match &residual {
+                Ok(None) => !known || [3, 9, 12].contains(&statement),
+                Ok(Some(r)) => known && (!x.to_vector().iter().any(|c| c.is_nan()) || !(*r <= 1e-3) || statement == 7),
+                Err(_) => known,
+            };
+            report.check(good, || format!("statement {statement} at t = {t}, {x:?}: {residual:?}"));
+        }
+    }
+    report.check(statements::known_hamiltonian::<1, _>(&Pendulum::default()).is_some(), || "no Hamiltonian".into());
+    let flow = ActionSquared { c: 0.4 };
+    for t in HOSTILE {
+        let residual = statements::conformal_flow(&flow, t, &triples()[0], &[(0.0, t)]);
+        report.check(!t.is_nan() || !residual.as_ref().is_ok_and(|r| *r <= 1e-3), || format!("t = {t}: {residual:?}"));
+    }
+}
+
+fn closed_forms(report: &mut Report) {
+    let (free, oscillator) = (FreeParticle { gamma: -0.1 }, HarmonicOscillator { gamma: -0.1 });
+    let field = UniformField::<1> { gamma: -0.1, field: [0.5] };
+    for x in triples() {
+        let at = VelocityPoint::from(x);
+        report.formula(&x, fine(free.solution(0.4, &at)));
+        report.formula(&x, fine(oscillator.solution(0.4, &at)));
+        report.formula(&x, fine(field.solution(0.4, &at)));
+        // Where there is none or not one, there is none.
+        for through in [free.velocity_through(x.x[0], x.y[0], 0.4), oscillator.velocity_through(x.x[0], x.y[0], 0.4)] {
+            report.door(&(x.x, x.y), through.ok_or("none"));
+        }
+        report.door(&(x.x, x.y), field.velocity_through(&x.x, &x.y, 0.4).ok_or("none"));
+    }
+    let start = VelocityPoint::new([0.3], [0.7], 0.2);
+    for t in HOSTILE {
+        report.formula(
+            &t,
+            fine(oscillator.solution(t, &start)).map(|x| (x, if t < 0.0 && t.is_infinite() { f64::NAN } else { 0.0 })),
+        );
+        report.door(&t, free.velocity_through(0.1, 0.2, t).ok_or("none"));
+        report.door(&t, oscillator.velocity_through(0.1, 0.2, t).ok_or("none"));
+        for n in [0, 1, 2, 5, u8::MAX] {
+            report.formula(&t, LaneEmden { n }.solution(t).ok_or("none"));
+        }
+    }
+}
+
+fn clocks(report: &mut Report) {
+    let clock = Kepler::<2>::default().clock();
+    for value in HOSTILE {
+        report.formula(&value, fine(clock.rate(&SVector::from([value, 0.3]))));
+    }
+}
