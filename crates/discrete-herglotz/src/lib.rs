@@ -20,6 +20,8 @@
 //!
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
+#[cfg(test)]
+mod coarse_tests;
 mod composition;
 mod discrete_lagrangian;
 mod discretised;

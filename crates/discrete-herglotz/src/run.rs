@@ -231,7 +231,12 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
         if let Some(misfit) = self.ld.misfit([&earlier, &before, &latest, &next.velocity], &next.end, next.sigma) {
             self.watch.note(self.k - 1, misfit);
         }
-        self.velocities = [next.velocity, latest, before];
+        // Before the first step velocities changed as they do in the second, for all that is known.
+        self.velocities = match self.k {
+            1 => [next.velocity; 3],
+            2 => [next.velocity, latest, latest * 2.0 - next.velocity],
+            _ => [next.velocity, latest, before],
+        };
         self.state = next.end;
         self.sigma = next.sigma;
         // A second jet an iteration, and the jet that makes the next momentum.

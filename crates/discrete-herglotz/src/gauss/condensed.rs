@@ -5,7 +5,7 @@
 
 use super::coefficients::{Coefficients, MOST};
 use super::compensated::{Twofold, exact_sum};
-use super::double_double::{Row, solve_exactly};
+use super::double_double::{ExactRow, solve_exactly};
 use super::stages::{Exact, StageMap, Stages, Weights, padded};
 use crate::{InputError, StepError};
 use num_traits::{One, Zero};
@@ -206,7 +206,7 @@ impl Condensed {
 }
 
 /// A matrix of stages, and beside it the column of what multiplies the velocity; padded to whole registers.
-type Wide = Row<{ MOST + 8 }>;
+type Wide = ExactRow<{ MOST + 8 }>;
 
 /// What a [`Condensed`] step multiplies its accelerations with.
 struct Products {

@@ -7,7 +7,7 @@ use qd::Quad;
 /// A row of numbers: heads and tails apart, so that both fill registers.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-pub(super) struct Row<const W: usize> {
+pub(super) struct ExactRow<const W: usize> {
     head: [f64; W],
     tail: [f64; W],
 }
@@ -28,8 +28,8 @@ fn sum_of_product(sum: (f64, f64), factor: Quad, x: (f64, f64)) -> (f64, f64) {
     renormalised(head, (sum.1 + rounding) + factor.1.mul_add(x.0, factor.0.mul_add(x.1, lost)))
 }
 
-impl<const W: usize> Row<W> {
-    pub const ZERO: Self = Row { head: [0.0; W], tail: [0.0; W] };
+impl<const W: usize> ExactRow<W> {
+    pub const ZERO: Self = ExactRow { head: [0.0; W], tail: [0.0; W] };
 
     #[inline(always)]
     pub fn from_fn(f: impl Fn(usize) -> Quad) -> Self {
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn rows_add_products_to_twice_the_precision() {
         let third = Quad::from(1.0) / Quad::from(3.0);
-        let x = Row::<8>::from_fn(|j| third * Quad::from(j as f64 + 1.0));
+        let x = ExactRow::<8>::from_fn(|j| third * Quad::from(j as f64 + 1.0));
         let mut sum = x.times(&x);
         sum.add(third, &x);
         for j in 0..8 {

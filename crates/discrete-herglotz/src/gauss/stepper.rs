@@ -334,12 +334,19 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     fn follow(&mut self) {
         let (q, h) = (SVector::from(self.values().q), self.products.h);
         let Some(Sequence { velocities, q: before }) = self.sequence.as_deref_mut() else { return };
+        let latest = (q - *before) / h;
         velocities.rotate_left(1);
-        velocities[3] = (q - *before) / h;
+        velocities[3] = latest;
         *before = q;
+        // Before the first step velocities changed as they do in the second, for all that is known.
+        match self.k {
+            0 => velocities.fill(latest),
+            1 => velocities[1] = velocities[2] * 2.0 - latest,
+            _ => {}
+        }
         let [a, b, c, d] = &*velocities;
         if let (Some(misfit), None) = (misfit([a, b, c, d], &q, h), self.suspicion) {
-            // Like those of a rule, from the change of the velocities before.
+            // Like those of a rule, seen one step late.
             self.suspicion = Some(Suspicion { step: self.k.saturating_sub(1), misfit });
         }
     }

@@ -75,7 +75,10 @@ pub(super) fn choose_with<L: Lagrangian<N>, const N: usize>(
     match integrator {
         Integrator::Gauss { stages } if stages >= OWN => {
             let found = converge(pilots, stages, wanted, false)?;
-            let (count, error) = fewest(stages, wanted, &found);
+            // Where W or the drag changes along the motion a longer step may leave their domain, as no misfit foretells.
+            let structure = &pilots.structure;
+            let longer = structure.separable && structure.has_constant_rate();
+            let (count, error) = fewest(stages, wanted, &found, longer);
             Ok(Choice { integrator, count, error: Some(error) })
         }
         _ => {
@@ -218,11 +221,12 @@ fn obstacle(distances: &[f64], order: f64, wanted: f64, t0: f64, span: f64) -> O
         let kept = distances.iter().take_while(|d| **d <= wanted).count();
         return Obstacle::Chaos { t: t0 + span * kept as f64 / distances.len() as f64 };
     }
-    if noise && last < 1e-9 { Obstacle::RoundOff } else { Obstacle::Order { order } }
+    // Where only roundings are left they may show any order.
+    if noise && last < 1e-9 || last <= 64.0 * f64::EPSILON { Obstacle::RoundOff } else { Obstacle::Order { order } }
 }
 
 /// The fewest steps of a Gauss method that the converged runs allow, with the error that they predict.
-fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>) -> (usize, f64) {
+fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, longer: bool) -> (usize, f64) {
     let Converged { k, errors: [error, beyond], misfit, narrow, .. } = *found;
     let order = 2.0 * stages as f64;
     // Ten times as exactly as wanted between the runs and beyond them, as errors of neighbouring steps may differ so much.
@@ -236,7 +240,7 @@ fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>) -> (
         // Coarser than what was followed only where the misfit says that steps still resolve the motion.
         let fewer = steps.max((0.6 * k as f64).ceil());
         let coarser = misfit * (k as f64 / fewer).powf(stages as f64);
-        return if fewer < k as f64 && coarser <= 1e-2 { (fewer as usize, predicted) } else { (k, error) };
+        return if longer && fewer < k as f64 && coarser <= 1e-2 { (fewer as usize, predicted) } else { (k, error) };
     }
     if steps < 2.0 * k as f64 { (steps as usize, larger(predicted, beyond)) } else { (2 * k, beyond) }
 }

@@ -144,6 +144,7 @@ fn relativistic() -> String {
     let Ok(truth) = problem.exact_in(64) else { return "no truth".into() };
     match problem.to(1e-9) {
         crate::motion::End::Refused(cause) => format!("refused: {cause}"),
+        crate::motion::End::Halted(cause) => format!("halted: {cause}"),
         end if end.error(&truth, 0.0) <= 1e-8 => "right".into(),
         end => format!("wrong by {:e}", end.error(&truth, 0.0)),
     }
