@@ -259,7 +259,24 @@ pub fn draw(panel: &Panel) -> String {
     let plots = panel.plots();
     let width = SIZE.0 + if panel.legend_is_beside() { BESIDE } else { 0.0 };
     let layout = panel.layout(&plots).with_width(width).with_height(SIZE.1);
-    kuva::render_to_svg(plots, layout)
+    numbered(&kuva::render_to_svg(plots, layout))
+}
+
+/// The same figure with its clips counted from 0: the library counts all those of a process, and a figure should not depend on which
+/// others are drawn.
+fn numbered(svg: &str) -> String {
+    const CLIP: &str = "kuva-clip-";
+    let (mut seen, mut parts) = (Vec::new(), svg.split(CLIP));
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (clip, rest) = part.split_at(part.find(|c: char| !c.is_ascii_digit()).unwrap_or(part.len()));
+        let place = seen.iter().position(|s| *s == clip).unwrap_or(seen.len());
+        if place == seen.len() {
+            seen.push(clip);
+        }
+        out += &format!("{CLIP}{place}{rest}");
+    }
+    out
 }
 
 /// A figure of panels side by side, marked a, b and so on, as SVG.
@@ -273,5 +290,18 @@ pub fn draw_row(panels: &[Panel]) -> String {
         .with_spacing(24.0)
         .with_labels_lowercase()
         .render();
-    SvgBackend.render_scene(&scene)
+    numbered(&SvgBackend.render_scene(&scene))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clips_are_counted_from_zero() {
+        let later = r#"<a id="kuva-clip-17"/><b clip="url(#kuva-clip-17)"/><a id="kuva-clip-3"/> kuva-clip-3"#;
+        let found = r#"<a id="kuva-clip-0"/><b clip="url(#kuva-clip-0)"/><a id="kuva-clip-1"/> kuva-clip-1"#;
+        assert_eq!(numbered(later), found);
+        assert_eq!(numbered("<svg/>"), "<svg/>");
+    }
 }
