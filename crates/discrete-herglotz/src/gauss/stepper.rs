@@ -1,5 +1,7 @@
 //! Runs of contact Gauss collocation.
 
+mod marks;
+
 use super::Gauss;
 use super::beginning::{Beginning, velocity};
 use super::condensed::Condensed;
@@ -7,7 +9,6 @@ use super::dense::{DenseStep, Solved, Start};
 use super::extension::{Extension, Physical};
 use super::general::General;
 use super::linear::Linear;
-use super::look::{Compare, Curve, Look, SETS};
 use super::mass::Mass;
 use super::resolution;
 use super::separable::Separable;
@@ -16,10 +17,10 @@ use super::sweeps::Progress;
 use super::table::Table;
 use crate::lanes::forget_branches;
 use crate::step_equations::is_identity;
-use crate::watch::misfit;
 use crate::{Halt, InputError, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint};
+use marks::{FEW, Sequence};
 use pulp::{Arch, Simd, WithSimd};
 
 /// How the steps of contact Gauss collocation are computed.
@@ -46,10 +47,6 @@ enum Route<'a, L, const N: usize> {
     Condensed(Separable<'a, L, N>),
     General(General<'a, L, Physical, N>),
 }
-
-/// The misfit between the nodes from which a step of at least three stages does not resolve the motion: of harmonics it then has an
-/// error of its own of 0.01 to 0.1.
-const UNRESOLVED: f64 = 0.1;
 
 /// How the stages of a step are solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,15 +89,6 @@ pub struct GaussStepper<'a, L, const N: usize> {
     sequence: Option<Box<Sequence<N>>>,
     suspicion: Option<Suspicion>,
 }
-
-/// The mean velocities of the last steps, in sequence.
-struct Sequence<const N: usize> {
-    velocities: [SVector<f64, N>; 4],
-    q: SVector<f64, N>,
-}
-
-/// The stages up to which the nodes of a step do not tell whether it resolves the motion.
-const FEW: usize = 2;
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     pub(super) fn new(
@@ -203,13 +191,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             Route::General(run) => run.solved(),
         };
         Some(DenseStep::new(s, t, h, start, &solved))
-    }
-
-    /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step.
-    pub(crate) fn look(&self, sets: usize) -> Option<Look> {
-        let curve = self.arch.dispatch(Stages { run: self })?;
-        let at = |set| self.arch.dispatch(Compare { lagrangian: self.lagrangian, curve: &curve, set });
-        (0..sets).map(at).reduce(Look::and)
     }
 
     /// The state as the route holds it.
@@ -329,28 +310,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         (taken, refused.map(StepError::from))
     }
 
-    /// Follows the mean velocities of steps of few stages.
-    #[inline(never)]
-    fn follow(&mut self) {
-        let (q, h) = (SVector::from(self.values().q), self.products.h);
-        let Some(Sequence { velocities, q: before }) = self.sequence.as_deref_mut() else { return };
-        let latest = (q - *before) / h;
-        velocities.rotate_left(1);
-        velocities[3] = latest;
-        *before = q;
-        // Before the first step velocities changed as they do in the second, for all that is known.
-        match self.k {
-            0 => velocities.fill(latest),
-            1 => velocities[1] = velocities[2] * 2.0 - latest,
-            _ => {}
-        }
-        let [a, b, c, d] = &*velocities;
-        if let (Some(misfit), None) = (misfit([a, b, c, d], &q, h), self.suspicion) {
-            // Like those of a rule, seen one step late.
-            self.suspicion = Some(Suspicion { step: self.k.saturating_sub(1), misfit });
-        }
-    }
-
     /// Tries the next cheaper solution once its pause is over.
     fn resume(&mut self) {
         if self.solution != Solution::Sweeps && self.pause == 0 {
@@ -382,41 +341,6 @@ struct Tried {
 
 /// The steps of Newton's method after which cheaper sweeps are tried again for the first time.
 const PAUSE: usize = 8;
-
-/// The stages of the last step, for a look between them.
-struct Stages<'b, 'a, L, const N: usize> {
-    run: &'b GaussStepper<'a, L, N>,
-}
-
-impl<L: Lagrangian<N>, const N: usize> WithSimd for Stages<'_, '_, L, N> {
-    type Output = Option<Curve<N>>;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> Option<Curve<N>> {
-        let GaussStepper { products, route, solved, from, k, t0, .. } = self.run;
-        if !solved {
-            return None;
-        }
-        let start = self.run.phase(from);
-        let t = t0 + k.checked_sub(1)? as f64 * products.h;
-        let mut curve = Curve::new(products.s, t, products.h, &start);
-        match &**route {
-            Route::Linear(run, table) => {
-                let a = run.accelerations(&from.q, &from.y);
-                let x = table.positions(&from.q, &from.y, &a);
-                let [a, x] = [a, x].map(|y| y.map(super::stages::Stages));
-                let mass = self.run.mass.as_deref();
-                curve.of_accelerations::<S, L>(self.run.lagrangian, table, mass, &from.y, [&a, &x]);
-            }
-            Route::Condensed(run) => {
-                let mass = self.run.mass.as_deref();
-                curve.of_accelerations::<S, L>(self.run.lagrangian, &run.table, mass, &from.y, [&run.a, &run.x]);
-            }
-            Route::General(run) => curve.of_solved(&run.solved()),
-        }
-        Some(curve)
-    }
-}
 
 /// Steps in the lanes of one instruction set; ends at a step that cannot be taken.
 struct Advance<'b, 'a, L, const N: usize> {
@@ -531,18 +455,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     /// What was seen along the steps; else what a look at the last step alone shows, between its nodes: a run that wants more asks
     /// more often.
     fn suspicion(&self) -> Option<Suspicion> {
-        if self.of_sigma > 1.0 && self.k > 0 {
-            return Some(Suspicion { step: 0, misfit: self.of_sigma });
-        }
-        self.suspicion.or_else(|| {
-            // A linear motion that is not resolved is so in every step, and none was looked at on the way.
-            let sets = if let Route::Linear(..) = &*self.route { SETS } else { 1 };
-            let Look { misfit, .. } = self.look(sets)?;
-            // A step of fewer stages is no polynomial between its nodes to speak of.
-            let misfit = if self.products.s > FEW { misfit / UNRESOLVED } else { misfit };
-            // A NaN is a misfit too.
-            if misfit <= 1.0 { None } else { Some(Suspicion { step: self.k - 1, misfit }) }
-        })
+        self.mark()
     }
 }
 

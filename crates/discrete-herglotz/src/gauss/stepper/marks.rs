@@ -1,0 +1,104 @@
+//! What the steps of a run say of themselves: whether they resolve the motion.
+
+use super::{GaussStepper, Route};
+use crate::Suspicion;
+use crate::gauss::look::{Compare, Curve, Look, SETS};
+use crate::watch::misfit;
+use contact_geom::Lagrangian;
+use contact_geom::nalgebra::SVector;
+use pulp::{Simd, WithSimd};
+
+/// The misfit between the nodes from which a step of at least three stages does not resolve the motion: of harmonics it then has an
+/// error of its own of 0.01 to 0.1.
+const UNRESOLVED: f64 = 0.1;
+
+/// The mean velocities of the last steps, in sequence.
+pub(super) struct Sequence<const N: usize> {
+    pub velocities: [SVector<f64, N>; 4],
+    pub q: SVector<f64, N>,
+}
+
+/// The stages up to which the nodes of a step do not tell whether it resolves the motion.
+pub(super) const FEW: usize = 2;
+
+impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
+    /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step.
+    pub(crate) fn look(&self, sets: usize) -> Option<Look> {
+        let curve = self.arch.dispatch(Stages { run: self })?;
+        let at = |set| self.arch.dispatch(Compare { lagrangian: self.lagrangian, curve: &curve, set });
+        (0..sets).map(at).reduce(Look::and)
+    }
+
+    /// Follows the mean velocities of steps of few stages.
+    #[inline(never)]
+    pub(super) fn follow(&mut self) {
+        let (q, h) = (SVector::from(self.values().q), self.products.h);
+        let Some(Sequence { velocities, q: before }) = self.sequence.as_deref_mut() else { return };
+        let latest = (q - *before) / h;
+        velocities.rotate_left(1);
+        velocities[3] = latest;
+        *before = q;
+        // Before the first step velocities changed as they do in the second, for all that is known.
+        match self.k {
+            0 => velocities.fill(latest),
+            1 => velocities[1] = velocities[2] * 2.0 - latest,
+            _ => {}
+        }
+        let [a, b, c, d] = &*velocities;
+        if let (Some(misfit), None) = (misfit([a, b, c, d], &q, h), self.suspicion) {
+            // Like those of a rule, seen one step late.
+            self.suspicion = Some(Suspicion { step: self.k.saturating_sub(1), misfit });
+        }
+    }
+
+    /// The first step that was seen not to resolve the motion, or what a look at the last one shows.
+    pub(super) fn mark(&self) -> Option<Suspicion> {
+        if self.of_sigma > 1.0 && self.k > 0 {
+            return Some(Suspicion { step: 0, misfit: self.of_sigma });
+        }
+        self.suspicion.or_else(|| {
+            // A linear motion that is not resolved is so in every step, and none was looked at on the way.
+            let sets = if let Route::Linear(..) = &*self.route { SETS } else { 1 };
+            let Look { misfit, .. } = self.look(sets)?;
+            // A step of fewer stages is no polynomial between its nodes to speak of.
+            let misfit = if self.products.s > FEW { misfit / UNRESOLVED } else { misfit };
+            // A NaN is a misfit too.
+            if misfit <= 1.0 { None } else { Some(Suspicion { step: self.k - 1, misfit }) }
+        })
+    }
+}
+
+/// The stages of the last step, for a look between them.
+struct Stages<'b, 'a, L, const N: usize> {
+    run: &'b GaussStepper<'a, L, N>,
+}
+
+impl<L: Lagrangian<N>, const N: usize> WithSimd for Stages<'_, '_, L, N> {
+    type Output = Option<Curve<N>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Option<Curve<N>> {
+        let GaussStepper { products, route, solved, from, k, t0, .. } = self.run;
+        if !solved {
+            return None;
+        }
+        let start = self.run.phase(from);
+        let t = t0 + k.checked_sub(1)? as f64 * products.h;
+        let mut curve = Curve::new(products.s, t, products.h, &start);
+        match &**route {
+            Route::Linear(run, table) => {
+                let a = run.accelerations(&from.q, &from.y);
+                let x = table.positions(&from.q, &from.y, &a);
+                let [a, x] = [a, x].map(|y| y.map(crate::gauss::stages::Stages));
+                let mass = self.run.mass.as_deref();
+                curve.of_accelerations::<S, L>(self.run.lagrangian, table, mass, &from.y, [&a, &x]);
+            }
+            Route::Condensed(run) => {
+                let mass = self.run.mass.as_deref();
+                curve.of_accelerations::<S, L>(self.run.lagrangian, &run.table, mass, &from.y, [&run.a, &run.x]);
+            }
+            Route::General(run) => curve.of_solved(&run.solved()),
+        }
+        Some(curve)
+    }
+}
