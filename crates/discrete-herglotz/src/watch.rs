@@ -54,8 +54,8 @@ pub(crate) fn turning<const N: usize>(
     (change > velocity && change * h.abs() > LEAST * size(q)).then(|| change / velocity)
 }
 
-/// See [`turning`].
-const LEAST: f64 = 1.0 / 256.0;
+/// See [`turning`]; the same for the difference of a step from two halves.
+pub(crate) const LEAST: f64 = 1.0 / 256.0;
 
 /// The misfit of a rational conformal factor, the exponential of a rate in the motion itself: above one where a step contracts or
 /// grows by more than three. `(1 + x)/(1 - x)`, which is three at `x = 1/2`, is then off by a tenth or more.

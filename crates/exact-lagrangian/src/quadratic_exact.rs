@@ -2,7 +2,6 @@
 
 mod evolution;
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests;
 
 use crate::conjugate::Fold;

@@ -193,7 +193,6 @@ fn least_squares_slope(points: &[(f64, f64)]) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use contact_geom::Scalar;

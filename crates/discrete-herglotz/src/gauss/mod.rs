@@ -27,6 +27,7 @@ pub(crate) use beginning::velocity;
 pub use clocked::ClockedStepper;
 pub use dense::DenseStep;
 pub(crate) use look::{Look, SETS};
+pub(crate) use stepper::FEW;
 pub use stepper::{GaussRoute, GaussStepper};
 
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};

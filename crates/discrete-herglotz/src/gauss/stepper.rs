@@ -20,7 +20,8 @@ use crate::step_equations::is_identity;
 use crate::{Halt, InputError, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint};
-use marks::{FEW, Sequence};
+pub(crate) use marks::FEW;
+use marks::Sequence;
 use pulp::{Arch, Simd, WithSimd};
 
 /// How the steps of contact Gauss collocation are computed.

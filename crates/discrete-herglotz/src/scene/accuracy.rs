@@ -8,8 +8,8 @@ use contact_geom::{Lagrangian, Structure, larger};
 /// The searches that may follow each other: each makes the steps shorter, or ends.
 const ATTEMPTS: usize = 64;
 
-/// The refinements, of so many steps, after which a step that still cannot be taken, or is not resolved, at the same time never will be, and those after
-/// which something narrow that is still between the nodes is left to the comparison of runs.
+/// The refinements, of so many steps, after which a step that still cannot be taken, or is not resolved, at the same time never will
+/// be, and those after which something narrow that is still between the nodes is left to the comparison of runs.
 const HALTS: usize = 8;
 const LONG: usize = 512;
 const NARROWS: usize = 10;

@@ -4,6 +4,7 @@ mod halved;
 
 use super::accuracy::Choice;
 use super::{Integrator, Scene, Wanted};
+use crate::gauss::FEW;
 use crate::verified::refuted;
 use crate::{
     ActionSplitting, Composition, Discretised, Flow, Gauss, GaussRoute, InputError, Method, Splitting, Status, Stepper,
@@ -239,11 +240,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         }
         let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
         // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes.
-        let halves =
-            self.error.is_none() && !matches!(self.integrator, Integrator::Gauss { stages } if stages > halved::FEW);
+        let halves = self.error.is_none() && !matches!(self.integrator, Integrator::Gauss { stages } if stages > FEW);
         while taken < self.count {
             let next_row = stride.map_or(self.count, |stride| (taken / stride + 1) * stride);
-            let halved = if halves { halved_step(taken, self.count) } else { usize::MAX };
+            // One mark is enough.
+            let halved = if halves && suspicion.is_none() { halved_step(taken, self.count) } else { usize::MAX };
             let before = (taken == halved).then(|| (stepper.time(), stepper.state()));
             let next_look = if taken == halved { taken + 1 } else { halved };
             let next = next_row.min(next_probe(taken)).min(next_look).min(self.count);

@@ -19,7 +19,7 @@ pub(super) struct Sequence<const N: usize> {
 }
 
 /// The stages up to which the nodes of a step do not tell whether it resolves the motion.
-pub(super) const FEW: usize = 2;
+pub(crate) const FEW: usize = 2;
 
 impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step.

@@ -1,7 +1,8 @@
 //! A step against two of half its length: whether given steps resolve the motion at all.
 
 use super::Plan;
-use crate::gauss::velocity;
+use crate::gauss::{FEW, velocity};
+use crate::watch::LEAST;
 use crate::{Flow, Gauss, Halt, Integrator, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, larger, largest};
@@ -9,13 +10,6 @@ use contact_geom::{Lagrangian, PhasePoint, larger, largest};
 /// The difference from two halves, relative to the motion, from which on a step does not resolve it. Of the orders that there are
 /// a step then has an error of its own of a twentieth, or a fifteenth with order one.
 const APART: f64 = 0.05;
-
-/// What a difference of velocities must move of the positions to count: a motion that has come to rest keeps velocities of
-/// rounding alone.
-const LEAST: f64 = 1.0 / 256.0;
-
-/// The stages up to which a Gauss step is compared with two halves. With more it is looked at between its nodes.
-pub(super) const FEW: usize = 2;
 
 impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
     /// The misfit of a step between two states; above one where it does not resolve the motion. `None` where there is nothing to
