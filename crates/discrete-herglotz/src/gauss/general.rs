@@ -313,9 +313,8 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         loop {
             let change = if cold || solved {
                 f64::INFINITY
-            } else if let Some(newton) = self.newton.take() {
-                let (change, moved) = self.correct(&newton);
-                self.newton = Some(newton);
+            } else if self.newton.is_some() {
+                let (change, moved) = self.correct();
                 sweeps.still = moved <= 4.0 * f64::EPSILON;
                 change
             } else {
@@ -324,7 +323,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             let of_clock = self.evaluate::<S>(t);
             if solved {
                 let outcome = self.finish::<S>();
-                self.judge(f64::INFINITY);
+                self.judge::<S>(f64::INFINITY);
                 return outcome;
             }
             if cold {
@@ -337,7 +336,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
                 Progress::Going => {}
                 Progress::Done => {
                     let outcome = self.finish::<S>();
-                    self.judge(sweeps.first());
+                    self.judge::<S>(sweeps.first());
                     self.age = self.age.saturating_add(1);
                     if self.newton.is_some() && sweeps.count() > SLOW && self.age > AGE {
                         self.renew(t);
@@ -351,7 +350,10 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
     }
 
     /// A sweep of Newton's method, in the place of [`sweep`](Self::sweep).
-    fn correct(&mut self, newton: &StageNewton<N>) -> (f64, f64) {
+    #[cold]
+    #[inline(never)]
+    fn correct(&mut self) -> (f64, f64) {
+        let Some(newton) = &self.newton else { return (f64::NAN, f64::NAN) };
         Arch::new().dispatch(CorrectStages {
             newton,
             table: &self.table,

@@ -5,7 +5,7 @@ use super::dense::Solved;
 use super::extension::Pace;
 use super::general::General;
 use super::resolution::{FORETOLD, of_sigma};
-use super::stages::Stages;
+use super::stages::{Stages, blocks};
 use crate::lanes::Lanes;
 use contact_geom::{Lagrangian, larger};
 use pulp::Simd;
@@ -17,23 +17,22 @@ const FALLEN: f64 = 0.2;
 impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'_, L, P, N> {
     /// Judges how well a step has resolved the motion, from how far its start was off what the step before foretold.
     #[inline(always)]
-    pub(super) fn judge(&mut self, first: f64) {
-        let resolved = first <= FORETOLD;
-        self.misfit = if resolved && self.fallen.abs() <= FALLEN { 0.0 } else { self.look(resolved) };
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn look(&self, resolved: bool) -> f64 {
-        let s = self.table.s;
-        let integral = (0..s).fold(0.0, |sum, j| sum + self.rate.0[j] / (1.0 - self.falling.0[j]));
-        let of_motion = if resolved {
-            0.0
-        } else {
-            let values = from_fn::<_, N, _>(|d| Stages(self.unweighted(&self.moved[d])));
-            self.tail.misfit(&values, &self.x, self.table.h)
-        };
-        larger(of_motion, of_sigma(1.0 / (1.0 - self.fallen), integral))
+    pub(super) fn judge<S: Simd>(&mut self, first: f64) {
+        self.misfit = 0.0;
+        if first > FORETOLD {
+            let rates = |d: usize, r| {
+                let v = self.v[d].block::<S>(r);
+                if P::PHYSICAL { v } else { v * self.extension.g.block(r) }
+            };
+            self.misfit = self.tail.misfit(rates, &self.x, self.table.h);
+        }
+        if first > FORETOLD || self.fallen.abs() > FALLEN {
+            let one = Lanes::<S>::splat(1.0);
+            let integral = (0..blocks::<S>(self.table.s)).fold(Lanes::<S>::splat(0.0), |sum, r| {
+                sum + self.rate.block::<S>(r) / (one - self.falling.block(r))
+            });
+            self.misfit = larger(self.misfit, of_sigma(1.0 / (1.0 - self.fallen), integral.sum()));
+        }
     }
 
     /// Whether the stages satisfy their equations to round-off, though the velocities still change: where W is ill conditioned

@@ -1,8 +1,10 @@
 //! Whether a step resolves the motion that it crosses.
 
 use super::coefficients::Coefficients;
-use super::stages::Stages;
-use contact_geom::largest;
+use super::stages::{Stages, blocks};
+use crate::lanes::Lanes;
+use contact_geom::larger;
+use pulp::Simd;
 
 /// The relative error of `sigma_d` in a step from which on the step does not resolve the drag: a tenth. Gauss' method with one
 /// stage reaches it at `gamma h = 1`, where the factor changes by e.
@@ -36,17 +38,31 @@ impl Tail {
         Tail { s, weights: Stages(Coefficients::of(s).last[0]) }
     }
 
-    /// The misfit of a step: above one where the values at its stages are not those of a polynomial. `time` turns them to
-    /// lengths that are compared with the positions. Up to two stages do not tell: a step is then no worse than its order.
-    #[cold]
-    #[inline(never)]
-    pub fn misfit(&self, values: &[Stages], positions: &[Stages], time: f64) -> f64 {
+    /// The misfit of a step by the values at its stages, by coordinate and register: above one where they are not those of a
+    /// polynomial. `time` turns them to lengths that are compared with the positions. Up to two stages do not tell: a step is then no
+    /// worse than its order. All must be finite.
+    #[inline(always)]
+    pub fn misfit<S: Simd, const N: usize>(
+        &self,
+        values: impl Fn(usize, usize) -> Lanes<S>,
+        positions: &[Stages; N],
+        time: f64,
+    ) -> f64 {
         if self.s < 3 {
             return 0.0;
         }
-        let all = |x: &[Stages]| largest(x.iter().flat_map(|x| &x.0[..self.s]).copied());
-        let last = |x: &Stages| x.0[..self.s].iter().zip(&self.weights.0).map(|(x, w)| x * w).sum::<f64>();
-        let tail = largest(values.iter().map(last));
-        if tail * time > MOVED * all(positions) { tail / (TAIL * all(values)) } else { 0.0 }
+        let zero = Lanes::<S>::splat(0.0);
+        let (mut tail, mut size, mut width) = (0.0, zero, zero);
+        for (d, x) in positions.iter().enumerate() {
+            let mut last = zero;
+            for r in 0..blocks::<S>(self.s) {
+                let value = values(d, r);
+                last = self.weights.block(r).mul_add(value, last);
+                size = size.max(value.abs());
+                width = width.max(x.block(r).abs());
+            }
+            tail = larger(tail, last.sum().abs());
+        }
+        if tail * time > MOVED * width.largest() { tail / (TAIL * size.largest()) } else { 0.0 }
     }
 }

@@ -15,10 +15,14 @@ use contact_geom::{Lagrangian, VelocityPoint, largest};
 use pulp::{Arch, Simd};
 
 /// The steps after which a matrix is expected to last.
-const LASTING: usize = 32;
+const LASTING: usize = 64;
 
 /// The largest relative change of a sweep after which its values are near enough for the parts that matrices' rounding leaves out.
 const NEAR: f64 = 1e-3;
+
+/// The tails of the matrices act in one of so many steps, with as many times their weight: what they add up to is the same, and is
+/// had at that part of the price. An odd number, so that they meet all phases of a period that is a power of two of steps.
+const TAILS: usize = 7;
 
 /// The state and the workspace of the condensed step.
 pub(super) struct Separable<'a, L, const N: usize> {
@@ -173,6 +177,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
     pub fn step<S: Simd>(&mut self, t: f64) -> Progress {
+        if self.warm && self.newton.is_none() && self.taken >= self.review {
+            self.review *= 2;
+            self.look_again();
+        }
         let s = self.table.s;
         let m = blocks::<S>(s);
         let kappa = Lanes::<S>::splat(self.left.kappa);
@@ -186,22 +194,32 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         if let Some(newton) = &mut self.newton {
             newton.a = self.rest;
         }
-        // The tails of the matrices act on the guess, from the second sweep on: beside the first one's forces they cost little. Where
-        // the guess is poor they act on the values of a later sweep.
+        // What is below round-off is added from the second sweep on: beside the first one's forces it costs little. Where the guess
+        // is poor the tails of the matrices wait for the values of a later sweep.
         let at_once = solved || self.newton.is_some();
         let mut due = self.far && !at_once;
-        let mut aside = !self.far && !at_once && self.left.tail.is_some();
-        self.begin::<S>(at_once);
+        let mut aside = !self.far && !at_once;
+        let weight = match self.taken % TAILS {
+            _ if at_once => 1.0,
+            0 => TAILS as f64,
+            _ => 0.0,
+        };
+        let (mut small, mut again) = (at_once.then_some(weight), true);
         self.far = false;
         let mut sweeps = Sweeps::default();
         let outcome = loop {
+            if again {
+                self.begin::<S>(small);
+                // Where Newton's method is needed the tails follow each of its corrections.
+                (small, again) = (Some(weight), self.newton.is_some());
+            }
             for d in 0..N {
                 let base = &self.base[d];
                 self.left.head.b.apply(&self.rest[d], s, &mut self.x[d], |r| base.block::<S>(r));
             }
             if aside {
                 aside = false;
-                self.begin::<S>(true);
+                self.begin::<S>(small);
             }
             let (mut change, mut size) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
             for r in 0..m {
@@ -220,21 +238,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             if solved {
                 break Progress::Done;
             }
-            if let Some(newton) = &mut self.newton {
-                let moved;
-                (change, moved) = newton.correct(Arch::new(), &mut self.rest);
-                let position = largest(self.x.iter().flat_map(|x| &x.0[..s]).copied());
-                sweeps.still = moved <= 4.0 * f64::EPSILON * position;
+            if self.newton.is_some() {
+                (change, sweeps.still) = self.correct();
             }
             match sweeps.judge(change, size) {
-                // Where Newton's method is needed the tails follow each of its corrections.
-                Progress::Going if self.newton.is_some() => self.begin::<S>(true),
+                Progress::Going if again => {}
                 Progress::Going if change > NEAR * size => (due, self.far) = (true, true),
-                Progress::Going if due => {
-                    due = false;
-                    self.begin::<S>(true);
-                }
-                Progress::Going => {}
+                Progress::Going => (again, due) = (due, false),
                 done => break done,
             }
         };
@@ -251,7 +261,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         }
         let foretold = sweeps.first() <= FORETOLD && !solved;
         let h = self.table.h;
-        self.misfit = if foretold { 0.0 } else { self.tail.misfit(&self.a, &self.x, h * h) };
+        self.misfit = if foretold { 0.0 } else { self.tail.misfit(|d, r| self.a[d].block::<S>(r), &self.x, h * h) };
         if self.newton.is_some() {
             self.age = self.age.saturating_add(1);
             if sweeps.count() > SLOW && self.age > AGE {
@@ -260,10 +270,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             return Progress::Done;
         }
         self.taken += 1;
-        if self.taken == self.review {
-            self.review *= 2;
-            self.look_again();
-        }
         Progress::Done
     }
 
@@ -275,28 +281,41 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         }
     }
 
-    /// What the sweeps of a step have in common: what comes of the state, with its rests, which are not free of its direction; and
-    /// of the tails of the matrices, with or without what these make of the accelerations.
+    /// Corrects a sweep by Newton's method. Returns the change, and whether the positions have not moved but for their round-off.
+    #[cold]
+    #[inline(never)]
+    fn correct(&mut self) -> (f64, bool) {
+        let Some(newton) = &mut self.newton else { return (f64::NAN, false) };
+        let (change, moved) = newton.correct(Arch::new(), &mut self.rest);
+        let width = largest(self.x.iter().flat_map(|x| &x.0[..self.table.s]).copied());
+        (change, moved <= 4.0 * f64::EPSILON * width)
+    }
+
+    /// What the sweeps of a step have in common: what comes of the state. With what is below its round-off where a weight is given:
+    /// the rests of the state, which are not free of its direction, and as many times what comes of the tails of the matrices.
     #[inline(always)]
-    fn begin<S: Simd>(&mut self, with_product: bool) {
+    fn begin<S: Simd>(&mut self, small: Option<f64>) {
         let (head, s) = (&self.left.head, self.table.s);
         for d in 0..N {
             let (q, v) = (Lanes::<S>::splat(self.q[d].value), Lanes::<S>::splat(self.v[d].value));
-            let (q_rest, v_rest) = (Lanes::<S>::splat(self.q[d].rest), Lanes::<S>::splat(self.v[d].rest));
             let base = &mut self.base[d];
+            let of_q = |r| head.q.block::<S>(r) * q;
+            let Some(weight) = small else {
+                (0..blocks::<S>(s)).for_each(|r| base.set(r, head.u.block::<S>(r).mul_add(v, of_q(r))));
+                continue;
+            };
+            let (q_rest, v_rest) = (Lanes::<S>::splat(self.q[d].rest), Lanes::<S>::splat(self.v[d].rest));
             let rests = |r| head.u.block::<S>(r).mul_add(v_rest, head.q.block::<S>(r) * q_rest);
-            let large = |r, small| head.q.block::<S>(r).mul_add(q, head.u.block::<S>(r).mul_add(v, small));
+            // The small terms first: a sum that has been rounded would not know them.
+            let sum = |r, small| head.q.block::<S>(r).mul_add(q, head.u.block::<S>(r).mul_add(v, small));
             match &self.left.tail {
-                Some(tail) => {
-                    let of_state = |r| tail.u.block(r).mul_add(v, tail.q.block(r).mul_add(q, rests(r)));
-                    if with_product {
-                        tail.b.apply::<S>(&self.rest[d], s, base, of_state);
-                        (0..blocks::<S>(s)).for_each(|r| base.set(r, large(r, base.block(r))));
-                    } else {
-                        (0..blocks::<S>(s)).for_each(|r| base.set(r, large(r, of_state(r))));
-                    }
+                Some(tail) if weight > 0.0 => {
+                    let of_state = |r| tail.u.block(r).mul_add(v, tail.q.block(r) * q);
+                    tail.b.apply::<S>(&self.rest[d], s, base, of_state);
+                    let weight = Lanes::<S>::splat(weight);
+                    (0..blocks::<S>(s)).for_each(|r| base.set(r, sum(r, weight.mul_add(base.block(r), rests(r)))));
                 }
-                None => (0..blocks::<S>(s)).for_each(|r| base.set(r, large(r, rests(r)))),
+                _ => (0..blocks::<S>(s)).for_each(|r| base.set(r, sum(r, rests(r)))),
             }
         }
     }

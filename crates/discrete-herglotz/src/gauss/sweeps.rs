@@ -55,7 +55,8 @@ const LEFT: f64 = 1.0 / 4.0;
 #[derive(Default)]
 pub(super) struct Sweeps {
     count: u32,
-    first: f64,
+    /// The change of the first sweep, and the largest term in it.
+    first: (f64, f64),
     before: f64,
     ratio: f64,
     risen: u32,
@@ -73,27 +74,26 @@ impl Sweeps {
 
     /// The change of the first sweep relative to the largest term: how far what the last step foretold was off.
     pub fn first(&self) -> f64 {
-        self.first
+        self.first.0 / self.first.1
     }
 
     /// Judges a sweep by its largest change and the largest term.
     #[inline(always)]
     pub fn judge(&mut self, change: f64, size: f64) -> Progress {
         self.count += 1;
-        if self.count == 1 {
-            self.first = change / size;
-        }
         let round_off = 0.5 * f64::EPSILON * size;
         if change <= round_off || self.last && change <= 256.0 * round_off {
             return Progress::Done;
         }
-        if !(change.is_finite() && size.is_finite()) {
+        if !(change + size).is_finite() {
             return Progress::NonFinite;
         }
-        if self.count > 1 {
+        if self.count == 1 {
+            self.first = (change, size);
+        } else {
             // The slower of the last two contractions: the first is often that of components which die out at once.
             let ratio = change / self.before;
-            let expected = if self.count > 2 { f64::max(ratio, self.ratio) } else { f64::max(ratio, 0.1) };
+            let expected = f64::max(ratio, if self.count > 2 { self.ratio } else { 0.1 });
             let next = change * expected;
             if next <= LEFT * round_off {
                 return Progress::Done;
