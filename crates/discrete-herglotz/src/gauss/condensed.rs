@@ -254,6 +254,7 @@ impl WithSimd for Multiply<'_> {
 type Rows = [[f64; MOST + 2]; MOST];
 
 /// The matrices of [`Condensed::preconditioned`], or what their rounding leaves out.
+#[repr(C)] // See `Separable`: the matrix last.
 pub(super) struct Left {
     pub q: Stages,
     pub u: Stages,
@@ -268,11 +269,12 @@ impl Left {
 }
 
 /// See [`Condensed::preconditioned`].
+#[repr(C)] // See `Separable`: the head last.
 pub(super) struct Preconditioned {
     pub kappa: f64,
-    pub head: Left,
     /// What the rounding of the head leaves out, found by [`refine`](Self::refine).
     pub tail: Option<Left>,
+    pub head: Left,
 }
 
 impl Preconditioned {

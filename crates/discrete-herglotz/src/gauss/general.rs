@@ -9,7 +9,7 @@ use super::extension::{Extension, Pace, Values};
 use super::mass::Mass;
 use super::resolution::Tail;
 use super::simplified::{CorrectStages, StageNewton};
-use super::stages::{Stages, blocks};
+use super::stages::{StageMap, Stages, blocks};
 use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use super::table::Table;
 use crate::lanes::{Lanes, branched};
@@ -30,14 +30,12 @@ use std::array::from_fn;
 ///
 /// A rate that is the same in every step is rounded the same in every step: so `1 - rho`, which is small where the rate is, is
 /// carried instead of rho, and enters by sums of which the rounding depends on the motion.
+///
+/// The matrix of the sweeps and what it multiplies lie together, as in [`Separable`](super::separable::Separable).
+#[repr(C)]
 pub(super) struct General<'a, L, P, const N: usize> {
-    pub lagrangian: &'a L,
-    pub extension: Extension<P>,
-    pub table: Table,
-    pub mass: Mass<N>,
-    pub q: [Compensated; N],
-    pub p: [Compensated; N],
-    pub z: Compensated,
+    /// The `m` of the table.
+    m: StageMap,
     /// The stages: velocities and `L_v`.
     pub(super) v: [Stages; N],
     pub(super) l_v: [Stages; N],
@@ -50,6 +48,13 @@ pub(super) struct General<'a, L, P, const N: usize> {
     pub(super) falling: Stages,
     pub(super) z_stages: Stages,
     pub(super) x: [Stages; N],
+    pub lagrangian: &'a L,
+    pub extension: Extension<P>,
+    pub table: Table,
+    pub mass: Mass<N>,
+    pub q: [Compensated; N],
+    pub p: [Compensated; N],
+    pub z: Compensated,
     /// `1 - rho` at the end of the last step.
     pub fallen: f64,
     warm: bool,
@@ -79,6 +84,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
     ) -> Self {
         let tail = Tail::new(table.s);
         let mut general = General {
+            m: table.m.clone(),
             lagrangian,
             extension,
             table,
@@ -254,13 +260,13 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
     #[inline(always)]
     fn place<S: Simd>(&mut self) {
         self.stride::<S>();
-        let (table, s) = (&self.table, self.table.s);
+        let (m, s) = (&self.m, self.table.s);
         for ((q, moved), x) in self.q.iter().zip(&self.moved).zip(&mut self.x) {
             let q = Lanes::<S>::splat(q.value);
-            table.m.apply(moved, s, x, |_| q);
+            m.apply(moved, s, x, |_| q);
         }
         let z = Lanes::<S>::splat(self.z.value);
-        table.m.apply(&self.l, s, &mut self.z_stages, |_| z);
+        m.apply(&self.l, s, &mut self.z_stages, |_| z);
     }
 
     /// The guesses of a step: the last one's polynomials carried on.
@@ -378,10 +384,10 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         let m = blocks::<S>(s);
         let zero = Lanes::<S>::splat(0.0);
         let (before, mut impulses) = (self.falling, [Stages::ZERO; N]);
-        self.table.m.apply(&self.rate, s, &mut self.falling, |_| zero);
+        self.m.apply(&self.rate, s, &mut self.falling, |_| zero);
         for d in 0..N {
             let p = Lanes::<S>::splat(self.p[d].value);
-            self.table.m.apply(&self.force[d], s, &mut impulses[d], |_| p);
+            self.m.apply(&self.force[d], s, &mut impulses[d], |_| p);
         }
         let one = Lanes::<S>::splat(1.0);
         let (mut dv, mut sv, mut dr, mut sr) = (zero, zero, zero, one);

@@ -25,23 +25,27 @@ const NEAR: f64 = 1e-3;
 const TAILS: usize = 7;
 
 /// The state and the workspace of the condensed step.
+///
+/// The matrix of the sweeps and what it multiplies lie together, within 4096 bytes in few dimensions: a processor takes a load for
+/// one of what was just stored where the last twelve bits of their addresses agree, and waits.
+#[repr(C)]
 pub(super) struct Separable<'a, L, const N: usize> {
     pub lagrangian: &'a L,
     pub table: Condensed,
     pub left: Preconditioned,
+    /// What the force adds to the linear one, `a_i + kappa Q_i`: the unknown of the iteration.
+    rest: [Stages; N],
+    pub x: [Stages; N],
+    /// The accelerations of the last sweep.
+    pub a: [Stages; N],
+    /// What the positions begin with: what comes of the state, and of the parts that the matrices' rounding leaves out.
+    base: [Stages; N],
     /// `M^-1`; `None` where M is the identity.
     inverse_mass: Option<Box<SMatrix<f64, N, N>>>,
     pub wants_z: bool,
     pub q: [Compensated; N],
     pub v: [Compensated; N],
     pub z: Compensated,
-    /// What the force adds to the linear one, `a_i + kappa Q_i`: the unknown of the iteration.
-    rest: [Stages; N],
-    /// The accelerations of the last sweep.
-    pub a: [Stages; N],
-    pub x: [Stages; N],
-    /// What the positions begin with: what comes of the state, and of the parts that the matrices' rounding leaves out.
-    base: [Stages; N],
     /// Whether guesses are far from the solution.
     far: bool,
     /// Whether `rest` belongs to the step before.
@@ -197,15 +201,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         // What is below round-off is added from the second sweep on: beside the first one's forces it costs little. Where the guess
         // is poor the tails of the matrices wait for the values of a later sweep.
         let at_once = solved || self.newton.is_some();
-        let mut due = self.far && !at_once;
-        let mut aside = !self.far && !at_once;
         let weight = match self.taken % TAILS {
             _ if at_once => 1.0,
             0 => TAILS as f64,
             _ => 0.0,
         };
+        let tails = !at_once && weight > 0.0;
+        let mut due = tails && self.far;
+        let mut aside = !at_once && !due;
         let (mut small, mut again) = (at_once.then_some(weight), true);
-        self.far = false;
+        self.far &= !tails;
         let mut sweeps = Sweeps::default();
         let outcome = loop {
             if again {
@@ -242,9 +247,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
                 (change, sweeps.still) = self.correct();
             }
             match sweeps.judge(change, size) {
-                Progress::Going if again => {}
-                Progress::Going if change > NEAR * size => (due, self.far) = (true, true),
-                Progress::Going => (again, due) = (due, false),
+                Progress::Going if tails && change > NEAR * size => (due, self.far) = (true, true),
+                Progress::Going => (again, due) = (again || due, false),
                 done => break done,
             }
         };
