@@ -97,10 +97,9 @@ fn forty_coordinates_fit_a_thread() {
     all::<40>().into_iter().for_each(in_small_thread);
 }
 
-/// All but collocation, whose kernel holds W at the stages: 2 MiB by itself in the widest registers.
 #[test]
 fn a_hundred_and_twenty_eight_coordinates_fit_a_thread() {
-    [claims::<128>, rule::<128>, splitting::<128>].into_iter().for_each(in_small_thread);
+    all::<128>().into_iter().for_each(in_small_thread);
 }
 
 /// By blocks of directions as by the Hessian of L.

@@ -13,8 +13,8 @@ use pulp::Simd;
 pub(super) enum Mass<const N: usize> {
     /// `W^-1`, the same everywhere.
     Constant(Box<SMatrix<f64, N, N>>),
-    /// `W^-1` at the stages, taken anew in each step.
-    Stages(Box<[[Stages; N]; N]>),
+    /// `W^-1` at the stages, by rows, taken anew in each step.
+    Stages(Box<[[Stages; N]]>),
 }
 
 impl<const N: usize> Mass<N> {
@@ -23,7 +23,7 @@ impl<const N: usize> Mass<N> {
         if structure.constant_mass || structure.separable {
             Mass::Constant(inverse)
         } else {
-            Mass::Stages(Box::new([[Stages::ZERO; N]; N]))
+            Mass::Stages(vec![[Stages::ZERO; N]; N].into())
         }
     }
 
@@ -41,6 +41,16 @@ impl<const N: usize> Mass<N> {
             }
         }
         true
+    }
+
+    /// Keeps `W^-1` of a stage, and of those beyond it.
+    pub fn keep(&mut self, stage: usize, inverse: &SMatrix<f64, N, N>) {
+        let Mass::Stages(stored) = self else { return };
+        for (i, row) in stored.iter_mut().enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                entry.0[stage..].fill(inverse[(i, j)]);
+            }
+        }
     }
 
     /// An entry of `W^-1` at a block of stages.

@@ -11,7 +11,7 @@ use super::modes::Modes;
 use super::stages::{Stages, blocks};
 use super::table::Table;
 use crate::lanes::Lanes;
-use contact_geom::nalgebra::{Complex, SMatrix, SVector};
+use contact_geom::nalgebra::{Complex, DMatrix, SMatrix, SVector};
 use contact_geom::{Hessian, Scalar, Triple, larger};
 use pulp::{Arch, Simd, WithSimd};
 
@@ -45,7 +45,12 @@ impl<const N: usize> SlopeNewton<N> {
         self.modes.iter().zip(&mut self.inverses).all(|(mode, (inverse, b))| {
             let mu = mode.value * self.h;
             *b = mu * mu / (-mu * self.gamma + 1.0);
-            *inverse = Matrix::identity() - slope.map(|e| *b * e);
+            // In place, for the sake of the stack.
+            for j in 0..N {
+                for i in 0..N {
+                    inverse[(i, j)] = Complex::from(if i == j { 1.0 } else { 0.0 }) - *b * slope[(i, j)];
+                }
+            }
             invert(inverse)
         })
     }
@@ -139,9 +144,12 @@ impl<const N: usize> Block<N> {
         let (z, rho) = ((-mu * g.z + 1.0).inv(), (mu * g.z + 1.0).inv());
         let (z_v, rho_v) = (with(&g.y, &g.x, mu) * mu, with(vz, qz, mu) * mu);
         let (of_z, of_rho, rho_z) = (with(vz, qz, -mu), with(&g.y, &g.x, -mu), mu * *zz);
-        let own = Matrix::<N>::from_fn(|d, e| mu * (qv[(e, d)] - qv[(d, e)]) - mu * mu * qq[(d, e)] + vv[(d, e)]);
-        let rho_of_v = rho_v + z_v * (rho_z * z);
-        let mut inverse = own + of_z * (z_v * z).transpose() - of_rho * (rho_of_v * rho).transpose();
+        let (z_of_v, rho_of_v) = (z_v * z, (rho_v + z_v * (rho_z * z)) * rho);
+        // Entry by entry, for the sake of the stack.
+        let mut inverse = Matrix::<N>::from_fn(|d, e| {
+            let own = mu * (qv[(e, d)] - qv[(d, e)]) - mu * mu * qq[(d, e)] + vv[(d, e)];
+            own + of_z[d] * z_of_v[e] - of_rho[d] * rho_of_v[e]
+        });
         invert(&mut inverse).then_some(Block { inverse, z, z_v, rho, rho_v, rho_z, of_z, of_rho })
     }
 
@@ -278,7 +286,15 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
     }
 }
 
-/// Inverts a matrix in place; `false` where it is singular or not finite.
+/// Inverts a matrix in place; `false` where it is singular or not finite. A large one on the heap.
 fn invert<const N: usize>(m: &mut Matrix<N>) -> bool {
-    m.iter().all(|e| e.is_finite()) && m.try_inverse_mut() && m.iter().all(|e| e.is_finite())
+    if !m.iter().all(|e| e.is_finite()) {
+        return false;
+    }
+    if const { N <= 8 } {
+        return m.try_inverse_mut() && m.iter().all(|e| e.is_finite());
+    }
+    let Some(inverse) = DMatrix::from_column_slice(N, N, m.as_slice()).try_inverse() else { return false };
+    m.copy_from_slice(inverse.as_slice());
+    m.iter().all(|e| e.is_finite())
 }
