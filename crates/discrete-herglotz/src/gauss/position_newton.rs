@@ -236,14 +236,14 @@ mod tests {
     }
 
     /// In positions alone the same stages are found as in velocities, actions and factors: to 64 roundings of the largest position
-    /// or force, over the condition of the two systems, which is below 10 at these steps.
+    /// or force, over the condition of the two systems, which is below 10 at these steps; longer ones have several solutions.
     #[test]
     fn the_stages_are_those_of_all_equations() {
         let mass: SMatrix<f64, 2, 2> = SMatrix::from(Coupled::MASS);
         let inverse = mass.try_inverse().unwrap();
         let (q, v) = (SVector::from([1.0, -2.0]), SVector::from([0.5, 1.0]));
         for s in [1, 2, 3, 5, 8, 16] {
-            for h in [0.1, 0.7, 1.5] {
+            for h in [0.1, 0.4, 0.7] {
                 let (t, gauss) = (0.4, Gauss::new::<2>(Coupled, s, h).unwrap());
                 let equations: StageEquations<_, 2> = gauss.equations(t, true);
                 let given = Given::Start(PhasePoint { q, p: mass * v, z: 0.0 });

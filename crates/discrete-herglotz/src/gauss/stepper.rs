@@ -56,14 +56,14 @@ enum Solution {
     Sweeps,
     /// By sweeps that simplified Newton iteration corrects.
     Simplified,
-    /// By Newton's method on all equations of the step at once.
+    /// By Newton's method with the derivatives at each stage, damped.
     Newton,
 }
 
 /// Contact Gauss collocation at work: stages in the lanes of the processor's vector registers, each step's start extrapolated
 /// from the one before, iteration to round-off, compensated sums. Where the iteration does not contract simplified Newton
 /// iteration takes its place, with a Jacobian that is kept as long as it serves; and where that does not either, Newton's
-/// method.
+/// method, in the positions of the stages alone where mass and rate are constant. A step of which no correction helps is given up.
 pub struct GaussStepper<'a, L, const N: usize> {
     lagrangian: &'a L,
     products: &'a Products,
