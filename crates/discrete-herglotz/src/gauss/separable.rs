@@ -5,10 +5,12 @@
 
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
+use super::position_newton::{At, PositionNewton};
 use super::resolution::{FORETOLD, Tail};
 use super::simplified::SlopeNewton;
 use super::stages::{Stages, blocks};
 use super::sweeps::{AGE, Progress, SLOW, Sweeps};
+use crate::StepError;
 use crate::lanes::{Lanes, branched};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, VelocityPoint, largest};
@@ -54,6 +56,8 @@ pub(super) struct Separable<'a, L, const N: usize> {
     pub newton: Option<Box<SlopeNewton<N>>>,
     /// The same while it is not used.
     parked: Option<Box<SlopeNewton<N>>>,
+    /// Solves the steps for which that does not serve; made for the first step that the sweeps do not solve.
+    positions: Option<Box<PositionNewton<N>>>,
     /// Whether the stages of the next step are solved, and `rest` is theirs.
     solved: bool,
     /// The steps that Newton's Jacobian has served.
@@ -94,6 +98,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             warm: false,
             newton: None,
             parked: None,
+            positions: None,
             solved: false,
             age: 0,
             tail,
@@ -104,9 +109,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         }
     }
 
-    /// Has the sweeps corrected by Newton's method, with the second derivatives of L in q from now on; `false` where that is not
-    /// possible.
-    pub fn linearise(&mut self, qq: &SMatrix<f64, N, N>) -> bool {
+    /// Has the sweeps corrected by Newton's method, with the second derivatives of L in q at a time and a position from now on;
+    /// `false` where that is not possible.
+    pub fn linearise(&mut self, t: f64, q: SVector<f64, N>) -> bool {
         if self.newton.is_none() {
             let Some(mut left) = self.table.preconditioned(0.0) else { return false };
             left.refine(&self.table);
@@ -114,7 +119,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             self.newton = self.parked.take().or_else(|| Some(Box::new(SlopeNewton::new(&self.table))));
             self.forget();
         }
-        let slope = self.inverse_mass.as_ref().map_or(*qq, |inverse| **inverse * qq);
+        let qq = self.lagrangian.hessian(t, &VelocityPoint { q, v: SVector::zeros(), z: 0.0 }).qq;
+        let slope = self.inverse_mass.as_ref().map_or(qq, |inverse| **inverse * qq);
         self.newton.as_mut().is_some_and(|newton| newton.factorise(&slope))
     }
 
@@ -130,17 +136,29 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         self.warm = false;
     }
 
-    /// Has the next step taken from stages that are solved, by L's derivatives in q and the positions there.
-    pub fn accept(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, SVector<f64, N>)>) {
+    /// Makes the workspace of Newton's method, so that later steps allocate nothing.
+    pub fn reserve(&mut self) {
+        self.positions.get_or_insert_with(|| Box::new(PositionNewton::new(self.table.s)));
+    }
+
+    /// Solves the stages of the next step, from the time `t`, by Newton's method, and has it taken from them.
+    ///
+    /// # Errors
+    /// [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`].
+    pub fn solve(&mut self, t: f64) -> Result<(), StepError> {
+        let positions = self.positions.get_or_insert_with(|| Box::new(PositionNewton::new(self.table.s)));
+        let (q, v) = (SVector::from(self.q.map(|q| q.value)), SVector::from(self.v.map(|v| v.value)));
+        let inverse_mass = self.inverse_mass.as_deref();
+        positions.solve(&At { lagrangian: self.lagrangian, table: &self.table, inverse_mass, t, q, v })?;
         self.rest = [Stages::ZERO; N];
-        for (i, (force, q)) in stages.enumerate() {
-            let a = self.inverse_mass.as_ref().map_or(force, |inverse| **inverse * force);
+        for (i, (a, q)) in positions.stages().enumerate() {
             for d in 0..N {
                 // Beyond the last stage it is repeated.
                 self.rest[d].0[i..].fill(a[d] + self.left.kappa * q[d]);
             }
         }
         self.solved = true;
+        Ok(())
     }
 
     /// Takes Newton's Jacobian anew, at the middle stage of the last step.
@@ -150,9 +168,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         self.age = 0;
         let i = self.table.s / 2;
         let q = SVector::from_fn(|d, _| self.x[d].0[i]);
-        let x = VelocityPoint { q, v: SVector::zeros(), z: 0.0 };
-        let hessian = self.lagrangian.hessian(t + self.table.times.0[i], &x);
-        if !self.linearise(&hessian.qq) {
+        if !self.linearise(t + self.table.times.0[i], q) {
             self.forget();
         }
     }

@@ -1,11 +1,15 @@
-//! The stage equations of contact Gauss collocation, with their Jacobian: for Newton's method, and for the discrete Lagrangian.
+//! The stage equations of contact Gauss collocation, with their Jacobian: for Newton's method of the general routes, and for the
+//! discrete Lagrangian. Of constant mass and constant rate [`PositionNewton`](super::position_newton::PositionNewton) has fewer
+//! unknowns.
 
 use super::coefficients::{Coefficients, MOST};
+use super::damping::{Damping, ITERATIONS, Verdict, chances};
 use crate::solver::DenseLu;
 use crate::step_equations::BLOCK;
 use crate::{ITERATION_LIMIT, StepError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, seed};
+use std::array::from_fn;
 
 /// The products of the coefficients with a step, which may be negative.
 #[derive(Clone, Debug)]
@@ -65,6 +69,13 @@ impl<const N: usize> Unknowns<N, f64> {
         over(&|r| r.abs()) * over(&|r| 1.0 / r.abs())
     }
 
+    fn copy_from(&mut self, x: &Self) {
+        self.v.copy_from_slice(&x.v);
+        self.z.copy_from_slice(&x.z);
+        self.rho.copy_from_slice(&x.rho);
+        self.p0 = x.p0;
+    }
+
     /// The same over another scalar, without differentials.
     pub fn lifted<T: Scalar>(&self) -> Unknowns<N, T> {
         Unknowns {
@@ -93,14 +104,15 @@ pub(super) struct Workspace<const N: usize> {
     pub x: Unknowns<N, f64>,
     /// L and its gradient at the stages of the solution.
     pub l: Vec<Dual<f64, Triple<N>>>,
+    /// The last iterate, from which the solution is tried.
+    from: Unknowns<N, f64>,
     jacobian: DMatrix<f64>,
     /// The factors of the Jacobian that an iteration uses: of its own iterate, or of one before.
     lu: DenseLu,
     residual: DVector<f64>,
+    correction: DVector<f64>,
+    next: DVector<f64>,
 }
-
-/// The ratio of two changes above which the Jacobian is taken anew: an iteration with the old one costs a tenth of it or less.
-const CONTRACTION: f64 = 0.2;
 
 /// The stage equations of a step.
 pub(super) struct StageEquations<'a, L, const N: usize> {
@@ -111,7 +123,7 @@ pub(super) struct StageEquations<'a, L, const N: usize> {
 
 impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     /// The number of unknowns.
-    pub fn size<T>(&self, given: &Given<N, T>) -> usize {
+    fn unknowns<T>(&self, given: &Given<N, T>) -> usize {
         self.products.s * (N + 2) + if matches!(given, Given::Ends { .. }) { N } else { 0 }
     }
 
@@ -138,14 +150,18 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
 
     /// The workspace for steps of this kind.
     pub fn workspace(&self, given: &Given<N, f64>) -> Workspace<N> {
-        let (s, n) = (self.products.s, self.size(given));
+        let (s, n) = (self.products.s, self.unknowns(given));
         let x = Unknowns { v: vec![SVector::zeros(); s], z: vec![0.0; s], rho: vec![1.0; s], p0: SVector::zeros() };
+        let numbers = DVector::zeros(n);
         Workspace {
+            from: x.clone(),
             x,
             l: Vec::with_capacity(s),
             jacobian: DMatrix::zeros(n, n),
             lu: DenseLu::new(n),
-            residual: DVector::zeros(n),
+            residual: numbers.clone(),
+            correction: numbers.clone(),
+            next: numbers,
         }
     }
 
@@ -202,6 +218,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             let y = VelocityPoint { q: self.position(given, x, k), v: x.v[k], z: x.z[k] };
             let Hessian { qq, qv, vv, qz, vz, zz } = &self.lagrangian.hessian(self.t + c[k], &y);
             let (rho, g) = (x.rho[k], &l[k].d);
+            let weights: [f64; MOST] = from_fn(|i| a[i][k]);
             // What stage k adds to the equations of stage i, through its own velocity, action and factor.
             for i in 0..s {
                 let (own, w) = (if i == k { 1.0 } else { 0.0 }, a[i][k]);
@@ -219,19 +236,26 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                 out[(row_r + i, row_r + k)] += own + w * g.z;
             }
             // And through its position, which the velocities of all stages move.
+            let n = out.nrows();
             for j in 0..s {
                 let moved = a[k][j];
                 for e in 0..N {
+                    let column = &mut out.as_mut_slice()[(j * N + e) * n..][..n];
+                    let (momenta, rest) = column.split_at_mut(row_z);
+                    let (actions, factors) = rest.split_at_mut(s);
                     for d in 0..N {
-                        out[(k * N + d, j * N + e)] += rho * qv[(e, d)] * moved;
+                        momenta[k * N + d] += rho * qv[(e, d)] * moved;
                     }
-                    for i in 0..s {
-                        let w = a[i][k] * moved;
-                        for d in 0..N {
-                            out[(i * N + d, j * N + e)] -= w * rho * qq[(d, e)];
+                    let (force, of_action, of_factor) =
+                        (qq.column(e) * (rho * moved), g.x[e] * moved, rho * qz[e] * moved);
+                    for (momentum, w) in momenta.chunks_exact_mut(N).zip(&weights) {
+                        for (entry, force) in momentum.iter_mut().zip(force.iter()) {
+                            *entry -= w * force;
                         }
-                        out[(row_z + i, j * N + e)] -= w * g.x[e];
-                        out[(row_r + i, j * N + e)] += w * rho * qz[e];
+                    }
+                    for (((action, factor), w), _) in actions.iter_mut().zip(factors).zip(&weights).zip(0..s) {
+                        *action -= w * of_action;
+                        *factor += w * of_factor;
                     }
                 }
             }
@@ -247,42 +271,39 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
     }
 
-    /// Adds a correction to the unknowns; returns the largest, each in units of the largest of its kind.
-    fn correct<T: Scalar>(&self, x: &mut Unknowns<N, T>, change: &DVector<T>, with_momentum: bool) -> f64 {
+    /// Adds a part of a correction to the unknowns.
+    fn add<T: Scalar>(&self, x: &mut Unknowns<N, T>, change: &DVector<T>, part: f64) {
+        let s = self.products.s;
+        for i in 0..s {
+            for d in 0..N {
+                x.v[i][d] -= change[i * N + d] * part;
+            }
+            x.z[i] -= change[s * N + i] * part;
+            x.rho[i] -= change[s * (N + 1) + i] * part;
+        }
+        for (p, change) in x.p0.iter_mut().zip(change.iter().skip(s * (N + 2))) {
+            *p -= *change * part;
+        }
+    }
+
+    /// The size of a correction: the largest, each in units of the largest of its kind.
+    fn size<T: Scalar>(&self, x: &Unknowns<N, T>, change: &DVector<T>) -> f64 {
         let s = self.products.s;
         let mut worst = 0.0f64;
         let mut see = |change: f64, size: f64| {
-            let relative = if change > 0.0 { change / size } else { change };
+            let relative = if change > 0.0 && size > 0.0 { change / size } else { f64::from(u8::from(change > 0.0)) };
             // `f64::max` would hide a NaN.
             if relative > worst || relative.is_nan() {
                 worst = relative;
             }
         };
-        let (mut dv, mut sv, mut dz, mut sz, mut dr, mut dp, mut sp) =
-            (0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
-        for i in 0..s {
-            for d in 0..N {
-                x.v[i][d] -= change[i * N + d];
-                dv = larger(dv, change[i * N + d].extent());
-                sv = larger(sv, x.v[i][d].extent());
-            }
-            x.z[i] -= change[s * N + i];
-            x.rho[i] -= change[s * (N + 1) + i];
-            dz = larger(dz, change[s * N + i].extent());
-            sz = larger(sz, x.z[i].extent());
-            dr = larger(dr, change[s * (N + 1) + i].extent());
-        }
-        if with_momentum {
-            for d in 0..N {
-                x.p0[d] -= change[s * (N + 2) + d];
-                dp = larger(dp, change[s * (N + 2) + d].extent());
-                sp = larger(sp, x.p0[d].extent());
-            }
-        }
-        see(dv, sv);
-        see(dz, sz);
-        see(dr, x.rho.iter().fold(1.0, |m, r| larger(m, r.extent())));
-        see(dp, sp);
+        let of = |range: std::ops::Range<usize>| {
+            change.iter().skip(range.start).take(range.len()).fold(0.0, |m, c| larger(m, c.extent()))
+        };
+        see(of(0..s * N), x.v.iter().flatten().fold(0.0, |m, v| larger(m, v.extent())));
+        see(of(s * N..s * (N + 1)), x.z.iter().fold(0.0, |m, z| larger(m, z.extent())));
+        see(of(s * (N + 1)..s * (N + 2)), x.rho.iter().fold(1.0, |m, r| larger(m, r.extent())));
+        see(of(s * (N + 2)..change.len()), x.p0.iter().fold(0.0, |m, p| larger(m, p.extent())));
         worst
     }
 
@@ -298,36 +319,53 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         p0: &SVector<f64, N>,
         work: &mut Workspace<N>,
     ) -> Result<u32, StepError> {
-        let Workspace { x, l, jacobian, lu, residual } = work;
+        let Workspace { x, l, from, jacobian, lu, residual, correction, next } = work;
         let (Given::Start(PhasePoint { z: z0, .. }) | Given::Ends { z0, .. }) = given;
         x.make_uniform(v, p0, *z0);
+        from.copy_from(x);
         self.stages(given, x, l);
-        let ends = matches!(given, Given::Ends { .. });
-        let (mut before, mut ratio) = (f64::INFINITY, f64::INFINITY);
-        for iterations in 1..=ITERATION_LIMIT {
-            self.residual(given, x, l, residual);
-            // Newton's iteration, until the changes fall so fast that its Jacobian need not be that of the last iterate.
-            if ratio > CONTRACTION {
+        self.residual(given, x, l, residual);
+        if !residual.iter().all(|r| r.is_finite()) {
+            return Err(StepError::NonFinite);
+        }
+        let (mut damping, mut change) = (Damping::new(chances(residual.len())), f64::INFINITY);
+        for iterations in 1..=ITERATIONS {
+            if damping.renews() {
                 self.jacobian(given, x, l, jacobian);
                 lu.factorise(|i, j| jacobian[(i, j)])?;
+                correction.copy_from(residual);
+                lu.solve(correction.as_mut_slice())?;
+            } else {
+                std::mem::swap(correction, next);
             }
-            lu.solve(residual.as_mut_slice())?;
-            let change = self.correct(x, residual, ends);
-            if !change.is_finite() {
-                return Err(StepError::NonFinite);
-            }
-            self.stages(given, x, l);
-            ratio = if before.is_finite() { change / before } else { 1.0 };
-            let predicted = ratio * change <= f64::EPSILON;
+            let after = loop {
+                x.copy_from(from);
+                self.add(x, correction, damping.part());
+                self.stages(given, x, l);
+                self.residual(given, x, l, residual);
+                next.copy_from(residual);
+                let after = if lu.solve(next.as_mut_slice()).is_ok() { self.size(x, next) } else { f64::NAN };
+                change = self.size(x, correction);
+                // With half of the digits there is no need of damping.
+                match damping.judge(change, after, f64::EPSILON.sqrt()) {
+                    Verdict::Taken => break after,
+                    Verdict::Again => {}
+                    Verdict::GivenUp => return Err(StepError::NotConverged { residual: change, iterations }),
+                }
+            };
             // With half of the digits at the least.
             let near = (1e3 * f64::EPSILON * x.spread()).min(f64::EPSILON.sqrt());
-            let stagnant = ratio >= 0.5 && change <= near;
-            if change <= f64::EPSILON || predicted || stagnant {
+            if after <= f64::EPSILON || damping.ratio() >= 0.5 && after <= near {
                 return Ok(iterations);
             }
-            before = change;
+            if damping.ratio() * after <= f64::EPSILON {
+                self.add(x, next, 1.0);
+                self.stages(given, x, l);
+                return Ok(iterations + 1);
+            }
+            from.copy_from(x);
         }
-        Err(StepError::NotConverged { residual: before, iterations: ITERATION_LIMIT })
+        Err(StepError::NotConverged { residual: change, iterations: ITERATIONS })
     }
 
     /// The end of the step whose stages are solved, from L and its gradient there.
@@ -359,7 +397,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         plain: &Given<N, f64>,
         work: &mut Workspace<N>,
     ) -> Result<End<N, T>, StepError> {
-        let n = self.size(plain);
+        let n = self.unknowns(plain);
         self.jacobian(plain, &work.x, &work.l, &mut work.jacobian);
         let inverse = work.jacobian.clone().try_inverse().ok_or(StepError::Singular { pivot: 0.0 })?;
         let (mut x, mut l) = (work.x.lifted::<T>(), Vec::new());
@@ -371,7 +409,8 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             for i in 0..n {
                 change[i] = (0..n).fold(T::zero(), |sum, j| sum + residual[j] * inverse[(i, j)]);
             }
-            let size = self.correct(&mut x, &change, matches!(given, Given::Ends { .. }));
+            self.add(&mut x, &change, 1.0);
+            let size = self.size(&x, &change);
             // The iteration ends in finitely many steps but for round-off.
             if size <= f64::EPSILON || (size >= 0.5 * before && size <= 1e-10) {
                 self.stages(given, &x, &mut l);

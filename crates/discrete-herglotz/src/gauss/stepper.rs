@@ -56,14 +56,14 @@ enum Solution {
     Sweeps,
     /// By sweeps that simplified Newton iteration corrects.
     Simplified,
-    /// By Newton's method on all equations of the step at once.
+    /// By Newton's method with the derivatives at each stage, damped.
     Newton,
 }
 
 /// Contact Gauss collocation at work: stages in the lanes of the processor's vector registers, each step's start extrapolated
 /// from the one before, iteration to round-off, compensated sums. Where the iteration does not contract simplified Newton
 /// iteration takes its place, with a Jacobian that is kept as long as it serves; and where that does not either, Newton's
-/// method.
+/// method, in the positions of the stages alone where mass and rate are constant. A step of which no correction helps is given up.
 pub struct GaussStepper<'a, L, const N: usize> {
     lagrangian: &'a L,
     products: &'a Products,
@@ -81,7 +81,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     /// Steps until the cheaper solution is tried again, and how many there are next time: twice as many.
     pause: usize,
     pauses: usize,
-    /// Of Newton's method, made for the first step that the sweeps do not solve.
+    /// Of Newton's method by the general routes, made for the first step that the sweeps do not solve.
     workspace: Option<Box<Workspace<N>>>,
     newton_steps: u64,
     /// The misfit of a constant conformal factor.
@@ -220,10 +220,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             return Err(refused);
         }
         tried.refused.get_or_insert(refused);
-        if self.workspace.is_none() {
-            // With that of the simplified iteration, so that later steps allocate nothing.
-            let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t: self.time() };
-            self.workspace = Some(Box::new(equations.workspace(&Given::Start(self.state()))));
+        // With that of the simplified iteration, so that later steps allocate nothing.
+        match &mut *self.route {
+            Route::Condensed(run) => run.reserve(),
+            _ if self.workspace.is_none() => {
+                let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t: self.time() };
+                self.workspace = Some(Box::new(equations.workspace(&Given::Start(self.state()))));
+            }
+            _ => {}
         }
         if !tried.simplified {
             tried.simplified = true;
@@ -252,30 +256,30 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     /// singular there, or not finite.
     fn linearise(&mut self) -> bool {
         let (t, state) = (self.time(), self.state());
-        let Ok(v) = velocity(self.lagrangian, t, &state, SVector::zeros()) else { return false };
-        let x = VelocityPoint { q: state.q, v, z: state.z };
-        let hessian = self.lagrangian.hessian(t, &x);
         match &mut *self.route {
             Route::Linear(..) => false,
             Route::Condensed(run) => {
                 run.forget();
-                run.linearise(&hessian.qq)
+                run.linearise(t, state.q)
             }
             Route::General(run) => {
+                let Ok(v) = velocity(self.lagrangian, t, &state, SVector::zeros()) else { return false };
+                let x = VelocityPoint { q: state.q, v, z: state.z };
                 run.guess(&v);
-                run.linearise(&self.lagrangian.gradient(t, &x), &hessian)
+                run.linearise(&self.lagrangian.gradient(t, &x), &self.lagrangian.hessian(t, &x))
             }
         }
     }
 
-    /// Solves the stages of the next step by Newton's method, from a constant velocity.
+    /// Solves the stages of the next step by Newton's method, from a motion without forces or of constant velocity.
     fn solve_stages(&mut self) -> Result<(), StepError> {
         self.solved = false;
-        let (t, mut from) = (self.time(), self.state());
-        if let Route::Condensed(_) = &*self.route {
-            // The action does not act back, so that its size must not decide when the iteration ends.
-            from.z = 0.0;
-        }
+        let (t, from) = (self.time(), self.state());
+        let run = match &mut *self.route {
+            Route::Linear(..) => return Ok(()),
+            Route::Condensed(run) => return run.solve(t),
+            Route::General(run) => run,
+        };
         let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t };
         let given = Given::Start(from);
         let v = match velocity(self.lagrangian, t, &from, SVector::zeros()) {
@@ -286,14 +290,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let work = self.workspace.get_or_insert_with(|| Box::new(equations.workspace(&given)));
         equations.solve(&given, &v, &from.p, work)?;
         let Workspace { x, l, .. } = &**work;
-        match &mut *self.route {
-            Route::Linear(..) => {}
-            Route::Condensed(run) => {
-                let position = |i: usize| equations.position(&given, x, i);
-                run.accept(l.iter().enumerate().map(|(i, l)| (l.d.x, position(i))));
-            }
-            Route::General(run) => run.accept((0..self.products.s).map(|i| (x.v[i], l[i].re, x.rho[i]))),
-        }
+        run.accept((0..self.products.s).map(|i| (x.v[i], l[i].re, x.rho[i])));
         Ok(())
     }
 
