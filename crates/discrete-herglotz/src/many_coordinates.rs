@@ -6,7 +6,7 @@ use crate::{
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Chain, Ends, System};
-use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, legendre};
+use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, ValueOnly, legendre};
 
 const MEBIBYTE: usize = 1 << 20;
 
@@ -82,9 +82,18 @@ fn collocation_by_newton<const N: usize>() {
     check::<N>("Gauss by Newton's method", 1.0, &step.end, 1e-3 * second::<N>());
 }
 
+/// By the value of L alone: with W at the stages, and nothing claimed.
+fn collocation_of_values<const N: usize>() {
+    let gauss = Gauss::new(ValueOnly(chain::<N>()), 2, STEP).unwrap();
+    let mut run = gauss.stepper(0.0, start(), SVector::zeros()).unwrap();
+    run.advance(2).unwrap();
+    check::<N>("Gauss by values", 2.0, &run.state(), 1e-3 * second::<N>());
+}
+
 /// Builds, verifies and takes steps by a rule, a splitting and collocation.
-fn all<const N: usize>() -> [fn(); 5] {
-    [claims::<N>, rule::<N>, splitting::<N>, collocation::<N>, collocation_by_newton::<N>]
+fn all<const N: usize>() -> [fn(); 6] {
+    let gauss: [fn(); 3] = [collocation::<N>, collocation_by_newton::<N>, collocation_of_values::<N>];
+    [claims::<N>, rule::<N>, splitting::<N>, gauss[0], gauss[1], gauss[2]]
 }
 
 fn in_small_thread(run: fn()) {

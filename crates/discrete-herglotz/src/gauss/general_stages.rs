@@ -28,9 +28,8 @@ impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'_, L, P, N> {
         }
         if first > FORETOLD || self.fallen.abs() > FALLEN {
             let one = Lanes::<S>::splat(1.0);
-            let integral = (0..blocks::<S>(self.table.s)).fold(Lanes::<S>::splat(0.0), |sum, r| {
-                sum + self.rate.block::<S>(r) / (one - self.falling.block(r))
-            });
+            let integral = (0..blocks::<S>(self.table.s))
+                .fold(Lanes::<S>::splat(0.0), |sum, r| sum + self.rate.block::<S>(r) / (one - self.falling.block(r)));
             self.misfit = larger(self.misfit, of_sigma(1.0 / (1.0 - self.fallen), integral.sum()));
         }
     }

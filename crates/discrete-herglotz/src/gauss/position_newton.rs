@@ -43,23 +43,47 @@ impl<L: Lagrangian<N>, const N: usize> At<'_, L, N> {
     fn stage(&self, i: usize, q: &SVector<f64, N>) -> (f64, VelocityPoint<N>) {
         (self.t + self.table.times.0[i], VelocityPoint { q: *q, v: SVector::zeros(), z: 0.0 })
     }
+}
 
-    /// `L_qq` at a stage.
-    fn curvature(&self, i: usize, q: &SVector<f64, N>) -> SMatrix<f64, N, N> {
-        let (t, x) = self.stage(i, q);
-        // The numbers of many directions would not fit on the stack.
-        if const { N > BLOCK } {
-            return self.lagrangian.hessian(t, &x).qq;
-        }
-        // Without the directions of velocity and action, at a fraction of the price.
-        let constant = KernelDual::<f64, SVector<f64, N>>::constant;
-        let mut x = VelocityPoint { q: x.q.map(constant), v: x.v.map(constant), z: constant(x.z) };
-        for d in 0..N {
-            x.q[d].d[d] = 1.0;
-        }
-        let (_, force) = self.lagrangian.with_force(constant(t), &x);
-        SMatrix::from_fn(|i, j| force[i].d[j])
+/// `L_qq` at a time and a position, where L is separable: without the directions of velocity and action, at a fraction of the price of
+/// all second derivatives, and of their room.
+#[inline(never)]
+pub(super) fn curvature<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    q: &SVector<f64, N>,
+) -> SMatrix<f64, N, N> {
+    if const { N > BLOCK } {
+        by_directions::<N, BLOCK>(lagrangian, t, q)
+    } else {
+        by_directions::<N, N>(lagrangian, t, q)
     }
+}
+
+/// The same by as many directions at once.
+#[inline(always)]
+fn by_directions<const N: usize, const B: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    q: &SVector<f64, N>,
+) -> SMatrix<f64, N, N> {
+    let constant = KernelDual::<f64, SVector<f64, B>>::constant;
+    let still = VelocityPoint { q: q.map(constant), v: SVector::from_element(constant(0.0)), z: constant(0.0) };
+    let mut curvature = SMatrix::zeros();
+    for first in (0..N).step_by(B.max(1)) {
+        let mut x = still;
+        let directions = first..(first + B).min(N);
+        for j in directions.clone() {
+            x.q[j].d[j - first] = 1.0;
+        }
+        let (_, force) = lagrangian.with_force(constant(t), &x);
+        for j in directions {
+            for i in 0..N {
+                curvature[(i, j)] = force[i].d[j - first];
+            }
+        }
+    }
+    curvature
 }
 
 impl<const N: usize> PositionNewton<N> {
@@ -182,8 +206,10 @@ impl<const N: usize> PositionNewton<N> {
     /// Factorises `1 - B a'` at the last iterate.
     fn factorise<L: Lagrangian<N>>(&mut self, at: &At<L, N>) -> Result<(), StepError> {
         for (i, (slope, q)) in self.slopes.iter_mut().zip(&self.x).enumerate() {
-            let qq = at.curvature(i, q);
-            *slope = at.inverse_mass.map_or(qq, |inverse| inverse * qq);
+            *slope = curvature(at.lagrangian, at.t + at.table.times.0[i], q);
+            if let Some(inverse) = at.inverse_mass {
+                *slope = inverse * *slope;
+            }
         }
         self.lu.factorise(|row, column| {
             let (i, j) = (row / N, column / N);

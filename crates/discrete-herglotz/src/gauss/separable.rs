@@ -5,7 +5,7 @@
 
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
-use super::position_newton::{At, PositionNewton};
+use super::position_newton::{At, PositionNewton, curvature};
 use super::resolution::{FORETOLD, Tail};
 use super::simplified::SlopeNewton;
 use super::stages::{Stages, blocks};
@@ -112,6 +112,19 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
     /// Has the sweeps corrected by Newton's method, with the second derivatives of L in q at a time and a position from now on;
     /// `false` where that is not possible.
     pub fn linearise(&mut self, t: f64, q: SVector<f64, N>) -> bool {
+        if !self.prepare() {
+            return false;
+        }
+        let mut slope = curvature(self.lagrangian, t, &q);
+        if let Some(inverse) = &self.inverse_mass {
+            slope = **inverse * slope;
+        }
+        self.newton.as_mut().is_some_and(|newton| newton.factorise(&slope))
+    }
+
+    /// Goes over to sweeps that Newton's method corrects; `false` where that is not possible. A frame of the stack by itself.
+    #[inline(never)]
+    fn prepare(&mut self) -> bool {
         if self.newton.is_none() {
             let Some(mut left) = self.table.preconditioned(0.0) else { return false };
             left.refine(&self.table);
@@ -119,9 +132,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             self.newton = self.parked.take().or_else(|| Some(Box::new(SlopeNewton::new(&self.table))));
             self.forget();
         }
-        let qq = self.lagrangian.hessian(t, &VelocityPoint { q, v: SVector::zeros(), z: 0.0 }).qq;
-        let slope = self.inverse_mass.as_ref().map_or(qq, |inverse| **inverse * qq);
-        self.newton.as_mut().is_some_and(|newton| newton.factorise(&slope))
+        true
     }
 
     /// Takes the sweeps as they are again.

@@ -353,8 +353,9 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                     Verdict::GivenUp => return Err(StepError::NotConverged { residual: change, iterations }),
                 }
             };
-            // With half of the digits at the least.
-            let near = (1e3 * f64::EPSILON * x.spread()).min(f64::EPSILON.sqrt());
+            // With half of the digits at the least. The round-off of a solution grows with the number of unknowns.
+            let round_off = f64::EPSILON * larger(1e3, 8.0 * residual.len() as f64);
+            let near = (round_off * x.spread()).min(f64::EPSILON.sqrt());
             if after <= f64::EPSILON || damping.ratio() >= 0.5 && after <= near {
                 return Ok(iterations);
             }
