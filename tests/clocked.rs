@@ -301,6 +301,8 @@ fn clocks_that_cannot_be_followed_are_refused() {
     assert_eq!(Integrator::Clocked { stages: 17 }.check(&Planar::default()), Err(InputError::Stages { found: 17 }));
     assert!(matches!(by.check(&Pendulum { gamma: -0.1 }), Err(InputError::Hypothesis { .. })));
     assert!(matches!(by.check(&PerturbedKepler::default()), Err(InputError::Hypothesis { .. })));
+    let driven = Clocked { rate: 1.0, autonomous: false };
+    assert_eq!(by.check(&driven), Err(InputError::Unclaimed { claim: "autonomous" }));
     let start = VelocityPoint::new([0.0], [1.0], 0.0);
     let refused = |rate: f64, autonomous: bool, steps: Steps| {
         Scene::new(&Clocked { rate, autonomous }, start, 2.0).by(by).steps(steps).plan().err()

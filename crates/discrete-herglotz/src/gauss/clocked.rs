@@ -59,8 +59,6 @@ pub struct ClockedStepper<'a, L, C, const N: usize> {
     taken: usize,
     /// The start of the last step, where that was taken by itself.
     from: Option<Values<N>>,
-    /// The last steps in sequence that have not changed the time.
-    standing: u32,
     suspicion: Option<Suspicion>,
 }
 
@@ -89,16 +87,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         let extension = Extension::new(Fictitious(clock), t0, -energy);
         let (table, mass) = (Table::new(gauss.stages(), h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, &state, &start.v));
-        Ok(ClockedStepper {
-            general,
-            arch: Arch::new(),
-            h,
-            tau: 0.0,
-            taken: 0,
-            from: None,
-            standing: 0,
-            suspicion: None,
-        })
+        Ok(ClockedStepper { general, arch: Arch::new(), h, tau: 0.0, taken: 0, from: None, suspicion: None })
     }
 
     /// The momentum `p_t` of the time, minus the energy but for the method's error: `E + p_t = K / g`. It is contracted as every
@@ -116,7 +105,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
     /// time is past already.
     ///
     /// # Errors
-    /// As [`advance`](Stepper::advance); [`StepError::NonFinite`] for a time that is not finite, and where the clock comes to a stand.
+    /// As [`advance`](Stepper::advance); [`StepError::NonFinite`] for a time that is not finite.
     pub fn advance_to(&mut self, t_end: f64) -> Result<(), Halt> {
         self.advance_until(usize::MAX, t_end).map(|_| ())
     }
@@ -180,10 +169,6 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
     }
 }
 
-/// The steps in sequence, too short to change the time, after which a motion counts as one that falls into a place where its clock
-/// stands still: what passes beside it, however near, has some tens of them.
-const STANDING: u32 = 1 << 12;
-
 /// Steps in the lanes of one instruction set; ends at a step that cannot be taken.
 struct Advance<'b, 'a, L, C, const N: usize> {
     general: &'b mut General<'a, L, Fictitious<C>, N>,
@@ -242,11 +227,6 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
             {
                 self.general.reset(&before);
                 return Err(halt(taken, cause));
-            }
-            self.standing = if self.time() > before.t.value { 0 } else { self.standing + 1 };
-            if self.standing > STANDING {
-                self.general.reset(&before);
-                return Err(halt(taken, StepError::NonFinite));
             }
             self.from = Some(before);
             self.tau += self.general.table.h;

@@ -25,8 +25,8 @@ pub enum Steps {
     Size(f64),
     /// This many steps; not by a clock, which counts them itself.
     Count(usize),
-    /// One length for the whole run, chosen by pilot runs so that the error of (q, p), relative to its size at the time or at the end,
-    /// is at most this at every tenth of the span. The pilot runs cost a small multiple of the run; what is narrower than the
+    /// One length for the whole run, of time or of the time of the Lagrangian's clock, chosen by pilot runs so that the error of (q, p),
+    /// relative to its size at the time or at the end, is at most this at every tenth of the span. The pilot runs cost a small multiple of the run; what is narrower than the
     /// distance of their nodes, about the step divided by four times the stages, may go unseen.
     Accuracy(f64),
 }
