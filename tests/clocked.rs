@@ -3,9 +3,11 @@
 #![allow(clippy::unwrap_used)]
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, PerturbedKepler, Radial, System};
-use contact_geom::{Clock, Larger, PhasePoint, Scalar, VelocityPoint, legendre};
-use discrete_herglotz::{ClockedStepper, Gauss, InputError, StepError, Stepper};
+use contact_geom::systems::{Kepler, Pendulum, PerturbedKepler, Radial, System};
+use contact_geom::{Clock, Lagrangian, Larger, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
+use discrete_herglotz::{
+    ClockedStepper, Gauss, InputError, Integrator, Outcome, Scene, Status, StepError, Stepper, Steps, Wanted,
+};
 
 type Planar = Kepler<2>;
 
@@ -170,4 +172,175 @@ fn powers_of_the_distance() {
         let rate: f64 = Radial { exponent }.rate(&q);
         assert!((rate / 0.5_f64.powf(exponent) - 1.0).abs() < 1e-15, "{exponent}");
     }
+}
+
+/// (q, p) on the orbit of [`pericentre`] without drag, from Kepler's equation by bisection.
+fn on_orbit(e: f64, t: f64) -> SVector<f64, 4> {
+    let mean = t.rem_euclid(std::f64::consts::TAU);
+    let (mut low, mut high) = (0.0, std::f64::consts::TAU);
+    for _ in 0..100 {
+        let u: f64 = 0.5 * (low + high);
+        *(if u - e * u.sin() < mean { &mut low } else { &mut high }) = u;
+    }
+    let ((sin, cos), b) = (low.sin_cos(), (1.0 - e * e).sqrt());
+    let r = 1.0 - e * cos;
+    SVector::from([cos - e, b * sin, -sin / r, b * cos / r])
+}
+
+/// The orbit for a span of three revolutions and a little, to an error, by an integrator or none; the true error.
+fn to_accuracy(e: f64, wanted: f64, by: Option<Integrator>) -> (Integrator, Outcome<2>, f64) {
+    let (kepler, span) = (Planar { gamma: 0.0, mu: 1.0 }, 20.0);
+    let scene = Scene::new(&kepler, pericentre(e), span).steps(Steps::Accuracy(wanted));
+    let plan = by.map_or_else(
+        || scene.plan(),
+        |by| Scene::new(&kepler, pericentre(e), span).steps(Steps::Accuracy(wanted)).by(by).plan(),
+    );
+    let plan = plan.unwrap();
+    let outcome = plan.run().unwrap();
+    assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
+    assert_eq!(outcome.steps, plan.count(), "{plan}");
+    let (q, p, truth) = (outcome.q, outcome.p, on_orbit(e, span));
+    let error = (SVector::from([q[0], q[1], p[0], p[1]]) - truth).norm() / truth.norm();
+    (plan.integrator(), outcome, error)
+}
+
+/// Eccentric orbits are followed by the clock, to the accuracy that is wanted, and for a part of the evaluations of equal steps. Of
+/// these `(1 - e)^(-3/2)` are as long as those at distance one; their iterations take two or three sweeps, where long steps take up to
+/// eighteen, and half of the rest is left to the orbit's mean.
+#[test]
+fn eccentric_orbits_choose_the_clock() {
+    for e in [0.9, 0.99] {
+        for wanted in [1e-6, 1e-8, 1e-10, 1e-11] {
+            let (integrator, outcome, error) = to_accuracy(e, wanted, None);
+            assert!(matches!(integrator, Integrator::Clocked { .. }), "{e}, {wanted:e}: {integrator}");
+            assert!(error <= wanted, "{e}, {wanted:e}: {error:e}");
+            assert_eq!(outcome.t, 20.0);
+        }
+        let (wanted, least) = (1e-8, 0.05 * (1.0 - e).powf(-1.5));
+        let (by_clock, equal) = (to_accuracy(e, wanted, None).1, to_accuracy(e, wanted, "gauss_8".parse().ok()).1);
+        let ratio = equal.evaluations as f64 / by_clock.evaluations as f64;
+        assert!(ratio >= least, "{e}: {} evaluations, {} by equal steps", by_clock.evaluations, equal.evaluations);
+    }
+}
+
+/// From the apocentre too, where the motion shows nothing yet of what is to come.
+#[test]
+fn starts_at_the_apocentre() {
+    let kepler = Planar { gamma: 0.0, mu: 1.0 };
+    for e in [0.9, 0.99] {
+        // The pericentre of -e.
+        let scene = Scene::new(&kepler, pericentre(-e), 20.0).steps(Steps::Accuracy(1e-8));
+        let plan = scene.plan().unwrap();
+        let Outcome { status, q, p, .. } = plan.run().unwrap();
+        let truth = -on_orbit(e, 20.0 + std::f64::consts::PI);
+        let error = (SVector::from([q[0], q[1], p[0], p[1]]) - truth).norm() / truth.norm();
+        assert!(matches!(plan.integrator(), Integrator::Clocked { .. }) && status == Status::Completed, "{plan}");
+        assert!(error <= 1e-8, "{e}: {error:e}");
+    }
+}
+
+/// Where the clock would gain little it is left alone; named, it keeps the accuracy there too, with any number of stages.
+#[test]
+fn round_orbits_take_equal_steps() {
+    for e in [0.0, 0.1] {
+        let (integrator, _, error) = to_accuracy(e, 1e-8, None);
+        assert!(matches!(integrator, Integrator::Gauss { .. }) && error <= 1e-8, "{e}: {integrator}, {error:e}");
+        for name in ["clocked_gauss_4", "clocked_gauss_8"] {
+            let (_, _, error) = to_accuracy(e, 1e-8, name.parse().ok());
+            assert!(error <= 1e-8, "{e}, {name}: {error:e}");
+        }
+    }
+}
+
+/// The same numbers to the last bit, whatever is observed; rows end where the run does, and the factor is that of linear drag.
+#[test]
+fn rows_of_a_clocked_run_change_nothing() {
+    let kepler = Planar { gamma: -0.01, mu: 1.0 };
+    for steps in [Steps::Size(0.25), Steps::Accuracy(1e-8)] {
+        let run = |wanted: Wanted<2>| {
+            let scene = Scene::new(&kepler, pericentre(0.9), 20.0).by(Integrator::Clocked { stages: 8 }).steps(steps);
+            let outcome = scene.wanting(wanted).plan().unwrap().run().unwrap();
+            assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
+            outcome
+        };
+        let nothing = run(Wanted { action: false, ..Wanted::default() });
+        let all = run(Wanted { action: true, conformal_factor: true, rows: Some(7), momentum: None });
+        assert_eq!((nothing.q, nothing.p, nothing.t, nothing.steps), (all.q, all.p, all.t, all.steps));
+        assert_eq!(all.rows.len(), all.steps.div_ceil(7) + 1);
+        assert_eq!(all.rows.last().map(|row| (row.t, row.q, row.z)), Some((all.t, all.q, all.z)));
+        assert!(all.rows.windows(2).all(|rows| rows[0].t < rows[1].t));
+        assert_eq!(all.t, 20.0);
+        let factor = all.conformal_factor.unwrap();
+        assert!((factor - (-0.2f64).exp()).abs() <= 1e-8, "{factor}");
+    }
+}
+
+/// A free particle with a clock of any rate, autonomous or not.
+struct Clocked {
+    rate: f64,
+    autonomous: bool,
+}
+
+impl Lagrangian<1> for Clocked {
+    const HAS_CLOCK: bool = true;
+
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 - z * 0.1
+    }
+    fn structure(&self) -> Structure {
+        Structure { autonomous: self.autonomous, ..Structure::default() }
+    }
+    fn clock_rate<T: Scalar>(&self, _q: &SVector<T, 1>) -> T {
+        T::from(self.rate)
+    }
+}
+
+#[test]
+fn clocks_that_cannot_be_followed_are_refused() {
+    let by = Integrator::Clocked { stages: 4 };
+    assert_eq!(Integrator::Clocked { stages: 17 }.check(&Planar::default()), Err(InputError::Stages { found: 17 }));
+    assert!(matches!(by.check(&Pendulum { gamma: -0.1 }), Err(InputError::Hypothesis { .. })));
+    assert!(matches!(by.check(&PerturbedKepler::default()), Err(InputError::Hypothesis { .. })));
+    let driven = Clocked { rate: 1.0, autonomous: false };
+    assert_eq!(by.check(&driven), Err(InputError::Unclaimed { claim: "autonomous" }));
+    let start = VelocityPoint::new([0.0], [1.0], 0.0);
+    let refused = |rate: f64, autonomous: bool, steps: Steps| {
+        Scene::new(&Clocked { rate, autonomous }, start, 2.0).by(by).steps(steps).plan().err()
+    };
+    assert_eq!(refused(1.0, false, Steps::Size(0.1)), Some(InputError::Unclaimed { claim: "autonomous" }));
+    for rate in [0.0, -1.0, f64::INFINITY, f64::NAN] {
+        assert!(matches!(refused(rate, true, Steps::Size(0.1)), Some(InputError::Clock { .. })), "{rate}");
+        assert!(matches!(refused(rate, true, Steps::Accuracy(1e-6)), Some(InputError::Clock { .. })), "{rate}");
+    }
+    assert!(matches!(refused(1e-300, true, Steps::Size(0.1)), Some(InputError::TooMany { .. })));
+    assert_eq!(refused(1.0, true, Steps::Size(-0.1)), Some(InputError::Step { h: -0.1 }));
+    let sentence = refused(1.0, true, Steps::Count(10)).map(|error| error.to_string()).unwrap_or_default();
+    assert!(sentence.contains("steps of a given size in the time of its clock"), "{sentence}");
+    // A clock that gains nothing is not chosen, whatever its rate.
+    for rate in [1.0, 1e-3, -1.0, f64::NAN] {
+        let system = Clocked { rate, autonomous: true };
+        let plan = Scene::new(&system, start, 2.0).steps(Steps::Accuracy(1e-8)).plan().unwrap();
+        assert!(matches!(plan.integrator(), Integrator::Gauss { .. }), "{rate}: {plan}");
+    }
+    let system = Clocked { rate: 0.5, autonomous: true };
+    let plan = Scene::new(&system, start, 2.0).by(by).steps(Steps::Size(0.3)).plan().unwrap();
+    let outcome = plan.run().unwrap();
+    let tenths = Scene::new(&system, start, 2.0).by(by).steps(Steps::Size(0.4)).plan().unwrap().run().unwrap();
+    assert_eq!((tenths.steps, tenths.t), (10, 2.0));
+    // Thirteen steps of 0.15, and one of a third of that; and the tenth of 0.2 ends the span, for all its rounding.
+    assert_eq!((outcome.steps, plan.count(), outcome.t), (14, 14, 2.0));
+    assert!(plan.to_string().contains("14 steps of 0.3 of the clock's time by clocked_gauss_4, t = 0 .. 2"), "{plan}");
+}
+
+/// A fall into the centre comes to an end, whoever asks for it.
+#[test]
+fn a_fall_into_the_centre_ends() {
+    let kepler = Planar { gamma: 0.0, mu: 1.0 };
+    let scene = || Scene::new(&kepler, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0), 2.0);
+    let refused = scene().steps(Steps::Accuracy(1e-6)).plan().err();
+    assert!(matches!(refused, Some(InputError::Accuracy { .. })), "{refused:?}");
+    let outcome = scene().by(Integrator::Clocked { stages: 8 }).steps(Steps::Size(0.1)).plan().unwrap().run().unwrap();
+    assert!(matches!(outcome.status, Status::Failed { .. }), "{outcome:?}");
+    // It takes pi / 8^(1/2) without another force.
+    assert!(outcome.t <= std::f64::consts::PI / 8.0f64.sqrt() && outcome.t > 1.0, "{}", outcome.t);
 }

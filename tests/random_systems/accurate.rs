@@ -1,10 +1,10 @@
 //! Scenes that ask for an accuracy: the true error is at most ten times what was asked for, or the scene is refused.
 
 use super::dice::Dice;
-use super::problem::Problem;
+use super::problem::{Problem, integrators};
 use super::truth::{NoTruth, truth};
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
-use discrete_herglotz::{Integrator, Scene, Status, Steps, Wanted};
+use discrete_herglotz::{Scene, Status, Steps, Wanted};
 
 /// The most steps that a case may take.
 const STEPS: usize = 200_000;
@@ -12,7 +12,7 @@ const STEPS: usize = 200_000;
 pub fn accurate<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let Problem { system, t0, start, span, .. } = problem;
     // A rule of order 1 or 2 to twelve digits has no end; by order, what is reasonable.
-    let integrator = dice.pick(&Integrator::all());
+    let integrator = dice.pick(&integrators());
     let least: f64 = if integrator.order() <= 2 { 1e-4 } else { 1e-10 };
     let tolerance = dice.scale(least, 1e-2);
     let wanted = Wanted { action: dice.chance(0.5), ..Wanted::default() };

@@ -1,11 +1,11 @@
 //! Scenes with fixed steps: by every integrator, judged by the motion itself and by runs with shorter steps.
 
 use super::dice::Dice;
-use super::problem::Problem;
+use super::problem::{Problem, integrators};
 use super::truth::{NoTruth, truth};
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
 use contact_geom::{Symmetry, Triple, VelocityPoint, legendre};
-use discrete_herglotz::{DiscreteLagrangian, Integrator, Outcome, Scene, Solver, Status, Steps, Wanted};
+use discrete_herglotz::{DiscreteLagrangian, Outcome, Scene, Solver, Status, Steps, Wanted};
 use exact_lagrangian::ExactLagrangian;
 
 /// The error, relative to the size of the motion, below which a run has found its motion.
@@ -24,7 +24,7 @@ const REFINED: usize = 1 << 12;
 /// Draws what is asked of a scene, runs it and judges it.
 pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let Problem { system, t0, start, span, .. } = problem;
-    let integrator = dice.pick(&Integrator::all());
+    let integrator = dice.pick(&integrators());
     let count = (dice.scale(1.0, STEPS as f64).round() as usize).max(1);
     let h = span / count as f64;
     let steps = if dice.chance(0.5) { Steps::Count(count) } else { Steps::Size(h) };

@@ -4,6 +4,12 @@ use super::dice::Dice;
 use super::system::RandomSystem;
 use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::SVector;
+use discrete_herglotz::Integrator;
+
+/// The integrators that may apply: random systems state no clock.
+pub fn integrators() -> Vec<Integrator> {
+    Integrator::all().into_iter().filter(|integrator| !matches!(integrator, Integrator::Clocked { .. })).collect()
+}
 
 /// A system with the time, the place and the span of a motion.
 #[derive(Clone, Debug)]

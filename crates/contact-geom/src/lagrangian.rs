@@ -30,6 +30,10 @@ use num_traits::One;
 /// assert_eq!(Damped.gradient(0.0, &x).y[0], 2.0); // L_v
 /// ```
 pub trait Lagrangian<const N: usize> {
+    /// Whether this Lagrangian states a clock, that is, whether [`clock_rate`](Self::clock_rate) is overridden: it is asked for
+    /// and compiled only then.
+    const HAS_CLOCK: bool = false;
+
     /// The value `L(t, q, v, z)`.
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T;
 
@@ -46,6 +50,14 @@ pub trait Lagrangian<const N: usize> {
     /// What is known of this Lagrangian's form; see [`Structure`]. The default claims nothing.
     fn structure(&self) -> Structure {
         Structure::default()
+    }
+
+    /// The rate `g(q) = dt/dtau` of the [`Clock`](crate::Clock) by whose time tau the steps of this motion are best equal, for
+    /// autonomous Lagrangians: it should fall as the motion gets faster, and be positive. With [`HAS_CLOCK`](Self::HAS_CLOCK); the
+    /// default is the time itself.
+    #[inline(always)]
+    fn clock_rate<T: Scalar>(&self, _q: &SVector<T, N>) -> T {
+        T::one()
     }
 
     /// The value and the differential along given directions: the coordinates of `x` carry the directions as duals.
@@ -208,6 +220,8 @@ pub fn derived_hessian<T: Scalar, const N: usize>(
 pub struct ValueOnly<L>(pub L);
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<L> {
+    const HAS_CLOCK: bool = L::HAS_CLOCK;
+
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         self.0.value(t, q, v, z)
@@ -215,9 +229,15 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<L> {
     fn structure(&self) -> Structure {
         self.0.structure()
     }
+    #[inline(always)]
+    fn clock_rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
+        self.0.clock_rate(q)
+    }
 }
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
+    const HAS_CLOCK: bool = L::HAS_CLOCK;
+
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         (**self).value(t, q, v, z)
@@ -232,5 +252,9 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
     }
     fn structure(&self) -> Structure {
         (**self).structure()
+    }
+    #[inline(always)]
+    fn clock_rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
+        (**self).clock_rate(q)
     }
 }

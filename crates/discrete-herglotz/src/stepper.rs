@@ -15,6 +15,16 @@ pub trait Stepper<const N: usize> {
     /// [`Halt`] where a step cannot be taken: the state is then that before it.
     fn advance(&mut self, steps: usize) -> Result<(), Halt>;
 
+    /// Takes `steps` steps, or fewer where a method whose steps vary with a clock reaches the time `t_end` before; returns how many.
+    /// Steps of one length end where they end.
+    ///
+    /// # Errors
+    /// As [`advance`](Self::advance).
+    fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, Halt> {
+        let _ = t_end;
+        self.advance(steps).map(|()| steps)
+    }
+
     /// The state `(q, p, z)`. Where the stepper was told that nobody wants the action, `z` stays what it was at the start.
     fn state(&self) -> PhasePoint<N>;
 

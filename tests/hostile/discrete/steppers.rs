@@ -44,7 +44,12 @@ pub const ATTACKS: &[Attack] = &[
         run: gauss,
     },
     Attack {
-        on: &["Gauss::clocked_stepper", "ClockedStepper::time_momentum", "ClockedStepper::advance_to"],
+        on: &[
+            "Gauss::clocked_stepper",
+            "ClockedStepper::time_momentum",
+            "ClockedStepper::advance_to",
+            "Stepper::advance_until",
+        ],
         run: clocked,
     },
     Attack { on: &["Event::new", "Event::in_direction", "Event::terminal", "run_with_events"], run: events },

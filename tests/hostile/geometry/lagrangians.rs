@@ -46,7 +46,7 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: closed_forms,
     },
-    Attack { on: &["Kepler::clock", "Clock::rate"], run: clocks },
+    Attack { on: &["Kepler::clock", "Clock::rate", "Lagrangian::clock_rate"], run: clocks },
 ];
 
 fn herglotz(report: &mut Report) {
@@ -180,8 +180,11 @@ fn closed_forms(report: &mut Report) {
 }
 
 fn clocks(report: &mut Report) {
-    let clock = Kepler::<2>::default().clock();
+    let kepler = Kepler::<2>::default();
+    let clock = kepler.clock();
     for value in HOSTILE {
-        report.formula(&value, fine(clock.rate(&SVector::from([value, 0.3]))));
+        let q = SVector::from([value, 0.3]);
+        report.formula(&value, fine(clock.rate(&q)));
+        report.formula(&value, fine(kepler.clock_rate(&q)));
     }
 }

@@ -24,6 +24,8 @@ impl<const D: usize> Default for Kepler<D> {
 }
 
 impl<const D: usize> Lagrangian<D> for Kepler<D> {
+    const HAS_CLOCK: bool = true;
+
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {
         v.dot(v) * 0.5 + attraction(self.mu, q) + z * self.gamma
@@ -45,6 +47,11 @@ impl<const D: usize> Lagrangian<D> for Kepler<D> {
             constant_mass: true,
             ..Structure::default()
         }
+    }
+
+    #[inline(always)]
+    fn clock_rate<T: Scalar>(&self, q: &SVector<T, D>) -> T {
+        self.clock().rate(q)
     }
 }
 

@@ -2,16 +2,29 @@
 
 use super::Gauss;
 use super::beginning::Beginning;
+use super::compensated::Compensated;
 use super::extension::{Extension, Fictitious, Values};
 use super::general::General;
+use super::look::{Compare, Curve, Look};
 use super::mass::Mass;
 use super::sweeps::Progress;
 use super::table::Table;
 use crate::lanes::forget_branches;
 use crate::{Halt, ITERATION_LIMIT, InputError, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Clock, Lagrangian, PhasePoint};
+use contact_geom::{Clock, Lagrangian, PhasePoint, Scalar, Structure};
 use pulp::{Arch, Simd, WithSimd};
+
+/// The clock that a Lagrangian states.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OwnClock<'a, L>(pub &'a L);
+
+impl<L: Lagrangian<N>, const N: usize> Clock<N> for OwnClock<'_, L> {
+    #[inline(always)]
+    fn rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
+        self.0.clock_rate(q)
+    }
+}
 
 /// Contact Gauss collocation of variable step at work: its steps are equal in the time tau of a [`Clock`], `dt = g(q) dtau`.
 ///
@@ -42,7 +55,10 @@ pub struct ClockedStepper<'a, L, C, const N: usize> {
     general: Box<General<'a, L, Fictitious<C>, N>>,
     arch: Arch,
     h: f64,
+    tau: f64,
     taken: usize,
+    /// The start of the last step, where that was taken by itself.
+    from: Option<Values<N>>,
     suspicion: Option<Suspicion>,
 }
 
@@ -50,12 +66,13 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
     pub(super) fn new(
         gauss: &'a Gauss<L>,
         clock: C,
+        probed: Option<Structure>,
         t0: f64,
         state: PhasePoint<N>,
         guess: SVector<f64, N>,
     ) -> Result<Self, InputError> {
         let (lagrangian, h) = (&gauss.lagrangian, gauss.forward.h);
-        let Beginning { start, structure, inverse, .. } = Beginning::of(lagrangian, None, t0, &state, guess)?;
+        let Beginning { start, structure, inverse, .. } = Beginning::of(lagrangian, probed, t0, &state, guess)?;
         if !structure.autonomous {
             return Err(InputError::Unclaimed { claim: "autonomous" });
         }
@@ -70,7 +87,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         let extension = Extension::new(Fictitious(clock), t0, -energy);
         let (table, mass) = (Table::new(gauss.stages(), h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, &state, &start.v));
-        Ok(ClockedStepper { general, arch: Arch::new(), h, taken: 0, suspicion: None })
+        Ok(ClockedStepper { general, arch: Arch::new(), h, tau: 0.0, taken: 0, from: None, suspicion: None })
     }
 
     /// The momentum `p_t` of the time, minus the energy but for the method's error: `E + p_t = K / g`. It is contracted as every
@@ -79,30 +96,31 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         self.general.extension.p_t.value
     }
 
+    /// The time tau of the clock since the start.
+    pub(crate) fn tau(&self) -> f64 {
+        self.tau
+    }
+
     /// Takes steps up to a physical time, the last one shorter so that it ends there to round-off. Nothing is done where the
     /// time is past already.
     ///
     /// # Errors
     /// As [`advance`](Stepper::advance); [`StepError::NonFinite`] for a time that is not finite.
     pub fn advance_to(&mut self, t_end: f64) -> Result<(), Halt> {
-        if !t_end.is_finite() {
-            return Err(Halt { taken: 0, cause: StepError::NonFinite });
-        }
-        let mut taken = 0;
-        while self.time() < t_end {
-            let before = self.general.values();
-            self.step().map_err(|cause| Halt { taken, cause })?;
-            if self.time() > t_end {
-                let ended = self.shorten(&before, t_end);
-                if ended.is_err() {
-                    self.general.reset(&before);
-                }
-                self.general.table = Table::new(self.general.table.s, self.h);
-                return ended.map_err(|cause| Halt { taken, cause });
-            }
-            taken += 1;
-        }
-        Ok(())
+        self.advance_until(usize::MAX, t_end).map(|_| ())
+    }
+
+    /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step that was
+    /// taken by itself.
+    pub(crate) fn look(&self, sets: usize) -> Option<Look> {
+        let (general, from) = (&*self.general, self.from.as_ref()?);
+        let value = |x: &[Compensated; N]| SVector::from(x.map(|x| x.value));
+        let start = PhasePoint { q: value(&from.q), p: value(&from.p), z: from.z.value };
+        let (&Table { s, h, .. }, clock) = (&general.table, &general.extension.pace);
+        let mut curve = Curve::new(s, from.t.value, h, &start);
+        curve.of_clock(&general.solved_by_clock(), [clock.0.rate(&start.q), general.rate()]);
+        let at = |set| self.arch.dispatch(Compare { lagrangian: general.lagrangian, pace: clock, curve: &curve, set });
+        (0..sets).map(at).reduce(Look::and)
     }
 
     /// Takes the last step again from where it started, so long that it ends at a time, which it has passed.
@@ -115,9 +133,9 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
             h = if short < newton && newton < long { newton } else { 0.5 * (short + long) };
             self.general.reset(before);
             self.general.table = Table::new(self.general.table.s, h);
-            self.step()?;
+            self.sweep(1).map_err(|halt| halt.cause)?;
             over = self.time() - t_end;
-            if over.abs() <= 2.0 * f64::EPSILON * t_end.abs().max(before.t.value.abs()) {
+            if self.ends_at(t_end, before.t.value) {
                 // The stages are those of another length than the next step's.
                 let end = self.general.values();
                 self.general.reset(&end);
@@ -128,8 +146,26 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         Err(StepError::NotConverged { residual: over, iterations: ITERATION_LIMIT })
     }
 
-    fn step(&mut self) -> Result<(), StepError> {
-        self.advance(1).map_err(|halt| halt.cause)
+    /// Whether a step from some time ends at another to round-off; that is then the time.
+    fn ends_at(&mut self, t_end: f64, before: f64) -> bool {
+        let there = (self.time() - t_end).abs() <= 2.0 * f64::EPSILON * t_end.abs().max(before.abs());
+        if there {
+            self.general.extension.t = t_end.into();
+        }
+        there
+    }
+
+    /// Takes steps by sweeps.
+    fn sweep(&mut self, steps: usize) -> Result<(), Halt> {
+        let ClockedStepper { general, taken, suspicion, .. } = self;
+        self.arch.dispatch(Advance { general: &mut **general, suspicion, taken, steps })
+    }
+
+    /// Goes back to the full step after one that was made shorter.
+    fn lengthen(&mut self) {
+        if self.general.table.h != self.h {
+            self.general.table = Table::new(self.general.table.s, self.h);
+        }
     }
 }
 
@@ -166,8 +202,37 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for Advance<'_, '_,
 impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedStepper<'_, L, C, N> {
     /// The steps are equal in the clock's time.
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
-        let ClockedStepper { general, taken, suspicion, .. } = self;
-        self.arch.dispatch(Advance { general: &mut **general, suspicion, taken, steps })
+        self.lengthen();
+        self.from = None;
+        let done = self.sweep(steps);
+        self.tau += done.map_or_else(|halt| halt.taken, |()| steps) as f64 * self.h;
+        done
+    }
+
+    /// The last step is shorter, so that it ends at `t_end` to round-off.
+    fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, Halt> {
+        let halt = |taken, cause| Halt { taken, cause };
+        if !t_end.is_finite() {
+            return Err(halt(0, StepError::NonFinite));
+        }
+        let mut taken = 0;
+        while taken < steps && self.time() < t_end {
+            self.lengthen();
+            let before = self.general.values();
+            self.from = None;
+            self.sweep(1).map_err(|refused| halt(taken, refused.cause))?;
+            if !self.ends_at(t_end, before.t.value)
+                && self.time() > t_end
+                && let Err(cause) = self.shorten(&before, t_end)
+            {
+                self.general.reset(&before);
+                return Err(halt(taken, cause));
+            }
+            self.from = Some(before);
+            self.tau += self.general.table.h;
+            taken += 1;
+        }
+        Ok(taken)
     }
 
     fn state(&self) -> PhasePoint<N> {

@@ -66,6 +66,11 @@ impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'_, L, P, N> {
         }
     }
 
+    /// The same of a step by a clock, in its time: `g V` for the velocities.
+    pub fn solved_by_clock(&self) -> Solved<N> {
+        Solved { v: from_fn(|d| self.unweighted(&self.moved[d])), ..self.solved() }
+    }
+
     /// What was multiplied with the weights, with 0 beyond the last stage.
     fn unweighted(&self, x: &Stages) -> [f64; MOST] {
         from_fn(|i| if i < self.table.s { x.0[i] / self.table.weights.0[i] } else { 0.0 })

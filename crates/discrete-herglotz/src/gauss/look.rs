@@ -6,11 +6,13 @@
 use super::coefficients::{Coefficients, MOST, lagrange_rows};
 use super::condensed::Condensed;
 use super::dense::Solved;
+use super::extension::Pace;
 use super::stages::{StageMap, Stages, blocks};
 use crate::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint, larger, largest};
 use pulp::{Simd, WithSimd};
+use std::array::from_fn;
 use std::sync::OnceLock;
 
 /// What a look at a step has found.
@@ -45,7 +47,8 @@ impl Look {
     }
 }
 
-/// A step as it was solved: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L.
+/// A step as it was solved: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L; where there is a clock
+/// in its time, each multiplied with its rate.
 pub(super) struct Curve<const N: usize> {
     pub s: usize,
     pub t: f64,
@@ -59,6 +62,8 @@ pub(super) struct Curve<const N: usize> {
     pub l: Stages,
     /// Whether z is part of the step; else `L` is that at `z = 0`.
     pub acts: bool,
+    /// The rates of the clock at the start and at the end.
+    rates: [f64; 2],
 }
 
 impl<const N: usize> Curve<N> {
@@ -77,7 +82,14 @@ impl<const N: usize> Curve<N> {
             rate: Stages::ZERO,
             l: Stages::ZERO,
             acts: true,
+            rates: [1.0; 2],
         }
+    }
+
+    /// From the stages of a step by a clock, and the rates of the clock at its ends.
+    pub fn of_clock(&mut self, solved: &Solved<N>, rates: [f64; 2]) {
+        self.of_solved(solved);
+        self.rates = rates;
     }
 
     /// From the stages of a general step.
@@ -155,7 +167,7 @@ impl Between {
         // other sets are equidistant, each moved so that all together leave the shortest gaps.
         let inner = Coefficients::of(s.saturating_sub(1).max(1));
         let end = 0.5 * (1.0 + g.c[s - 1].0);
-        let points = std::array::from_fn(|i| match set {
+        let points = from_fn(|i| match set {
             0 if i + 1 < s => inner.c[i].0,
             0 => end,
             _ => (i.min(s - 1) as f64 + (set as f64 * golden).fract()) / s as f64,
@@ -171,18 +183,19 @@ fn weighted(weights: &[f64; MOST], y: &Stages) -> f64 {
 }
 
 /// The look, in the lanes of an instruction set.
-pub(super) struct Compare<'a, L, const N: usize> {
+pub(super) struct Compare<'a, L, P, const N: usize> {
     pub lagrangian: &'a L,
+    pub pace: &'a P,
     pub curve: &'a Curve<N>,
     pub set: usize,
 }
 
-impl<L: Lagrangian<N>, const N: usize> WithSimd for Compare<'_, L, N> {
+impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> WithSimd for Compare<'_, L, P, N> {
     type Output = Look;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Look {
-        let Compare { lagrangian, curve, set } = self;
+        let Compare { lagrangian, pace, curve, set } = self;
         let Curve { s, t, h, .. } = *curve;
         let between = Between::of(s, set);
         let zero = Lanes::<S>::splat(0.0);
@@ -210,33 +223,40 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Compare<'_, L, N> {
         let (mut of_value, mut kinetic, mut largest_l) = (zero, zero, zero);
         let (mut misfit, mut size, mut of_z, mut size_z, mut all) = (zero, zero, zero, zero, zero);
         for r in 0..blocks::<S>(s) {
-            let x = VelocityPoint {
+            let mut x = VelocityPoint {
                 q: SVector::from_fn(|d, _| q[d].block::<S>(r)),
                 v: SVector::from_fn(|d, _| v[d].block::<S>(r)),
                 z: z.block::<S>(r),
             };
+            // From the clock's time to t.
+            let (mut slower, mut long) = (Lanes::<S>::splat(1.0), Lanes::<S>::splat(h));
+            if !P::PHYSICAL {
+                let rate = pace.rate(&x.q);
+                (slower, long) = (rate.recip(), long * rate);
+                x.v *= slower;
+            }
             let (value, g) = lagrangian.with_gradient(between.points.block::<S>(r) * h + t, &x);
             let inverse = (Lanes::<S>::splat(1.0) - fallen.block::<S>(r)).recip();
             let mut work = zero;
-            let drag = (rate.block::<S>(r) * inverse - g.z) * h;
+            let drag = (rate.block::<S>(r) * inverse * slower - g.z) * long;
             for d in 0..N {
                 let p = y[d].block::<S>(r) * inverse;
                 let force = f[d].block::<S>(r) * inverse * h;
-                let of_force = p.mul_add(drag, force - g.x[d] * h);
+                let of_force = p.mul_add(drag, force - g.x[d] * long);
                 let of_momentum = p - g.y[d];
                 misfit = misfit.max(of_force.abs()).max(of_momentum.abs());
                 size = size.max(p.abs()).max(force.abs());
                 all += of_force * 0.0 + of_momentum * 0.0;
                 work = p.mul_add(x.v[d], work);
             }
-            let apart = l.block::<S>(r) - value;
+            let apart = l.block::<S>(r) * slower - value;
             of_value = of_value.max(apart.abs());
             kinetic = kinetic.max(work.abs() + (g.z * x.z).abs());
             largest_l = largest_l.max(value.abs());
             all += apart * 0.0;
             if curve.acts {
-                of_z = of_z.max((apart * h).abs());
-                size_z = size_z.max(z.block::<S>(r).abs()).max((value * h).abs());
+                of_z = of_z.max((apart * long).abs());
+                size_z = size_z.max(z.block::<S>(r).abs()).max((value * long).abs());
             }
         }
         // The largest over lanes may hide a NaN; a NaN or an infinity times 0 is not 0.
@@ -262,7 +282,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Compare<'_, L, N> {
         if curve.acts {
             expected += relative(tail(&curve.l) * h, size_z);
         }
-        let ends = g.ends.each_ref().map(|row| weighted(row, &curve.l));
+        let ends = from_fn(|i| weighted(&g.ends[i], &curve.l) / curve.rates[i]);
         Look { misfit, size, expected, of_value, kinetic: kinetic.largest(), ends }
     }
 }

@@ -27,6 +27,7 @@ mod table;
 
 pub(crate) use beginning::velocity;
 pub use clocked::ClockedStepper;
+use clocked::OwnClock;
 pub use dense::DenseStep;
 pub(crate) use look::{Look, SETS};
 pub(crate) use stepper::FEW;
@@ -162,7 +163,22 @@ impl<L> Gauss<L> {
         L: Lagrangian<N>,
         C: Clock<N>,
     {
-        ClockedStepper::new(self, clock, t0, state, guess)
+        ClockedStepper::new(self, clock, None, t0, state, guess)
+    }
+
+    /// Like [`clocked_stepper`](Self::clocked_stepper) by the Lagrangian's own clock, where the structure has been probed at this
+    /// start.
+    pub(crate) fn own_clock_stepper<const N: usize>(
+        &self,
+        structure: Structure,
+        t0: f64,
+        state: PhasePoint<N>,
+        guess: SVector<f64, N>,
+    ) -> Result<ClockedStepper<'_, L, OwnClock<'_, L>, N>, InputError>
+    where
+        L: Lagrangian<N>,
+    {
+        ClockedStepper::new(self, OwnClock(&self.lagrangian), Some(structure), t0, state, guess)
     }
 
     /// The stage equations of a step forward or backward in time.

@@ -20,11 +20,17 @@ const REFERENCE: usize = 12;
 /// The stages from which a Gauss method is its own reference.
 const OWN: usize = 6;
 
+/// The stages by a clock, for every error: what its clock makes smooth could be followed by longer steps of more stages, were it not for
+/// the iteration.
+const BY_CLOCK: usize = 8;
+
 /// What is chosen for a scene.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Choice {
     pub integrator: Integrator,
     pub count: usize,
+    /// The length of a step; by a clock, in its time.
+    pub h: f64,
     /// The error that the pilot runs found, or predict; `None` where the steps are given.
     pub error: Option<f64>,
 }
@@ -51,6 +57,9 @@ fn stages_for(wanted: f64) -> usize {
 /// Chooses the steps, and the integrator where the scene names none, so that the error of (q, p), relative to their size, is at most
 /// `wanted` at ten times along the motion.
 ///
+/// By the clock that the motion states, where steps that are equal in its time are much fewer: the first run with equal steps sees
+/// that, and ends there.
+///
 /// A reference is found first: contact Gauss collocation with k and 2k steps. They must agree; and between the nodes their curves must
 /// solve Herglotz' equations up to a misfit that falls from the one to the other as it does where the motion is smooth. The search ends
 /// a run at the first step that does not resolve the motion, so that runs that are far too coarse cost nothing. The error of the
@@ -63,7 +72,7 @@ pub(super) fn choose<L: Lagrangian<N>, const N: usize>(
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
-    choose_with(&mut Pilots { scene, structure, left: BUDGET, wanted })
+    choose_with(&mut Pilots { scene, structure, left: BUDGET, wanted, watches_clock: false })
 }
 
 /// The same with a budget.
@@ -74,17 +83,88 @@ pub(super) fn choose_with<L: Lagrangian<N>, const N: usize>(
     let integrator = pilots.scene.integrator.unwrap_or(Integrator::Gauss { stages: stages_for(wanted) });
     match integrator {
         Integrator::Gauss { stages } if stages >= OWN => {
-            let found = converge(pilots, stages, wanted, false)?;
-            // Where W or the drag changes along the motion a longer step may leave their domain, as no misfit foretells.
-            let structure = &pilots.structure;
-            let longer = structure.separable && structure.has_constant_rate();
-            let (count, error) = fewest(stages, wanted, &found, longer);
-            Ok(Choice { integrator, count, error: Some(error) })
+            pilots.watches_clock =
+                pilots.scene.integrator.is_none() && const { L::HAS_CLOCK } && pilots.structure.autonomous;
+            if let Some(choice) = by_equal_steps(pilots, stages)? {
+                return Ok(choice);
+            }
+            pilots.watches_clock = false;
+            // Where the clock leads nowhere equal steps may.
+            by_clock(pilots, BY_CLOCK).or_else(|refused| by_equal_steps(pilots, stages)?.ok_or(refused))
         }
+        Integrator::Clocked { stages } if stages >= OWN => by_clock(pilots, stages),
         _ => {
-            let found = converge(pilots, REFERENCE, wanted / 8.0, true)?;
+            let clocked = matches!(integrator, Integrator::Clocked { .. });
+            let at = if clocked { Compared::Times } else { Compared::Tenths };
+            let found = reference(pilots, REFERENCE, wanted / 8.0, at)?;
             by_reference(pilots, integrator, &found)
         }
+    }
+}
+
+/// Where pilot runs are compared.
+#[derive(Clone, Copy)]
+enum Compared {
+    /// At the ends of steps next to tenths of the span.
+    Steps,
+    /// At tenths of the span, which divide the numbers of steps.
+    Tenths,
+    /// At tenths of the span; the runs are by the motion's clock.
+    Times,
+}
+
+/// Gauss collocation that is its own reference, with equal steps; `None` where a clock takes much fewer, and these were watched.
+fn by_equal_steps<L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, '_, L, N>,
+    stages: usize,
+) -> Result<Option<Choice>, InputError> {
+    let wanted = pilots.wanted;
+    let Some(found) = converge(pilots, stages, wanted, Compared::Steps)? else { return Ok(None) };
+    // Where W or the drag changes along the motion a longer step may leave their domain, as no misfit foretells.
+    let structure = &pilots.structure;
+    let longer = structure.separable && structure.has_constant_rate();
+    let (count, error) = fewest(stages, wanted, &found, longer);
+    Ok(Some(chosen(pilots, Integrator::Gauss { stages }, count, error, &found)))
+}
+
+/// The same with steps that are equal in the time of the motion's clock.
+fn by_clock<L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, '_, L, N>,
+    stages: usize,
+) -> Result<Choice, InputError> {
+    let wanted = pilots.wanted;
+    let found = reference(pilots, stages, wanted, Compared::Times)?;
+    let (count, error) = fewest(stages, wanted, &found, false);
+    Ok(chosen(pilots, Integrator::Clocked { stages }, count, error, &found))
+}
+
+/// The runs that agree where no clock is watched.
+fn reference<L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, '_, L, N>,
+    stages: usize,
+    goal: f64,
+    compared: Compared,
+) -> Result<Converged<N>, InputError> {
+    let refused = InputError::Accuracy { wanted: pilots.wanted, reached: f64::INFINITY, cause: Obstacle::Budget };
+    converge(pilots, stages, goal, compared)?.ok_or(refused)
+}
+
+/// The choice of steps of which so many fill the span; by a clock they are counted anew, in its time.
+fn chosen<L: Lagrangian<N>, const N: usize>(
+    pilots: &Pilots<'_, '_, L, N>,
+    integrator: Integrator,
+    count: usize,
+    error: f64,
+    found: &Converged<N>,
+) -> Choice {
+    let (h, error) = (pilots.step(count, &found.marks), Some(error));
+    match integrator {
+        Integrator::Clocked { .. } => {
+            // The last step is about half of the others, so that no rounding adds one.
+            let count = (found.truth.tau / h + 0.5).ceil().max(1.0);
+            Choice { integrator, count: count as usize, h: found.truth.tau / (count - 0.5), error }
+        }
+        _ => Choice { integrator, count, h, error },
     }
 }
 
@@ -103,17 +183,21 @@ fn first_guess<L: Lagrangian<N>, const N: usize>(scene: &Scene<'_, L, N>, stages
     if count.is_finite() { (count.ceil() as usize).clamp(1, 1 << 20) } else { 1 }
 }
 
-/// Finds the runs that agree, with numbers of steps that tenths divide or any.
+/// Finds the runs that agree; `None` where one has ended since a clock would take much fewer steps.
 fn converge<L: Lagrangian<N>, const N: usize>(
     pilots: &mut Pilots<'_, '_, L, N>,
     stages: usize,
     goal: f64,
-    tenths: bool,
-) -> Result<Converged<N>, InputError> {
+    compared: Compared,
+) -> Result<Option<Converged<N>>, InputError> {
     let refuse = |wanted, reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
     let (wanted, t0, span) = (pilots.wanted, pilots.scene.t0, pilots.scene.span);
     let s = stages as f64;
-    let marks_of = |k: usize| if tenths { Marks::equal(k) } else { Marks::of(k) };
+    let marks_of = |k: usize| match compared {
+        Compared::Steps => Marks::of(k),
+        Compared::Tenths => Marks::equal(k),
+        Compared::Times => Marks::Times,
+    };
     let mut k = first_guess(pilots.scene, stages, goal);
     let mut marks = marks_of(k);
     let (mut best, mut strikes, mut narrows, mut halts) = (f64::INFINITY, 0, 0, (0, 0.0));
@@ -149,6 +233,7 @@ fn converge<L: Lagrangian<N>, const N: usize>(
                     tracks.push(track);
                     continue;
                 }
+                Ending::Uneven => return Ok(None),
                 Ending::Exhausted => {
                     return refuse(wanted, best, if best.is_finite() { Obstacle::Budget } else { cause });
                 }
@@ -183,14 +268,14 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         let rounded = 2e-15 * larger(growth, 1.0) * (k as f64).sqrt();
         let agreed = error <= 0.25 * goal || (error <= 1e-2 && beyond <= 0.1 * goal && rounded <= 0.1 * goal);
         if falls && agreed {
-            return Ok(Converged {
+            return Ok(Some(Converged {
                 k,
                 errors: [error, beyond],
                 misfit: coarse.misfit,
                 truth: fine.clone(),
                 marks,
                 narrow: narrows > 0,
-            });
+            }));
         }
         strikes = if error < 0.5 * best { 0 } else { strikes + 1 };
         cause = if !falls {
@@ -258,8 +343,8 @@ fn by_reference<L: Lagrangian<N>, const N: usize>(
     let mut count = whole((found.k * REFERENCE) as f64 / order.min(4.0));
     let (mut best, mut strikes) = (f64::INFINITY, 0);
     let (mut cause, mut before) = (Obstacle::Budget, None);
-    // The fewest steps that were seen to be enough.
-    let mut enough: Option<Choice> = None;
+    // The fewest steps that were seen to be enough, with their error.
+    let mut enough: Option<(usize, f64)> = None;
     for _ in 0..ATTEMPTS {
         if count as f64 > MOST_STEPS {
             break;
@@ -268,7 +353,7 @@ fn by_reference<L: Lagrangian<N>, const N: usize>(
             Ending::Followed(track) => {
                 let error = track.distance(&found.truth);
                 if error <= 0.7 * wanted {
-                    enough = Some(Choice { integrator, count, error: Some(error) });
+                    enough = Some((count, error));
                     // Down, where an order says that much fewer steps will do.
                     let fewer = whole(count as f64 * (error / (0.5 * wanted)).powf(1.0 / order).max(1.0 / 16.0));
                     if error > 0.2 * wanted || fewer as f64 > 0.8 * count as f64 || strikes > 0 {
@@ -312,7 +397,7 @@ fn by_reference<L: Lagrangian<N>, const N: usize>(
         count = whole(count as f64 * factor);
     }
     match enough {
-        Some(choice) => Ok(choice),
+        Some((count, error)) => Ok(chosen(pilots, integrator, count, error, found)),
         None => refuse(best, cause),
     }
 }

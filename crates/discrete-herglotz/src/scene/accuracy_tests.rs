@@ -5,7 +5,7 @@ use super::pilot::{BUDGET, Pilots};
 use super::{Scene, Steps};
 use crate::{InputError, Integrator, Obstacle, Status};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::Pendulum;
+use contact_geom::systems::{Kepler, Pendulum};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use std::time::Instant;
 
@@ -104,7 +104,7 @@ fn pilot_runs_cost_little() {
     for (span, wanted) in [(30.0, 1e-4), (30.0, 1e-7), (100.0, 1e-9), (300.0, 1e-6), (1000.0, 1e-8)] {
         let scene = Scene::new(&pendulum, at(1.0, 1.0), span).steps(Steps::Accuracy(wanted));
         let structure = pendulum.structure();
-        let mut pilots = Pilots { scene: &scene, structure, left: BUDGET, wanted };
+        let mut pilots = Pilots { scene: &scene, structure, left: BUDGET, wanted, watches_clock: false };
         let choice = choose_with(&mut pilots).unwrap();
         let run = scene.plan().unwrap().run().unwrap();
         assert_eq!(choice.count, run.steps);
@@ -112,6 +112,35 @@ fn pilot_runs_cost_little() {
         let (spent, looks) = ((BUDGET - pilots.left) as f64, 2.5 * 2.0 * 2000.0);
         let most = 7.0 * run.evaluations as f64 + looks;
         assert!(spent <= most, "{span}, {wanted:e}: {spent} evaluations for {}", run.evaluations);
+    }
+}
+
+/// So they do by a clock; and where it would gain nothing it costs nothing: the search is that for the integrator by name.
+#[test]
+fn pilot_runs_by_a_clock_cost_little() {
+    let kepler = Kepler::<2> { gamma: 0.0, mu: 1.0 };
+    let structure = kepler.structure();
+    for e in [0.0, 0.1, 0.6, 0.9, 0.99] {
+        for apocentre in [false, true] {
+            let e = if apocentre { -e } else { e };
+            let start = VelocityPoint::new([1.0 - e, 0.0], [0.0, f64::sqrt((1.0 + e) / (1.0 - e))], 0.0);
+            let scene = || Scene::new(&kepler, start, 40.0).steps(Steps::Accuracy(1e-8));
+            let search = |scene: &Scene<'_, Kepler<2>, 2>| {
+                let mut pilots = Pilots { scene, structure, left: BUDGET, wanted: 1e-8, watches_clock: false };
+                let choice = choose_with(&mut pilots).unwrap();
+                (choice.integrator, BUDGET - pilots.left)
+            };
+            let (integrator, spent) = search(&scene());
+            if e.abs() < 0.5 {
+                let equal = Integrator::Gauss { stages: 8 };
+                assert_eq!((integrator, spent), search(&scene().by(equal)), "{e}");
+                continue;
+            }
+            assert_eq!(integrator, Integrator::Clocked { stages: 8 }, "{e}");
+            let run = scene().plan().unwrap().run().unwrap();
+            let most = 7.0 * run.evaluations as f64 + 2.5 * 2.0 * 2000.0;
+            assert!(spent as f64 <= most, "{e}: {spent} evaluations for {}", run.evaluations);
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The table of integrators.
 
 use crate::{Gauss, InputError, Method, SplittingScheme};
-use contact_geom::Structure;
+use contact_geom::{Lagrangian, Structure};
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 use thiserror::Error;
@@ -16,6 +16,12 @@ pub enum Integrator {
         /// The number of stages.
         stages: usize,
     },
+    /// The same with steps that are equal in the time of the clock which an autonomous Lagrangian states: short where its motion is
+    /// fast, and the last one shorter, so that it ends where the span does.
+    Clocked {
+        /// The number of stages.
+        stages: usize,
+    },
     /// A splitting with exact rate, for `v.Mv/2 - V(t, q) + f(z)`.
     Splitting(SplittingScheme),
     /// A symmetric composition of a symmetric rule of order 2.
@@ -23,36 +29,49 @@ pub enum Integrator {
 }
 
 impl Integrator {
-    /// Every integrator by one name: quadrature rules, Gauss methods, splittings, and the compositions of the symmetric midpoint
-    /// rule.
+    /// Every integrator by one name: quadrature rules, Gauss methods, splittings, the compositions of the symmetric midpoint rule, and
+    /// Gauss methods by a clock.
     pub fn all() -> Vec<Integrator> {
         let discrete = Method::RULES.iter().copied().map(Integrator::Discrete);
         let gauss = (1..=Gauss::<()>::STAGES).map(|stages| Integrator::Gauss { stages });
         let splittings = SplittingScheme::ALL.into_iter().map(Integrator::Splitting);
         let compositions = SplittingScheme::ALL.into_iter().filter(|s| !s.is_nystrom() && s.order() > 2);
         let compositions = compositions.map(|scheme| Integrator::Composition(Method::Midpoint, scheme));
-        discrete.chain(gauss).chain(splittings).chain(compositions).collect()
+        let clocked = (1..=Gauss::<()>::STAGES).map(|stages| Integrator::Clocked { stages });
+        discrete.chain(gauss).chain(splittings).chain(compositions).chain(clocked).collect()
     }
 
-    /// The order of the flow.
+    /// The order of the flow; by a clock, in steps of its time.
     pub fn order(self) -> u32 {
         match self {
             Integrator::Discrete(method) => method.order(),
-            Integrator::Gauss { stages } => 2 * stages as u32,
+            Integrator::Gauss { stages } | Integrator::Clocked { stages } => 2 * stages as u32,
             Integrator::Splitting(scheme) | Integrator::Composition(_, scheme) => scheme.order(),
         }
     }
 
-    /// Whether a Lagrangian of this structure meets the hypotheses of the method.
+    /// Whether a Lagrangian meets the hypotheses of the method.
     ///
     /// # Errors
     /// [`InputError::Unclaimed`] with the claim that is missing, [`InputError::Hypothesis`], and [`InputError::Stages`].
-    pub fn check(self, structure: &Structure) -> Result<(), InputError> {
+    pub fn check<const N: usize, L: Lagrangian<N>>(self, lagrangian: &L) -> Result<(), InputError> {
+        self.check_form(&lagrangian.structure(), L::HAS_CLOCK)
+    }
+
+    /// The same for a Lagrangian of a form, with a clock or without.
+    fn check_form(self, structure: &Structure, has_clock: bool) -> Result<(), InputError> {
         match self {
             Integrator::Discrete(method) => method.check(structure),
-            Integrator::Gauss { stages } if !(1..=Gauss::<()>::STAGES).contains(&stages) => {
+            Integrator::Gauss { stages } | Integrator::Clocked { stages }
+                if !(1..=Gauss::<()>::STAGES).contains(&stages) =>
+            {
                 Err(InputError::Stages { found: stages })
             }
+            Integrator::Clocked { .. } if !has_clock => Err(InputError::Hypothesis {
+                hypothesis: "a Lagrangian that states a clock (`HAS_CLOCK`, `clock_rate`)",
+            }),
+            Integrator::Clocked { .. } if !structure.autonomous => Err(InputError::Unclaimed { claim: "autonomous" }),
+            Integrator::Clocked { .. } => Ok(()),
             Integrator::Gauss { .. } => Ok(()),
             Integrator::Splitting(_) if !structure.separable => Err(InputError::Unclaimed { claim: "separable" }),
             // The third flow, that of f(z), leaves the hypothesis of Runge-Kutta-Nyström methods.
@@ -70,12 +89,13 @@ impl Integrator {
     }
 }
 
-/// The name in tables: `midpoint`, `gauss_8`, `kahan_li_8`, `midpoint_by_kahan_li_8`.
+/// The name in tables: `midpoint`, `gauss_8`, `clocked_gauss_8`, `kahan_li_8`, `midpoint_by_kahan_li_8`.
 impl Display for Integrator {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         match self {
             Integrator::Discrete(method) => f.pad(method.name()),
             Integrator::Gauss { stages } => f.pad(&format!("gauss_{stages}")),
+            Integrator::Clocked { stages } => f.pad(&format!("clocked_gauss_{stages}")),
             Integrator::Splitting(scheme) => f.pad(scheme.name()),
             Integrator::Composition(method, scheme) => f.pad(&format!("{method}_by_{}", scheme.name())),
         }

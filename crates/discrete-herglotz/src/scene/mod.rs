@@ -20,12 +20,13 @@ use contact_geom::{Lagrangian, PhasePoint, Regularity, Symmetry, VelocityPoint, 
 /// The time step of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steps {
-    /// Steps of this length, made a little shorter so that a whole number of them fills the span.
+    /// Steps of this length, made a little shorter so that a whole number of them fills the span; of an integrator by a clock, steps
+    /// of this length in the clock's time, the last one shorter.
     Size(f64),
-    /// This many steps.
+    /// This many steps; not by a clock, which counts them itself.
     Count(usize),
-    /// One length for the whole run, chosen by pilot runs so that the error of (q, p), relative to its size at the time or at the end,
-    /// is at most this at every tenth of the span. The pilot runs cost a small multiple of the run; what is narrower than the
+    /// One length for the whole run, of time or of the time of the Lagrangian's clock, chosen by pilot runs so that the error of (q, p),
+    /// relative to its size at the time or at the end, is at most this at every tenth of the span. The pilot runs cost a small multiple of the run; what is narrower than the
     /// distance of their nodes, about the step divided by four times the stages, may go unseen.
     Accuracy(f64),
 }
@@ -101,8 +102,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
         Scene { t0, ..self }
     }
 
-    /// The same by this integrator. Where none is named, it is contact Gauss collocation, with stages for the wanted accuracy, or
-    /// eight where steps are given.
+    /// The same by this integrator. Where none is named, it is contact Gauss collocation: with stages for the wanted accuracy, and by
+    /// the clock that the Lagrangian states where that takes much fewer steps; or with eight stages where steps are given.
     pub fn by(self, integrator: Integrator) -> Self {
         Scene { integrator: Some(integrator), ..self }
     }
@@ -135,25 +136,33 @@ impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
             return Err(InputError::Count { what: "the steps between two rows", least: 1, found: 0 });
         }
         if let Some(integrator) = self.integrator {
-            integrator.check(&self.lagrangian.structure())?;
+            integrator.check(self.lagrangian)?;
         }
         self.check_start()?;
         let structure = verified(self.lagrangian, self.t0, &self.start)?;
         // Pilot runs look at the equations of motion along the whole span.
         let times = if matches!(self.steps, Steps::Accuracy(_)) { 4 } else { 16 };
         verified_over(self.lagrangian, self.t0, self.span, &self.start, times)?;
-        let given = |count| Choice { integrator: self.integrator.unwrap_or(DEFAULT), count, error: None };
-        let choice = match self.steps {
-            Steps::Count(0) => return Err(InputError::Count { what: "the number of steps", least: 1, found: 0 }),
-            Steps::Count(count) => given(count),
-            Steps::Size(h) if !(h > 0.0 && h.is_finite()) => return Err(InputError::Step { h }),
-            // A step that fits the span up to rounding is not made shorter.
-            Steps::Size(h) => {
-                let count = (self.span / h * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0);
-                check_count(count)?;
-                given(count as usize)
+        let given = |count: usize| {
+            let h = self.span / count as f64;
+            Choice { integrator: self.integrator.unwrap_or(DEFAULT), count, h, error: None }
+        };
+        let rate = self.clock_rate()?;
+        let choice = match (self.steps, rate) {
+            (Steps::Count(0), _) => {
+                return Err(InputError::Count { what: "the number of steps", least: 1, found: 0 });
             }
-            Steps::Accuracy(error) => accuracy::choose(self, structure, error)?,
+            (Steps::Count(_), Some(_)) => return Err(InputError::Hypothesis { hypothesis: SIZED }),
+            (Steps::Count(count), None) => given(count),
+            (Steps::Size(h), _) if !(h > 0.0 && h.is_finite()) => return Err(InputError::Step { h }),
+            // A step that fits the span up to rounding is not made shorter.
+            (Steps::Size(h), _) => {
+                let count = (self.span / (h * rate.unwrap_or(1.0)) * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0);
+                check_count(count)?;
+                let choice = given(count as usize);
+                if rate.is_some() { Choice { h, ..choice } } else { choice }
+            }
+            (Steps::Accuracy(error), _) => accuracy::choose(self, structure, error)?,
         };
         check_count(choice.count as f64)?;
         let plan = Plan::new(self, structure, &choice)?;
@@ -188,6 +197,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
         Err(InputError::FirstStep(StepError::Singular { pivot: smallest }))
     }
 
+    /// The rate of the clock at the start, where an integrator by a clock is named.
+    fn clock_rate(&self) -> Result<Option<f64>, InputError> {
+        let Some(Integrator::Clocked { .. }) = self.integrator else { return Ok(None) };
+        let rate = self.lagrangian.clock_rate(&self.start.q);
+        if rate > 0.0 && rate.is_finite() { Ok(Some(rate)) } else { Err(InputError::Clock { rate }) }
+    }
+
     /// The same for the final (q, p) alone.
     fn bare(&self) -> Self {
         Scene { wanted: Wanted { action: false, ..Wanted::default() }, ..*self }
@@ -196,6 +212,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> Scene<'a, L, N> {
 
 /// The integrator where none is named and steps are given.
 const DEFAULT: Integrator = Integrator::Gauss { stages: 8 };
+
+/// What an integrator by a clock needs.
+const SIZED: &str =
+    "steps of a given size in the time of its clock, or for a wanted accuracy, since it counts them itself";
 
 /// The largest number of steps: `t0 + k h` then still tells times a thousandth of a step apart.
 const MOST_STEPS: f64 = (1u64 << 42) as f64;

@@ -35,18 +35,24 @@ const CHUNK: usize = 1024;
 /// The parts of a span at whose ends runs are compared.
 const PARTS: usize = 10;
 
-/// The times of a span at which runs are compared: ends of steps of a run with `base` steps, which divides the steps of all others.
+/// How many times fewer steps a clock must take at the least, for its steps to be tried: each costs about so many of equal steps of the
+/// same error. Of Kepler's orbits those do of which the eccentricity is above one half.
+const PROFIT: f64 = 3.5;
+
+/// The times of a span at which runs are compared.
 #[derive(Clone, Debug)]
-pub(super) struct Marks {
-    base: usize,
-    at: Vec<usize>,
+pub(super) enum Marks {
+    /// Ends of steps of a run with `base` steps, which divides the steps of all others.
+    Steps { base: usize, at: Vec<usize> },
+    /// The ends of the tenths of a span, on which steps by a clock are made to end.
+    Times,
 }
 
 impl Marks {
     /// The ends of the tenths of a span, each moved to the end of the step in which it lies; of all steps where they are fewer.
     pub fn of(base: usize) -> Self {
         let parts = base.min(PARTS);
-        Marks { base, at: (1..=parts).map(|i| (i * base).div_ceil(parts)).collect() }
+        Marks::Steps { base, at: (1..=parts).map(|i| (i * base).div_ceil(parts)).collect() }
     }
 
     /// Equal parts of a span, as many as tenths and as steps.
@@ -56,7 +62,16 @@ impl Marks {
 
     /// The fewest steps from a number on that they divide.
     pub fn whole(&self, steps: f64) -> usize {
-        (steps / self.base as f64).ceil().max(1.0) as usize * self.base
+        let base = if let Marks::Steps { base, .. } = self { *base } else { 1 };
+        (steps / base as f64).ceil().max(1.0) as usize * base
+    }
+
+    /// The number of steps and the time, whichever a run with so many steps over a span reaches first, at the i-th mark.
+    fn stop(&self, i: usize, count: usize, t0: f64, span: f64) -> Option<(usize, f64)> {
+        match self {
+            Marks::Steps { base, at } => at.get(i).map(|mark| (mark * (count / base), f64::INFINITY)),
+            Marks::Times => (i < PARTS).then(|| (usize::MAX, t0 + span * ((i + 1) as f64 / PARTS as f64))),
+        }
     }
 }
 
@@ -66,6 +81,8 @@ pub(super) struct Track<const N: usize> {
     states: Vec<[SVector<f64, N>; 2]>,
     /// The largest misfit that was seen between the nodes of its steps.
     pub misfit: f64,
+    /// The span in the time of its clock.
+    pub tau: f64,
 }
 
 /// A 2-norm that neither overflows nor underflows.
@@ -104,6 +121,8 @@ pub(super) enum Ending<const N: usize> {
     Unresolved { part: f64 },
     /// The same, where the misfit is that of something narrow.
     Narrow { part: f64 },
+    /// Where steps by the motion's own clock are seen to be much fewer.
+    Uneven,
     /// At a step that could not be taken.
     Halted { part: f64, cause: StepError },
     /// No evaluations are left.
@@ -137,6 +156,26 @@ impl Seen {
     }
 }
 
+/// What a clock would make of the equal steps of a run so far.
+#[derive(Default)]
+struct Uneven {
+    steps: f64,
+    /// The sum of the reciprocal rates, which is the span of the clock's time in units of the step, and the largest of them.
+    sum: f64,
+    largest: f64,
+}
+
+impl Uneven {
+    /// Takes in the rate at the end of the next step, and says how many times fewer steps of the clock, all as short as the shortest of
+    /// these in its own time, lead as far.
+    fn profit(&mut self, rate: f64) -> f64 {
+        let speed = 1.0 / rate;
+        (self.steps, self.sum) = (self.steps + 1.0, self.sum + speed);
+        self.largest = larger(self.largest, speed);
+        self.largest * self.steps / self.sum
+    }
+}
+
 /// Pilot runs of a scene, with what is left of their budget.
 pub(super) struct Pilots<'s, 'a, L, const N: usize> {
     pub scene: &'s Scene<'a, L, N>,
@@ -145,6 +184,8 @@ pub(super) struct Pilots<'s, 'a, L, const N: usize> {
     pub left: u64,
     /// The error that is wanted.
     pub wanted: f64,
+    /// Whether runs with equal steps end where a clock would take much fewer.
+    pub watches_clock: bool,
 }
 
 impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
@@ -158,37 +199,68 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
         closely: bool,
         narrow: bool,
     ) -> Result<Ending<N>, InputError> {
-        let Scene { lagrangian, start, t0, span, .. } = *self.scene;
-        let gauss = Gauss::new(lagrangian, stages, span / count as f64)?;
+        let Scene { lagrangian, start, t0, .. } = *self.scene;
+        let gauss = Gauss::new(lagrangian, stages, self.step(count, marks))?;
         let state = contact_geom::legendre(lagrangian, t0, &start);
+        let points = if closely { POINTS.div_ceil(stages * count).min(SETS) } else { 1 };
+        let course = Course { count, marks, points, narrow, price: Price::of::<N>(stages) };
+        if const { L::HAS_CLOCK } && matches!(marks, Marks::Times) {
+            let mut stepper = match gauss.own_clock_stepper(self.structure, t0, state, start.v) {
+                Ok(stepper) => stepper,
+                Err(error) => return halted_at_the_start(error),
+            };
+            let ending = self.watch(&mut stepper, &course, 1, |run, sets| (run.look(sets), 0))?;
+            return Ok(ending.with_tau(stepper.tau()));
+        }
         let mut stepper = match gauss.verified_stepper(self.structure, t0, state, start.v, false) {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),
         };
         // Of a linear motion nothing is to be seen between the nodes that the order does not show.
         let linear = stepper.route() == GaussRoute::Linear;
-        let stride = if linear { CHUNK } else { 1 };
-        let sets = match closely {
-            _ if linear => 0,
-            true => POINTS.div_ceil(stages * count).min(SETS),
-            false => 1,
-        };
+        let (stride, points) = if linear { (CHUNK, 0) } else { (1, course.points) };
+        let course = Course { points, ..course };
+        self.watch(&mut stepper, &course, stride, |run, sets| (run.look(sets), run.newton_steps()))
+    }
+
+    /// The length of steps of which so many fill the span; by a clock, if its rate stayed what it is at the start.
+    pub fn step(&self, count: usize, marks: &Marks) -> f64 {
+        let h = self.scene.span / count as f64;
+        if let Marks::Times = marks { h / self.scene.lagrangian.clock_rate(&self.scene.start.q) } else { h }
+    }
+
+    /// Follows the motion with looks, by `look` at so many sets of points, which also counts the steps of Newton's method.
+    fn watch<R: Stepper<N>>(
+        &mut self,
+        run: &mut R,
+        course: &Course<'_>,
+        stride: usize,
+        look: impl Fn(&R, usize) -> (Option<Look>, u64),
+    ) -> Result<Ending<N>, InputError> {
+        let Course { count, marks, points, narrow, price } = course;
+        let Scene { lagrangian, start, .. } = *self.scene;
         let floor = larger(0.1 * self.wanted, 1e-11);
-        let price = Price::of::<N>(stages);
-        let (mut looks, mut seen) = (0, Seen::default());
-        let ending = self.follow(&mut stepper, count, marks, stride, |run, part| {
-            let ending = run.look(sets).and_then(|look| {
-                looks += sets as u64 + 1;
+        let watches_clock = self.watches_clock;
+        let (mut looks, mut seen, mut uneven) = (0, Seen::default(), Uneven::default());
+        let ending = self.follow(run, *count, marks, stride, |run, part| {
+            let (look, newton_steps) = look(run, *points);
+            let spent = |looks: u64| run.evaluations() + newton_steps * price.newton + looks * price.look;
+            if const { L::HAS_CLOCK } && watches_clock && uneven.profit(lagrangian.clock_rate(&run.state().q)) > PROFIT
+            {
+                return (Some(Ending::Uneven), spent(looks));
+            }
+            let ending = look.and_then(|look| {
+                looks += *points as u64 + 1;
                 if !seen.resolves(&look) {
                     return Some(Ending::Unresolved { part });
                 }
-                (narrow && look.misfit > NARROW * look.expected + floor).then_some(Ending::Narrow { part })
+                (*narrow && look.misfit > NARROW * look.expected + floor).then_some(Ending::Narrow { part })
             });
-            (ending, run.evaluations() + run.newton_steps() * price.newton + looks * price.look)
+            (ending, spent(looks))
         });
         // What is met nowhere else may be what a claim denies.
         if let Ending::Narrow { .. } | Ending::Unresolved { .. } = ending
-            && let Some(Defect { claim, size }) = refuted(lagrangian, stepper.time(), &stepper.state(), &start.v)
+            && let Some(Defect { claim, size }) = refuted(lagrangian, run.time(), &run.state(), &start.v)
         {
             return Err(InputError::FalseClaim { claim, size });
         }
@@ -201,7 +273,8 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
     /// Follows the motion by the scene's own integrator.
     pub fn own(&mut self, integrator: Integrator, count: usize, marks: &Marks) -> Result<Ending<N>, InputError> {
         let scene = self.scene.bare();
-        let plan = match Plan::new(&scene, self.structure, &Choice { integrator, count, error: None }) {
+        let choice = Choice { integrator, count, h: self.step(count, marks), error: None };
+        let plan = match Plan::new(&scene, self.structure, &choice) {
             Ok(plan) => plan,
             Err(error) => return halted_at_the_start(error),
         };
@@ -210,7 +283,7 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
             Err(error) => return halted_at_the_start(error),
         };
         let price = match integrator {
-            Integrator::Gauss { .. } => 1,
+            Integrator::Gauss { .. } | Integrator::Clocked { .. } => 1,
             Integrator::Splitting(_) => 4,
             // Newton's method takes second derivatives.
             Integrator::Discrete(_) | Integrator::Composition(..) => 32 * N as u64,
@@ -229,20 +302,22 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
         stride: usize,
         mut look: impl FnMut(&R, f64) -> (Option<Ending<N>>, u64),
     ) -> Ending<N> {
-        let (mut states, mut taken, mut spent) = (Vec::with_capacity(marks.at.len()), 0, 0);
+        let Scene { t0, span, .. } = *self.scene;
+        let (mut states, mut taken, mut spent) = (Vec::with_capacity(PARTS), 0, 0);
         let mut ending = None;
         while ending.is_none()
-            && let Some(mark) = marks.at.get(states.len())
+            && let Some((steps, time)) = marks.stop(states.len(), count, t0, span)
         {
-            let mark = mark * (count / marks.base);
-            let chunk = stride.min(mark - taken);
-            let halt = run.advance(chunk).err();
-            taken += halt.map_or(chunk, |halt| halt.taken);
-            let part = taken as f64 / count as f64;
+            let (done, cause) = match run.advance_until(stride.min(steps - taken), time) {
+                Ok(done) => (done, None),
+                Err(Halt { taken, cause }) => (taken, Some(cause)),
+            };
+            taken += done;
+            let part = (run.time() - t0) / span;
             let seen;
             (seen, spent) = look(run, part);
-            ending = halt.map(|Halt { cause, .. }| Ending::Halted { part, cause }).or(seen);
-            if taken == mark {
+            ending = cause.map(|cause| Ending::Halted { part, cause }).or(seen);
+            if taken == steps || run.time() >= time {
                 let x = run.state();
                 states.push([x.q, x.p]);
             }
@@ -251,7 +326,25 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
             }
         }
         self.left = self.left.saturating_sub(spent);
-        ending.unwrap_or(Ending::Followed(Track { states, misfit: 0.0 }))
+        ending.unwrap_or(Ending::Followed(Track { states, misfit: 0.0, tau: span }))
+    }
+}
+
+/// What a run that is watched is asked for.
+struct Course<'m> {
+    count: usize,
+    marks: &'m Marks,
+    /// The sets of points of a look.
+    points: usize,
+    /// Whether it ends at what is narrow beside the steps.
+    narrow: bool,
+    price: Price,
+}
+
+impl<const N: usize> Ending<N> {
+    /// With the span in the time of a clock.
+    fn with_tau(self, tau: f64) -> Self {
+        if let Ending::Followed(track) = self { Ending::Followed(Track { tau, ..track }) } else { self }
     }
 }
 

@@ -39,6 +39,11 @@ const FIRST_STEPS: usize = 64;
 /// The largest number of rows: a few gigabytes.
 const MOST_ROWS: usize = 1 << 26;
 
+fn too_many_rows(count: usize) -> InputError {
+    let (found, most, remedy) = (count as f64, MOST_ROWS as f64, "record fewer rows");
+    InputError::TooMany { what: "the number of rows", found, most, remedy }
+}
+
 /// The steps between two probes of the claims in long runs: so many that a probe costs less than one in a hundred.
 const PROBES: usize = 1 << 14;
 
@@ -64,6 +69,7 @@ pub struct Plan<'a, L, const N: usize> {
     start: PhasePoint<N>,
     guess: SVector<f64, N>,
     t0: f64,
+    t_end: f64,
     h: f64,
     count: usize,
     error: Option<f64>,
@@ -122,13 +128,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
     /// A plan of a scene whose start has been checked, and the structure probed there.
     pub(super) fn new(scene: &Scene<'a, L, N>, structure: Structure, choice: &Choice) -> Result<Self, InputError> {
         let Scene { lagrangian, start, t0, span, .. } = scene;
-        let Choice { integrator, count, error } = choice;
-        let (lagrangian, count): (&'a L, usize) = (lagrangian, *count);
+        let Choice { integrator, count, h, error } = choice;
+        let (lagrangian, count, h): (&'a L, usize, f64) = (lagrangian, *count, *h);
         let state = PhasePoint { q: start.q, p: start.v, z: start.z };
-        let h = span / count as f64;
         let engine = match integrator {
             Integrator::Discrete(method) => Engine::Discrete(method.discretise(lagrangian, h, *t0, &state)?),
-            Integrator::Gauss { stages } => Engine::Gauss(Box::new(Gauss::new(lagrangian, *stages, h)?)),
+            Integrator::Gauss { stages } | Integrator::Clocked { stages } => {
+                Engine::Gauss(Box::new(Gauss::new(lagrangian, *stages, h)?))
+            }
             Integrator::Splitting(_) | Integrator::Composition(..) => Engine::Explicit,
         };
         let mut plan = Plan {
@@ -136,6 +143,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             start: legendre(lagrangian, *t0, start),
             guess: start.v,
             t0: *t0,
+            t_end: t0 + span,
             h,
             count,
             error: *error,
@@ -151,12 +159,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         Ok(plan)
     }
 
-    /// The time step.
+    /// The time step; by a clock, in its time.
     pub fn step_size(&self) -> f64 {
         self.h
     }
 
-    /// The number of steps.
+    /// The number of steps; by a clock with steps of a given size, as many as its rate at the start lets expect.
     pub fn count(&self) -> usize {
         self.count
     }
@@ -176,7 +184,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         &self.items
     }
 
-    /// A stepper at the start, for those who drive it themselves. A splitting's does not watch whether its steps resolve the motion:
+    /// A stepper at the start, for those who drive it themselves: by a clock with [`Stepper::advance_until`], which ends where the span
+    /// does. A splitting's does not watch whether its steps resolve the motion:
     /// that costs up to a third of its time, and is for runs whose steps were not found by pilot runs.
     ///
     /// # Errors
@@ -189,9 +198,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         let (t0, start, action) = (self.t0, self.start, self.wanted.action || !self.z_decouples);
         Ok(match &self.engine {
             Engine::Discrete(ld) => Box::new(Flow::with_guess(ld, t0, start, self.guess)?),
+            Engine::Gauss(gauss) if const { L::HAS_CLOCK } && self.by_clock() => {
+                Box::new(gauss.own_clock_stepper(self.structure, t0, start, self.guess)?)
+            }
             Engine::Gauss(gauss) => Box::new(gauss.verified_stepper(self.structure, t0, start, self.guess, action)?),
             Engine::Explicit => self.explicit(self.h, t0, start, watched)?,
         })
+    }
+
+    /// Whether steps follow a clock, which ends the run.
+    fn by_clock(&self) -> bool {
+        matches!(self.integrator, Integrator::Clocked { .. })
     }
 
     /// A stepper of a splitting or a composition.
@@ -216,7 +233,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 Box::new(Composition::new(rule, scheme, h, t0, start)?)
             }
             // `new` makes no others.
-            Integrator::Discrete(_) | Integrator::Gauss { .. } => return Err(InputError::Dimension),
+            Integrator::Discrete(_) | Integrator::Gauss { .. } | Integrator::Clocked { .. } => {
+                return Err(InputError::Dimension);
+            }
         })
     }
 
@@ -227,30 +246,35 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
     pub fn run(&self) -> Result<Outcome<N>, InputError> {
         let mut stepper = self.make_stepper(self.error.is_none())?;
         let Wanted { conformal_factor, rows: stride, .. } = &self.wanted;
+        let by_clock = self.by_clock();
         // The logarithm of the product of the sigma_d; in single steps only where they differ.
         let (mut log_factor, single) = (0.0, *conformal_factor && !self.constant_rate);
         let mut rows = Vec::new();
         if let Some(stride) = stride {
-            let count = self.count / stride + 2;
+            // By a clock the number of steps may be a guess.
+            let count = if by_clock && self.error.is_none() { 2 } else { self.count / stride + 2 };
             if count > MOST_ROWS || rows.try_reserve_exact(count).is_err() {
-                let (found, most, remedy) = (count as f64, MOST_ROWS as f64, "record fewer rows");
-                return Err(InputError::TooMany { what: "the number of rows", found, most, remedy });
+                return Err(too_many_rows(count));
             }
             rows.push(self.row(&*stepper));
         }
         let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
         // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes.
-        let halves = self.error.is_none() && !matches!(self.integrator, Integrator::Gauss { stages } if stages > FEW);
-        while taken < self.count {
-            let next_row = stride.map_or(self.count, |stride| (taken / stride + 1) * stride);
+        let halves = self.error.is_none()
+            && !by_clock
+            && !matches!(self.integrator, Integrator::Gauss { stages } if stages > FEW);
+        let most = if by_clock { usize::MAX } else { self.count };
+        let mut over = false;
+        while !over {
+            let next_row = stride.map_or(most, |stride| (taken / stride + 1) * stride);
             // One mark is enough.
-            let halved = if halves && suspicion.is_none() { halved_step(taken, self.count) } else { usize::MAX };
+            let halved = if halves && suspicion.is_none() { halved_step(taken, most) } else { usize::MAX };
             let before = (taken == halved).then(|| (stepper.time(), stepper.state()));
             let next_look = if taken == halved { taken + 1 } else { halved };
-            let next = next_row.min(next_probe(taken)).min(next_look).min(self.count);
+            let next = next_row.min(next_probe(taken)).min(next_look).min(most);
             let chunk = if single { 1 } else { next - taken };
-            let (done, cause) = match stepper.advance(chunk) {
-                Ok(()) => (chunk, None),
+            let (done, cause) = match stepper.advance_until(chunk, self.t_end) {
+                Ok(done) => (done, None),
                 Err(halt) => (halt.taken, Some(halt.cause)),
             };
             if let (Some((t, from)), None) = (before, cause) {
@@ -265,10 +289,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 status = Status::Failed { step: taken, cause };
                 break;
             }
-            if stride.is_some_and(|stride| taken % stride == 0 || taken == self.count) {
+            over = taken == most || by_clock && stepper.time() >= self.t_end;
+            if stride.is_some_and(|stride| taken % stride == 0 || over) {
+                if rows.len() == MOST_ROWS {
+                    return Err(too_many_rows(rows.len() + 1));
+                }
                 rows.push(self.row(&*stepper));
             }
-            if taken == self.count || taken == next_probe(taken - 1) {
+            if over || taken == next_probe(taken - 1) {
                 suspicion = first(suspicion, stepper.suspicion());
                 if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
                     status = Status::FalseClaim { step: taken, claim, size };
@@ -308,10 +336,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         let mut taken = 0;
         while taken < self.count.min(FIRST_STEPS) {
             let steps = next_probe(taken).min(self.count) - taken;
-            if stepper.advance(steps).is_err() {
-                break;
+            match stepper.advance_until(steps, self.t_end) {
+                Ok(done) if done > 0 => taken += done,
+                _ => break,
             }
-            taken += steps;
             if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
                 return Err(InputError::FalseClaim { claim, size });
             }
@@ -332,6 +360,19 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         let mut items = Vec::new();
         let mut say = |what, computed, why: &str| items.push(Item { what, computed, why: why.into() });
         match (&self.engine, &self.integrator) {
+            (_, Integrator::Clocked { .. }) => {
+                say(
+                    "time step",
+                    true,
+                    "the clock's rate follows the motion: equal steps of its time, a shorter one at the end",
+                );
+                say("iteration", true, "velocities, actions, factors and rates of the stages, to round-off");
+                let why =
+                    if structure.constant_mass { "W is constant: inverted once" } else { "at the stages, once a step" };
+                say("mass matrix", !structure.constant_mass, why);
+                say("Jacobian", false, "the iteration needs gradients alone");
+                say("Newton's method", false, "steps whose iteration does not contract are refused");
+            }
             (Engine::Gauss(gauss), _) => {
                 let route = gauss.verified_stepper(structure, self.t0, self.start, start.v, false)?.route();
                 self.constant_rate = matches!(route, GaussRoute::Linear | GaussRoute::Condensed);
@@ -418,8 +459,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
 
 impl<L, const N: usize> Display for Plan<'_, L, N> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        let end = self.t0 + self.count as f64 * self.h;
-        writeln!(f, "{} steps of {} by {}, t = {} .. {end}", self.count, self.h, self.integrator, self.t0)?;
+        let Plan { count, h, integrator, t0, t_end, .. } = self;
+        let of = if let Integrator::Clocked { .. } = integrator { " of the clock's time" } else { "" };
+        writeln!(f, "{count} steps of {h}{of} by {integrator}, t = {t0} .. {t_end}")?;
         for (title, computed) in [("computed", true), ("skipped", false)] {
             writeln!(f, "{title}:")?;
             for item in self.items.iter().filter(|item| item.computed == computed) {

@@ -2,6 +2,7 @@
 
 use super::{GaussStepper, Route};
 use crate::Suspicion;
+use crate::gauss::extension::Physical;
 use crate::gauss::look::{Compare, Curve, Look, SETS};
 use crate::watch::misfit;
 use contact_geom::Lagrangian;
@@ -25,7 +26,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step.
     pub(crate) fn look(&self, sets: usize) -> Option<Look> {
         let curve = self.arch.dispatch(Stages { run: self })?;
-        let at = |set| self.arch.dispatch(Compare { lagrangian: self.lagrangian, curve: &curve, set });
+        let at = |set| self.arch.dispatch(Compare { lagrangian: self.lagrangian, pace: &Physical, curve: &curve, set });
         (0..sets).map(at).reduce(Look::and)
     }
 

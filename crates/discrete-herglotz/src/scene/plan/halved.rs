@@ -37,6 +37,7 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         let h = 0.5 * self.h;
         let end = |run: &mut dyn Stepper<N>| Some(run.advance(2).map(|()| run.state()));
         match self.integrator {
+            Integrator::Clocked { .. } => None,
             Integrator::Gauss { stages } if stages > FEW => None,
             Integrator::Gauss { stages } => {
                 let half = Gauss::new(self.lagrangian, stages, h).ok()?;

@@ -7,7 +7,7 @@ use crate::random::Random;
 use crate::report::Report;
 use crate::statistics::quantile;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger};
+use contact_geom::{PhasePoint, VelocityPoint, larger};
 use discrete_herglotz::{InputError, Integrator, Method, Scene, SplittingScheme, Steps};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -138,9 +138,8 @@ fn fastest<T>(call: impl Fn() -> T) -> (f64, T) {
 
 /// The time of the fastest of the configurations that keeps the tolerance, each with the fewest steps that do.
 fn by_hand<const N: usize>(problem: &Problem<N>, truth: &PhasePoint<N>, tolerance: f64, first: bool) -> Option<f64> {
-    let structure = problem.system.structure();
     let mut best: Option<f64> = None;
-    for integrator in CONFIGURATIONS.into_iter().filter(|i| i.check(&structure).is_ok()) {
+    for integrator in CONFIGURATIONS.into_iter().filter(|i| i.check(&problem.system).is_ok()) {
         let keeps = |count: f64| problem.by(integrator, count as usize).error(truth, 0.0) <= tolerance;
         let mut count = (problem.span / 4.0).ceil().max(1.0);
         while count < MOST_STEPS && !keeps(count) {
@@ -170,7 +169,7 @@ fn solve<const N: usize, const D: usize>(
     named: Option<Integrator>,
     compared: bool,
 ) -> Option<Found> {
-    let named = named.filter(|integrator| integrator.check(&problem.system.structure()).is_ok());
+    let named = named.filter(|integrator| integrator.check(&problem.system).is_ok());
     let scene = || -> Scene<'_, Formula<N>, N> {
         let scene = problem.scene().steps(Steps::Accuracy(tolerance));
         match named {

@@ -126,7 +126,7 @@ fn same_bits(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fai
     let steps = 1001;
     let (mut again, mut pieces, mut recorded) = (0, 0, 0);
     for (name, system) in systems {
-        let applies = |i: &Integrator| i.check(&contact_geom::Lagrangian::structure(&system)).is_ok();
+        let applies = |i: &Integrator| i.check(&system).is_ok();
         for integrator in FAMILIES.into_iter().filter(applies) {
             let problem = Problem { system, t0: 0.0, start, span: H * f64::from(steps) };
             let scene = || problem.scene().by(integrator).steps(Steps::Count(steps as usize));

@@ -33,8 +33,8 @@ fn factor(integrator: Integrator) -> f64 {
         Integrator::Composition(_, scheme) => {
             scheme.substeps().map_or(f64::NAN, |g| g.iter().map(|g| rational(*g)).sum())
         }
-        // Gauss methods have the Pade approximation of e^x, which at this x is e^x from two stages on.
-        Integrator::Gauss { .. } | Integrator::Splitting(_) => 2.0 * half,
+        // Gauss methods have the Pade approximation of e^x, which at this x is e^x from two stages on; by a clock its steps differ.
+        Integrator::Gauss { .. } | Integrator::Clocked { .. } | Integrator::Splitting(_) => 2.0 * half,
     }
 }
 

@@ -180,7 +180,7 @@ fn poles(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
             End::Whole(x) => (Worth::Wrong, misses(x)),
             other => (other.worth(&problem.state(), 0.0, bound), f64::NAN),
         };
-        let applies = |i: &Integrator| i.check(&contact_geom::Lagrangian::structure(&system)).is_ok();
+        let applies = |i: &Integrator| i.check(&system).is_ok();
         for (integrator, count) in FAMILIES.into_iter().filter(applies).flat_map(|i| [20, 400].map(|n| (i, n))) {
             let (worth, error) = worth(&problem.by(integrator, count), ORDER_ONE);
             table.add("pole", integrator, sideways, worth, error);
@@ -201,7 +201,7 @@ fn light(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
         let start = VelocityPoint::new([size], [0.0], 0.0);
         let problem = Problem { system, t0: 0.0, start, span: 2.0 * size };
         let exact = problem.exact_in(64)?;
-        let applies = |i: &Integrator| i.check(&contact_geom::Lagrangian::structure(&system)).is_ok();
+        let applies = |i: &Integrator| i.check(&system).is_ok();
         for (integrator, count) in FAMILIES.into_iter().filter(applies).flat_map(|i| [8, 64, 512].map(|n| (i, n))) {
             let (worth, error) = problem.worth(integrator, count, &exact, 0.0);
             table.add("light", integrator, size, worth, error);

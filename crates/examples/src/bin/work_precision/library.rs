@@ -17,7 +17,9 @@ pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
 }
 
 fn of<L: Lagrangian<N>, const N: usize>(lagrangian: &'static L, problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
-    let applicable = |integrator: &Integrator| integrator.check(&lagrangian.structure()).is_ok();
+    // Those of one step size: by a clock the number of steps is found by the run.
+    let fixed = |integrator: &Integrator| !matches!(integrator, Integrator::Clocked { .. });
+    let applicable = |integrator: &Integrator| fixed(integrator) && integrator.check(lagrangian).is_ok();
     let chosen = Integrator::all().into_iter().filter(applicable);
     chosen.map(|integrator| of_library(lagrangian, integrator, problem, z)).collect()
 }
