@@ -3,9 +3,9 @@
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::motion::{Motion, Progress, Reached};
 use super::separable::Separable;
-use crate::{Halt, InputError, SplittingScheme, Stepper, Suspicion};
+use crate::{Doubt, Halt, InputError, SplittingScheme, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, larger};
+use contact_geom::{Lagrangian, PhasePoint};
 
 /// A splitting at work on `L = v.Mv/2 - V(t, q) + f(z)`, in three exact flows: the kinetic part `A`, the kick `B` of `-V`, and
 /// the flow `C` of f, an [`ActionFlow`]. A substep is the symmetric `C B A B C`, each but A over half its length; steps are
@@ -132,6 +132,10 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
     fn suspicion(&self) -> Option<Suspicion> {
         self.progress.watch.first
     }
+
+    fn doubt(&mut self) -> Option<Doubt<N>> {
+        self.progress.watch.doubt.take()
+    }
 }
 
 /// The motion after some steps more, and its state.
@@ -142,7 +146,7 @@ fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool>(
     from: &Progress<N>,
     steps: usize,
 ) -> Reached<N> {
-    let (mut m, mut misfit, (z, constant)) = (from.motion, 0.0, table.rest);
+    let (mut m, mut seen, (z, constant)) = (from.motion, from.seen(), table.rest);
     for k in 0..steps {
         let t = from.time_after(k);
         m.sigma = 1.0;
@@ -156,13 +160,13 @@ fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool>(
             m.q.add::<COMPENSATED>(|i, _| stage.length * v[i]);
             let force = m.force;
             (m.value, m.force) = form.kick(t + stage.time, &m.q.value, z);
-            misfit = larger(misfit, m.misfit(&momentum, &force, stage.length));
+            m.look(&momentum, &force, stage.length, &mut seen);
             m.value -= constant;
             m.kick::<true, COMPENSATED>(stage.half);
         }
         apply::<C, N, COMPENSATED>(&mut m, &table.closing);
     }
-    Reached { motion: m, state: m.state(), misfit }
+    Reached { motion: m, state: m.state(), seen }
 }
 
 /// The flow of f, and its factor.
