@@ -206,6 +206,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
         Ok(match &self.integrator {
             Integrator::Splitting(scheme) if !self.z_decouples => {
                 let splitting = ActionSplitting::new(self.lagrangian, scheme, h, t0, start)?;
+                let splitting = if watched { splitting.doubting() } else { splitting };
                 Box::new(if self.moves_little(h) { splitting.compensated() } else { splitting })
             }
             Integrator::Splitting(scheme) => {

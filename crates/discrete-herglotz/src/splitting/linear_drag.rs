@@ -213,7 +213,7 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
                     self.kick_and_drift::<ACTION, COMPENSATED, TIMED>(&mut m, t, stage);
                     (m.value, m.force) = form.kick(t + stage.time, &m.q.value, 0.0);
                     if WATCHED {
-                        m.look(&momentum, &force, stage.span, &mut seen);
+                        m.look::<true>(&momentum, &force, stage.span, &mut seen);
                     }
                 }
             }

@@ -70,7 +70,13 @@ impl<const N: usize> Motion<N> {
     /// Looks at a drift over the time s, between the momentum and the force before it and those that the motion holds, as a
     /// [`Watch`] does at steps as long as the drift.
     #[inline(always)]
-    pub(super) fn look(&mut self, momentum: &SVector<f64, N>, force: &SVector<f64, N>, s: f64, seen: &mut Seen) {
+    pub(super) fn look<const DOUBTS: bool>(
+        &mut self,
+        momentum: &SVector<f64, N>,
+        force: &SVector<f64, N>,
+        s: f64,
+        seen: &mut Seen,
+    ) {
         let now = (self.force - force) * s;
         let before = std::mem::replace(&mut self.change, now);
         if now.dot(&before) < 0.0 {
@@ -79,7 +85,7 @@ impl<const N: usize> Motion<N> {
                 seen.misfit = larger(seen.misfit, misfit);
             }
         }
-        if let Some(sharpness) = sharper([&now, &self.p.value, &self.q.value], s, seen.floor, seen.sharpest) {
+        if DOUBTS && let Some(sharpness) = sharper([&now, &self.p.value, &self.q.value], s, seen.floor, seen.sharpest) {
             seen.sharpest = sharpness;
         }
     }
