@@ -3,7 +3,7 @@
 use super::Plan;
 use crate::gauss::velocity;
 use crate::watch::rounding;
-use crate::{Doubt, Integrator, Suspicion};
+use crate::{Doubt, Integrator, Method, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, herglotz_rates, larger, largest};
 
@@ -33,6 +33,13 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
             Integrator::Splitting(_) | Integrator::Composition(..) => 0.5 * self.h,
             Integrator::Discrete(_) | Integrator::Gauss { .. } => 0.0,
         };
+        // However strong.
+        let exact_drag = matches!(
+            self.integrator,
+            Integrator::Splitting(_)
+                | Integrator::Discrete(Method::Strang)
+                | Integrator::Composition(Method::Strang, _)
+        );
         let before = if *step > 0 { aside } else { 0.0 };
         let after = if step + steps < self.count { aside } else { 0.0 };
         let size = |x: &SVector<f64, N>| largest(x.iter().copied());
@@ -42,7 +49,8 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
             let x = between(&start, &end, span, at);
             speed = larger(speed, size(&x.v));
             // Where the curve leaves the domain of L this is not finite: the steps are none of the motion's.
-            *acceleration = herglotz_rates(self.lagrangian, t + at, &x).ok()?.0.y;
+            let (rates, drag) = herglotz_rates(self.lagrangian, t + at, &x).ok()?;
+            *acceleration = if exact_drag { rates.y - x.v * drag } else { rates.y };
         }
         let jump = largest(accelerations.windows(3).map(|a| size(&(a[2] - a[1] * 2.0 + a[0]))));
         let rounded = jump * self.h * self.h <= rounding(&self.start.q, &self.guess, self.h);
