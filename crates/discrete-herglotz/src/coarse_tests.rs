@@ -1,8 +1,10 @@
 //! Steps that are far too long are marked or refused, by every integrator; and what must not decide about them.
 
-use crate::{Gauss, InputError, Integrator, Scene, Status, Stepper, Steps, Suspicion};
+use crate::{
+    Gauss, InputError, Integrator, Method, Scene, SplittingScheme, Status, StepError, Stepper, Steps, Suspicion,
+};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{HarmonicOscillator, Pendulum};
+use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 
 /// How a run of three given steps ends, and its mark; where it begins.
@@ -96,4 +98,187 @@ fn a_guess_of_the_velocity_may_be_of_any_size() {
             "from {guess:e}: {found:?}"
         );
     }
+}
+
+/// `v^2/2 - q^2/2 - slope |q - at|`, whose force jumps.
+struct Kinked {
+    at: f64,
+    slope: f64,
+}
+
+impl Lagrangian<1> for Kinked {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        (v[0] * v[0] - q[0] * q[0]) * 0.5 - (q[0] - self.at).abs() * self.slope
+    }
+    fn structure(&self) -> Structure {
+        Structure { autonomous: true, z_free: true, separable: true, constant_mass: true, ..Structure::default() }
+    }
+}
+
+/// The integrators whose steps tell nothing between their nodes.
+fn blind() -> impl Iterator<Item = Integrator> {
+    Integrator::all().into_iter().filter(|i| !matches!(i, Integrator::Gauss { stages } if *stages > 2))
+}
+
+/// A force that jumps by a tenth of the velocity in a step is seen, wherever in the run and in the step it jumps.
+#[test]
+fn no_energy_is_lost_over_a_kink_in_silence() {
+    let (mut lost, mut kept) = (Vec::new(), 0);
+    for (at, slope) in [(0.3, 1.0), (0.0, 5.0), (-0.2, 100.0)] {
+        let system = Kinked { at, slope };
+        let energy = |q: f64, p: f64| 0.5 * (p * p + q * q) + slope * (q - at).abs();
+        for (integrator, count) in blind().flat_map(|i| [10, 50, 200].map(|n| (i, n))) {
+            let scene = Scene::new(&system, VelocityPoint::new([1.0], [0.0], 0.0), 3.0);
+            let run = scene.by(integrator).steps(Steps::Count(count)).plan().and_then(|plan| plan.run());
+            let Ok(end) = run else { continue };
+            if (end.status, end.suspicion) != (Status::Completed, None) {
+                continue;
+            }
+            let off = energy(end.q[0], end.p[0]) / energy(1.0, 0.0) - 1.0;
+            if off.abs() <= 0.1 {
+                kept += 1;
+            } else {
+                lost.push((slope, integrator.to_string(), count, off));
+            }
+        }
+    }
+    assert!(lost.is_empty(), "{} lost, {kept} kept: {lost:?}", lost.len());
+    // Short steps are not marked.
+    assert!(kept > 50, "{kept}");
+}
+
+/// A revolution of a thin orbit, whose passage of the centre is over in a step or two.
+#[test]
+fn a_centre_that_is_passed_in_a_step_is_marked() {
+    let system = Kepler::<2> { mu: 1.0, gamma: 0.0 };
+    let mut silent = Vec::new();
+    for e in [0.9, 0.97, 0.99, 0.999] {
+        let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
+        for (integrator, count) in blind().flat_map(|i| (20..40).step_by(3).chain([32]).map(move |n| (i, n))) {
+            let scene = Scene::new(&system, start, std::f64::consts::TAU).by(integrator).steps(Steps::Count(count));
+            let Ok(end) = scene.plan().and_then(|plan| plan.run()) else { continue };
+            let off = (end.q - start.q).norm() + (end.p - start.v).norm();
+            if (end.status, end.suspicion) == (Status::Completed, None) && off > 0.3 {
+                silent.push((e, integrator.to_string(), count, off));
+            }
+        }
+    }
+    assert!(silent.is_empty(), "{}: {silent:?}", silent.len());
+}
+
+/// Steps that resolve the motion raise doubts where they are long, and no mark.
+#[test]
+fn a_doubt_is_no_mark() {
+    let start = VelocityPoint::new([1.0], [0.3], 0.0);
+    for integrator in Integrator::all().into_iter().filter(|i| i.order() > 1) {
+        let parts =
+            if let Integrator::Gauss { stages } = integrator { f64::max(0.5 * stages as f64, 1.0) } else { 1.0 };
+        for radians in [0.1, 0.2, 0.3, 0.4] {
+            for count in [10, 100] {
+                let system = Pendulum { gamma: -0.01 };
+                let scene = Scene::new(&system, start, radians * parts * f64::from(count));
+                let end = scene.by(integrator).steps(Steps::Count(count as usize)).plan().unwrap().run().unwrap();
+                assert_eq!((end.status, end.suspicion), (Status::Completed, None), "{integrator}, {radians} x {count}");
+            }
+        }
+    }
+}
+
+/// A pendulum by `sin(q + pi/2)`, whose forces beside the origin are rounded like those at pi/2.
+struct Shifted;
+
+impl Lagrangian<1> for Shifted {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 + (q[0] + std::f64::consts::FRAC_PI_2).sin() - z
+    }
+    fn structure(&self) -> Structure {
+        Structure {
+            autonomous: true,
+            z_affine: true,
+            constant_rate: true,
+            separable: true,
+            constant_mass: true,
+            ..Structure::default()
+        }
+    }
+}
+
+/// What has come to rest beside the origin moves by its rounding alone, which is no motion to be resolved.
+#[test]
+fn a_motion_at_rest_is_not_marked() {
+    for scheme in SplittingScheme::ALL {
+        for count in [1000, 1024] {
+            let start = VelocityPoint::new([1.0], [0.3], 0.0);
+            let scene = Scene::new(&Shifted, start, 0.1 * f64::from(count)).by(Integrator::Splitting(scheme));
+            let end = scene.steps(Steps::Count(count as usize)).plan().unwrap().run().unwrap();
+            assert_eq!((end.status, end.suspicion), (Status::Completed, None), "{}, {:e}", scheme.name(), end.q[0]);
+            assert!(end.q[0].abs() < 1e-14, "{}, {:e}", scheme.name(), end.q[0]);
+        }
+    }
+    // A known issue: the equations of an implicit step have no solution there, as forces jump from one number to the next.
+    let scene = Scene::new(&Shifted, VelocityPoint::new([1.0], [0.3], 0.0), 100.0);
+    let end = scene.by(Integrator::Discrete(Method::Midpoint)).steps(Steps::Count(1000)).plan().unwrap().run().unwrap();
+    assert!(matches!(end.status, Status::Failed { cause: StepError::NotConverged { .. }, .. }), "{:?}", end.status);
+}
+
+/// A known issue: a step that ends at a centre of force has nodes on one side of it alone.
+#[test]
+fn many_stages_pass_a_centre_at_the_end_of_a_step() {
+    let system = Kepler::<2> { mu: 1.0, gamma: 0.0 };
+    let e = 0.999;
+    let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
+    let run = |count| {
+        let scene = Scene::new(&system, start, std::f64::consts::TAU).by(Integrator::Gauss { stages: 8 });
+        scene.steps(Steps::Count(count)).plan().unwrap().run().unwrap()
+    };
+    let silent = run(20);
+    assert_eq!((silent.status, silent.suspicion), (Status::Completed, None));
+    assert!((silent.q - start.q).norm() > 1.0, "{}", silent.q);
+    assert_ne!(run(21).suspicion, None);
+}
+
+/// Steps that move by so little that each is rounded in the same way: the sum of many loses none of it.
+#[test]
+fn tiny_steps_lose_nothing() {
+    let (system, count) = (Pendulum { gamma: -0.1 }, 1000);
+    let (q, v) = (1.0, 0.7);
+    for (scheme, h) in SplittingScheme::ALL.into_iter().flat_map(|s| [1e-12, 1e-11, 1e-10].map(|h| (s, h))) {
+        let scene = Scene::new(&system, VelocityPoint::new([q], [v], 0.0), h * f64::from(count));
+        let scene = scene.by(Integrator::Splitting(scheme)).steps(Steps::Count(count as usize));
+        let end = scene.plan().unwrap().run().unwrap();
+        // Taylor's series; the time is 1e-7 at most.
+        let (t, a) = (h * f64::from(count), -f64::sin(q) - 0.1 * v);
+        let (right_q, right_p) = (q + t * (v + 0.5 * t * a), v + t * (a + 0.5 * t * (-f64::cos(q) * v - 0.1 * a)));
+        // A rounding of the start, the end and the series.
+        let off = f64::max((end.q[0] - right_q).abs(), (end.p[0] - right_p).abs());
+        assert!(off <= 4.0 * f64::EPSILON, "{}, h = {h:e}: {off:e}", scheme.name());
+    }
+}
+
+/// Two coordinates of which the first has a mass that grows with z, from below zero: the motion ends where it vanishes.
+struct Massless;
+
+impl Lagrangian<2> for Massless {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+        v[0] * v[0] * (q[1] * z * 0.588 - 0.064) * 0.5 + v[1] * v[1] * 252.0
+    }
+}
+
+/// A step may have a solution beyond the end of its motion, and so may all after it.
+#[test]
+fn a_step_past_the_end_of_a_motion_is_marked() {
+    let start = VelocityPoint::new([-0.674, 0.863], [1.348, 0.541], 0.0);
+    let (mut silent, mut whole) = (Vec::new(), 0);
+    for integrator in blind() {
+        // The mass vanishes after 0.0017.
+        for count in [10, 20, 40] {
+            let scene = Scene::new(&Massless, start, 1.6).by(integrator).steps(Steps::Count(count));
+            let Ok(end) = scene.plan().and_then(|plan| plan.run()) else { continue };
+            whole += u32::from(end.status == Status::Completed);
+            if (end.status, end.suspicion) == (Status::Completed, None) {
+                silent.push((integrator.to_string(), count));
+            }
+        }
+    }
+    assert!(silent.is_empty() && whole > 0, "{silent:?} of {whole}");
 }

@@ -1,7 +1,9 @@
 //! Symmetric compositions of discrete flows.
 
-use crate::watch::{Watch, turning};
-use crate::{DiscreteLagrangian, Halt, InputError, Solver, SplittingScheme, StepError, Stepper, Suspicion, Transition};
+use crate::watch::{Watch, sharper, turning};
+use crate::{
+    DiscreteLagrangian, Doubt, Halt, InputError, Solver, SplittingScheme, StepError, Stepper, Suspicion, Transition,
+};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
@@ -38,7 +40,9 @@ pub struct Composition<D, const N: usize> {
     /// The difference quotient of the last two mean velocities, and its last change over a substep.
     acceleration: SVector<f64, N>,
     change: SVector<f64, N>,
-    watch: Watch,
+    /// The state before the last step.
+    before: PhasePoint<N>,
+    watch: Watch<N>,
 }
 
 /// One substep: its rule by index, and the earlier of its two times after the step's start.
@@ -111,7 +115,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             solver: Solver::default(),
             acceleration: SVector::zeros(),
             change: SVector::zeros(),
-            watch: Watch::default(),
+            before: state,
+            watch: Watch::new(&state.q, &SVector::zeros(), h),
         };
         if let Some(first) = composition.substeps.first().copied() {
             let guess = SVector::zeros();
@@ -141,15 +146,24 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
     /// One step; the state changes only if each substep can be taken.
     fn step(&mut self) -> Result<(), StepError> {
         let (mut state, mut velocity, mut sigma) = (self.state, self.velocity, 1.0);
+        let mut sharpest = self.watch.sharpest;
         for i in 0..self.substeps.len() {
             let substep = self.substeps[i];
             let next = self.substep(&substep, &state, &velocity)?;
             sigma *= if substep.back { 1.0 / next.sigma } else { next.sigma };
-            self.watch(&substep, &velocity, &next);
+            self.watch(&substep, &velocity, &next, &mut sharpest);
             // Newton's method evaluates once for each iteration, and once where it ends.
             self.evaluations += u64::from(next.iterations) + 1;
             (state, velocity) = (next.end, next.velocity);
         }
+        if sharpest > self.watch.sharpest
+            && let Some(step) = self.taken.checked_sub(1)
+        {
+            // What turns the first mean velocity may lie in the step before.
+            let t = self.t0 + step as f64 * self.h;
+            self.watch.doubt(sharpest, Doubt { step, steps: 2, t, from: self.before, to: state });
+        }
+        self.before = self.state;
         (self.state, self.velocity, self.sigma) = (state, velocity, sigma);
         self.taken += 1;
         Ok(())
@@ -160,7 +174,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
     /// Looks whether a substep resolves the motion: by its rule's factor, and by the second differences of the mean velocities
     /// along a time as long as the substep. The first step has nothing before it to compare with.
     #[inline(always)]
-    fn watch(&mut self, substep: &Substep, before: &SVector<f64, N>, next: &Transition<N>) {
+    fn watch(&mut self, substep: &Substep, before: &SVector<f64, N>, next: &Transition<N>, sharpest: &mut f64) {
         let now = &next.velocity;
         let acceleration = (now - before) / substep.apart;
         let last = std::mem::replace(&mut self.acceleration, acceleration);
@@ -168,12 +182,15 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         let last = std::mem::replace(&mut self.change, change);
         if self.taken > 0 {
             let found = if change.dot(&last) < 0.0 {
-                turning([&last, &change], [before, now, now], &next.end.q, substep.length)
+                turning([&last, &change], [before, now, now], &next.end.q, substep.length, self.watch.floor)
             } else {
                 None
             };
             if let Some(misfit) = found {
                 self.watch.note(self.taken, misfit);
+            }
+            if let Some(sharpness) = sharper([&change, now, &next.end.q], substep.length, self.watch.floor, *sharpest) {
+                *sharpest = sharpness;
             }
         }
         if let Some(misfit) = self.rules[substep.rule].misfit([now; 4], &next.end, next.sigma) {
@@ -205,5 +222,9 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
 
     fn suspicion(&self) -> Option<Suspicion> {
         self.watch.first
+    }
+
+    fn doubt(&mut self) -> Option<Doubt<N>> {
+        self.watch.doubt.take()
     }
 }

@@ -79,5 +79,6 @@ pub use splitting::{
 };
 pub use stepper::{Halt, Stepper};
 pub use verified::verified;
+pub use watch::Doubt;
 
 pub use contact_geom;

@@ -332,7 +332,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
 
     #[inline(always)]
     fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
-        factor_misfit(sigma).or_else(|| misfit(velocities, &to.q, self.h))
+        factor_misfit(sigma).or_else(|| misfit(velocities, &to.q, self.h, 0.0))
     }
 
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {

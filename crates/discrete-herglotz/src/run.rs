@@ -1,8 +1,8 @@
 //! Runs: many steps of a discrete Hamiltonian flow, recording only what is asked for.
 
 use crate::legendre::{discrete_regularity, legendre_minus};
-use crate::watch::Watch;
-use crate::{DiscreteLagrangian, Halt, InputError, Solver, Status, StepError, Stepper, Suspicion};
+use crate::watch::{Watch, at_rest, sharper};
+use crate::{DiscreteLagrangian, Doubt, Halt, InputError, Solver, Status, StepError, Stepper, Suspicion, Transition};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, GeometryError, PhasePoint};
 use std::ops::ControlFlow;
@@ -140,7 +140,9 @@ pub struct Flow<'a, D, const N: usize> {
     /// `sigma_d` of the last step.
     sigma: f64,
     evaluations: u64,
-    watch: Watch,
+    /// The state before the last step.
+    before: PhasePoint<N>,
+    watch: Watch<N>,
 }
 
 impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
@@ -166,8 +168,8 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
         // A singular Lagrangian is the reason of what goes wrong, where something does.
         ld.check_start(t0, &state, &first.map_or(guess, |step| step.velocity))?;
         let first = first.map_err(InputError::first_step)?;
-        let (velocities, watch) = ([first.velocity; 3], Watch::default());
-        Ok(Flow { ld, t0, k: 0, state, velocities, solver, sigma: 1.0, evaluations: 0, watch })
+        let (velocities, watch) = ([first.velocity; 3], Watch::new(&state.q, &first.velocity, ld.step_size()));
+        Ok(Flow { ld, t0, k: 0, state, velocities, solver, sigma: 1.0, evaluations: 0, before: state, watch })
     }
 
     /// A flow from the two positions `q0, q1` and the action `z0`: its state at `t0` is `F-L_d (q0, q1, z0)`.
@@ -228,8 +230,18 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
             sigma: next.sigma,
             iterations: next.iterations,
         };
-        if let Some(misfit) = self.ld.misfit([&earlier, &before, &latest, &next.velocity], &next.end, next.sigma) {
-            self.watch.note(self.k - 1, misfit);
+        let velocities = [&earlier, &before, &latest, &next.velocity];
+        if let Some(misfit) = self.ld.misfit(velocities, &next.end, next.sigma) {
+            self.suspect(misfit, velocities, &next);
+        }
+        // The first velocity has none before it.
+        let (turn, h) = (next.velocity - latest * 2.0 + before, self.ld.step_size());
+        if let Some(sharpness) = sharper([&turn, &latest, &next.end.q], h, self.watch.floor, self.watch.sharpest)
+            && let Some(step) = self.k.checked_sub(2).filter(|step| *step > 0)
+        {
+            // What turns mean velocities lies in this step or the last.
+            let doubt = Doubt { step, steps: 2, t: self.t0 + step as f64 * h, from: self.before, to: next.end };
+            self.watch.doubt(sharpness, doubt);
         }
         // Before the first step velocities changed as they do in the second, for all that is known.
         self.velocities = match self.k {
@@ -237,11 +249,23 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
             2 => [next.velocity, latest, latest * 2.0 - next.velocity],
             _ => [next.velocity, latest, before],
         };
+        self.before = self.state;
         self.state = next.end;
         self.sigma = next.sigma;
         // A second jet an iteration, and the jet that makes the next momentum.
         self.evaluations += u64::from(next.iterations) + 1;
         Ok(step)
+    }
+
+    /// Notes the misfit of a step. What is at rest turns by its rounding, and has a misfit by its factor alone.
+    #[cold]
+    #[inline(never)]
+    fn suspect(&mut self, misfit: f64, velocities: [&SVector<f64, N>; 4], next: &Transition<N>) {
+        let still = at_rest(velocities, self.ld.step_size(), self.watch.floor);
+        let of_factor = || self.ld.misfit([&SVector::zeros(); 4], &next.end, next.sigma);
+        if let Some(misfit) = if still { of_factor() } else { Some(misfit) } {
+            self.watch.note(self.k - 1, misfit);
+        }
     }
 
     /// Takes up to `steps` steps, showing each to the observer. The flow stays at the last state reached, and can go on.
@@ -311,6 +335,10 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<'_, D, N> {
 
     fn suspicion(&self) -> Option<Suspicion> {
         self.watch.first
+    }
+
+    fn doubt(&mut self) -> Option<Doubt<N>> {
+        self.watch.doubt.take()
     }
 }
 

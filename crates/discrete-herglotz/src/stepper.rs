@@ -1,6 +1,6 @@
 //! A method at work on one motion.
 
-use crate::{StepError, Suspicion};
+use crate::{Doubt, StepError, Suspicion};
 use contact_geom::PhasePoint;
 
 /// A method at work on one motion: its state, its workspace, and what it carries from one step to the next (guesses,
@@ -39,6 +39,11 @@ pub trait Stepper<const N: usize> {
 
     /// The first step so far that cannot have resolved the motion, where one was seen.
     fn suspicion(&self) -> Option<Suspicion> {
+        None
+    }
+
+    /// The last steps since the last call that are in doubt: they may not have resolved the motion.
+    fn doubt(&mut self) -> Option<Doubt<N>> {
         None
     }
 }

@@ -75,6 +75,7 @@ pub const ATTACKS: &[Attack] = &[
             "Stepper::sigma",
             "Stepper::evaluations",
             "Stepper::suspicion",
+            "Stepper::doubt",
         ],
         run: steppers,
     },
@@ -152,8 +153,10 @@ fn steppers(report: &mut Report) {
         report.check(stepper.advance(0).is_ok() && stepper.state() == start && stepper.time() == 0.0, || {
             "no step".into()
         });
-        report.check(stepper.sigma() == 1.0 && stepper.suspicion().is_none(), || "before the first step".into());
+        let blank = stepper.sigma() == 1.0 && stepper.suspicion().is_none() && stepper.doubt().is_none();
+        report.check(blank, || "before the first step".into());
         report.check(stepper.advance(2).is_ok() && stepper.evaluations() > 0, || "two steps".into());
+        report.check(stepper.doubt().is_none_or(|d| d.step + d.steps <= 2), || "a doubt of steps to come".into());
     }
 }
 

@@ -17,7 +17,8 @@ use super::sweeps::Progress;
 use super::table::Table;
 use crate::lanes::forget_branches;
 use crate::step_equations::is_identity;
-use crate::{Halt, InputError, StepError, Stepper, Suspicion};
+use crate::watch::Watch;
+use crate::{Doubt, Halt, InputError, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint};
 pub(crate) use marks::FEW;
@@ -88,7 +89,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     of_sigma: f64,
     /// Of steps that tell nothing between their nodes: the last mean velocities.
     sequence: Option<Box<Sequence<N>>>,
-    suspicion: Option<Suspicion>,
+    watch: Watch<N>,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
@@ -128,6 +129,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             let physical = Extension::new(Physical, t0, 0.0);
             Route::General(General::new(lagrangian, physical, Table::new(s, h), mass, &state, &start.v))
         };
+        let from = Start { q: [0.0; N], y: [0.0; N], z: 0.0 };
+        let velocities = [start.v; 4];
         Ok(GaussStepper {
             lagrangian,
             products: &gauss.forward,
@@ -136,7 +139,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             arch: Arch::new(),
             t0,
             k: 0,
-            from: Start { q: [0.0; N], y: [0.0; N], z: 0.0 },
+            from,
             solved: false,
             newton: true,
             solution: Solution::Sweeps,
@@ -145,8 +148,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             workspace: None,
             newton_steps: 0,
             of_sigma,
-            sequence: (s <= FEW).then(|| Box::new(Sequence { velocities: [start.v; 4], q: state.q })),
-            suspicion: None,
+            sequence: (s <= FEW).then(|| Box::new(Sequence { velocities, q: state.q, ends: [from; 2] })),
+            watch: Watch::new(&state.q, &start.v, h),
         })
     }
 
@@ -379,8 +382,8 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
                 Route::Condensed(condensed) => condensed.misfit,
                 Route::General(general) => general.misfit,
             };
-            if misfit > 1.0 && run.suspicion.is_none() {
-                run.suspicion = Some(Suspicion { step: run.k, misfit });
+            if misfit > 1.0 {
+                run.watch.note(run.k, misfit);
             }
             if run.sequence.is_some() {
                 run.follow();
@@ -454,6 +457,10 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     /// more often.
     fn suspicion(&self) -> Option<Suspicion> {
         self.mark()
+    }
+
+    fn doubt(&mut self) -> Option<Doubt<N>> {
+        self.watch.doubt.take()
     }
 }
 

@@ -283,6 +283,8 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         } else if before.is_nan() {
             // The first two runs show no order, and are the last if others would cost too much.
             Obstacle::Budget
+        } else if fine.has_underflown() {
+            Obstacle::RoundOff
         } else {
             obstacle(&distances, (before / error).log2(), wanted, t0, span)
         };

@@ -163,3 +163,12 @@ fn singularities_end_the_search_soon() {
         assert!(clock.elapsed().as_secs_f64() < 5.0, "{integrator}: {:?}", clock.elapsed());
     }
 }
+
+/// Where a motion decays below the normal numbers, to a few units of the smallest, runs differ by roundings and are not chaotic.
+#[test]
+fn what_decays_below_the_numbers_is_rounded() {
+    let system = contact_geom::systems::HarmonicOscillator { gamma: -0.1 };
+    let start = VelocityPoint::new([1e-300], [5e-301], 0.0);
+    let refused = Scene::new(&system, start, 1e3).steps(Steps::Accuracy(1e-9)).plan().err();
+    assert!(matches!(refused, Some(InputError::Accuracy { cause: Obstacle::RoundOff, .. })), "{refused:?}");
+}

@@ -106,6 +106,11 @@ impl<const N: usize> Track<N> {
         self.states.iter().zip(&of.states).map(relative).collect()
     }
 
+    /// Whether the motion ends with numbers that have lost digits since they are too small.
+    pub fn has_underflown(&self) -> bool {
+        self.states.last().is_some_and(|last| norm(last) < f64::MIN_POSITIVE)
+    }
+
     /// The largest of the [`distances`](Self::distances).
     pub fn distance(&self, of: &Self) -> f64 {
         contact_geom::largest(self.distances(of))

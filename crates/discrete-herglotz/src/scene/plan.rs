@@ -1,17 +1,18 @@
 //! The plan of a scene: the route, in code and in words.
 
 mod halved;
+mod jump;
 
 use super::accuracy::Choice;
 use super::{Integrator, Scene, Wanted};
 use crate::gauss::FEW;
 use crate::verified::refuted;
 use crate::{
-    ActionSplitting, Composition, Discretised, Flow, Gauss, GaussRoute, InputError, Method, Splitting, Status, Stepper,
-    Suspicion,
+    ActionSplitting, Composition, Discretised, Doubt, Flow, Gauss, GaussRoute, InputError, Method, Splitting, Status,
+    Stepper, Suspicion,
 };
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Defect, Lagrangian, OneParameterGroup, PhasePoint, Structure, VelocityPoint, legendre};
+use contact_geom::{Defect, Lagrangian, OneParameterGroup, PhasePoint, Structure, VelocityPoint, largest, legendre};
 use std::fmt::{Display, Formatter};
 
 /// One line of a plan: something that could be computed, whether it is, and why.
@@ -221,11 +222,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
     ) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
         Ok(match &self.integrator {
             Integrator::Splitting(scheme) if !self.z_decouples => {
-                Box::new(ActionSplitting::new(self.lagrangian, scheme, h, t0, start)?)
+                let splitting = ActionSplitting::new(self.lagrangian, scheme, h, t0, start)?;
+                let splitting = if watched { splitting.doubting() } else { splitting };
+                Box::new(if self.moves_little(h) { splitting.compensated() } else { splitting })
             }
             Integrator::Splitting(scheme) => {
                 let splitting = Splitting::new(self.lagrangian, scheme, h, t0, start)?;
                 let splitting = if watched { splitting.watched() } else { splitting };
+                let splitting = if self.moves_little(h) { splitting.compensated() } else { splitting };
                 if self.wanted.action { Box::new(splitting) } else { Box::new(splitting.without_action()) }
             }
             Integrator::Composition(method, scheme) => {
@@ -237,6 +241,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 return Err(InputError::Dimension);
             }
         })
+    }
+
+    /// Whether steps move by so little of the position that half of the digits are lost in each; they change so little from step to step
+    /// that they are rounded in the same way, and the error piles up.
+    fn moves_little(&self, h: f64) -> bool {
+        let size = |x: &SVector<f64, N>| largest(x.iter().copied());
+        let moved = h * size(&self.guess);
+        moved > 0.0 && moved < f64::EPSILON.sqrt() * size(&self.start.q)
     }
 
     /// Runs the scene.
@@ -278,8 +290,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 Err(halt) => (halt.taken, Some(halt.cause)),
             };
             if let (Some((t, from)), None) = (before, cause) {
-                let misfit = self.against_halves(t, &from, &stepper.state()).filter(|m| *m > 1.0);
-                suspicion = first(suspicion, misfit.map(|misfit| Suspicion { step: taken, misfit }));
+                let step = Doubt { step: taken, steps: 1, t, from, to: stepper.state() };
+                suspicion = first(suspicion, self.settled(&step));
             }
             taken += done;
             if single {
@@ -297,6 +309,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 rows.push(self.row(&*stepper));
             }
             if over || taken == next_probe(taken - 1) {
+                let doubt = stepper.doubt().filter(|_| halves && suspicion.is_none());
+                suspicion = first(suspicion, doubt.and_then(|doubt| self.settled(&doubt)));
                 suspicion = first(suspicion, stepper.suspicion());
                 if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
                     status = Status::FalseClaim { step: taken, claim, size };

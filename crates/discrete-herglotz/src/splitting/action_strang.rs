@@ -88,7 +88,7 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> DiscreteLagrangian<N> for 
 
     #[inline(always)]
     fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
-        misfit(velocities, &to.q, self.h)
+        misfit(velocities, &to.q, self.h, 0.0)
     }
 
     /// Explicit; the guess and the solver are not needed.

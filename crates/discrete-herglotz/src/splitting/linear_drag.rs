@@ -3,8 +3,8 @@
 use super::drag::{Drag, Drift};
 use super::motion::{Motion, Progress, Reached};
 use super::separable::Separable;
-use crate::{Halt, InputError, SplittingScheme, Stepper, Suspicion};
-use contact_geom::{Lagrangian, PhasePoint, larger};
+use crate::{Doubt, Halt, InputError, SplittingScheme, Stepper, Suspicion};
+use contact_geom::{Lagrangian, PhasePoint};
 
 /// A splitting at work on `L = v.Mv/2 - V(t, q) + gamma(t) z`.
 ///
@@ -159,6 +159,10 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     fn suspicion(&self) -> Option<Suspicion> {
         self.progress.watch.first
     }
+
+    fn doubt(&mut self) -> Option<Doubt<N>> {
+        self.progress.watch.doubt.take()
+    }
 }
 
 /// What a step consists of.
@@ -199,7 +203,7 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
         steps: usize,
     ) -> Reached<N> {
         let Maps { form, table, .. } = self;
-        let (mut m, mut misfit) = (from.motion, 0.0);
+        let (mut m, mut seen) = (from.motion, from.seen());
         let first = usize::from(from.taken == 0);
         for (stages, range) in [(&table.first, 0..first), (&table.joined, first..steps)] {
             for k in range {
@@ -209,14 +213,14 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
                     self.kick_and_drift::<ACTION, COMPENSATED, TIMED>(&mut m, t, stage);
                     (m.value, m.force) = form.kick(t + stage.time, &m.q.value, 0.0);
                     if WATCHED {
-                        misfit = larger(misfit, m.misfit(&momentum, &force, stage.span));
+                        m.look::<true>(&momentum, &force, stage.span, &mut seen);
                     }
                 }
             }
         }
         let mut end = m;
         self.kick_and_drift::<ACTION, COMPENSATED, TIMED>(&mut end, from.time_after(steps - 1), &table.closing);
-        Reached { motion: m, state: end.state(), misfit }
+        Reached { motion: m, state: end.state(), seen }
     }
 
     /// `sigma_d` of the step from the time t. Found where it is asked for: of a drag in time it costs as much as the drifts.

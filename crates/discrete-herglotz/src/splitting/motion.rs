@@ -1,9 +1,9 @@
 //! What every splitting moves: sums that may carry their rounding, a state of them, and a run in chunks.
 
-use crate::watch::{Watch, turning};
-use crate::{Halt, StepError};
+use crate::watch::{Watch, sharper, turning};
+use crate::{Doubt, Halt, StepError};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, Triple};
+use contact_geom::{PhasePoint, Triple, larger};
 
 /// A vector that many small changes are added to, with what rounding has taken from the compensated ones so far.
 #[derive(Clone, Copy, Debug)]
@@ -67,18 +67,39 @@ impl<const N: usize> Motion<N> {
         self.p.add::<COMPENSATED>(|i, _| s * force[i]);
     }
 
-    /// The misfit of a drift over the time s, between the momentum and the force before it and those that the motion holds; 0
-    /// where it is at most one. That of a [`Watch`], for steps as long as the drift.
+    /// Looks at a drift over the time s, between the momentum and the force before it and those that the motion holds, as a
+    /// [`Watch`] does at steps as long as the drift.
     #[inline(always)]
-    pub(super) fn misfit(&mut self, momentum: &SVector<f64, N>, force: &SVector<f64, N>, s: f64) -> f64 {
+    pub(super) fn look<const DOUBTS: bool>(
+        &mut self,
+        momentum: &SVector<f64, N>,
+        force: &SVector<f64, N>,
+        s: f64,
+        seen: &mut Seen,
+    ) {
         let now = (self.force - force) * s;
         let before = std::mem::replace(&mut self.change, now);
         if now.dot(&before) < 0.0 {
             let momenta = [momentum, &self.p.value, &(self.p.value + self.force * s)];
-            return turning([&before, &now], momenta, &self.q.value, s).unwrap_or(0.0);
+            if let Some(misfit) = turning([&before, &now], momenta, &self.q.value, s, seen.floor) {
+                seen.misfit = larger(seen.misfit, misfit);
+            }
         }
-        0.0
+        if DOUBTS && let Some(sharpness) = sharper([&now, &self.p.value, &self.q.value], s, seen.floor, seen.sharpest) {
+            seen.sharpest = sharpness;
+        }
     }
+}
+
+/// What looks at drifts have seen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    /// The largest misfit; 0 where none is above one.
+    misfit: f64,
+    /// The sharpness of the sharpest turn, or what none is beyond.
+    sharpest: f64,
+    /// What is moved at most by rounding.
+    floor: f64,
 }
 
 /// Where some steps lead.
@@ -86,8 +107,7 @@ pub(super) struct Reached<const N: usize> {
     pub(super) motion: Motion<N>,
     /// The state that the motion stands for.
     pub(super) state: PhasePoint<N>,
-    /// The largest misfit of a step; 0 where none is above one.
-    pub(super) misfit: f64,
+    pub(super) seen: Seen,
 }
 
 /// The steps between two looks whether the motion is finite.
@@ -104,12 +124,13 @@ pub(super) struct Progress<const N: usize> {
     pub(super) motion: Motion<N>,
     /// The state after the steps taken: that of the motion, completed where the next step has a part of the last.
     pub(super) state: PhasePoint<N>,
-    pub(super) watch: Watch,
+    pub(super) watch: Watch<N>,
 }
 
 impl<const N: usize> Progress<N> {
     pub(super) fn new(h: f64, t0: f64, forces: usize, state: PhasePoint<N>, kick: (f64, SVector<f64, N>)) -> Self {
-        Progress { h, t0, taken: 0, forces, motion: Motion::new(state, kick), state, watch: Watch::default() }
+        let watch = Watch::new(&state.q, &SVector::zeros(), h);
+        Progress { h, t0, taken: 0, forces, motion: Motion::new(state, kick), state, watch }
     }
 
     /// The time after so many steps more.
@@ -123,17 +144,24 @@ impl<const N: usize> Progress<N> {
         (self.taken * self.forces) as u64 + 1
     }
 
+    /// Nothing, so far.
+    #[inline(always)]
+    pub(super) fn seen(&self) -> Seen {
+        Seen { misfit: 0.0, sharpest: self.watch.sharpest, floor: self.watch.floor }
+    }
+
     /// Takes steps in chunks; one that ends with what is not finite step by step up to the last that is, and one with the first
-    /// misfit step by step up to that.
+    /// misfit, or with a doubt, step by step up to that.
     pub(super) fn advance(&mut self, steps: usize, after: impl Fn(&Self, usize) -> Reached<N>) -> Result<(), Halt> {
         let (mut taken, mut longest) = (0, CHUNK);
         while taken < steps {
             let chunk = longest.min(steps - taken);
-            let Reached { motion, state, misfit } = after(self, chunk);
+            let Reached { motion, state, seen: Seen { misfit, sharpest, .. } } = after(self, chunk);
             // What is not finite in the motion is not finite in its state, or in the next.
             let finite = Triple::from(state).is_finite() && motion.sigma.is_finite();
             let misfit = (misfit > 0.0 && self.watch.first.is_none()).then_some(misfit);
-            if chunk > 1 && (!finite || misfit.is_some()) {
+            let sharper = sharpest > self.watch.sharpest;
+            if chunk > 1 && (!finite || misfit.is_some() || sharper) {
                 longest = 1;
                 continue;
             }
@@ -142,6 +170,10 @@ impl<const N: usize> Progress<N> {
             }
             if let Some(misfit) = misfit {
                 self.watch.note(self.taken, misfit);
+                longest = CHUNK;
+            } else if sharper {
+                let (t, from) = (self.time_after(0), self.state);
+                self.watch.doubt(sharpest, Doubt { step: self.taken, steps: 1, t, from, to: state });
                 longest = CHUNK;
             }
             (self.motion, self.state) = (motion, state);

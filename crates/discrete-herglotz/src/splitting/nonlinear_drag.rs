@@ -3,9 +3,9 @@
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::motion::{Motion, Progress, Reached};
 use super::separable::Separable;
-use crate::{Halt, InputError, SplittingScheme, Stepper, Suspicion};
+use crate::{Doubt, Halt, InputError, SplittingScheme, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, larger};
+use contact_geom::{Lagrangian, PhasePoint};
 
 /// A splitting at work on `L = v.Mv/2 - V(t, q) + f(z)`, in three exact flows: the kinetic part `A`, the kick `B` of `-V`, and
 /// the flow `C` of f, an [`ActionFlow`]. A substep is the symmetric `C B A B C`, each but A over half its length; steps are
@@ -19,6 +19,7 @@ pub struct ActionSplitting<'a, L, F: ActionFlow, const N: usize> {
     table: Table<F::Map>,
     progress: Progress<N>,
     compensated: bool,
+    doubting: bool,
 }
 
 /// The substeps of a step.
@@ -94,22 +95,28 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
         let table = Table { stages, closing: flow.over(0.5 * before * h), rest: (state.z, flow.rate(state.z)) };
         let (value, force) = form.first_kick(t0, &state.q, state.z)?;
         let progress = Progress::new(h, t0, scheme.stages(), state, (value - table.rest.1, force));
-        Ok(ActionSplitting { form, table, progress, compensated: false })
+        Ok(ActionSplitting { form, table, progress, compensated: false, doubting: false })
     }
 
     /// With compensated sums (Kahan's), as [`Splitting::compensated`](crate::Splitting::compensated).
     pub fn compensated(self) -> Self {
         ActionSplitting { compensated: true, ..self }
     }
+
+    /// With doubts, for a run that looks at them: they cost a tenth of its time.
+    pub(crate) fn doubting(self) -> Self {
+        ActionSplitting { doubting: true, ..self }
+    }
 }
 
 impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplitting<'_, L, F, N> {
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
-        let ActionSplitting { form, table, progress, compensated } = self;
-        if *compensated {
-            progress.advance(steps, |at, n| run::<L, F::Map, N, true>(form, table, at, n))
-        } else {
-            progress.advance(steps, |at, n| run::<L, F::Map, N, false>(form, table, at, n))
+        let ActionSplitting { form, table, progress, compensated, doubting } = self;
+        match (*compensated, *doubting) {
+            (false, false) => progress.advance(steps, |at, n| run::<L, F::Map, N, false, false>(form, table, at, n)),
+            (false, true) => progress.advance(steps, |at, n| run::<L, F::Map, N, false, true>(form, table, at, n)),
+            (true, false) => progress.advance(steps, |at, n| run::<L, F::Map, N, true, false>(form, table, at, n)),
+            (true, true) => progress.advance(steps, |at, n| run::<L, F::Map, N, true, true>(form, table, at, n)),
         }
     }
 
@@ -132,17 +139,21 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
     fn suspicion(&self) -> Option<Suspicion> {
         self.progress.watch.first
     }
+
+    fn doubt(&mut self) -> Option<Doubt<N>> {
+        self.progress.watch.doubt.take()
+    }
 }
 
 /// The motion after some steps more, and its state.
 #[inline(never)]
-fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool>(
+fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool, const DOUBTING: bool>(
     form: &Separable<&L, N>,
     table: &Table<C>,
     from: &Progress<N>,
     steps: usize,
 ) -> Reached<N> {
-    let (mut m, mut misfit, (z, constant)) = (from.motion, 0.0, table.rest);
+    let (mut m, mut seen, (z, constant)) = (from.motion, from.seen(), table.rest);
     for k in 0..steps {
         let t = from.time_after(k);
         m.sigma = 1.0;
@@ -156,13 +167,13 @@ fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool>(
             m.q.add::<COMPENSATED>(|i, _| stage.length * v[i]);
             let force = m.force;
             (m.value, m.force) = form.kick(t + stage.time, &m.q.value, z);
-            misfit = larger(misfit, m.misfit(&momentum, &force, stage.length));
+            m.look::<DOUBTING>(&momentum, &force, stage.length, &mut seen);
             m.value -= constant;
             m.kick::<true, COMPENSATED>(stage.half);
         }
         apply::<C, N, COMPENSATED>(&mut m, &table.closing);
     }
-    Reached { motion: m, state: m.state(), misfit }
+    Reached { motion: m, state: m.state(), seen }
 }
 
 /// The flow of f, and its factor.

@@ -1,10 +1,11 @@
 //! What the steps of a run say of themselves: whether they resolve the motion.
 
 use super::{GaussStepper, Route};
-use crate::Suspicion;
+use crate::gauss::dense::Start;
 use crate::gauss::extension::Physical;
 use crate::gauss::look::{Compare, Curve, Look, SETS};
-use crate::watch::misfit;
+use crate::watch::{misfit, sharper};
+use crate::{Doubt, Suspicion};
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;
 use pulp::{Simd, WithSimd};
@@ -13,10 +14,11 @@ use pulp::{Simd, WithSimd};
 /// error of its own of 0.01 to 0.1.
 const UNRESOLVED: f64 = 0.1;
 
-/// The mean velocities of the last steps, in sequence.
+/// The mean velocities of the last steps, in sequence, the last position, and the states after the last two steps.
 pub(super) struct Sequence<const N: usize> {
     pub velocities: [SVector<f64, N>; 4],
     pub q: SVector<f64, N>,
+    pub ends: [Start<N>; 2],
 }
 
 /// The stages up to which the nodes of a step do not tell whether it resolves the motion.
@@ -33,8 +35,11 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// Follows the mean velocities of steps of few stages.
     #[inline(never)]
     pub(super) fn follow(&mut self) {
-        let (q, h) = (SVector::from(self.values().q), self.products.h);
-        let Some(Sequence { velocities, q: before }) = self.sequence.as_deref_mut() else { return };
+        let (end, h) = (self.values(), self.products.h);
+        let q = SVector::from(end.q);
+        let Some(Sequence { velocities, q: before, ends }) = self.sequence.as_deref_mut() else { return };
+        let [from, last] = *ends;
+        *ends = [last, end];
         let latest = (q - *before) / h;
         velocities.rotate_left(1);
         velocities[3] = latest;
@@ -46,9 +51,15 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
             _ => {}
         }
         let [a, b, c, d] = &*velocities;
-        if let (Some(misfit), None) = (misfit([a, b, c, d], &q, h), self.suspicion) {
+        let sharper = sharper([&(d - c * 2.0 + b), c, &q], h, self.watch.floor, self.watch.sharpest);
+        if let Some(misfit) = misfit([a, b, c, d], &q, h, self.watch.floor) {
             // Like those of a rule, seen one step late.
-            self.suspicion = Some(Suspicion { step: self.k.saturating_sub(1), misfit });
+            self.watch.note(self.k.saturating_sub(1), misfit);
+        }
+        if let (Some(sharpness), Some(step)) = (sharper, self.k.checked_sub(1).filter(|step| *step > 0)) {
+            let t = self.t0 + step as f64 * h;
+            let (from, to) = (self.phase(&from), self.phase(&end));
+            self.watch.doubt(sharpness, Doubt { step, steps: 2, t, from, to });
         }
     }
 
@@ -57,7 +68,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         if self.of_sigma > 1.0 && self.k > 0 {
             return Some(Suspicion { step: 0, misfit: self.of_sigma });
         }
-        self.suspicion.or_else(|| {
+        self.watch.first.or_else(|| {
             // A linear motion that is not resolved is so in every step, and none was looked at on the way.
             let sets = if let Route::Linear(..) = &*self.route { SETS } else { 1 };
             let Look { misfit, .. } = self.look(sets)?;

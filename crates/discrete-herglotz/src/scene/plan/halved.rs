@@ -1,9 +1,9 @@
-//! A step against two of half its length: whether given steps resolve the motion at all.
+//! Steps against twice as many of half their length: whether given steps resolve the motion at all.
 
 use super::Plan;
 use crate::gauss::{FEW, velocity};
-use crate::watch::LEAST;
-use crate::{Flow, Gauss, Halt, Integrator, Stepper};
+use crate::watch::{LEAST, rounding};
+use crate::{Doubt, Flow, Gauss, Halt, Integrator, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, larger, largest};
 
@@ -12,12 +12,12 @@ use contact_geom::{Lagrangian, PhasePoint, larger, largest};
 const APART: f64 = 0.05;
 
 impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
-    /// The misfit of a step between two states; above one where it does not resolve the motion. `None` where there is nothing to
-    /// compare with.
-    pub(super) fn against_halves(&self, t: f64, from: &PhasePoint<N>, to: &PhasePoint<N>) -> Option<f64> {
-        let v = velocity(self.lagrangian, t, from, self.guess).ok()?;
-        let at_end = |x: &PhasePoint<N>| velocity(self.lagrangian, t + self.h, x, v).ok();
-        let fine = match self.two_halves(t, from, &v)? {
+    /// The misfit of some steps; above one where they do not resolve the motion. `None` where there is nothing to compare with.
+    pub(super) fn against_halves(&self, Doubt { steps, t, from, to, .. }: &Doubt<N>) -> Option<f64> {
+        let v = velocity(self.lagrangian, *t, from, self.guess).ok()?;
+        let end = t + *steps as f64 * self.h;
+        let at_end = |x: &PhasePoint<N>| velocity(self.lagrangian, end, x, v).ok();
+        let fine = match self.halves(*t, from, &v, 2 * steps)? {
             Ok(fine) => fine,
             // What shorter steps do not get over a longer one should not.
             Err(_) => return Some(f64::INFINITY),
@@ -26,16 +26,22 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         let size = |x: [&SVector<f64, N>; 3]| largest(x.into_iter().flat_map(|x| x.iter().copied()));
         let apart = |a: &SVector<f64, N>, b: &SVector<f64, N>| largest((a - b).iter().copied());
         let relative = |apart: f64, size: f64| if apart == 0.0 { 0.0 } else { apart / size };
-        let width = size([&from.q, &to.q, &fine.q]);
+        let width = larger(size([&from.q, &to.q, &fine.q]), rounding(&self.start.q, &self.guess, self.h));
         let of_v = apart(&coarse_v, &fine_v);
         let of_v = if of_v * self.h > LEAST * width { relative(of_v, size([&v, &coarse_v, &fine_v])) } else { 0.0 };
         Some(larger(relative(apart(&to.q, &fine.q), width), of_v) / APART)
     }
 
-    /// The end of two steps of half the length.
-    fn two_halves(&self, t: f64, from: &PhasePoint<N>, v: &SVector<f64, N>) -> Option<Result<PhasePoint<N>, Halt>> {
+    /// The end of some steps of half the length.
+    fn halves(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        v: &SVector<f64, N>,
+        count: usize,
+    ) -> Option<Result<PhasePoint<N>, Halt>> {
         let h = 0.5 * self.h;
-        let end = |run: &mut dyn Stepper<N>| Some(run.advance(2).map(|()| run.state()));
+        let end = |run: &mut dyn Stepper<N>| Some(run.advance(count).map(|()| run.state()));
         match self.integrator {
             Integrator::Clocked { .. } => None,
             Integrator::Gauss { stages } if stages > FEW => None,

@@ -7,7 +7,7 @@ use crate::parallel::parallel;
 use crate::report::Report;
 use contact_examples::{Failure, number};
 use contact_geom::systems::HarmonicOscillator;
-use contact_geom::{PhasePoint, VelocityPoint, larger, largest};
+use contact_geom::{PhasePoint, VelocityPoint, larger};
 
 /// Powers of two from 3e-151 to 3e150: their squares, which z is, are still normal numbers.
 const POWERS: [i32; 7] = [-500, -300, -100, 0, 100, 300, 500];
@@ -136,15 +136,17 @@ fn accuracies(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
         let exact = HarmonicOscillator { gamma }.solution(span, &start);
         let exact = PhasePoint { q: exact.q, p: exact.v, z: exact.z };
         let end = problem.to(1e-9);
-        (end.worth(&exact, 0.0, 1e-8), end.error(&exact, 0.0))
+        // A number below the normal ones has fewer digits than are asked for: to refuse is right.
+        let normal = norm(&[exact.q[0], exact.p[0]]) >= f64::MIN_POSITIVE;
+        (end.worth(&exact, 0.0, 1e-8), end.error(&exact, 0.0), normal)
     });
-    let mut tally = Tally::new();
-    for ((size, span), (worth, error)) in cases.iter().zip(&found) {
+    let (mut tally, mut refused) = (Tally::new(), 0);
+    for ((size, span), (worth, error, normal)) in cases.iter().zip(&found) {
         *tally.entry(*worth).or_default() += 1;
+        refused += u32::from(*normal && matches!(worth, Worth::Refused | Worth::Halted));
         rows.push(row(&format!("accuracy_over_{span:e}"), "scene", *size, worth.name(), *error));
     }
     // The square of 1e-160, which the action and the energy are, is no number any more; (q, p) are.
-    let refused = largest([Worth::Refused, Worth::Halted].map(|w| tally.get(&w).copied().unwrap_or(0) as f64));
     report.at_most("an oscillator of 1e-300 .. 1e150 over 1e-12 .. 1e3, to 1e-9: above 1e-8", bad([&tally]), 0.0)?;
-    report.at_most("the same: refused", refused, 0.0)
+    report.at_most("the same: refused, though the end is a normal number", f64::from(refused), 0.0)
 }
