@@ -237,8 +237,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             }
             // And through its position, which the velocities of all stages move.
             let n = out.nrows();
-            for j in 0..s {
-                let moved = a[k][j];
+            for (j, &moved) in a[k][..s].iter().enumerate() {
                 for e in 0..N {
                     let column = &mut out.as_mut_slice()[(j * N + e) * n..][..n];
                     let (momenta, rest) = column.split_at_mut(row_z);
@@ -253,7 +252,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                             *entry -= w * force;
                         }
                     }
-                    for (((action, factor), w), _) in actions.iter_mut().zip(factors).zip(&weights).zip(0..s) {
+                    for ((action, factor), w) in actions.iter_mut().zip(factors).zip(&weights) {
                         *action -= w * of_action;
                         *factor += w * of_factor;
                     }
