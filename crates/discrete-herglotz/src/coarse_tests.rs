@@ -170,12 +170,12 @@ fn a_centre_that_is_passed_in_a_step_is_marked() {
 #[test]
 fn a_doubt_is_no_mark() {
     let start = VelocityPoint::new([1.0], [0.3], 0.0);
-    for integrator in Integrator::all().into_iter().filter(|i| i.order() > 1) {
+    let system = Pendulum { gamma: -0.01 };
+    for integrator in Integrator::all().into_iter().filter(|i| i.order() > 1 && i.check::<1, _>(&system).is_ok()) {
         let parts =
             if let Integrator::Gauss { stages } = integrator { f64::max(0.5 * stages as f64, 1.0) } else { 1.0 };
         for radians in [0.1, 0.2, 0.3, 0.4] {
             for count in [10, 100] {
-                let system = Pendulum { gamma: -0.01 };
                 let scene = Scene::new(&system, start, radians * parts * f64::from(count));
                 let end = scene.by(integrator).steps(Steps::Count(count as usize)).plan().unwrap().run().unwrap();
                 assert_eq!((end.status, end.suspicion), (Status::Completed, None), "{integrator}, {radians} x {count}");

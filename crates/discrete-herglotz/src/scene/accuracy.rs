@@ -255,7 +255,8 @@ fn converge<L: Lagrangian<N>, const N: usize>(
             continue 'search;
         }
         let [coarse, fine] = tracks.as_slice() else { break };
-        let error = coarse.distance(fine);
+        // Runs that agree in all digits may still be off by half of the last one.
+        let error = larger(coarse.distance(fine), 0.5 * f64::EPSILON);
         // A misfit of a smooth motion falls with the order s. What jumps has one that does not; what is rounded has none to speak of.
         let falls = fine.misfit <= larger(coarse.misfit / 8.0, larger(0.01 * wanted, 1e-11));
         let order = (coarse.misfit / fine.misfit).log2().clamp(0.0, s);
