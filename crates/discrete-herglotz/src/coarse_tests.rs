@@ -117,7 +117,8 @@ impl Lagrangian<1> for Kinked {
 
 /// The integrators whose steps tell nothing between their nodes.
 fn blind() -> impl Iterator<Item = Integrator> {
-    Integrator::all().into_iter().filter(|i| !matches!(i, Integrator::Gauss { stages } if *stages > 2))
+    let looks = |i: &Integrator| matches!(i, Integrator::Gauss { stages: 3.. } | Integrator::Clocked { .. });
+    Integrator::all().into_iter().filter(move |i| !looks(i))
 }
 
 /// A force that jumps by a tenth of the velocity in a step is seen, wherever in the run and in the step it jumps.
@@ -151,19 +152,20 @@ fn no_energy_is_lost_over_a_kink_in_silence() {
 #[test]
 fn a_centre_that_is_passed_in_a_step_is_marked() {
     let system = Kepler::<2> { mu: 1.0, gamma: 0.0 };
-    let mut silent = Vec::new();
+    let (mut silent, mut marked) = (Vec::new(), 0);
     for e in [0.9, 0.97, 0.99, 0.999] {
         let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
         for (integrator, count) in blind().flat_map(|i| (20..40).step_by(3).chain([32]).map(move |n| (i, n))) {
             let scene = Scene::new(&system, start, std::f64::consts::TAU).by(integrator).steps(Steps::Count(count));
             let Ok(end) = scene.plan().and_then(|plan| plan.run()) else { continue };
+            marked += u32::from(end.suspicion.is_some());
             let off = (end.q - start.q).norm() + (end.p - start.v).norm();
             if (end.status, end.suspicion) == (Status::Completed, None) && off > 0.3 {
                 silent.push((e, integrator.to_string(), count, off));
             }
         }
     }
-    assert!(silent.is_empty(), "{}: {silent:?}", silent.len());
+    assert!(silent.is_empty() && marked > 100, "{marked} marked, {}: {silent:?}", silent.len());
 }
 
 /// Steps that resolve the motion raise doubts where they are long, and no mark.

@@ -33,7 +33,6 @@ const ROUNDED: f64 = 1e-10;
 /// What rounding moves a motion from this start by, at most. Forces are rounded as they are at its size, so that this holds too where it has
 /// come to rest beside the origin.
 pub(crate) fn rounding<const N: usize>(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> f64 {
-    let size = |x: &SVector<f64, N>| largest(x.iter().copied());
     let reach = larger(size(q), size(v) * h);
     if reach.is_finite() { ROUNDED * reach } else { 0.0 }
 }
@@ -80,6 +79,11 @@ impl<const N: usize> Watch<N> {
     }
 }
 
+/// The largest component of a vector.
+pub(crate) fn size<const N: usize>(x: &SVector<f64, N>) -> f64 {
+    largest(x.iter().copied())
+}
+
 /// The sharpness of a turn within a time h, the square of a second difference of the velocity in units of the velocity, where it is beyond
 /// the sharpest so far; `None` where it is not, and where it moves the position q by no more than rounding.
 #[inline(always)]
@@ -95,7 +99,6 @@ pub(crate) fn sharper<const N: usize>(
 #[cold]
 #[inline(never)]
 fn sharpness<const N: usize>([turn, velocity, q]: [&SVector<f64, N>; 3], h: f64, floor: f64) -> Option<f64> {
-    let size = |x: &SVector<f64, N>| largest(x.iter().copied());
     let moves = size(turn) * h.abs() > larger(ROUNDED * size(q), floor);
     moves.then(|| turn.dot(turn) / velocity.dot(velocity))
 }
@@ -129,7 +132,6 @@ pub(crate) fn turning<const N: usize>(
     h: f64,
     floor: f64,
 ) -> Option<f64> {
-    let size = |x: &SVector<f64, N>| largest(x.iter().copied());
     let change = size(changes[0]) + size(changes[1]);
     let velocity = largest(velocities.map(size));
     (change > velocity && change * h.abs() > larger(LEAST * size(q), floor)).then(|| change / velocity)

@@ -13,7 +13,6 @@ use super::stages::{StageMap, Stages, blocks};
 use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use super::table::Table;
 use crate::lanes::{Lanes, branched};
-use crate::step_equations::{inverted, kept_mass_matrix};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
 use pulp::{Arch, Simd};
@@ -260,20 +259,6 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             let at = self.table.times.block::<S>(r) + t;
             let w = self.lagrangian.mass_matrix(at, &self.point::<S>(r));
             self.mass.invert(r, &w)
-        })
-    }
-
-    /// The same stage by stage, on the heap.
-    #[inline(never)]
-    fn invert_one_by_one(&mut self, t: f64) -> bool {
-        (0..self.table.s).all(|i| {
-            let (q, v) = (SVector::from_fn(|d, _| self.x[d].0[i]), SVector::from_fn(|d, _| self.v[d].0[i]));
-            let x = VelocityPoint { q, v, z: self.z_stages.0[i] };
-            let w = kept_mass_matrix(self.lagrangian, t + self.table.times.0[i], &x);
-            inverted(&w).is_ok_and(|inverse| {
-                self.mass.keep(i, &inverse);
-                true
-            })
         })
     }
 

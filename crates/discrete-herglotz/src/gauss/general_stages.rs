@@ -7,7 +7,9 @@ use super::general::General;
 use super::resolution::{FORETOLD, of_sigma};
 use super::stages::{Stages, blocks};
 use crate::lanes::Lanes;
-use contact_geom::{Lagrangian, larger};
+use crate::step_equations::{inverted, kept_mass_matrix};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, VelocityPoint, larger};
 use pulp::Simd;
 use std::array::from_fn;
 
@@ -54,6 +56,20 @@ impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'_, L, P, N> {
         holds(1.0, &self.rate.map(|rate| -rate), &|i| rho.0[i])
             && holds(self.z.value, &self.l, &|i| self.z_stages.0[i])
             && (0..N).all(|d| holds(self.p[d].value, &self.force[d], &|i| rho.0[i] * self.l_v[d].0[i]))
+    }
+
+    /// Inverts W at the stages, one by one, on the heap; `false` where it is singular.
+    #[inline(never)]
+    pub(super) fn invert_one_by_one(&mut self, t: f64) -> bool {
+        (0..self.table.s).all(|i| {
+            let (q, v) = (SVector::from_fn(|d, _| self.x[d].0[i]), SVector::from_fn(|d, _| self.v[d].0[i]));
+            let x = VelocityPoint { q, v, z: self.z_stages.0[i] };
+            let w = kept_mass_matrix(self.lagrangian, t + self.table.times.0[i], &x);
+            inverted(&w).is_ok_and(|inverse| {
+                self.mass.keep(i, &inverse);
+                true
+            })
+        })
     }
 
     /// The stages of the last step, for dense output.

@@ -38,13 +38,6 @@ pub(super) struct At<'a, L, const N: usize> {
     pub v: SVector<f64, N>,
 }
 
-impl<L: Lagrangian<N>, const N: usize> At<'_, L, N> {
-    /// Position, without velocity and action, and time of a stage.
-    fn stage(&self, i: usize, q: &SVector<f64, N>) -> (f64, VelocityPoint<N>) {
-        (self.t + self.table.times.0[i], VelocityPoint { q: *q, v: SVector::zeros(), z: 0.0 })
-    }
-}
-
 /// `L_qq` at a time and a position, where L is separable: without the directions of velocity and action, at a fraction of the price of
 /// all second derivatives, and of their room.
 #[inline(never)]
@@ -191,7 +184,7 @@ impl<const N: usize> PositionNewton<N> {
     /// The accelerations at the positions that are tried, and what these then lack.
     fn evaluate<L: Lagrangian<N>>(&mut self, at: &At<L, N>) {
         for (i, (a, q)) in self.a.iter_mut().zip(&self.trial).enumerate() {
-            let (t, x) = at.stage(i, q);
+            let (t, x) = (at.t + at.table.times.0[i], VelocityPoint { q: *q, v: SVector::zeros(), z: 0.0 });
             let (_, force) = at.lagrangian.with_force(t, &x);
             *a = at.inverse_mass.map_or(force, |inverse| inverse * force);
         }
@@ -233,7 +226,6 @@ fn extent(x: &[f64]) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::super::Gauss;
     use super::super::stage_equations::{Given, StageEquations};

@@ -8,7 +8,7 @@ use crate::solver::DenseLu;
 use crate::step_equations::BLOCK;
 use crate::{ITERATION_LIMIT, StepError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, seed};
+use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, seed};
 use std::array::from_fn;
 
 /// The products of the coefficients with a step, which may be negative.
@@ -420,9 +420,4 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
         Err(StepError::NotConverged { residual: before, iterations: ITERATION_LIMIT })
     }
-}
-
-/// The larger; a NaN counts as infinite in an extent, so that none is hidden.
-fn larger(a: f64, b: f64) -> f64 {
-    if b > a { b } else { a }
 }

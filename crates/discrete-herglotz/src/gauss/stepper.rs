@@ -405,14 +405,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
                 Solution::Simplified => self.sweep(self.pause.min(left)),
                 Solution::Newton => {
                     tried.newton = true;
-                    let solved = self.solve_stages().map_or_else(|cause| (0, Some(cause)), |()| self.sweep(1));
-                    // Equations may have solutions that are none of the motion's: such steps are rare, and all looked at.
-                    if let (None, (1, _)) = (self.watch.first, &solved)
-                        && let Some(Suspicion { step, misfit }) = self.mark()
-                    {
-                        self.watch.note(step, misfit);
-                    }
-                    solved
+                    self.solve_stages().map_or_else(|cause| (0, Some(cause)), |()| self.sweep(1))
                 }
             };
             done += taken;

@@ -7,12 +7,13 @@ use super::accuracy::Choice;
 use super::{Integrator, Scene, Wanted};
 use crate::gauss::FEW;
 use crate::verified::refuted;
+use crate::watch::size;
 use crate::{
     ActionSplitting, Composition, Discretised, Doubt, Flow, Gauss, GaussRoute, InputError, Method, Splitting, Status,
     Stepper, Suspicion,
 };
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Defect, Lagrangian, OneParameterGroup, PhasePoint, Structure, VelocityPoint, largest, legendre};
+use contact_geom::{Defect, Lagrangian, OneParameterGroup, PhasePoint, Structure, VelocityPoint, legendre};
 use std::fmt::{Display, Formatter};
 
 /// One line of a plan: something that could be computed, whether it is, and why.
@@ -246,7 +247,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
     /// Whether steps move by so little of the position that half of the digits are lost in each; they change so little from step to step
     /// that they are rounded in the same way, and the error piles up.
     fn moves_little(&self, h: f64) -> bool {
-        let size = |x: &SVector<f64, N>| largest(x.iter().copied());
         let moved = h * size(&self.guess);
         moved > 0.0 && moved < f64::EPSILON.sqrt() * size(&self.start.q)
     }

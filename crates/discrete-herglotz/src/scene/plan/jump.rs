@@ -2,7 +2,7 @@
 
 use super::Plan;
 use crate::gauss::velocity;
-use crate::watch::rounding;
+use crate::watch::{rounding, size};
 use crate::{Doubt, Integrator, Method, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, herglotz_rates, larger, largest};
@@ -42,7 +42,6 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         );
         let before = if *step > 0 { aside } else { 0.0 };
         let after = if step + steps < self.count { aside } else { 0.0 };
-        let size = |x: &SVector<f64, N>| largest(x.iter().copied());
         let (mut accelerations, mut speed) = ([SVector::<f64, N>::zeros(); PARTS + 1], 0.0);
         for (i, acceleration) in accelerations.iter_mut().enumerate() {
             let at = (before + span + after) * (i as f64 / PARTS as f64) - before;
