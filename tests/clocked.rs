@@ -6,7 +6,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum, PerturbedKepler, Radial, System};
 use contact_geom::{Clock, Lagrangian, Larger, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
 use discrete_herglotz::{
-    ClockedStepper, Gauss, InputError, Integrator, Outcome, Scene, Status, StepError, Stepper, Steps, Wanted,
+    ClockedStepper, Gauss, InputError, Integrator, Outcome, Problem, Rows, Status, StepError, Stepper, Steps, Until,
 };
 
 type Planar = Kepler<2>;
@@ -190,12 +190,10 @@ fn on_orbit(e: f64, t: f64) -> SVector<f64, 4> {
 /// The orbit for a span of three revolutions and a little, to an error, by an integrator or none; the true error.
 fn to_accuracy(e: f64, wanted: f64, by: Option<Integrator>) -> (Integrator, Outcome<2>, f64) {
     let (kepler, span) = (Planar { gamma: 0.0, mu: 1.0 }, 20.0);
-    let scene = Scene::new(&kepler, pericentre(e), span).steps(Steps::Accuracy(wanted));
-    let plan = by.map_or_else(
-        || scene.plan(),
-        |by| Scene::new(&kepler, pericentre(e), span).steps(Steps::Accuracy(wanted)).by(by).plan(),
-    );
-    let plan = plan.unwrap();
+    let problem = Problem::new(&kepler, 0.0, pericentre(e)).unwrap();
+    let run = problem.steps(Steps::Accuracy(wanted));
+    let run = if let Some(by) = by { run.by(by) } else { run };
+    let plan = run.plan(Until::Time(span)).unwrap();
     let outcome = plan.run().unwrap();
     assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
     assert_eq!(outcome.steps, plan.count(), "{plan}");
@@ -229,8 +227,8 @@ fn starts_at_the_apocentre() {
     let kepler = Planar { gamma: 0.0, mu: 1.0 };
     for e in [0.9, 0.99] {
         // The pericentre of -e.
-        let scene = Scene::new(&kepler, pericentre(-e), 20.0).steps(Steps::Accuracy(1e-8));
-        let plan = scene.plan().unwrap();
+        let problem = Problem::new(&kepler, 0.0, pericentre(-e)).unwrap();
+        let plan = problem.steps(Steps::Accuracy(1e-8)).plan(Until::Time(20.0)).unwrap();
         let Outcome { status, q, p, .. } = plan.run().unwrap();
         let truth = -on_orbit(e, 20.0 + std::f64::consts::PI);
         let error = (SVector::from([q[0], q[1], p[0], p[1]]) - truth).norm() / truth.norm();
@@ -256,21 +254,22 @@ fn round_orbits_take_equal_steps() {
 #[test]
 fn rows_of_a_clocked_run_change_nothing() {
     let kepler = Planar { gamma: -0.01, mu: 1.0 };
+    let problem = Problem::new(&kepler, 0.0, pericentre(0.9)).unwrap();
     for steps in [Steps::Size(0.25), Steps::Accuracy(1e-8)] {
-        let run = |wanted: Wanted<2>| {
-            let scene = Scene::new(&kepler, pericentre(0.9), 20.0).by(Integrator::Clocked { stages: 8 }).steps(steps);
-            let outcome = scene.wanting(wanted).plan().unwrap().run().unwrap();
-            assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
-            outcome
-        };
-        let nothing = run(Wanted { action: false, ..Wanted::default() });
-        let all = run(Wanted { action: true, conformal_factor: true, rows: Some(7), momentum: None });
+        let by_clock = problem.by(Integrator::Clocked { stages: 8 }).steps(steps);
+        let nothing = by_clock.without_action().run(Until::Time(20.0)).unwrap();
+        let mut rows = Rows::every(7).unwrap();
+        let by_clock = problem.by(Integrator::Clocked { stages: 8 }).steps(steps);
+        let all = by_clock.with_conformal_factor().observe(&mut rows).run(Until::Time(20.0)).unwrap();
+        let rows = rows.rows;
+        assert_eq!((nothing.status, nothing.suspicion), (Status::Completed, None));
+        assert_eq!((all.status, all.suspicion), (Status::Completed, None));
         assert_eq!((nothing.q, nothing.p, nothing.t, nothing.steps), (all.q, all.p, all.t, all.steps));
-        assert_eq!(all.rows.len(), all.steps.div_ceil(7) + 1);
-        assert_eq!(all.rows.last().map(|row| (row.t, row.q, row.z)), Some((all.t, all.q, all.z)));
-        assert!(all.rows.windows(2).all(|rows| rows[0].t < rows[1].t));
+        assert_eq!(rows.len(), all.steps.div_ceil(7) + 1);
+        assert_eq!(rows.last().map(|row| (row.t, row.q, row.z)), Some((all.t, all.q, all.z)));
+        assert!(rows.windows(2).all(|rows| rows[0].t < rows[1].t));
         assert_eq!(all.t, 20.0);
-        let factor = all.conformal_factor.unwrap();
+        let factor = all.log_factor.unwrap().exp();
         assert!((factor - (-0.2f64).exp()).abs() <= 1e-8, "{factor}");
     }
 }
@@ -305,7 +304,8 @@ fn clocks_that_cannot_be_followed_are_refused() {
     assert_eq!(by.check(&driven), Err(InputError::Unclaimed { claim: "autonomous" }));
     let start = VelocityPoint::new([0.0], [1.0], 0.0);
     let refused = |rate: f64, autonomous: bool, steps: Steps| {
-        Scene::new(&Clocked { rate, autonomous }, start, 2.0).by(by).steps(steps).plan().err()
+        let system = Clocked { rate, autonomous };
+        Problem::new(&system, 0.0, start).unwrap().by(by).steps(steps).plan(Until::Time(2.0)).err()
     };
     assert_eq!(refused(1.0, false, Steps::Size(0.1)), Some(InputError::Unclaimed { claim: "autonomous" }));
     for rate in [0.0, -1.0, f64::INFINITY, f64::NAN] {
@@ -319,27 +319,37 @@ fn clocks_that_cannot_be_followed_are_refused() {
     // A clock that gains nothing is not chosen, whatever its rate.
     for rate in [1.0, 1e-3, -1.0, f64::NAN] {
         let system = Clocked { rate, autonomous: true };
-        let plan = Scene::new(&system, start, 2.0).steps(Steps::Accuracy(1e-8)).plan().unwrap();
+        let problem = Problem::new(&system, 0.0, start).unwrap();
+        let plan = problem.steps(Steps::Accuracy(1e-8)).plan(Until::Time(2.0)).unwrap();
         assert!(matches!(plan.integrator(), Integrator::Gauss { .. }), "{rate}: {plan}");
     }
     let system = Clocked { rate: 0.5, autonomous: true };
-    let plan = Scene::new(&system, start, 2.0).by(by).steps(Steps::Size(0.3)).plan().unwrap();
+    let problem = Problem::new(&system, 0.0, start).unwrap();
+    let plan = problem.by(by).steps(Steps::Size(0.3)).plan(Until::Time(2.0)).unwrap();
     let outcome = plan.run().unwrap();
-    let tenths = Scene::new(&system, start, 2.0).by(by).steps(Steps::Size(0.4)).plan().unwrap().run().unwrap();
+    let tenths = problem.by(by).steps(Steps::Size(0.4)).run(Until::Time(2.0)).unwrap();
     assert_eq!((tenths.steps, tenths.t), (10, 2.0));
     // Thirteen steps of 0.15, and one of a third of that; and the tenth of 0.2 ends the span, for all its rounding.
     assert_eq!((outcome.steps, plan.count(), outcome.t), (14, 14, 2.0));
     assert!(plan.to_string().contains("14 steps of 0.3 of the clock's time by clocked_gauss_4, t = 0 .. 2"), "{plan}");
+    // The same number of steps back, each as long.
+    let plan = problem.by(by).steps(Steps::Size(0.3)).plan(Until::Time(-2.0)).unwrap();
+    let back = plan.run().unwrap();
+    assert_eq!((back.steps, plan.count(), back.t, plan.step_size()), (14, 14, -2.0, -0.3));
+    // A clock has no number of steps to end after.
+    let counted = problem.by(by).steps(Steps::Size(0.3)).plan(Until::Steps(14)).err();
+    assert!(matches!(counted, Some(InputError::Hypothesis { .. })), "{counted:?}");
 }
 
 /// A fall into the centre comes to an end, whoever asks for it.
 #[test]
 fn a_fall_into_the_centre_ends() {
     let kepler = Planar { gamma: 0.0, mu: 1.0 };
-    let scene = || Scene::new(&kepler, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0), 2.0);
-    let refused = scene().steps(Steps::Accuracy(1e-6)).plan().err();
+    let problem = Problem::new(&kepler, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0)).unwrap();
+    let refused = problem.steps(Steps::Accuracy(1e-6)).plan(Until::Time(2.0)).err();
     assert!(matches!(refused, Some(InputError::Accuracy { .. })), "{refused:?}");
-    let outcome = scene().by(Integrator::Clocked { stages: 8 }).steps(Steps::Size(0.1)).plan().unwrap().run().unwrap();
+    let outcome =
+        problem.by(Integrator::Clocked { stages: 8 }).steps(Steps::Size(0.1)).run(Until::Time(2.0)).unwrap();
     assert!(matches!(outcome.status, Status::Failed { .. }), "{outcome:?}");
     // It takes pi / 8^(1/2) without another force.
     assert!(outcome.t <= std::f64::consts::PI / 8.0f64.sqrt() && outcome.t > 1.0, "{}", outcome.t);

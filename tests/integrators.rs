@@ -1,4 +1,4 @@
-//! The integrators: steppers, scenes, dense output and events, over the catalogue of systems.
+//! The integrators: steppers, runs, dense output and events, over the catalogue of systems.
 
 #![allow(missing_docs)]
 // In a check `f64::max` and `amax` would lose a NaN.
@@ -18,4 +18,4 @@ mod gauss;
 mod gauss_catalogue;
 mod gauss_stress;
 mod round_off;
-mod scenes;
+mod runs;

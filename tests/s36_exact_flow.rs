@@ -5,7 +5,7 @@ use crate::common::oracle::hamiltonian_motion;
 use crate::common::{AlongMotion, OverMotions, over_motions};
 use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use contact_geom::{Largest, Triple, VelocityPoint};
-use discrete_herglotz::{FinalOnly, Flow, Status, legendre_minus, legendre_plus};
+use discrete_herglotz::{Flow, Stepper, legendre_minus, legendre_plus};
 use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow, statements};
 use std::collections::BTreeSet;
 
@@ -76,7 +76,7 @@ fn a_run() {
             let ld = ExactLagrangian::<_, N>::new(system, h).unwrap();
             let start = contact_geom::legendre(system, t, &x);
             let end = Flow::new(&ld, t, start).and_then(|mut flow| {
-                assert_eq!(flow.run(20, &mut FinalOnly)?, Status::Completed);
+                assert_eq!(flow.advance(20), Ok(()));
                 Ok(*flow.state())
             });
             let truth = herglotz_flow(system, t, &x, 2.0).map(|m| contact_geom::legendre(system, t + 2.0, &m.end));

@@ -1,8 +1,7 @@
 //! Steps that are far too long are marked or refused, by every integrator; and what must not decide about them.
 
-use crate::{
-    Gauss, InputError, Integrator, Method, Scene, SplittingScheme, Status, StepError, Stepper, Steps, Suspicion,
-};
+use crate::run::run_of;
+use crate::{Gauss, InputError, Integrator, Method, SplittingScheme, Status, StepError, Stepper, Steps, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
@@ -14,8 +13,7 @@ fn run<L: Lagrangian<1>>(
     h: f64,
 ) -> Result<(Status, Option<Suspicion>), InputError> {
     let start = VelocityPoint::new([1.0], [0.3], 0.0);
-    let scene = Scene::new(system, start, 3.0 * h).by(integrator).steps(Steps::Count(3));
-    let outcome = scene.plan()?.run()?;
+    let outcome = run_of(system, start, 3.0 * h, Some(integrator), Steps::Count(3))?;
     Ok((outcome.status, outcome.suspicion))
 }
 
@@ -129,8 +127,8 @@ fn no_energy_is_lost_over_a_kink_in_silence() {
         let system = Kinked { at, slope };
         let energy = |q: f64, p: f64| 0.5 * (p * p + q * q) + slope * (q - at).abs();
         for (integrator, count) in blind().flat_map(|i| [10, 50, 200].map(|n| (i, n))) {
-            let scene = Scene::new(&system, VelocityPoint::new([1.0], [0.0], 0.0), 3.0);
-            let run = scene.by(integrator).steps(Steps::Count(count)).plan().and_then(|plan| plan.run());
+            let start = VelocityPoint::new([1.0], [0.0], 0.0);
+            let run = run_of(&system, start, 3.0, Some(integrator), Steps::Count(count));
             let Ok(end) = run else { continue };
             if (end.status, end.suspicion) != (Status::Completed, None) {
                 continue;
@@ -156,8 +154,8 @@ fn a_centre_that_is_passed_in_a_step_is_marked() {
     for e in [0.9, 0.97, 0.99, 0.999] {
         let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
         for (integrator, count) in blind().flat_map(|i| (20..40).step_by(3).chain([32]).map(move |n| (i, n))) {
-            let scene = Scene::new(&system, start, std::f64::consts::TAU).by(integrator).steps(Steps::Count(count));
-            let Ok(end) = scene.plan().and_then(|plan| plan.run()) else { continue };
+            let end = run_of(&system, start, std::f64::consts::TAU, Some(integrator), Steps::Count(count));
+            let Ok(end) = end else { continue };
             marked += u32::from(end.suspicion.is_some());
             let off = (end.q - start.q).norm() + (end.p - start.v).norm();
             if (end.status, end.suspicion) == (Status::Completed, None) && off > 0.3 {
@@ -178,8 +176,8 @@ fn a_doubt_is_no_mark() {
             if let Integrator::Gauss { stages } = integrator { f64::max(0.5 * stages as f64, 1.0) } else { 1.0 };
         for radians in [0.1, 0.2, 0.3, 0.4] {
             for count in [10, 100] {
-                let scene = Scene::new(&system, start, radians * parts * f64::from(count));
-                let end = scene.by(integrator).steps(Steps::Count(count as usize)).plan().unwrap().run().unwrap();
+                let (span, steps) = (radians * parts * f64::from(count), Steps::Count(count as usize));
+                let end = run_of(&system, start, span, Some(integrator), steps).unwrap();
                 assert_eq!((end.status, end.suspicion), (Status::Completed, None), "{integrator}, {radians} x {count}");
             }
         }
@@ -211,32 +209,40 @@ fn a_motion_at_rest_is_not_marked() {
     for scheme in SplittingScheme::ALL {
         for count in [1000, 1024] {
             let start = VelocityPoint::new([1.0], [0.3], 0.0);
-            let scene = Scene::new(&Shifted, start, 0.1 * f64::from(count)).by(Integrator::Splitting(scheme));
-            let end = scene.steps(Steps::Count(count as usize)).plan().unwrap().run().unwrap();
+            let (span, steps) = (0.1 * f64::from(count), Steps::Count(count as usize));
+            let end = run_of(&Shifted, start, span, Some(Integrator::Splitting(scheme)), steps).unwrap();
             assert_eq!((end.status, end.suspicion), (Status::Completed, None), "{}, {:e}", scheme.name(), end.q[0]);
             assert!(end.q[0].abs() < 1e-14, "{}, {:e}", scheme.name(), end.q[0]);
         }
     }
     // A known issue: the equations of an implicit step have no solution there, as forces jump from one number to the next.
-    let scene = Scene::new(&Shifted, VelocityPoint::new([1.0], [0.3], 0.0), 100.0);
-    let end = scene.by(Integrator::Discrete(Method::Midpoint)).steps(Steps::Count(1000)).plan().unwrap().run().unwrap();
+    let (start, midpoint) = (VelocityPoint::new([1.0], [0.3], 0.0), Integrator::Discrete(Method::Midpoint));
+    let end = run_of(&Shifted, start, 100.0, Some(midpoint), Steps::Count(1000)).unwrap();
     assert!(matches!(end.status, Status::Failed { cause: StepError::NotConverged { .. }, .. }), "{:?}", end.status);
 }
 
-/// A known issue: a step that ends at a centre of force has nodes on one side of it alone.
+/// A step that ends at a centre of force has nodes on one side of it alone: what turns the velocity there is compared with halves.
 #[test]
-fn many_stages_pass_a_centre_at_the_end_of_a_step() {
+fn many_stages_do_not_pass_a_centre_at_the_end_of_a_step() {
     let system = Kepler::<2> { mu: 1.0, gamma: 0.0 };
-    let e = 0.999;
-    let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
-    let run = |count| {
-        let scene = Scene::new(&system, start, std::f64::consts::TAU).by(Integrator::Gauss { stages: 8 });
-        scene.steps(Steps::Count(count)).plan().unwrap().run().unwrap()
-    };
-    let silent = run(20);
-    assert_eq!((silent.status, silent.suspicion), (Status::Completed, None));
-    assert!((silent.q - start.q).norm() > 1.0, "{}", silent.q);
-    assert_ne!(run(21).suspicion, None);
+    let (mut lost, mut silent) = (0, Vec::new());
+    for e in [0.9, 0.95, 0.98, 0.99, 0.995, 0.999] {
+        let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
+        for stages in 3..=16 {
+            for count in 20..=40 {
+                let by = Some(Integrator::Gauss { stages });
+                let end = run_of(&system, start, std::f64::consts::TAU, by, Steps::Count(count)).unwrap();
+                if end.status == Status::Completed && (end.q - start.q).norm() > 1.0 {
+                    lost += 1;
+                    if end.suspicion.is_none() {
+                        silent.push((e, stages, count));
+                    }
+                }
+            }
+        }
+    }
+    assert!(lost > 100, "{lost}");
+    assert!(silent.is_empty(), "{silent:?} of {lost}");
 }
 
 /// Steps that move by so little that each is rounded in the same way: the sum of many loses none of it.
@@ -245,9 +251,8 @@ fn tiny_steps_lose_nothing() {
     let (system, count) = (Pendulum { gamma: -0.1 }, 1000);
     let (q, v) = (1.0, 0.7);
     for (scheme, h) in SplittingScheme::ALL.into_iter().flat_map(|s| [1e-12, 1e-11, 1e-10].map(|h| (s, h))) {
-        let scene = Scene::new(&system, VelocityPoint::new([q], [v], 0.0), h * f64::from(count));
-        let scene = scene.by(Integrator::Splitting(scheme)).steps(Steps::Count(count as usize));
-        let end = scene.plan().unwrap().run().unwrap();
+        let (start, steps) = (VelocityPoint::new([q], [v], 0.0), Steps::Count(count as usize));
+        let end = run_of(&system, start, h * f64::from(count), Some(Integrator::Splitting(scheme)), steps).unwrap();
         // Taylor's series; the time is 1e-7 at most.
         let (t, a) = (h * f64::from(count), -f64::sin(q) - 0.1 * v);
         let (right_q, right_p) = (q + t * (v + 0.5 * t * a), v + t * (a + 0.5 * t * (-f64::cos(q) * v - 0.1 * a)));
@@ -274,8 +279,7 @@ fn a_step_past_the_end_of_a_motion_is_marked() {
     for integrator in blind() {
         // The mass vanishes after 0.0017.
         for count in [10, 20, 40] {
-            let scene = Scene::new(&Massless, start, 1.6).by(integrator).steps(Steps::Count(count));
-            let Ok(end) = scene.plan().and_then(|plan| plan.run()) else { continue };
+            let Ok(end) = run_of(&Massless, start, 1.6, Some(integrator), Steps::Count(count)) else { continue };
             whole += u32::from(end.status == Status::Completed);
             if (end.status, end.suspicion) == (Status::Completed, None) {
                 silent.push((integrator.to_string(), count));

@@ -61,7 +61,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
     /// A composition of the rules that `rule` makes for each length of a substep, from the state `(q, p, z)` at `t0`.
     ///
     /// # Errors
-    /// [`InputError::Step`] unless h is positive and finite; [`InputError::Hypothesis`] for a scheme that is no composition;
+    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Hypothesis`] for a scheme that is no composition;
     /// [`InputError::Geometry`] where the time or the state is not finite, or the Lagrangian singular; [`InputError::Sigma`] and
     /// [`InputError::FirstStep`] where the first substep cannot be taken; those of `rule`.
     pub fn new(
@@ -71,7 +71,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         t0: f64,
         state: PhasePoint<N>,
     ) -> Result<Self, InputError> {
-        if !(h > 0.0 && h.is_finite()) {
+        if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
         crate::run::check_time(t0)?;

@@ -12,7 +12,7 @@ use contact_geom::{DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondD
 /// method on them. The discretisations of this crate override both by cheaper routes to the same numbers. For a
 /// time-dependent Lagrangian, `t` is the time `t_k` at the start of the step.
 pub trait DiscreteLagrangian<const N: usize> {
-    /// The time step `h > 0`.
+    /// The time step h; negative where steps go back in time.
     fn step_size(&self) -> f64;
 
     /// The value `L_d(q0, q1, z0)`.
@@ -68,7 +68,7 @@ pub trait DiscreteLagrangian<const N: usize> {
     ) -> Result<Transition<N>, StepError> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>| DiscretePoint { q0: from.q, q1: from.q + u * h, z0: from.z };
-        let start = Start { u: *guess, z: 0.0, resolution: from.q.amax() / h, impulse: from.p.amax() * h };
+        let start = Start { u: *guess, z: 0.0, resolution: from.q.amax() / h.abs(), impulse: from.p.amax() * h.abs() };
         let root = newton(start, solver, |u, _| {
             let jet = self.second_jet(t, &point(u))?;
             Ok(Linearised {
@@ -100,7 +100,8 @@ pub trait DiscreteLagrangian<const N: usize> {
     ) -> Result<Transition<N>, StepError> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>, z0: f64| DiscretePoint { q0: from.q - u * h, q1: from.q, z0 };
-        let start = Start { u: *guess, z: from.z, resolution: from.q.amax() / h, impulse: from.p.amax() * h };
+        let start =
+            Start { u: *guess, z: from.z, resolution: from.q.amax() / h.abs(), impulse: from.p.amax() * h.abs() };
         let root = newton(start, solver, |u, z0| {
             let jet = self.second_jet(t, &point(u, z0))?;
             let defect = z0 + jet.first.value - from.z;

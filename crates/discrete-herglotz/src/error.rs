@@ -6,14 +6,14 @@ use thiserror::Error;
 /// Bad input, found before the first step.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum InputError {
-    /// The step is not a positive finite number.
-    #[error("the step h = {h} must be a positive finite number")]
+    /// The step is 0 or not finite, or negative where the direction of a run is that of its span.
+    #[error("the step h = {h} must be a finite number, not 0, and positive where the span tells the direction")]
     Step {
         /// The step that was passed.
         h: f64,
     },
-    /// The span of a scene is not a positive finite time.
-    #[error("the span of time is {span}; it must be positive and finite")]
+    /// The span of a run is 0 or not finite.
+    #[error("the span of time is {span}; it must be finite and not 0 (negative to go back)")]
     Span {
         /// The span that was passed.
         span: f64,
@@ -45,6 +45,16 @@ pub enum InputError {
         most: f64,
         /// What to do.
         remedy: &'static str,
+    },
+    /// Times of output are not in order, not finite, or outside of the span of the run.
+    #[error(
+        "the time t = {t} of row {index} is out of order, not finite or outside of the run's span; give times in the order of the run"
+    )]
+    Times {
+        /// The first row with such a time.
+        index: usize,
+        /// The time.
+        t: f64,
     },
     /// The Lagrangian has no finite value or derivative at the start.
     #[error("the Lagrangian or one of its derivatives is not finite at the start; choose a start inside its domain")]
@@ -175,6 +185,12 @@ pub enum StepError {
     /// A coordinate or a derivative is infinite or not a number.
     #[error("a value is not finite: the motion leaves the domain of the Lagrangian, or grows without bound")]
     NonFinite,
+    /// The function of an event is not finite.
+    #[error("the function of an event is not finite at t = {t}; give one that is defined along the motion")]
+    Event {
+        /// The time.
+        t: f64,
+    },
     /// A formula branches on the value of a number, of which vector lanes have several.
     #[error(
         "the Lagrangian or the clock asks for one value (`re`, `extent`, `==`) of lanes that differ; \
@@ -260,10 +276,14 @@ impl std::fmt::Display for Suspicion {
 pub enum Status {
     /// All steps were taken.
     Completed,
-    /// The observer asked to stop after this step.
+    /// An observer ended the run.
     Stopped {
         /// The number of steps taken.
         step: usize,
+        /// The time, within the last step or at its end.
+        t: f64,
+        /// Which observer.
+        by: &'static str,
     },
     /// A claim of the Lagrangian's structure was found false at a state of the run: all that was computed may be wrong.
     FalseClaim {
@@ -278,6 +298,8 @@ pub enum Status {
     Failed {
         /// The number of the step that failed, counted from 0.
         step: usize,
+        /// The time that was reached.
+        t: f64,
         /// Why.
         cause: StepError,
     },
@@ -287,13 +309,13 @@ impl std::fmt::Display for Status {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Status::Completed => write!(f, "completed"),
-            Status::Stopped { step } => write!(f, "stopped by the observer after step {step}"),
+            Status::Stopped { step, t, by } => write!(f, "stopped by {by} at t = {t}, in step {step}"),
             Status::FalseClaim { step, claim, size } => write!(
                 f,
                 "unreliable: after step {step} the Lagrangian is not {claim}, as it claims (relative size {size:e}); correct \
                  its structure and run again"
             ),
-            Status::Failed { step, cause } => write!(f, "failed in step {step}: {cause}"),
+            Status::Failed { step, t, cause } => write!(f, "failed in step {step} at t = {t}: {cause}"),
         }
     }
 }

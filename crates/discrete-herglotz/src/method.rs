@@ -138,7 +138,7 @@ impl Method {
     ///
     /// # Errors
     /// [`InputError::Geometry`] where the time or the state is not finite, and those of the method's constructor:
-    /// [`InputError::Step`] unless `h` is positive and finite, [`InputError::Dimension`] if `N = 0`, and those of
+    /// [`InputError::Step`] unless `h` is finite and not 0; it is negative to go back in time, [`InputError::Dimension`] if `N = 0`, and those of
     /// [`Strang::new`].
     pub fn discretise<const N: usize, L: Lagrangian<N>>(
         self,

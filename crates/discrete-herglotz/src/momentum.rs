@@ -1,7 +1,7 @@
 //! Discrete symmetries and their dissipated momenta.
 
-use crate::{DiscreteLagrangian, Observer, Step, StepError};
-use contact_geom::{DiscretePoint, OneParameterGroup, PhasePoint};
+use crate::{DiscreteLagrangian, Moment, Needs, Observer, StepError, Stop};
+use contact_geom::{DiscretePoint, OneParameterGroup};
 use std::ops::ControlFlow;
 
 /// The discrete momentum `J_d(xi) = p0 . xi_Q(q0)` with `p0 = -D1 L_d / sigma_d`; paper, section 3.2, with the physical
@@ -44,7 +44,7 @@ pub struct MomentumRow {
     pub t: f64,
     /// The momentum `J_k = p_k . xi_Q(q_k)`.
     pub momentum: f64,
-    /// Its prediction `J_0 sigma_1 ... sigma_k`.
+    /// Its prediction `J_0 sigma_1 ... sigma_k`, by the sum of the logarithms.
     pub predicted: f64,
 }
 
@@ -71,15 +71,19 @@ impl<G> MomentumDecay<G> {
 }
 
 impl<const N: usize, G: OneParameterGroup<N>> Observer<N> for MomentumDecay<G> {
-    fn start(&mut self, t: f64, state: &PhasePoint<N>) {
-        let momentum = self.group.momentum(&state.q, &state.p);
-        self.rows.push(MomentumRow { t, momentum, predicted: momentum });
+    fn needs(&self) -> Needs {
+        Needs { action: false, conformal_factor: true }
     }
 
-    fn step(&mut self, step: &Step<N>) -> ControlFlow<()> {
-        let momentum = self.group.momentum(&step.to.q, &step.to.p);
-        let predicted = self.rows.last().map_or(momentum, |row| row.predicted * step.sigma);
-        self.rows.push(MomentumRow { t: step.t, momentum, predicted });
+    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        self.step(at)
+    }
+
+    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        let momentum = self.group.momentum(&at.state.q, &at.state.p);
+        let factor = at.log_factor.unwrap_or(f64::NAN).exp();
+        let predicted = self.rows.first().map_or(momentum, |row| row.momentum * factor);
+        self.rows.push(MomentumRow { t: at.t, momentum, predicted });
         ControlFlow::Continue(())
     }
 }

@@ -65,7 +65,7 @@ impl<L, R: Rule> Quadrature<L, R> {
     /// The rule applied to a Lagrangian with the time step `h`.
     ///
     /// # Errors
-    /// [`InputError::Step`] unless `h` is positive and finite, [`InputError::Dimension`] if `N = 0`.
+    /// [`InputError::Step`] unless `h` is finite and not 0; it is negative to go back in time, [`InputError::Dimension`] if `N = 0`.
     pub fn new<const N: usize>(lagrangian: L, h: f64) -> Result<Self, InputError>
     where
         L: Lagrangian<N>,
@@ -73,7 +73,7 @@ impl<L, R: Rule> Quadrature<L, R> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
-        if !(h > 0.0 && h.is_finite()) {
+        if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
         Ok(Quadrature { lagrangian, h, rule: PhantomData })

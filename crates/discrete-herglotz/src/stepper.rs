@@ -1,7 +1,9 @@
 //! A method at work on one motion.
 
+use crate::DenseStep;
 use crate::{Doubt, StepError, Suspicion};
 use contact_geom::PhasePoint;
+use thiserror::Error;
 
 /// A method at work on one motion: its state, its workspace, and what it carries from one step to the next (guesses,
 /// compensations, a kick that two steps share).
@@ -25,7 +27,7 @@ pub trait Stepper<const N: usize> {
         self.advance(steps).map(|()| steps)
     }
 
-    /// The state `(q, p, z)`. Where the stepper was told that nobody wants the action, `z` stays what it was at the start.
+    /// The state `(q, p, z)`. Where the stepper was told that the action is not requested, `z` stays what it was at the start.
     fn state(&self) -> PhasePoint<N>;
 
     /// The time of the state.
@@ -36,6 +38,11 @@ pub trait Stepper<const N: usize> {
 
     /// The evaluations of forces, or of gradients of L, since the start: one a point of R x TQ x R.
     fn evaluations(&self) -> u64;
+
+    /// The last step as a curve, for a method that has one of its own; `None` before the first, and after a step that could not be taken.
+    fn dense(&self) -> Option<DenseStep<N>> {
+        None
+    }
 
     /// The first step so far that cannot have resolved the motion, where one was seen.
     fn suspicion(&self) -> Option<Suspicion> {
@@ -48,8 +55,9 @@ pub trait Stepper<const N: usize> {
     }
 }
 
-/// A run that ended before its last step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Steps that ended before the last of them.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error("halted after {taken} steps: {cause}")]
 pub struct Halt {
     /// The steps taken before.
     pub taken: usize,

@@ -33,12 +33,12 @@ const ROUNDED: f64 = 1e-10;
 /// What rounding moves a motion from this start by, at most. Forces are rounded as they are at its size, so that this holds too where it has
 /// come to rest beside the origin.
 pub(crate) fn rounding<const N: usize>(q: &SVector<f64, N>, v: &SVector<f64, N>, h: f64) -> f64 {
-    let reach = larger(size(q), size(v) * h);
+    let reach = larger(size(q), size(v) * h.abs());
     if reach.is_finite() { ROUNDED * reach } else { 0.0 }
 }
 
 /// Some steps along which the velocity has turned twice as sharply as in all before them: no fault where the force is smooth, but it may
-/// jump there, or be narrower than the steps. [`Scene`](crate::Scene)s look.
+/// jump there, or be narrower than the steps. A [`Run`](crate::Run) looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Doubt<const N: usize> {
     /// The steps taken before them.

@@ -129,11 +129,6 @@ impl<const N: usize> DenseStep<N> {
         self.s
     }
 
-    /// The time at a fraction of the step.
-    pub(crate) fn time(&self, fraction: f64) -> f64 {
-        self.t + fraction * self.h
-    }
-
     /// The state at a fraction of the step.
     pub(crate) fn at_fraction(&self, fraction: f64) -> PhasePoint<N> {
         let p = legendre(self.s, 2.0 * fraction - 1.0);

@@ -58,9 +58,9 @@ use stage_equations::{Given, Products, StageEquations, Workspace};
 /// use discrete_herglotz::{Gauss, Stepper};
 /// let gauss = Gauss::new(DoublePendulum::default(), 8, 0.1)?;
 /// let mut run = gauss.stepper(0.0, PhasePoint::new([1.0, 0.5], [0.0, 0.0], 0.0), [0.0, 0.0].into())?;
-/// run.advance(100).map_err(|halt| discrete_herglotz::InputError::FirstStep(halt.cause))?;
+/// run.advance(100)?;
 /// println!("t = {}: {:?}", run.time(), run.state());
-/// # Ok::<(), discrete_herglotz::InputError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Gauss<L> {
@@ -84,7 +84,7 @@ impl<L> Gauss<L> {
         if !(1..=MOST).contains(&stages) {
             return Err(InputError::Stages { found: stages });
         }
-        if !(h > 0.0 && h.is_finite()) {
+        if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
         if N == 0 {

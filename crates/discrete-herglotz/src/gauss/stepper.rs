@@ -87,7 +87,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     newton_steps: u64,
     /// The misfit of a constant conformal factor.
     of_sigma: f64,
-    /// Of steps that tell nothing between their nodes: the last mean velocities.
+    /// Of steps that tell nothing between their nodes, and where doubts are wanted: the last mean velocities.
     sequence: Option<Box<Sequence<N>>>,
     watch: Watch<N>,
 }
@@ -130,7 +130,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             Route::General(General::new(lagrangian, physical, Table::new(s, h), mass, &state, &start.v))
         };
         let from = Start { q: [0.0; N], y: [0.0; N], z: 0.0 };
-        let velocities = [start.v; 4];
         Ok(GaussStepper {
             lagrangian,
             products: &gauss.forward,
@@ -148,9 +147,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             workspace: None,
             newton_steps: 0,
             of_sigma,
-            sequence: (s <= FEW).then(|| Box::new(Sequence { velocities, q: state.q, ends: [from; 2] })),
+            sequence: (s <= FEW).then(|| Sequence::new(Start { q: state.q.into(), ..from })),
             watch: Watch::new(&state.q, &start.v, h),
         })
+    }
+
+    /// With [`Doubt`]s about steps of any number of stages.
+    pub(crate) fn doubting(mut self) -> Self {
+        if self.sequence.is_none() {
+            self.sequence = Some(Sequence::new(self.values()));
+        }
+        self
     }
 
     /// Without Newton's method: a step whose iteration does not contract then fails with [`StepError::NotConverged`].
@@ -174,9 +181,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         self.newton_steps
     }
 
-    /// The last step as a curve; `None` before the first, and after a step that could not be taken. It costs nothing where it
-    /// is not asked for.
-    pub fn dense(&self) -> Option<DenseStep<N>> {
+    /// The last step as a curve.
+    fn curve(&self) -> Option<DenseStep<N>> {
         let (s, h) = (self.products.s, self.products.h);
         let t = self.t0 + self.k.checked_sub(1)? as f64 * h;
         let condensed = |table: &Condensed, a, wants_z| {
@@ -451,6 +457,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             Route::Condensed(run) => run.evaluations,
             Route::General(run) => run.evaluations,
         }
+    }
+
+    /// The collocation polynomial. It costs nothing where it is not asked for.
+    fn dense(&self) -> Option<DenseStep<N>> {
+        self.curve()
     }
 
     /// What was seen along the steps; else what a look at the last step alone shows, between its nodes: a run that wants more asks

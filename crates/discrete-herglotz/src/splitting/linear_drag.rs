@@ -68,7 +68,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
     /// A splitting from the state `(q, p, z)` at time `t0`, with the action.
     ///
     /// # Errors
-    /// [`InputError::Step`] unless h is positive and finite; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
+    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
     /// is not separable and affine in z; [`InputError::Geometry`] where the state is not finite or M singular;
     /// [`InputError::FirstStep`] where V is not defined at the start.
     pub fn new(

@@ -63,7 +63,7 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
     /// A splitting from the state `(q, p, z)` at time `t0`, with the flow of f.
     ///
     /// # Errors
-    /// [`InputError::Step`] unless h is positive and finite; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
+    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
     /// is not separable; [`InputError::Hypothesis`] where `L_z` depends on time or is not `f'`, where the maps are not the
     /// flow of f, and for a Runge-Kutta-Nyström scheme; [`InputError::Geometry`] where the state is not finite or M singular;
     /// [`InputError::FirstStep`] where V is not defined at the start.

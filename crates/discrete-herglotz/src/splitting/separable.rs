@@ -24,7 +24,7 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
-        if !(h > 0.0 && h.is_finite()) {
+        if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
         crate::run::check_time(t)?;

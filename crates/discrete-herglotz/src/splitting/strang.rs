@@ -19,13 +19,13 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::Pendulum};
-/// use discrete_herglotz::{FinalOnly, Flow, Strang};
+/// use discrete_herglotz::{Flow, Stepper, Strang};
 /// let pendulum = Pendulum { gamma: -0.1 };
 /// let start = PhasePoint::new([1.0], [1.0], 0.0);
 /// let ld = Strang::new(&pendulum, 0.1, 0.0, &start)?;
 /// let mut flow = Flow::new(&ld, 0.0, start)?;
-/// flow.run(100, &mut FinalOnly)?;
-/// # Ok::<(), discrete_herglotz::InputError>(())
+/// flow.advance(100)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Strang<L, const N: usize> {

@@ -8,7 +8,7 @@ use crate::report::Report;
 use crate::statistics::quantile;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::{PhasePoint, VelocityPoint, larger};
-use discrete_herglotz::{InputError, Integrator, Method, Scene, SplittingScheme, Steps};
+use discrete_herglotz::{InputError, Integrator, Method, SplittingScheme, Steps};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -106,7 +106,7 @@ struct Found {
     worth: Worth,
     error: f64,
     steps: usize,
-    /// Whether dop853 sides with the scene where the exact flow does not.
+    /// Whether dop853 sides with the run where the exact flow does not.
     doubt: bool,
     /// Where it was refused: whether a configuration of the library solves it.
     solvable: bool,
@@ -149,7 +149,8 @@ fn by_hand<const N: usize>(problem: &Problem<N>, truth: &PhasePoint<N>, toleranc
             continue;
         }
         let run = || -> Result<f64, InputError> {
-            let plan = problem.scene().by(integrator).steps(Steps::Count(count as usize)).plan()?;
+            let motion = problem.motion()?;
+            let plan = motion.by(integrator).steps(Steps::Count(count as usize)).plan(problem.end())?;
             Ok(fastest(|| plan.run()).0)
         };
         if let Ok(seconds) = run() {
@@ -170,19 +171,20 @@ fn solve<const N: usize, const D: usize>(
     compared: bool,
 ) -> Option<Found> {
     let named = named.filter(|integrator| integrator.check(&problem.system).is_ok());
-    let scene = || -> Scene<'_, Formula<N>, N> {
-        let scene = problem.scene().steps(Steps::Accuracy(tolerance));
-        match named {
-            Some(integrator) => scene.by(integrator),
-            None => scene,
-        }
-    };
     let truth = problem.exact_in(3).ok()?;
     if distance(&problem.exact_in(7).ok()?, &truth, 0.0) > 0.05 * tolerance {
         return None;
     }
     let clock = Instant::now();
-    let plan = caught(|| scene().plan());
+    let motion = caught(|| problem.motion());
+    let plan = motion.as_ref().and_then(|motion| match motion {
+        Ok(motion) => caught(|| {
+            let run = motion.steps(Steps::Accuracy(tolerance));
+            let run = if let Some(integrator) = named { run.by(integrator) } else { run };
+            run.plan(problem.end())
+        }),
+        Err(refused) => Some(Err(*refused)),
+    });
     let plan_time = clock.elapsed().as_secs_f64();
     let (run, end, steps) = match &plan {
         None => (f64::NAN, End::Panicked, 0),

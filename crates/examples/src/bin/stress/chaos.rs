@@ -7,7 +7,7 @@ use crate::random::Random;
 use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::{PhasePoint, Triple, VelocityPoint, larger, largest};
-use discrete_herglotz::{Flow, Gauss, InputError, Integrator, Stepper, Steps, Wanted};
+use discrete_herglotz::{Flow, Gauss, InputError, Integrator, Rows, Run, Stepper, Steps};
 
 /// A particle in a square well with rounded corners, chaotic at this energy.
 fn chaotic(gamma: f64) -> Formula<2> {
@@ -46,7 +46,8 @@ fn reversal(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
         let run = |gamma: f64, start: &PhasePoint<2>| -> Result<PhasePoint<2>, InputError> {
             let start = VelocityPoint { q: start.q, v: start.p, z: start.z };
             let problem = Problem { system: chaotic(gamma), t0: 0.0, start, span: f64::from(span) };
-            let plan = problem.scene().by(integrator).steps(Steps::Count(count)).plan()?;
+            let motion = problem.motion()?;
+            let plan = motion.by(integrator).steps(Steps::Count(count)).plan(problem.end())?;
             let mut stepper = plan.stepper()?;
             let ended = stepper.advance(count).is_err();
             let state = stepper.state();
@@ -129,14 +130,14 @@ fn same_bits(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fai
         let applies = |i: &Integrator| i.check(&system).is_ok();
         for integrator in FAMILIES.into_iter().filter(applies) {
             let problem = Problem { system, t0: 0.0, start, span: H * f64::from(steps) };
-            let scene = || problem.scene().by(integrator).steps(Steps::Count(steps as usize));
-            let whole = |wanted: Wanted<2>| -> Result<Vec<u64>, InputError> {
-                let outcome = scene().wanting(wanted).plan()?.run()?;
-                Ok(bits(&PhasePoint { q: outcome.q, p: outcome.p, z: outcome.z.unwrap_or(f64::NAN) }))
+            let motion = problem.motion()?;
+            let count = Steps::Count(steps as usize);
+            let whole = |run: Run<'_, Formula<2>, 2>| -> Result<Vec<u64>, InputError> {
+                Ok(bits(&run.run(problem.end())?.state()))
             };
-            let one = whole(Wanted::default())?;
-            again += u32::from(whole(Wanted::default())? != one);
-            let plan = scene().plan()?;
+            let one = whole(motion.by(integrator).steps(count))?;
+            again += u32::from(whole(motion.by(integrator).steps(count))? != one);
+            let plan = motion.by(integrator).steps(count).plan(problem.end())?;
             for piece in [1, 7, 300] {
                 let mut stepper = plan.stepper()?;
                 let mut left = steps as usize;
@@ -146,9 +147,12 @@ fn same_bits(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fai
                 pieces += u32::from(bits(&stepper.state()) != one);
             }
             for stride in [1, 10, 333] {
-                let rows = Wanted { rows: Some(stride), ..Wanted::default() };
-                recorded += u32::from(whole(rows.clone())? != one);
-                recorded += u32::from(whole(Wanted { conformal_factor: true, ..rows })? != one);
+                let mut states = Rows::every(stride)?;
+                let run = motion.by(integrator).steps(count).observe(&mut states);
+                recorded += u32::from(whole(run)? != one);
+                let mut states = Rows::every(stride)?;
+                let run = motion.by(integrator).steps(count).with_conformal_factor().observe(&mut states);
+                recorded += u32::from(whole(run)? != one);
             }
             let words = one.iter().map(|b| format!("{b:016x}")).collect::<Vec<_>>().join(" ");
             rows.push(vec![format!("bits, {name}"), integrator.to_string(), steps.to_string(), words]);

@@ -46,7 +46,8 @@ fn angular(x: &PhasePoint<2>) -> f64 {
 fn step(integrator: Integrator, from: &Triple<2>) -> Result<(PhasePoint<2>, f64), InputError> {
     let start = VelocityPoint { q: from.x, v: from.y, z: from.z };
     let problem = Problem { system: Formula::<2>::kepler(GAMMA), t0: 0.0, start, span: H };
-    let plan = problem.scene().by(integrator).steps(Steps::Count(1)).plan()?;
+    let motion = problem.motion()?;
+    let plan = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end())?;
     let mut stepper = plan.stepper()?;
     let ended = stepper.advance(1).is_err();
     Ok((stepper.state(), if ended { f64::NAN } else { stepper.sigma() }))
@@ -79,7 +80,8 @@ fn contact_defect(integrator: Integrator, at: &PhasePoint<2>) -> Result<f64, Inp
 fn along(integrator: Integrator, power: u32) -> Result<Vec<Row>, InputError> {
     let start = VelocityPoint::new([0.7, 0.0], [0.0, (1.3f64 / 0.7).sqrt()], 0.0);
     let problem = Problem { system: Formula::<2>::kepler(GAMMA), t0: 0.0, start, span: H };
-    let plan = problem.scene().by(integrator).steps(Steps::Count(1)).plan()?;
+    let motion = problem.motion()?;
+    let plan = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end())?;
     let mut stepper = plan.stepper()?;
     let (mut rows, mut taken, first) = (Vec::new(), 0, angular(&stepper.state()));
     // The sum of logarithms, with what each addition loses.

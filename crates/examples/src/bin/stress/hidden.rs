@@ -126,13 +126,13 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
             End::Panicked => Worth::Refused,
             end => end.worth(&truth, 0.0, EXACT),
         };
-        let of_scene = (to.worth(&truth, 0.0, 10.0 * ACCURACY), to.error(&truth, 0.0));
-        Some((hidden.kind, hidden.width, of_scene, (exact_worth, exact.error(&truth, 0.0))))
+        let of_run = (to.worth(&truth, 0.0, 10.0 * ACCURACY), to.error(&truth, 0.0));
+        Some((hidden.kind, hidden.width, of_run, (exact_worth, exact.error(&truth, 0.0))))
     });
     let mut rows = Vec::new();
     let mut tallies: BTreeMap<(&str, usize), Tally> = BTreeMap::new();
-    for (kind, width, of_scene, of_flow) in found.iter().flatten() {
-        for (by, (worth, error)) in [("to 1e-6", of_scene), ("exact flow", of_flow)] {
+    for (kind, width, of_run, of_flow) in found.iter().flatten() {
+        for (by, (worth, error)) in [("to 1e-6", of_run), ("exact flow", of_flow)] {
             *tallies.entry((by, *kind)).or_default().entry(*worth).or_default() += 1;
             rows.push(vec![KINDS[*kind].into(), by.into(), number(*width), worth.name().into(), number(*error)]);
         }

@@ -101,7 +101,8 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         let Long { system, integrator, steps, truth, remembered, truncation, .. } = &all[i];
         let steps = if quick { steps / 2000 } else { *steps };
         let problem = Problem { system: *system, t0: 0.0, start: start_of(*truth), span: H };
-        let plan = problem.scene().by(*integrator).steps(Steps::Count(1)).plan()?;
+        let motion = problem.motion()?;
+        let plan = motion.by(*integrator).steps(Steps::Count(1)).plan(problem.end())?;
         let mut stepper = plan.stepper()?;
         let (mut taken, mut seen) = (0, Vec::new());
         let mut next = 1 << 10;
@@ -172,7 +173,8 @@ fn decays(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
             start: VelocityPoint::new([1.0], [0.0], 0.0),
             span: h,
         };
-        let plan = problem.scene().by(integrator).steps(Steps::Count(1)).plan()?;
+        let motion = problem.motion()?;
+        let plan = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end())?;
         let mut stepper = plan.stepper()?;
         let (mut times, mut fails) = (Vec::new(), false);
         for part in 0..16 {

@@ -5,7 +5,9 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{PhasePoint, Triple, VelocityPoint, herglotz_rates, larger, legendre};
 use differential_equations::methods::ExplicitRungeKutta;
 use differential_equations::prelude::{IVP, ODE};
-use discrete_herglotz::{InputError, Integrator, Method, Outcome, Scene, SplittingScheme, Status, StepError, Steps};
+use discrete_herglotz::{
+    InputError, Integrator, Method, Outcome, Run, SplittingScheme, Status, StepError, Steps, Until,
+};
 use exact_lagrangian::{ExactError, herglotz_flow};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -20,6 +22,9 @@ pub struct Problem<const N: usize> {
     pub start: VelocityPoint<N>,
     pub span: f64,
 }
+
+/// The same for the library.
+pub type Motion<'a, const N: usize> = discrete_herglotz::Problem<'a, Formula<N>, N>;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,14 +133,19 @@ impl<const N: usize> Problem<N> {
         legendre(&self.system, self.t0, &self.start)
     }
 
-    /// The scene of it.
-    pub fn scene(&self) -> Scene<'_, Formula<N>, N> {
-        Scene::new(&self.system, self.start, self.span).from_time(self.t0)
+    /// It for the library, which may refuse its start.
+    pub fn motion(&self) -> Result<Motion<'_, N>, InputError> {
+        Motion::new(&self.system, self.t0, self.start)
+    }
+
+    /// Where its runs end.
+    pub fn end(&self) -> Until {
+        Until::Time(self.t0 + self.span)
     }
 
     /// The run with a number of steps of one integrator.
     pub fn by(&self, integrator: Integrator, count: usize) -> End<N> {
-        end_of(&self.scene().by(integrator).steps(Steps::Count(count)))
+        self.run(|motion| motion.by(integrator).steps(Steps::Count(count)))
     }
 
     /// What a run with fixed steps is worth, and its error: an error of order one in silence is a wrong result where a step of it
@@ -150,7 +160,8 @@ impl<const N: usize> Problem<N> {
 
     /// The largest error of a step of a run, each from where it started; `None` where the exact motion is not known.
     fn local_error(&self, integrator: Integrator, count: usize, scale: f64) -> Option<f64> {
-        let plan = self.scene().by(integrator).steps(Steps::Count(count)).plan().ok()?;
+        let motion = self.motion().ok()?;
+        let plan = motion.by(integrator).steps(Steps::Count(count)).plan(self.end()).ok()?;
         let mut stepper = plan.stepper().ok()?;
         let mut worst = 0.0;
         for _ in 0..count {
@@ -166,9 +177,18 @@ impl<const N: usize> Problem<N> {
         Some(worst)
     }
 
-    /// The run to an accuracy, with the integrator that a scene takes where none is named.
+    /// The run to an accuracy, with the integrator that a run takes where none is named.
     pub fn to(&self, accuracy: f64) -> End<N> {
-        end_of(&self.scene().steps(Steps::Accuracy(accuracy)))
+        self.run(|motion| motion.steps(Steps::Accuracy(accuracy)))
+    }
+
+    /// The end of a run.
+    fn run(&self, run_of: impl for<'p> FnOnce(&'p Motion<'p, N>) -> Run<'p, Formula<N>, N>) -> End<N> {
+        match caught(|| run_of(&self.motion()?).run(self.end())) {
+            None => End::Panicked,
+            Some(Err(refused)) => End::Refused(refused),
+            Some(Ok(outcome)) => end_of_outcome(&outcome),
+        }
     }
 
     /// The end of the motion by the exact flow, in one go.
@@ -189,18 +209,9 @@ impl<const N: usize> Problem<N> {
     }
 }
 
-/// The end of the run of a scene.
-fn end_of<const N: usize>(scene: &Scene<'_, Formula<N>, N>) -> End<N> {
-    match caught(|| scene.plan()?.run()) {
-        None => End::Panicked,
-        Some(Err(refused)) => End::Refused(refused),
-        Some(Ok(outcome)) => end_of_outcome(&outcome),
-    }
-}
-
 /// The end that an outcome tells of.
 pub fn end_of_outcome<const N: usize>(outcome: &Outcome<N>) -> End<N> {
-    let state = PhasePoint { q: outcome.q, p: outcome.p, z: outcome.z.unwrap_or(0.0) };
+    let state = outcome.state();
     match outcome.status {
         Status::Completed if outcome.suspicion.is_some() => End::Marked(state),
         Status::Completed => End::Whole(state),

@@ -4,7 +4,7 @@ use crate::formula::{Formula, Kinetic, Rate, Smooth};
 use crate::motion::Problem;
 use contact_geom::systems::Radial;
 use contact_geom::{VelocityPoint, largest, legendre};
-use discrete_herglotz::{Gauss, InputError, Integrator, Method, Status, Stepper, Steps, Wanted};
+use discrete_herglotz::{Gauss, InputError, Integrator, Method, Rows, Status, Stepper, Steps};
 use exact_lagrangian::herglotz_flow;
 use std::io::Read;
 use std::process::{Command, Stdio};
@@ -84,18 +84,23 @@ pub fn ask(name: &str, patience: Duration) -> std::io::Result<Ended> {
     }
 }
 
-/// What a run of a plan came to.
+/// What a run came to, with a row for each so many steps where that is asked for.
 fn run<const N: usize>(
     problem: &Problem<N>,
     steps: Steps,
     integrator: Option<Integrator>,
-    rows: Option<usize>,
+    stride: Option<usize>,
 ) -> Result<String, InputError> {
-    let mut scene = problem.scene().steps(steps).wanting(Wanted { rows, ..Wanted::default() });
+    let mut rows = stride.map(Rows::every).transpose()?;
+    let motion = problem.motion()?;
+    let mut run = motion.steps(steps);
     if let Some(integrator) = integrator {
-        scene = scene.by(integrator);
+        run = run.by(integrator);
     }
-    let outcome = scene.plan()?.run()?;
+    if let Some(rows) = &mut rows {
+        run = run.observe(rows);
+    }
+    let outcome = run.run(problem.end())?;
     Ok(match outcome.status {
         Status::Completed => format!("completed q = {:e}", outcome.q[0]),
         status => format!("halted: {status}"),
@@ -111,8 +116,8 @@ fn oscillator() -> Problem<1> {
     Problem { system: Formula::oscillator(-0.1), t0: 0.0, start, span: 1.0 }
 }
 
-fn steps(steps: Steps, rows: Option<usize>) -> String {
-    said(run(&oscillator(), steps, Some(Integrator::Discrete(Method::Midpoint)), rows))
+fn steps(steps: Steps, stride: Option<usize>) -> String {
+    said(run(&oscillator(), steps, Some(Integrator::Discrete(Method::Midpoint)), stride))
 }
 
 fn nan_spring() -> Formula<1> {

@@ -291,7 +291,8 @@ impl Ensemble {
                             Way::ActionDriven(scheme) => Integrator::Splitting(scheme),
                             Way::General(stages) | Way::Clocked(stages) => Integrator::Gauss { stages },
                         };
-                        let plan = problem.scene().by(integrator).steps(Steps::Count(1)).plan()?;
+                        let motion = problem.motion()?;
+                        let plan = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end())?;
                         Ok(walk(&mut *plan.stepper()?))
                     }
                 }

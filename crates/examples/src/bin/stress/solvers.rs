@@ -270,7 +270,8 @@ fn price(report: &mut Report) -> Result<(), Failure> {
 /// The time of a step, from a run that goes on as long as it can, and of one that is given up; zero where there is none.
 fn of_step<const N: usize>(system: Formula<N>, start: VelocityPoint<N>, integrator: Integrator, h: f64) -> [f64; 2] {
     let problem = Problem { system, t0: 0.0, start, span: h };
-    let Ok(plan) = problem.scene().by(integrator).steps(Steps::Count(1)).plan() else {
+    let Ok(motion) = problem.motion() else { return [f64::NAN; 2] };
+    let Ok(plan) = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end()) else {
         return [f64::NAN; 2];
     };
     let mut least = [f64::INFINITY; 2];

@@ -2,7 +2,7 @@
 
 use crate::problems::Problem;
 use contact_geom::{Lagrangian, VelocityPoint};
-use discrete_herglotz::{Halt, InputError, Integrator, Scene, Steps, Wanted};
+use discrete_herglotz::{Halt, InputError, Integrator, Steps, Until};
 use std::time::Instant;
 use thiserror::Error;
 
@@ -69,7 +69,7 @@ struct OfLibrary<L: 'static, const N: usize> {
     z: bool,
 }
 
-/// A candidate that runs an integrator of the library, by the plan of a scene. The plan is made before the clock starts, as the
+/// A candidate that runs an integrator of the library, by a plan. The plan is made before the clock starts, as the
 /// peers' solvers are.
 pub fn of_library<L: Lagrangian<N>, const N: usize>(
     lagrangian: &'static L,
@@ -96,12 +96,11 @@ impl<L: Lagrangian<N>, const N: usize> Candidate for OfLibrary<L, N> {
     fn run(&self, h: f64) -> Result<Run, RunError> {
         let start = self.problem.phase_point::<N>();
         // The momenta of the problems are velocities.
-        let scene =
-            Scene::new(self.lagrangian, VelocityPoint { q: start.q, v: start.p, z: start.z }, self.problem.duration)
-                .by(self.integrator)
-                .steps(Steps::Size(h))
-                .wanting(Wanted { action: self.z, ..Wanted::default() });
-        let plan = scene.plan()?;
+        let start = VelocityPoint { q: start.q, v: start.p, z: start.z };
+        let motion = discrete_herglotz::Problem::new(self.lagrangian, 0.0, start)?;
+        let run = motion.by(self.integrator).steps(Steps::Size(h));
+        let run = if self.z { run } else { run.without_action() };
+        let plan = run.plan(Until::Time(self.problem.duration))?;
         let mut stepper = plan.stepper()?;
         let clock = Instant::now();
         stepper.advance(plan.count()).map_err(RunError::Halt)?;

@@ -1,9 +1,9 @@
 //! Steps in doubt: whether what turned the velocity is narrower than they are.
 
-use super::Plan;
+use super::{Integrator, Plan, Problem};
 use crate::gauss::velocity;
 use crate::watch::{rounding, size};
-use crate::{Doubt, Integrator, Method, Suspicion};
+use crate::{Doubt, Method, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, herglotz_rates, larger, largest};
 
@@ -17,7 +17,10 @@ const JUMP: f64 = 0.1;
 impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
     /// What becomes of a doubt: a mark, where shorter steps differ or the acceleration jumps.
     pub(super) fn settled(&self, doubt: &Doubt<N>) -> Option<Suspicion> {
-        let misfit = larger(self.against_halves(doubt).unwrap_or(0.0), self.jump(doubt).unwrap_or(0.0));
+        let halves = self.against_halves(doubt).unwrap_or(0.0);
+        // Long steps of many stages are no cubic curves; and they see what jumps between their nodes.
+        let jump = if self.many_stages() { None } else { self.jump(doubt) };
+        let misfit = larger(halves, jump.unwrap_or(0.0));
         // A NaN is a misfit too.
         if misfit <= 1.0 { None } else { Some(Suspicion { step: doubt.step + doubt.steps - 1, misfit }) }
     }
@@ -25,9 +28,10 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
     /// The misfit of the largest second difference of the acceleration along the cubic curve through both ends: a jump has it however
     /// close the points are, and what is smooth falls with their square. `None` where no velocity is known.
     fn jump(&self, Doubt { step, steps, t, from, to }: &Doubt<N>) -> Option<f64> {
+        let Problem { lagrangian, start: first, .. } = *self.problem;
         let span = *steps as f64 * self.h;
-        let start = VelocityPoint { q: from.q, v: velocity(self.lagrangian, *t, from, self.guess).ok()?, z: from.z };
-        let end = VelocityPoint { q: to.q, v: velocity(self.lagrangian, t + span, to, start.v).ok()?, z: to.z };
+        let start = VelocityPoint { q: from.q, v: velocity(lagrangian, *t, from, first.v).ok()?, z: from.z };
+        let end = VelocityPoint { q: to.q, v: velocity(lagrangian, t + span, to, start.v).ok()?, z: to.z };
         // Substeps back and forth meet what lies beside the steps; but nothing is beside the run.
         let aside = match self.integrator {
             Integrator::Splitting(_) | Integrator::Composition(..) => 0.5 * self.h,
@@ -48,24 +52,26 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
             let x = between(&start, &end, span, at);
             speed = larger(speed, size(&x.v));
             // Where the curve leaves the domain of L this is not finite: the steps are none of the motion's.
-            let (rates, drag) = herglotz_rates(self.lagrangian, t + at, &x).ok()?;
+            let (rates, drag) = herglotz_rates(lagrangian, t + at, &x).ok()?;
             *acceleration = if exact_drag { rates.y - x.v * drag } else { rates.y };
         }
         let jump = largest(accelerations.windows(3).map(|a| size(&(a[2] - a[1] * 2.0 + a[0]))));
-        let rounded = jump * self.h * self.h <= rounding(&self.start.q, &self.guess, self.h);
-        Some(if rounded { 0.0 } else { jump * self.h / (JUMP * speed) })
+        let rounded = jump * self.h * self.h <= rounding(&first.q, &first.v, self.h);
+        Some(if rounded { 0.0 } else { jump * self.h.abs() / (JUMP * speed) })
     }
 }
 
 /// The cubic curve through two points with their velocities, at some time after the first; straight on beside them.
 fn between<const N: usize>(start: &VelocityPoint<N>, end: &VelocityPoint<N>, span: f64, at: f64) -> VelocityPoint<N> {
-    if at <= 0.0 {
+    // In units of the span, which is negative where the run goes back.
+    let u = at / span;
+    if u <= 0.0 {
         return VelocityPoint { q: start.q + start.v * at, ..*start };
     }
-    if at >= span {
+    if u >= 1.0 {
         return VelocityPoint { q: end.q + end.v * (at - span), ..*end };
     }
-    let (u, left) = (at / span, 1.0 - at / span);
+    let left = 1.0 - u;
     let q = start.q * (left * left * (1.0 + 2.0 * u))
         + end.q * (u * u * (1.0 + 2.0 * left))
         + (start.v * left - end.v * u) * (span * u * left);

@@ -1,12 +1,12 @@
 //! Pilot runs: a motion followed with some number of steps, seen at a few common times, and looked at between its steps.
 
 use super::accuracy::Choice;
-use super::{Integrator, Plan, Scene};
+use super::{Integrator, Plan, Problem, Task};
 use crate::gauss::{Look, SETS};
 use crate::verified::refuted;
 use crate::{Gauss, GaussRoute, Halt, InputError, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Defect, Lagrangian, Structure, larger};
+use contact_geom::{Defect, Lagrangian, larger};
 
 /// What all pilot runs of a plan may cost together, in evaluations of L at one stage: some seconds.
 pub(super) const BUDGET: u64 = 1 << 26;
@@ -69,7 +69,7 @@ impl Marks {
     /// The number of steps and the time, whichever a run with so many steps over a span reaches first, at the i-th mark.
     fn stop(&self, i: usize, count: usize, t0: f64, span: f64) -> Option<(usize, f64)> {
         match self {
-            Marks::Steps { base, at } => at.get(i).map(|mark| (mark * (count / base), f64::INFINITY)),
+            Marks::Steps { base, at } => at.get(i).map(|mark| (mark * (count / base), f64::INFINITY.copysign(span))),
             Marks::Times => (i < PARTS).then(|| (usize::MAX, t0 + span * ((i + 1) as f64 / PARTS as f64))),
         }
     }
@@ -181,11 +181,9 @@ impl Uneven {
     }
 }
 
-/// Pilot runs of a scene, with what is left of their budget.
-pub(super) struct Pilots<'s, 'a, L, const N: usize> {
-    pub scene: &'s Scene<'a, L, N>,
-    /// What the Lagrangian claims, probed at the start.
-    pub structure: Structure,
+/// Pilot runs of a task, with what is left of their budget.
+pub(super) struct Pilots<'p, L, const N: usize> {
+    pub task: Task<'p, L, N>,
     pub left: u64,
     /// The error that is wanted.
     pub wanted: f64,
@@ -193,7 +191,7 @@ pub(super) struct Pilots<'s, 'a, L, const N: usize> {
     pub watches_clock: bool,
 }
 
-impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
+impl<L: Lagrangian<N>, const N: usize> Pilots<'_, L, N> {
     /// Follows the motion by contact Gauss collocation, with a look between the nodes of each step: closely, at so many points of the
     /// span that nothing is narrower, or at a few of each step; and for what is narrow beside the steps or not.
     pub fn gauss(
@@ -204,20 +202,19 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
         closely: bool,
         narrow: bool,
     ) -> Result<Ending<N>, InputError> {
-        let Scene { lagrangian, start, t0, .. } = *self.scene;
+        let Problem { lagrangian, start, state, t0, structure } = *self.task.problem;
         let gauss = Gauss::new(lagrangian, stages, self.step(count, marks))?;
-        let state = contact_geom::legendre(lagrangian, t0, &start);
         let points = if closely { POINTS.div_ceil(stages * count).min(SETS) } else { 1 };
         let course = Course { count, marks, points, narrow, price: Price::of::<N>(stages) };
         if const { L::HAS_CLOCK } && matches!(marks, Marks::Times) {
-            let mut stepper = match gauss.own_clock_stepper(self.structure, t0, state, start.v) {
+            let mut stepper = match gauss.own_clock_stepper(structure, t0, state, start.v) {
                 Ok(stepper) => stepper,
                 Err(error) => return halted_at_the_start(error),
             };
             let ending = self.watch(&mut stepper, &course, 1, |run, sets| (run.look(sets), 0))?;
             return Ok(ending.with_tau(stepper.tau()));
         }
-        let mut stepper = match gauss.verified_stepper(self.structure, t0, state, start.v, false) {
+        let mut stepper = match gauss.verified_stepper(structure, t0, state, start.v, false) {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),
         };
@@ -230,8 +227,9 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
 
     /// The length of steps of which so many fill the span; by a clock, if its rate stayed what it is at the start.
     pub fn step(&self, count: usize, marks: &Marks) -> f64 {
-        let h = self.scene.span / count as f64;
-        if let Marks::Times = marks { h / self.scene.lagrangian.clock_rate(&self.scene.start.q) } else { h }
+        let Problem { lagrangian, start, .. } = self.task.problem;
+        let h = self.task.span / count as f64;
+        if let Marks::Times = marks { h / lagrangian.clock_rate(&start.q) } else { h }
     }
 
     /// Follows the motion with looks, by `look` at so many sets of points, which also counts the steps of Newton's method.
@@ -243,7 +241,7 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
         look: impl Fn(&R, usize) -> (Option<Look>, u64),
     ) -> Result<Ending<N>, InputError> {
         let Course { count, marks, points, narrow, price } = course;
-        let Scene { lagrangian, start, .. } = *self.scene;
+        let Problem { lagrangian, start, .. } = *self.task.problem;
         let floor = larger(0.1 * self.wanted, 1e-11);
         let watches_clock = self.watches_clock;
         let (mut looks, mut seen, mut uneven) = (0, Seen::default(), Uneven::default());
@@ -275,11 +273,10 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
         })
     }
 
-    /// Follows the motion by the scene's own integrator.
+    /// Follows the motion by the integrator of the task.
     pub fn own(&mut self, integrator: Integrator, count: usize, marks: &Marks) -> Result<Ending<N>, InputError> {
-        let scene = self.scene.bare();
         let choice = Choice { integrator, count, h: self.step(count, marks), error: None };
-        let plan = match Plan::new(&scene, self.structure, &choice) {
+        let plan = match Plan::new(self.task.bare(), &choice) {
             Ok(plan) => plan,
             Err(error) => return halted_at_the_start(error),
         };
@@ -307,7 +304,7 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
         stride: usize,
         mut look: impl FnMut(&R, f64) -> (Option<Ending<N>>, u64),
     ) -> Ending<N> {
-        let Scene { t0, span, .. } = *self.scene;
+        let Task { problem: &Problem { t0, .. }, span, .. } = self.task;
         let (mut states, mut taken, mut spent) = (Vec::with_capacity(PARTS), 0, 0);
         let mut ending = None;
         while ending.is_none()
@@ -322,7 +319,7 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, '_, L, N> {
             let seen;
             (seen, spent) = look(run, part);
             ending = cause.map(|cause| Ending::Halted { part, cause }).or(seen);
-            if taken == steps || run.time() >= time {
+            if taken == steps || (run.time() - time) * span >= 0.0 {
                 let x = run.state();
                 states.push([x.q, x.p]);
             }

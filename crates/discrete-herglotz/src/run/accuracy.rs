@@ -1,9 +1,9 @@
 //! The integrator and the number of steps for a wanted error.
 
 use super::pilot::{BUDGET, Ending, Marks, Pilots, Track};
-use super::{Integrator, MOST_STEPS, Scene};
+use super::{Integrator, MOST_STEPS, Problem, Task};
 use crate::{InputError, Obstacle};
-use contact_geom::{Lagrangian, Structure, larger};
+use contact_geom::{Lagrangian, larger};
 
 /// The searches that may follow each other: each makes the steps shorter, or ends.
 const ATTEMPTS: usize = 64;
@@ -65,26 +65,25 @@ fn stages_for(wanted: f64) -> usize {
 /// a run at the first step that does not resolve the motion, so that runs that are far too coarse cost nothing. The error of the
 /// integrator's own runs is then their distance from the reference.
 pub(super) fn choose<L: Lagrangian<N>, const N: usize>(
-    scene: &Scene<'_, L, N>,
-    structure: Structure,
+    task: Task<'_, L, N>,
     wanted: f64,
 ) -> Result<Choice, InputError> {
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
-    choose_with(&mut Pilots { scene, structure, left: BUDGET, wanted, watches_clock: false })
+    choose_with(&mut Pilots { task, left: BUDGET, wanted, watches_clock: false })
 }
 
 /// The same with a budget.
 pub(super) fn choose_with<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, '_, L, N>,
+    pilots: &mut Pilots<'_, L, N>,
 ) -> Result<Choice, InputError> {
     let wanted = pilots.wanted;
-    let integrator = pilots.scene.integrator.unwrap_or(Integrator::Gauss { stages: stages_for(wanted) });
+    let integrator = pilots.task.integrator.unwrap_or(Integrator::Gauss { stages: stages_for(wanted) });
     match integrator {
         Integrator::Gauss { stages } if stages >= OWN => {
             pilots.watches_clock =
-                pilots.scene.integrator.is_none() && const { L::HAS_CLOCK } && pilots.structure.autonomous;
+                pilots.task.integrator.is_none() && const { L::HAS_CLOCK } && pilots.task.problem.structure.autonomous;
             if let Some(choice) = by_equal_steps(pilots, stages)? {
                 return Ok(choice);
             }
@@ -115,13 +114,13 @@ enum Compared {
 
 /// Gauss collocation that is its own reference, with equal steps; `None` where a clock takes much fewer, and these were watched.
 fn by_equal_steps<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, '_, L, N>,
+    pilots: &mut Pilots<'_, L, N>,
     stages: usize,
 ) -> Result<Option<Choice>, InputError> {
     let wanted = pilots.wanted;
     let Some(found) = converge(pilots, stages, wanted, Compared::Steps)? else { return Ok(None) };
     // Where W or the drag changes along the motion a longer step may leave their domain, as no misfit foretells.
-    let structure = &pilots.structure;
+    let structure = &pilots.task.problem.structure;
     let longer = structure.separable && structure.has_constant_rate();
     let (count, error) = fewest(stages, wanted, &found, longer);
     Ok(Some(chosen(pilots, Integrator::Gauss { stages }, count, error, &found)))
@@ -129,7 +128,7 @@ fn by_equal_steps<L: Lagrangian<N>, const N: usize>(
 
 /// The same with steps that are equal in the time of the motion's clock.
 fn by_clock<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, '_, L, N>,
+    pilots: &mut Pilots<'_, L, N>,
     stages: usize,
 ) -> Result<Choice, InputError> {
     let wanted = pilots.wanted;
@@ -140,7 +139,7 @@ fn by_clock<L: Lagrangian<N>, const N: usize>(
 
 /// The runs that agree where no clock is watched.
 fn reference<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, '_, L, N>,
+    pilots: &mut Pilots<'_, L, N>,
     stages: usize,
     goal: f64,
     compared: Compared,
@@ -151,7 +150,7 @@ fn reference<L: Lagrangian<N>, const N: usize>(
 
 /// The choice of steps of which so many fill the span; by a clock they are counted anew, in its time.
 fn chosen<L: Lagrangian<N>, const N: usize>(
-    pilots: &Pilots<'_, '_, L, N>,
+    pilots: &Pilots<'_, L, N>,
     integrator: Integrator,
     count: usize,
     error: f64,
@@ -169,8 +168,8 @@ fn chosen<L: Lagrangian<N>, const N: usize>(
 }
 
 /// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.
-fn first_guess<L: Lagrangian<N>, const N: usize>(scene: &Scene<'_, L, N>, stages: usize, goal: f64) -> usize {
-    let Scene { lagrangian, start, t0, span, .. } = scene;
+fn first_guess<L: Lagrangian<N>, const N: usize>(task: &Task<'_, L, N>, stages: usize, goal: f64) -> usize {
+    let Task { problem: Problem { lagrangian, start, t0, .. }, span, .. } = task;
     let h = lagrangian.hessian(*t0, start);
     let frequency = h.vv.try_inverse().map_or(0.0, |inverse| (inverse * h.qq).norm()).sqrt();
     // The error of a step of x radians is about x^(2s+1) s!^4 / (2s)!^3.
@@ -185,20 +184,20 @@ fn first_guess<L: Lagrangian<N>, const N: usize>(scene: &Scene<'_, L, N>, stages
 
 /// Finds the runs that agree; `None` where one has ended since a clock would take much fewer steps.
 fn converge<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, '_, L, N>,
+    pilots: &mut Pilots<'_, L, N>,
     stages: usize,
     goal: f64,
     compared: Compared,
 ) -> Result<Option<Converged<N>>, InputError> {
     let refuse = |wanted, reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
-    let (wanted, t0, span) = (pilots.wanted, pilots.scene.t0, pilots.scene.span);
+    let (wanted, t0, span) = (pilots.wanted, pilots.task.problem.t0, pilots.task.span);
     let s = stages as f64;
     let marks_of = |k: usize| match compared {
         Compared::Steps => Marks::of(k),
         Compared::Tenths => Marks::equal(k),
         Compared::Times => Marks::Times,
     };
-    let mut k = first_guess(pilots.scene, stages, goal);
+    let mut k = first_guess(&pilots.task, stages, goal);
     let mut marks = marks_of(k);
     let (mut best, mut strikes, mut narrows, mut halts) = (f64::INFINITY, 0, 0, (0, 0.0));
     let mut cause = Obstacle::Unresolved { t: t0 };
@@ -335,7 +334,7 @@ fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, long
 
 /// The steps of any integrator, whose runs are compared with the reference.
 fn by_reference<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, '_, L, N>,
+    pilots: &mut Pilots<'_, L, N>,
     integrator: Integrator,
     found: &Converged<N>,
 ) -> Result<Choice, InputError> {
@@ -389,7 +388,7 @@ fn by_reference<L: Lagrangian<N>, const N: usize>(
                 if enough.is_some() {
                     break;
                 }
-                cause = Obstacle::Halted { t: pilots.scene.t0 + part * pilots.scene.span, cause: halt };
+                cause = Obstacle::Halted { t: pilots.task.problem.t0 + part * pilots.task.span, cause: halt };
                 2.0
             }
             _ => {

@@ -2,7 +2,7 @@
 
 use super::accuracy::choose_with;
 use super::pilot::{BUDGET, Pilots};
-use super::{Scene, Steps};
+use super::{Needs, Problem, Steps, Task, Until, run_of};
 use crate::{InputError, Integrator, Obstacle, Status};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum};
@@ -60,8 +60,8 @@ fn jumps_of_the_potential_are_refused() {
         let place = if i % 4 == 0 { 10.0 * (i + 1) as f64 / 64.0 } else { 0.5 + 0.137 * i as f64 };
         let height = [-0.8, -0.02, 0.003, 0.3][i / 4 % 4];
         let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Jump { at: place, height } };
-        let scene = Scene::new(&line, at(0.0, 1.0), 10.0).steps(Steps::Accuracy(1e-6));
-        let cause = match scene.plan() {
+        let problem = Problem::new(&line, 0.0, at(0.0, 1.0)).unwrap();
+        let cause = match problem.steps(Steps::Accuracy(1e-6)).plan(Until::Time(10.0)) {
             Err(InputError::Accuracy { cause, .. }) => cause,
             other => panic!("{place}, {height}: {:?}", other.map(|plan| plan.count())),
         };
@@ -74,8 +74,7 @@ fn jumps_of_the_potential_are_refused() {
 fn motions_that_come_to_rest_are_followed() {
     let line = Line { gamma: -0.89, swing: 0.0, potential: Potential::Well };
     for span in [40.0, 90.0, 400.0] {
-        let outcome =
-            Scene::new(&line, at(0.3, -0.5), span).steps(Steps::Accuracy(1e-8)).plan().unwrap().run().unwrap();
+        let outcome = run_of(&line, at(0.3, -0.5), span, None, Steps::Accuracy(1e-8)).unwrap();
         assert_eq!(outcome.status, Status::Completed, "{span}");
         // At the bottom of the well: its force there is round-off.
         let x = VelocityPoint::new([outcome.q[0]], [outcome.p[0]], 0.0);
@@ -89,11 +88,22 @@ fn motions_that_come_to_rest_are_followed() {
 fn rest_is_followed() {
     let line = Line { gamma: -0.25, swing: 1.0, potential: Potential::Pole };
     let start = VelocityPoint::new([0.0], [0.0], -0.98);
-    let outcome = Scene::new(&line, start, 20.0).steps(Steps::Accuracy(1e-8)).plan().unwrap().run().unwrap();
+    let outcome = run_of(&line, start, 20.0, None, Steps::Accuracy(1e-8)).unwrap();
     assert_eq!((outcome.status, outcome.q[0], outcome.p[0]), (Status::Completed, 0.0, 0.0));
     // z' = gamma (1 + cos t) z. The accuracy is not that of z, but steps that do not resolve it to a twentieth are refused.
     let z = -0.98 * (-0.25 * (20.0 + 20.0f64.sin())).exp();
     assert!(outcome.z.is_some_and(|found| (found - z).abs() <= 0.05 * z.abs()), "{:?}, not {z}", outcome.z);
+}
+
+/// The search for the steps of a run, before it begins.
+fn searching<'p, L: Lagrangian<N>, const N: usize>(
+    problem: &'p Problem<'p, L, N>,
+    span: f64,
+    integrator: Option<Integrator>,
+    wanted: f64,
+) -> Pilots<'p, L, N> {
+    let task = Task { problem, span, integrator, steps: Steps::Accuracy(wanted), needs: Needs::default() };
+    Pilots { task, left: BUDGET, wanted, watches_clock: false }
 }
 
 /// Pilot runs cost a small multiple of the run: those with k and 2k steps, and where these do not agree with 4k; before them one that
@@ -102,11 +112,10 @@ fn rest_is_followed() {
 fn pilot_runs_cost_little() {
     let pendulum = Pendulum { gamma: -0.01 };
     for (span, wanted) in [(30.0, 1e-4), (30.0, 1e-7), (100.0, 1e-9), (300.0, 1e-6), (1000.0, 1e-8)] {
-        let scene = Scene::new(&pendulum, at(1.0, 1.0), span).steps(Steps::Accuracy(wanted));
-        let structure = pendulum.structure();
-        let mut pilots = Pilots { scene: &scene, structure, left: BUDGET, wanted, watches_clock: false };
+        let problem = Problem::new(&pendulum, 0.0, at(1.0, 1.0)).unwrap();
+        let mut pilots = searching(&problem, span, None, wanted);
         let choice = choose_with(&mut pilots).unwrap();
-        let run = scene.plan().unwrap().run().unwrap();
+        let run = problem.steps(Steps::Accuracy(wanted)).run(Until::Time(span)).unwrap();
         assert_eq!(choice.count, run.steps);
         // Looks count twice their points, of which there are at least 2000 beside those of the steps.
         let (spent, looks) = ((BUDGET - pilots.left) as f64, 2.5 * 2.0 * 2000.0);
@@ -119,25 +128,24 @@ fn pilot_runs_cost_little() {
 #[test]
 fn pilot_runs_by_a_clock_cost_little() {
     let kepler = Kepler::<2> { gamma: 0.0, mu: 1.0 };
-    let structure = kepler.structure();
     for e in [0.0, 0.1, 0.6, 0.9, 0.99] {
         for apocentre in [false, true] {
             let e = if apocentre { -e } else { e };
             let start = VelocityPoint::new([1.0 - e, 0.0], [0.0, f64::sqrt((1.0 + e) / (1.0 - e))], 0.0);
-            let scene = || Scene::new(&kepler, start, 40.0).steps(Steps::Accuracy(1e-8));
-            let search = |scene: &Scene<'_, Kepler<2>, 2>| {
-                let mut pilots = Pilots { scene, structure, left: BUDGET, wanted: 1e-8, watches_clock: false };
+            let problem = Problem::new(&kepler, 0.0, start).unwrap();
+            let search = |integrator| {
+                let mut pilots = searching(&problem, 40.0, integrator, 1e-8);
                 let choice = choose_with(&mut pilots).unwrap();
                 (choice.integrator, BUDGET - pilots.left)
             };
-            let (integrator, spent) = search(&scene());
+            let (integrator, spent) = search(None);
             if e.abs() < 0.5 {
                 let equal = Integrator::Gauss { stages: 8 };
-                assert_eq!((integrator, spent), search(&scene().by(equal)), "{e}");
+                assert_eq!((integrator, spent), search(Some(equal)), "{e}");
                 continue;
             }
             assert_eq!(integrator, Integrator::Clocked { stages: 8 }, "{e}");
-            let run = scene().plan().unwrap().run().unwrap();
+            let run = problem.steps(Steps::Accuracy(1e-8)).run(Until::Time(40.0)).unwrap();
             let most = 7.0 * run.evaluations as f64 + 2.5 * 2.0 * 2000.0;
             assert!(spent as f64 <= most, "{e}: {spent} evaluations for {}", run.evaluations);
         }
@@ -151,7 +159,7 @@ fn singularities_end_the_search_soon() {
     for integrator in ["gauss_8", "midpoint", "strang", "midpoint_by_kahan_li_8"] {
         let integrator: Integrator = integrator.parse().unwrap();
         let clock = Instant::now();
-        let refused = Scene::new(&line, at(0.5, 0.5), 20.0).by(integrator).steps(Steps::Accuracy(1e-4)).plan().err();
+        let refused = run_of(&line, at(0.5, 0.5), 20.0, Some(integrator), Steps::Accuracy(1e-4)).err();
         assert!(
             matches!(
                 refused,
@@ -169,6 +177,6 @@ fn singularities_end_the_search_soon() {
 fn what_decays_below_the_numbers_is_rounded() {
     let system = contact_geom::systems::HarmonicOscillator { gamma: -0.1 };
     let start = VelocityPoint::new([1e-300], [5e-301], 0.0);
-    let refused = Scene::new(&system, start, 1e3).steps(Steps::Accuracy(1e-9)).plan().err();
+    let refused = run_of(&system, start, 1e3, None, Steps::Accuracy(1e-9)).err();
     assert!(matches!(refused, Some(InputError::Accuracy { cause: Obstacle::RoundOff, .. })), "{refused:?}");
 }

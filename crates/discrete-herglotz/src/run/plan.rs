@@ -1,0 +1,365 @@
+//! The plan of a run: the route, and the one loop of all runs.
+
+use super::accuracy::Choice;
+use super::{Course, Integrator, Moment, Motion, Needs, Observer, Outcome, Problem, Stop, Task};
+use crate::gauss::{FEW, velocity};
+use crate::verified::refuted;
+use crate::watch::size;
+use crate::{
+    ActionSplitting, Composition, Discretised, Doubt, Flow, Gauss, GaussRoute, InputError, Method, Splitting, Status,
+    StepError, Stepper, Suspicion,
+};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Defect, Lagrangian, PhasePoint, VelocityPoint};
+
+/// What all runs of a plan share.
+pub(super) enum Engine<'p, L, const N: usize> {
+    Discrete(Discretised<&'p L, N>),
+    Gauss(Box<Gauss<&'p L>>),
+    /// Explicit: the coefficients are the stepper's.
+    Explicit,
+}
+
+/// The steps that are tried, and probed, before a run.
+const FIRST_STEPS: usize = 64;
+
+/// The steps between two probes of the claims in long runs: so many that a probe costs less than one in a hundred.
+const PROBES: usize = 1 << 14;
+
+/// The step after which the claims are probed next: every power of two, and the multiples of [`PROBES`].
+fn next_probe(taken: usize) -> usize {
+    (taken + 1).checked_next_power_of_two().unwrap_or(usize::MAX).min((taken / PROBES + 1) * PROBES)
+}
+
+/// The next step, counted from 0, that is compared with two halves: each that ends at a power of two, and the last.
+fn halved_step(taken: usize, count: usize) -> usize {
+    (taken + 1).checked_next_power_of_two().unwrap_or(count).min(count) - 1
+}
+
+/// The earlier of two.
+fn first(a: Option<Suspicion>, b: Option<Suspicion>) -> Option<Suspicion> {
+    a.into_iter().chain(b).min_by_key(|s| s.step)
+}
+
+/// A run after its checks, with step and route chosen; made by [`Run::plan`](super::Run::plan). Printed, it says what will be computed and
+/// what is skipped.
+pub struct Plan<'p, L, const N: usize> {
+    pub(super) problem: &'p Problem<'p, L, N>,
+    pub(super) t_end: f64,
+    /// Negative where the run goes back.
+    pub(super) h: f64,
+    pub(super) count: usize,
+    error: Option<f64>,
+    pub(super) integrator: Integrator,
+    pub(super) needs: Needs,
+    pub(super) engine: Engine<'p, L, N>,
+    /// The route of Gauss collocation by equal steps.
+    pub(super) route: Option<GaussRoute>,
+    /// Whether `sigma_d` is the same in all steps.
+    pub(super) constant_rate: bool,
+    /// Whether z can be left out.
+    pub(super) z_decouples: bool,
+}
+
+impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
+    /// Finds the route of a task.
+    pub(super) fn new(task: Task<'p, L, N>, choice: &Choice) -> Result<Self, InputError> {
+        let Task { problem, span, needs, .. } = task;
+        let &Problem { lagrangian, t0, start, state, structure } = problem;
+        let &Choice { integrator, count, h, error } = choice;
+        let at = PhasePoint { q: start.q, p: start.v, z: start.z };
+        let engine = match integrator {
+            Integrator::Discrete(method) => Engine::Discrete(method.discretise(lagrangian, h, t0, &at)?),
+            Integrator::Gauss { stages } | Integrator::Clocked { stages } => {
+                Engine::Gauss(Box::new(Gauss::new(lagrangian, stages, h)?))
+            }
+            Integrator::Splitting(_) | Integrator::Composition(..) => Engine::Explicit,
+        };
+        let route = match (&engine, integrator) {
+            (Engine::Gauss(gauss), Integrator::Gauss { .. }) => {
+                Some(gauss.verified_stepper(structure, t0, state, start.v, false)?.route())
+            }
+            _ => None,
+        };
+        let condensed = matches!(route, Some(GaussRoute::Linear | GaussRoute::Condensed));
+        let explicit = matches!(integrator, Integrator::Splitting(_));
+        let strang =
+            matches!(integrator, Integrator::Discrete(Method::Strang) | Integrator::Composition(Method::Strang, _));
+        Ok(Plan {
+            problem,
+            t_end: t0 + span,
+            h,
+            count,
+            error,
+            integrator,
+            needs,
+            engine,
+            route,
+            constant_rate: condensed || (explicit || strang) && structure.has_constant_rate(),
+            z_decouples: condensed || explicit && structure.is_affine_in_z(),
+        })
+    }
+
+    /// The time step, negative where the run goes back; by a clock, in its time.
+    pub fn step_size(&self) -> f64 {
+        self.h
+    }
+
+    /// The number of steps; by a clock with steps of a given size, as many as its rate at the start lets expect.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The integrator, where none was named the one that was chosen.
+    pub fn integrator(&self) -> Integrator {
+        self.integrator
+    }
+
+    /// The error of (q, p) that the pilot runs found, or predict; `None` where no accuracy was asked for.
+    pub fn error(&self) -> Option<f64> {
+        self.error
+    }
+
+    /// A stepper at the start, to be driven by hand: by a clock with [`Stepper::advance_until`], which ends where the span
+    /// does. A splitting's does not watch whether its steps resolve the motion:
+    /// that costs up to a third of its time, and is for runs whose steps were not found by pilot runs.
+    ///
+    /// # Errors
+    /// Those of the method's start.
+    pub fn stepper(&self) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
+        self.make_stepper(false)
+    }
+
+    fn make_stepper(&self, watched: bool) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
+        let Problem { t0, start, state, structure, .. } = *self.problem;
+        let action = self.needs.action || !self.z_decouples;
+        Ok(match &self.engine {
+            Engine::Discrete(ld) => Box::new(Flow::with_guess(ld, t0, state, start.v)?),
+            Engine::Gauss(gauss) if const { L::HAS_CLOCK } && self.by_clock() => {
+                Box::new(gauss.own_clock_stepper(structure, t0, state, start.v)?)
+            }
+            Engine::Gauss(gauss) => {
+                let stepper = gauss.verified_stepper(structure, t0, state, start.v, action)?;
+                Box::new(if watched { stepper.doubting() } else { stepper })
+            }
+            Engine::Explicit => self.explicit(self.h, t0, state, watched)?,
+        })
+    }
+
+    /// Whether steps look at themselves between the nodes of their many stages.
+    pub(super) fn many_stages(&self) -> bool {
+        matches!(self.integrator, Integrator::Gauss { stages } if stages > FEW)
+    }
+
+    /// Whether steps follow a clock, which ends the run.
+    fn by_clock(&self) -> bool {
+        matches!(self.integrator, Integrator::Clocked { .. })
+    }
+
+    /// Whether a time is the end of the span, or beyond it.
+    fn is_over(&self, t: f64) -> bool {
+        if self.h < 0.0 { t <= self.t_end } else { t >= self.t_end }
+    }
+
+    /// A stepper of a splitting or a composition.
+    pub(super) fn explicit(
+        &self,
+        h: f64,
+        t: f64,
+        from: PhasePoint<N>,
+        watched: bool,
+    ) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
+        let lagrangian = self.problem.lagrangian;
+        Ok(match &self.integrator {
+            Integrator::Splitting(scheme) if !self.z_decouples => {
+                let splitting = ActionSplitting::new(lagrangian, scheme, h, t, from)?;
+                let splitting = if watched { splitting.doubting() } else { splitting };
+                Box::new(if self.moves_little(h) { splitting.compensated() } else { splitting })
+            }
+            Integrator::Splitting(scheme) => {
+                let splitting = Splitting::new(lagrangian, scheme, h, t, from)?;
+                let splitting = if watched { splitting.watched() } else { splitting };
+                let splitting = if self.moves_little(h) { splitting.compensated() } else { splitting };
+                if self.needs.action { Box::new(splitting) } else { Box::new(splitting.without_action()) }
+            }
+            Integrator::Composition(method, scheme) => {
+                let rule = |h| method.discretise(lagrangian, h, t, &from);
+                Box::new(Composition::new(rule, scheme, h, t, from)?)
+            }
+            // `new` makes no others.
+            Integrator::Discrete(_) | Integrator::Gauss { .. } | Integrator::Clocked { .. } => {
+                return Err(InputError::Dimension);
+            }
+        })
+    }
+
+    /// Whether steps move by so little of the position that half of the digits are lost in each; they change so little from step to step
+    /// that they are rounded in the same way, and the error piles up.
+    fn moves_little(&self, h: f64) -> bool {
+        let start = &self.problem.start;
+        let moved = h.abs() * size(&start.v);
+        moved > 0.0 && moved < f64::EPSILON.sqrt() * size(&start.q)
+    }
+
+    /// Runs it with no observer but those of the plan's own outcome.
+    ///
+    /// # Errors
+    /// Those of [`stepper`](Self::stepper). Bad luck in mid-run is the outcome's status.
+    pub fn run(&self) -> Result<Outcome<N>, InputError> {
+        self.observed_by(&mut Vec::new())
+    }
+
+    /// Runs it under the eyes of observers.
+    pub(super) fn observed_by(&self, observers: &mut Vec<&mut dyn Observer<N>>) -> Result<Outcome<N>, InputError> {
+        let by_clock = self.by_clock();
+        let h = (!by_clock).then_some(self.h);
+        let count = (!by_clock || self.error.is_some()).then_some(self.count);
+        observers.prepare(&Course { t0: self.problem.t0, t_end: self.t_end, h, count })?;
+        let mut stepper = self.make_stepper(self.error.is_none())?;
+        // The logarithm of the product of the sigma_d; in single steps only where they differ.
+        let (mut log_factor, single) = (0.0, self.needs.conformal_factor && !self.constant_rate);
+        let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
+        // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes, and are compared
+        // with halves in doubt alone.
+        let doubts = self.error.is_none() && !by_clock;
+        let halves = doubts && !self.many_stages();
+        let most = if by_clock { usize::MAX } else { self.count };
+        let start = self.moment(&*stepper, None, 0.0, (0, false));
+        let (mut over, mut stop) = (false, observers.start(&start).break_value());
+        while !over && stop.is_none() {
+            // One mark is enough.
+            let halved = if halves && suspicion.is_none() { halved_step(taken, most) } else { usize::MAX };
+            let next_seen = observers.next(taken).max(taken + 1);
+            let next_look = if taken == halved { taken + 1 } else { halved };
+            let next = next_seen.min(next_probe(taken)).min(next_look).min(most);
+            let chunk = if single { 1 } else { next - taken };
+            let before = (taken == halved || next_seen == taken + 1).then(|| (stepper.time(), stepper.state()));
+            let (done, cause) = match stepper.advance_until(chunk, self.t_end) {
+                Ok(done) => (done, None),
+                Err(halt) => (halt.taken, Some(halt.cause)),
+            };
+            if taken == halved
+                && let (Some((t, from)), None) = (before, cause)
+            {
+                let step = Doubt { step: taken, steps: 1, t, from, to: stepper.state() };
+                suspicion = first(suspicion, self.settled(&step));
+            }
+            taken += done;
+            if self.constant_rate {
+                log_factor = taken as f64 * stepper.sigma().ln();
+            } else if single {
+                log_factor += done as f64 * stepper.sigma().ln();
+            }
+            if let Some(cause) = cause {
+                status = Status::Failed { step: taken, t: stepper.time(), cause };
+                break;
+            }
+            over = taken == most || by_clock && self.is_over(stepper.time());
+            if taken >= next_seen || over {
+                let before = if done == 1 { before } else { None };
+                stop = observers.step(&self.moment(&*stepper, before, log_factor, (taken, over))).break_value();
+            }
+            if over || taken == next_probe(taken - 1) {
+                let doubt = stepper.doubt().filter(|_| doubts && suspicion.is_none());
+                suspicion = first(suspicion, doubt.and_then(|doubt| self.settled(&doubt)));
+                suspicion = first(suspicion, stepper.suspicion());
+                if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
+                    status = Status::FalseClaim { step: taken, claim, size };
+                    break;
+                }
+            }
+        }
+        let (mut t, mut state) = (stepper.time(), stepper.state());
+        if let Some(Stop { by, cause, at }) = stop {
+            (t, state) = at.unwrap_or((t, state));
+            status = match cause {
+                Some(cause) => Status::Failed { step: taken, t, cause },
+                None => Status::Stopped { step: taken, t, by },
+            };
+        }
+        let Needs { action, conformal_factor } = self.needs;
+        Ok(Outcome {
+            status,
+            suspicion: first(suspicion, stepper.suspicion()),
+            steps: taken,
+            t,
+            q: state.q,
+            p: state.p,
+            v: self.velocity(t, &state).ok(),
+            z: action.then_some(state.z),
+            log_factor: conformal_factor.then_some(log_factor),
+            evaluations: stepper.evaluations(),
+            z_or_start: state.z,
+        })
+    }
+
+    /// What observers see after some steps.
+    fn moment<'r>(
+        &'r self,
+        stepper: &'r dyn Stepper<N>,
+        before: Option<(f64, PhasePoint<N>)>,
+        log_factor: f64,
+        (k, last): (usize, bool),
+    ) -> Moment<'r, N> {
+        let log_factor = self.needs.conformal_factor.then_some(log_factor);
+        let (t, state, sigma) = (stepper.time(), stepper.state(), stepper.sigma());
+        Moment { k, t, state, sigma, log_factor, last, before, motion: self, stepper }
+    }
+
+    /// The first claim that is false at the state of a stepper.
+    fn refuted(&self, stepper: &dyn Stepper<N>) -> Option<Defect> {
+        refuted(self.problem.lagrangian, stepper.time(), &stepper.state(), &self.problem.start.v)
+    }
+
+    /// Probes the claims along the first steps.
+    ///
+    /// # Errors
+    /// [`InputError::FalseClaim`] with the first claim that does not hold.
+    pub(super) fn probe_first_steps(&self) -> Result<(), InputError> {
+        let mut stepper = self.stepper()?;
+        let mut taken = 0;
+        while taken < self.count.min(FIRST_STEPS) {
+            let steps = next_probe(taken).min(self.count) - taken;
+            match stepper.advance_until(steps, self.t_end) {
+                Ok(done) if done > 0 => taken += done,
+                _ => break,
+            }
+            if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
+                return Err(InputError::FalseClaim { claim, size });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
+    fn velocity(&self, t: f64, state: &PhasePoint<N>) -> Result<SVector<f64, N>, StepError> {
+        velocity(self.problem.lagrangian, t, state, self.problem.start.v).map_err(step_error)
+    }
+
+    fn energy(&self, t: f64, state: &PhasePoint<N>) -> Result<f64, StepError> {
+        let v = self.velocity(t, state)?;
+        let energy = v.dot(&state.p) - self.problem.lagrangian.value(t, &state.q, &v, state.z);
+        if energy.is_finite() { Ok(energy) } else { Err(StepError::NonFinite) }
+    }
+
+    fn rates(&self, t: f64, state: &PhasePoint<N>) -> Result<PhasePoint<N>, StepError> {
+        let v = self.velocity(t, state)?;
+        let (value, g) = self.problem.lagrangian.with_gradient(t, &VelocityPoint { q: state.q, v, z: state.z });
+        Ok(PhasePoint { q: v, p: g.x + state.p * g.z, z: value })
+    }
+
+    fn inside(&self, (t0, from): &(f64, PhasePoint<N>), t: f64) -> Result<PhasePoint<N>, StepError> {
+        let v = self.velocity(*t0, from)?;
+        self.reach((*t0, from), &v, t - t0, 1).map_err(step_error)
+    }
+}
+
+/// Of what goes wrong along a motion.
+pub(super) fn step_error(error: InputError) -> StepError {
+    match error {
+        InputError::FirstStep(cause) => cause,
+        InputError::Sigma { sigma } => StepError::SigmaVanished { sigma },
+        _ => StepError::NonFinite,
+    }
+}
