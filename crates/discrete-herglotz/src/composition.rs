@@ -1,8 +1,10 @@
 //! Symmetric compositions of discrete flows.
 
+use crate::flow::account_of;
 use crate::watch::{Watch, sharper, turning};
 use crate::{
-    DiscreteLagrangian, Doubt, Halt, InputError, Solver, SplittingScheme, StepError, Stepper, Suspicion, Transition,
+    DiscreteLagrangian, Doubt, Halt, InputError, Item, Solver, SplittingScheme, StepError, Stepper, Suspicion,
+    Transition,
 };
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
@@ -200,6 +202,14 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> {
+    fn has_constant_rate(&self) -> bool {
+        self.rules.iter().all(|rule| rule.constant_rate())
+    }
+
+    fn account(&self) -> Vec<Item> {
+        account_of(self.rules.iter().all(|rule| rule.is_explicit()), "substep")
+    }
+
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
         (0..steps).try_for_each(|taken| self.step().map_err(|cause| Halt { taken, cause }))
     }

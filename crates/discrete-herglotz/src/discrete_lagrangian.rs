@@ -37,6 +37,16 @@ pub trait DiscreteLagrangian<const N: usize> {
         None
     }
 
+    /// Whether its steps solve no equation. By default they do.
+    fn is_explicit(&self) -> bool {
+        false
+    }
+
+    /// Whether `sigma_d` is the same at all points. By default it is not known to be.
+    fn constant_rate(&self) -> bool {
+        false
+    }
+
     /// Value and first derivatives `D1 L_d, D2 L_d, Dz L_d`.
     ///
     /// # Errors
@@ -136,6 +146,12 @@ impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
     #[inline(always)]
     fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
         (**self).misfit(velocities, to, sigma)
+    }
+    fn is_explicit(&self) -> bool {
+        (**self).is_explicit()
+    }
+    fn constant_rate(&self) -> bool {
+        (**self).constant_rate()
     }
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
         (**self).jet(t, x)

@@ -57,6 +57,14 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Discretised<L, 
         each!(self, ld => ld.misfit(velocities, to, sigma))
     }
 
+    fn is_explicit(&self) -> bool {
+        each!(self, ld => DiscreteLagrangian::<N>::is_explicit(ld))
+    }
+
+    fn constant_rate(&self) -> bool {
+        each!(self, ld => DiscreteLagrangian::<N>::constant_rate(ld))
+    }
+
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
         each!(self, ld => ld.jet(t, x))
     }

@@ -46,6 +46,12 @@ pub enum InputError {
         /// What to do.
         remedy: &'static str,
     },
+    /// A run has neither steps nor an accuracy for which they are chosen.
+    #[error("the run has no steps; give them by `steps`, or ask for an `accuracy`")]
+    NoSteps,
+    /// A run with given steps names no integrator.
+    #[error("the run has no integrator; name one by `by`, or ask for an `accuracy` for which one is chosen")]
+    NoIntegrator,
     /// Times of output are not in order, not finite, or outside of the span of the run.
     #[error(
         "the time t = {t} of row {index} is out of order, not finite or outside of the run's span; give times in the order of the run"

@@ -3,7 +3,7 @@
 use crate::legendre::{legendre_minus, legendre_minus_inverse, legendre_plus, legendre_plus_inverse};
 use crate::run::{check_time, start_of};
 use crate::watch::{Watch, at_rest, sharper};
-use crate::{DiscreteLagrangian, Doubt, Halt, InputError, Solver, StepError, Stepper, Suspicion, Transition};
+use crate::{DiscreteLagrangian, Doubt, Halt, InputError, Item, Solver, StepError, Stepper, Suspicion, Transition};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{DiscretePoint, PhasePoint};
 
@@ -118,8 +118,8 @@ pub struct FlowStep<const N: usize> {
 /// println!("q(10) = {}", flow.state().q[0]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct Flow<'a, D, const N: usize> {
-    ld: &'a D,
+pub struct Flow<D, const N: usize> {
+    ld: D,
     t0: f64,
     k: usize,
     state: PhasePoint<N>,
@@ -134,13 +134,13 @@ pub struct Flow<'a, D, const N: usize> {
     watch: Watch<N>,
 }
 
-impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
-    /// A flow from the state `(q, p, z)` at time `t0`.
+impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
+    /// A flow of a discrete Lagrangian, or of a reference to one, from the state `(q, p, z)` at time `t0`.
     ///
     /// # Errors
     /// [`InputError`] where the state is not finite, `sigma_d <= 0`, the discrete Lagrangian is not regular there, or the
     /// first step cannot be solved.
-    pub fn new(ld: &'a D, t0: f64, state: PhasePoint<N>) -> Result<Self, InputError> {
+    pub fn new(ld: D, t0: f64, state: PhasePoint<N>) -> Result<Self, InputError> {
         Self::with_guess(ld, t0, state, SVector::zeros())
     }
 
@@ -149,7 +149,7 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
-    pub fn with_guess(ld: &'a D, t0: f64, state: PhasePoint<N>, guess: SVector<f64, N>) -> Result<Self, InputError> {
+    pub fn with_guess(ld: D, t0: f64, state: PhasePoint<N>, guess: SVector<f64, N>) -> Result<Self, InputError> {
         check_time(t0)?;
         state.check()?;
         let mut solver = Solver::default();
@@ -166,10 +166,11 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
     /// # Errors
     /// [`InputError`] where a coordinate is not finite, `sigma_d <= 0`, or the discrete Lagrangian is not regular at the
     /// point; [`InputError::EqualPoints`] where that is because `q0 = q1`.
-    pub fn from_points(ld: &'a D, t0: f64, x: DiscretePoint<N>) -> Result<Self, InputError> {
+    pub fn from_points(ld: D, t0: f64, x: DiscretePoint<N>) -> Result<Self, InputError> {
         check_time(t0)?;
-        let state = start_of(ld, t0, &x)?;
-        Self::with_guess(ld, t0, state, (x.q1 - x.q0) / ld.step_size())
+        let state = start_of(&ld, t0, &x)?;
+        let velocity = (x.q1 - x.q0) / ld.step_size();
+        Self::with_guess(ld, t0, state, velocity)
     }
 
     /// The first step so far that cannot have resolved the motion, where one was seen: as fewer than six steps in a period of
@@ -262,7 +263,15 @@ impl<'a, D: DiscreteLagrangian<N>, const N: usize> Flow<'a, D, N> {
     }
 }
 
-impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<'_, D, N> {
+impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
+    fn has_constant_rate(&self) -> bool {
+        self.ld.constant_rate()
+    }
+
+    fn account(&self) -> Vec<Item> {
+        account_of(self.ld.is_explicit(), "step")
+    }
+
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
         for taken in 0..steps {
             self.step().map_err(|cause| Halt { taken, cause })?;
@@ -293,4 +302,21 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<'_, D, N> {
     fn doubt(&mut self) -> Option<Doubt<N>> {
         self.watch.doubt.take()
     }
+}
+
+/// What the steps or substeps of discrete Lagrangians compute.
+pub(crate) fn account_of(explicit: bool, what: &str) -> Vec<Item> {
+    let solved = if explicit {
+        [
+            Item::skipped("Newton's method", "each step is explicit: forces only"),
+            Item::skipped("Jacobian", "no equation is solved"),
+        ]
+    } else {
+        [
+            Item::computed("Newton's method", format!("each {what} is implicit in q1")),
+            Item::computed("Jacobian", "second derivatives of L at each iterate"),
+        ]
+    };
+    let action = Item::computed("action z", "the flow of a discrete Lagrangian carries it");
+    solved.into_iter().chain([action]).collect()
 }

@@ -8,12 +8,12 @@
 //!
 //! ```
 //! use contact_geom::{VelocityPoint, systems::DoublePendulum};
-//! use discrete_herglotz::{Integrator, Problem, Rows, Steps, Until};
+//! use discrete_herglotz::{GaussCollocation, Problem, Rows, Steps, Until};
 //!
 //! let system = DoublePendulum::default();
 //! let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0, 0.5], [0.0, 0.0], 0.0))?;
 //! let mut rows = Rows::at([0.5, 1.0, 1.5])?;
-//! let run = problem.by(Integrator::Gauss { stages: 8 }).steps(Steps::Size(0.05)).observe(&mut rows);
+//! let run = problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.05)).observe(&mut rows);
 //! let outcome = run.run(Until::Time(2.0))?;
 //! println!("{}: {:?}, last {:?}", outcome.status, rows.rows, outcome.state());
 //! # Ok::<(), discrete_herglotz::InputError>(())
@@ -60,7 +60,7 @@ pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
 pub use flow::{
     Flow, FlowStep, HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian,
 };
-pub use gauss::{ClockedStepper, DenseStep, Gauss, GaussRoute, GaussStepper};
+pub use gauss::{ClockedGauss, ClockedStepper, DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper};
 pub use legendre::{
     DiscreteRegularity, discrete_regularity, legendre_minus, legendre_minus_inverse, legendre_plus,
     legendre_plus_inverse, sigma_d,
@@ -70,10 +70,10 @@ pub use momentum::{MomentumDecay, MomentumRow, discrete_momentum, discrete_symme
 pub use newton::{ITERATION_LIMIT, last_correction};
 pub use path::{DiscretePath, discrete_action};
 pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
-pub use rules::{LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
+pub use rules::{ByRule, Composed, Discrete, Discretisation, LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
 pub use run::{
-    Course, Crossing, Direction, Event, Events, Integrator, Item, LastStep, Moment, Needs, Observer, Outcome, Plan,
-    Problem, Row, Rows, Run, Start, Steps, Stop, UnknownIntegrator, Until,
+    AnyIntegrator, Course, Crossing, Direction, Event, Events, Facts, Integrator, Item, LastStep, Moment, Needs,
+    Observer, Outcome, Plan, Problem, Row, Rows, Run, Start, Steps, Stop, UnknownIntegrator, Until, Wants,
 };
 pub use solver::{CROSSOVER, Solver};
 pub use splitting::{

@@ -1,7 +1,7 @@
 //! The table of methods: what is known of each, and a discrete Lagrangian by any of them, chosen at run time.
 
 use crate::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
-use crate::{Discretised, InputError, Node, Quadrature, Rule, Strang};
+use crate::{Discretised, InputError, Quadrature, Rule, Strang};
 use contact_geom::{Lagrangian, PhasePoint, Structure};
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
@@ -40,7 +40,7 @@ pub enum Method {
 }
 
 /// What is known of a method.
-struct Facts {
+struct Known {
     name: &'static str,
     order: u32,
     symmetric: bool,
@@ -48,14 +48,13 @@ struct Facts {
     exact_rate: bool,
 }
 
-impl Facts {
+impl Known {
     /// Those of a quadrature rule, read off its nodes.
     fn of_rule<R: Rule>() -> Self {
-        let mirrored = |n: &Node| Node { weight: n.weight, place: 1.0 - n.place, action: 1.0 - n.action };
-        Facts {
+        Known {
             name: R::NAME,
             order: R::ORDER,
-            symmetric: R::NODES.iter().all(|node| R::NODES.contains(&mirrored(node))),
+            symmetric: R::is_symmetric(),
             implicit_in_z: R::NODES.iter().any(|node| node.action != 0.0),
             // Rational in h gamma, whatever the nodes.
             exact_rate: false,
@@ -78,43 +77,43 @@ impl Method {
         Self::ALL.iter().copied().filter(|method| method.check(structure).is_ok())
     }
 
-    fn facts(self) -> Facts {
+    fn known(self) -> Known {
         match self {
-            Method::Rectangle => Facts::of_rule::<RectangleRule>(),
-            Method::LeftMidpoint => Facts::of_rule::<LeftMidpointRule>(),
-            Method::Midpoint => Facts::of_rule::<MidpointRule>(),
-            Method::Trapezoidal => Facts::of_rule::<TrapezoidalRule>(),
+            Method::Rectangle => Known::of_rule::<RectangleRule>(),
+            Method::LeftMidpoint => Known::of_rule::<LeftMidpointRule>(),
+            Method::Midpoint => Known::of_rule::<MidpointRule>(),
+            Method::Trapezoidal => Known::of_rule::<TrapezoidalRule>(),
             Method::Strang => {
-                Facts { name: "strang", order: 2, symmetric: true, implicit_in_z: false, exact_rate: true }
+                Known { name: "strang", order: 2, symmetric: true, implicit_in_z: false, exact_rate: true }
             }
         }
     }
 
     /// The name in tables, in lower case with underscores.
     pub fn name(self) -> &'static str {
-        self.facts().name
+        self.known().name
     }
 
     /// The order of the flow.
     pub fn order(self) -> u32 {
-        self.facts().order
+        self.known().order
     }
 
     /// Whether the method is its own adjoint: a step of the motion reversed in time leads back.
     pub fn symmetric(self) -> bool {
-        self.facts().symmetric
+        self.known().symmetric
     }
 
     /// Whether the action at the end of a step is defined by an equation that contains it, where L depends on z;
     /// otherwise it is an explicit function of `(q0, q1, z0)`.
     pub fn implicit_in_z(self) -> bool {
-        self.facts().implicit_in_z
+        self.known().implicit_in_z
     }
 
     /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the motion itself. A
     /// quadrature rule has a rational function of `h gamma` in its place, `1 + h gamma` where it is explicit in z.
     pub fn exact_rate(self) -> bool {
-        self.facts().exact_rate
+        self.known().exact_rate
     }
 
     /// Whether the claims of this structure are all that the method needs. The quadrature rules take

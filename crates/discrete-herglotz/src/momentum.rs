@@ -76,6 +76,7 @@ impl<const N: usize, G: OneParameterGroup<N>> Observer<N> for MomentumDecay<G> {
     }
 
     fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        self.rows.clear();
         self.step(at)
     }
 

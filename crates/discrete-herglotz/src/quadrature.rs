@@ -31,6 +31,12 @@ pub trait Rule: 'static {
     const ORDER: u32;
     /// The nodes.
     const NODES: &'static [Node];
+
+    /// Whether it is its own adjoint: its nodes, mirrored in time, are the same.
+    fn is_symmetric() -> bool {
+        let mirrored = |n: &Node| Node { weight: n.weight, place: 1.0 - n.place, action: 1.0 - n.action };
+        Self::NODES.iter().all(|node| Self::NODES.contains(&mirrored(node)))
+    }
 }
 
 /// The discrete Lagrangian of a [`Rule`]: `L_d(q0, q1, z0) = z1 - z0`, where

@@ -1,7 +1,6 @@
 //! A method at work on one motion.
 
-use crate::DenseStep;
-use crate::{Doubt, StepError, Suspicion};
+use crate::{DenseStep, Doubt, Item, StepError, Suspicion};
 use contact_geom::PhasePoint;
 use thiserror::Error;
 
@@ -42,6 +41,16 @@ pub trait Stepper<const N: usize> {
     /// The last step as a curve, for a method that has one of its own; `None` before the first, and after a step that could not be taken.
     fn dense(&self) -> Option<DenseStep<N>> {
         None
+    }
+
+    /// Whether `sigma_d` is the same in all steps, as it is known before the first.
+    fn has_constant_rate(&self) -> bool {
+        false
+    }
+
+    /// What its steps compute and what they skip, the action among it: as it is where that is not requested.
+    fn account(&self) -> Vec<Item> {
+        Vec::new()
     }
 
     /// The first step so far that cannot have resolved the motion, where one was seen.

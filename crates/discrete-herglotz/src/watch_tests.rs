@@ -241,7 +241,7 @@ fn a_singular_mass_matrix_is_refused() -> Outcome {
         let ld = Midpoint::new(&reference, 0.1)?;
         let mut expected = Flow::new(&ld, 0.0, start)?;
         assert_eq!(Stepper::advance(&mut expected, 10), Ok(()));
-        let sum = |flow: &Flow<'_, _, 2>| flow.state().q.sum();
+        let sum = |flow: &Flow<_, 2>| flow.state().q.sum();
         // Each of ten steps solves a system of this condition.
         let off = (sum(&flow) - sum(&expected)).abs();
         assert!(off <= 100.0 * condition * f64::EPSILON, "{condition:e}: {off:e}");

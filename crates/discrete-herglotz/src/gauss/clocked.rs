@@ -1,16 +1,17 @@
 //! Runs of contact Gauss collocation in the time of a clock.
 
-use super::Gauss;
+use super::account::account_by_clock;
 use super::beginning::Beginning;
 use super::compensated::Compensated;
 use super::extension::{Extension, Fictitious, Values};
 use super::general::General;
 use super::look::{Compare, Curve, Look};
 use super::mass::Mass;
+use super::stage_equations::Products;
 use super::sweeps::Progress;
 use super::table::Table;
 use crate::lanes::forget_branches;
-use crate::{Halt, ITERATION_LIMIT, InputError, StepError, Stepper, Suspicion};
+use crate::{Halt, ITERATION_LIMIT, InputError, Item, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Clock, Lagrangian, PhasePoint, Scalar, Structure};
 use pulp::{Arch, Simd, WithSimd};
@@ -64,14 +65,15 @@ pub struct ClockedStepper<'a, L, C, const N: usize> {
 
 impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C, N> {
     pub(super) fn new(
-        gauss: &'a Gauss<L>,
+        lagrangian: &'a L,
+        products: Products,
         clock: C,
         probed: Option<Structure>,
         t0: f64,
         state: PhasePoint<N>,
         guess: SVector<f64, N>,
     ) -> Result<Self, InputError> {
-        let (lagrangian, h) = (&gauss.lagrangian, gauss.forward.h);
+        let Products { s, h, .. } = products;
         let Beginning { start, structure, inverse, .. } = Beginning::of(lagrangian, probed, t0, &state, guess)?;
         if !structure.autonomous {
             return Err(InputError::Unclaimed { claim: "autonomous" });
@@ -85,7 +87,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
             return Err(InputError::FirstStep(StepError::NonFinite));
         }
         let extension = Extension::new(Fictitious(clock), t0, -energy);
-        let (table, mass) = (Table::new(gauss.stages(), h), Mass::new(&structure, inverse));
+        let (table, mass) = (Table::new(s, h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, &state, &start.v));
         Ok(ClockedStepper { general, arch: Arch::new(), h, tau: 0.0, taken: 0, from: None, suspicion: None })
     }
@@ -253,6 +255,10 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
 
     fn evaluations(&self) -> u64 {
         self.general.evaluations
+    }
+
+    fn account(&self) -> Vec<Item> {
+        account_by_clock(&self.general.lagrangian.structure())
     }
 
     fn suspicion(&self) -> Option<Suspicion> {

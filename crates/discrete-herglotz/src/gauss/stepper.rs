@@ -2,7 +2,7 @@
 
 mod marks;
 
-use super::Gauss;
+use super::account::account;
 use super::beginning::{Beginning, velocity};
 use super::condensed::Condensed;
 use super::dense::{DenseStep, Solved, Start};
@@ -18,7 +18,7 @@ use super::table::Table;
 use crate::lanes::forget_branches;
 use crate::step_equations::is_identity;
 use crate::watch::Watch;
-use crate::{Doubt, Halt, InputError, StepError, Stepper, Suspicion};
+use crate::{Doubt, Halt, InputError, Item, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint};
 pub(crate) use marks::FEW;
@@ -67,7 +67,7 @@ enum Solution {
 /// method, in the positions of the stages alone where mass and rate are constant. A step of which no correction helps is given up.
 pub struct GaussStepper<'a, L, const N: usize> {
     lagrangian: &'a L,
-    products: &'a Products,
+    products: Products,
     route: Box<Route<'a, L, N>>,
     mass: Option<Box<SMatrix<f64, N, N>>>,
     arch: Arch,
@@ -94,14 +94,15 @@ pub struct GaussStepper<'a, L, const N: usize> {
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     pub(super) fn new(
-        gauss: &'a Gauss<L>,
+        lagrangian: &'a L,
+        products: Products,
         probed: Option<Structure>,
         t0: f64,
         state: PhasePoint<N>,
         guess: SVector<f64, N>,
         wants_z: bool,
     ) -> Result<Self, InputError> {
-        let (lagrangian, s, h) = (&gauss.lagrangian, gauss.stages(), gauss.forward.h);
+        let Products { s, h, .. } = products;
         let Beginning { start, structure, w, inverse } = Beginning::of(lagrangian, probed, t0, &state, guess)?;
         let condensed = structure.separable && structure.has_constant_rate();
         let (mut mass, mut of_sigma) = (None, 0.0);
@@ -132,7 +133,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let from = Start { q: [0.0; N], y: [0.0; N], z: 0.0 };
         Ok(GaussStepper {
             lagrangian,
-            products: &gauss.forward,
+            products,
             route: Box::new(route),
             mass,
             arch: Arch::new(),
@@ -233,7 +234,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         match &mut *self.route {
             Route::Condensed(run) => run.reserve(),
             _ if self.workspace.is_none() => {
-                let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t: self.time() };
+                let equations =
+                    StageEquations { lagrangian: self.lagrangian, products: &self.products, t: self.time() };
                 self.workspace = Some(Box::new(equations.workspace(&Given::Start(self.state()))));
             }
             _ => {}
@@ -289,7 +291,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             Route::Condensed(run) => return run.solve(t),
             Route::General(run) => run,
         };
-        let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t };
+        let equations = StageEquations { lagrangian: self.lagrangian, products: &self.products, t };
         let given = Given::Start(from);
         let v = match velocity(self.lagrangian, t, &from, SVector::zeros()) {
             Ok(v) => v,
@@ -457,6 +459,14 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             Route::Condensed(run) => run.evaluations,
             Route::General(run) => run.evaluations,
         }
+    }
+
+    fn has_constant_rate(&self) -> bool {
+        !matches!(&*self.route, Route::General(_))
+    }
+
+    fn account(&self) -> Vec<Item> {
+        account(self.route(), &self.lagrangian.structure())
     }
 
     /// The collocation polynomial. It costs nothing where it is not asked for.

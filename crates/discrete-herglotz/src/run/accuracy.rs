@@ -1,9 +1,10 @@
 //! The integrator and the number of steps for a wanted error.
 
 use super::pilot::{BUDGET, Ending, Marks, Pilots, Track};
-use super::{Integrator, MOST_STEPS, Problem, Task};
-use crate::{InputError, Obstacle};
+use super::{MOST_STEPS, Problem, Shared, Task};
+use crate::{ClockedGauss, GaussCollocation, InputError, Obstacle};
 use contact_geom::{Lagrangian, larger};
+use std::sync::Arc;
 
 /// The searches that may follow each other: each makes the steps shorter, or ends.
 const ATTEMPTS: usize = 64;
@@ -24,15 +25,20 @@ const OWN: usize = 6;
 /// the iteration.
 const BY_CLOCK: usize = 8;
 
-/// What is chosen for a scene.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Choice {
-    pub integrator: Integrator,
+/// What is chosen for a run.
+pub(super) struct Choice<'p, L, const N: usize> {
+    pub integrator: Shared<'p, L, N>,
     pub count: usize,
     /// The length of a step; by a clock, in its time.
     pub h: f64,
     /// The error that the pilot runs found, or predict; `None` where the steps are given.
     pub error: Option<f64>,
+}
+
+impl<L, const N: usize> Clone for Choice<'_, L, N> {
+    fn clone(&self) -> Self {
+        Choice { integrator: self.integrator.clone(), ..*self }
+    }
 }
 
 /// A motion that runs with k and 2k steps agree on.
@@ -64,10 +70,10 @@ fn stages_for(wanted: f64) -> usize {
 /// solve Herglotz' equations up to a misfit that falls from the one to the other as it does where the motion is smooth. The search ends
 /// a run at the first step that does not resolve the motion, so that runs that are far too coarse cost nothing. The error of the
 /// integrator's own runs is then their distance from the reference.
-pub(super) fn choose<L: Lagrangian<N>, const N: usize>(
-    task: Task<'_, L, N>,
+pub(super) fn choose<'p, L: Lagrangian<N>, const N: usize>(
+    task: &Task<'p, L, N>,
     wanted: f64,
-) -> Result<Choice, InputError> {
+) -> Result<Choice<'p, L, N>, InputError> {
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
@@ -75,28 +81,31 @@ pub(super) fn choose<L: Lagrangian<N>, const N: usize>(
 }
 
 /// The same with a budget.
-pub(super) fn choose_with<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, L, N>,
-) -> Result<Choice, InputError> {
+pub(super) fn choose_with<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, 'p, L, N>,
+) -> Result<Choice<'p, L, N>, InputError> {
     let wanted = pilots.wanted;
-    let integrator = pilots.task.integrator.unwrap_or(Integrator::Gauss { stages: stages_for(wanted) });
-    match integrator {
-        Integrator::Gauss { stages } if stages >= OWN => {
-            pilots.watches_clock =
-                pilots.task.integrator.is_none() && const { L::HAS_CLOCK } && pilots.task.problem.structure.autonomous;
-            if let Some(choice) = by_equal_steps(pilots, stages)? {
-                return Ok(choice);
-            }
-            pilots.watches_clock = false;
-            // Where the clock leads nowhere equal steps may.
-            by_clock(pilots, BY_CLOCK).or_else(|refused| by_equal_steps(pilots, stages)?.ok_or(refused))
+    let Some(integrator) = pilots.task.integrator.clone() else {
+        let stages = stages_for(wanted);
+        let equal: Shared<'p, L, N> = Arc::new(GaussCollocation { stages });
+        pilots.watches_clock = const { L::HAS_CLOCK } && pilots.task.problem.structure.autonomous;
+        if let Some(choice) = by_equal_steps(pilots, &equal, stages)? {
+            return Ok(choice);
         }
-        Integrator::Clocked { stages } if stages >= OWN => by_clock(pilots, stages),
+        pilots.watches_clock = false;
+        // Where the clock leads nowhere equal steps may.
+        let clocked: Shared<'p, L, N> = Arc::new(ClockedGauss { stages: BY_CLOCK });
+        return by_clock(pilots, &clocked, BY_CLOCK)
+            .or_else(|refused| by_equal_steps(pilots, &equal, stages)?.ok_or(refused));
+    };
+    let facts = integrator.facts();
+    match facts.collocation {
+        Some(stages) if stages >= OWN && facts.by_clock => by_clock(pilots, &integrator, stages),
+        Some(stages) if stages >= OWN => by_equal_steps(pilots, &integrator, stages)?.ok_or(InputError::NoSteps),
         _ => {
-            let clocked = matches!(integrator, Integrator::Clocked { .. });
-            let at = if clocked { Compared::Times } else { Compared::Tenths };
+            let at = if facts.by_clock { Compared::Times } else { Compared::Tenths };
             let found = reference(pilots, REFERENCE, wanted / 8.0, at)?;
-            by_reference(pilots, integrator, &found)
+            by_reference(pilots, &integrator, &found)
         }
     }
 }
@@ -113,33 +122,35 @@ enum Compared {
 }
 
 /// Gauss collocation that is its own reference, with equal steps; `None` where a clock takes much fewer, and these were watched.
-fn by_equal_steps<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, L, N>,
+fn by_equal_steps<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, 'p, L, N>,
+    integrator: &Shared<'p, L, N>,
     stages: usize,
-) -> Result<Option<Choice>, InputError> {
+) -> Result<Option<Choice<'p, L, N>>, InputError> {
     let wanted = pilots.wanted;
     let Some(found) = converge(pilots, stages, wanted, Compared::Steps)? else { return Ok(None) };
     // Where W or the drag changes along the motion a longer step may leave their domain, as no misfit foretells.
     let structure = &pilots.task.problem.structure;
     let longer = structure.separable && structure.has_constant_rate();
     let (count, error) = fewest(stages, wanted, &found, longer);
-    Ok(Some(chosen(pilots, Integrator::Gauss { stages }, count, error, &found)))
+    Ok(Some(chosen(pilots, integrator, count, error, &found)))
 }
 
 /// The same with steps that are equal in the time of the motion's clock.
-fn by_clock<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, L, N>,
+fn by_clock<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, 'p, L, N>,
+    integrator: &Shared<'p, L, N>,
     stages: usize,
-) -> Result<Choice, InputError> {
+) -> Result<Choice<'p, L, N>, InputError> {
     let wanted = pilots.wanted;
     let found = reference(pilots, stages, wanted, Compared::Times)?;
     let (count, error) = fewest(stages, wanted, &found, false);
-    Ok(chosen(pilots, Integrator::Clocked { stages }, count, error, &found))
+    Ok(chosen(pilots, integrator, count, error, &found))
 }
 
 /// The runs that agree where no clock is watched.
 fn reference<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, L, N>,
+    pilots: &mut Pilots<'_, '_, L, N>,
     stages: usize,
     goal: f64,
     compared: Compared,
@@ -149,22 +160,20 @@ fn reference<L: Lagrangian<N>, const N: usize>(
 }
 
 /// The choice of steps of which so many fill the span; by a clock they are counted anew, in its time.
-fn chosen<L: Lagrangian<N>, const N: usize>(
-    pilots: &Pilots<'_, L, N>,
-    integrator: Integrator,
+fn chosen<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &Pilots<'_, 'p, L, N>,
+    integrator: &Shared<'p, L, N>,
     count: usize,
     error: f64,
     found: &Converged<N>,
-) -> Choice {
-    let (h, error) = (pilots.step(count, &found.marks), Some(error));
-    match integrator {
-        Integrator::Clocked { .. } => {
-            // The last step is about half of the others, so that no rounding adds one.
-            let count = (found.truth.tau / h + 0.5).ceil().max(1.0);
-            Choice { integrator, count: count as usize, h: found.truth.tau / (count - 0.5), error }
-        }
-        _ => Choice { integrator, count, h, error },
+) -> Choice<'p, L, N> {
+    let (h, integrator, error) = (pilots.step(count, &found.marks), integrator.clone(), Some(error));
+    if let Marks::Times = found.marks {
+        // The last step is about half of the others, so that no rounding adds one.
+        let count = (found.truth.tau / h + 0.5).ceil().max(1.0);
+        return Choice { integrator, count: count as usize, h: found.truth.tau / (count - 0.5), error };
     }
+    Choice { integrator, count, h, error }
 }
 
 /// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.
@@ -184,7 +193,7 @@ fn first_guess<L: Lagrangian<N>, const N: usize>(task: &Task<'_, L, N>, stages: 
 
 /// Finds the runs that agree; `None` where one has ended since a clock would take much fewer steps.
 fn converge<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, L, N>,
+    pilots: &mut Pilots<'_, '_, L, N>,
     stages: usize,
     goal: f64,
     compared: Compared,
@@ -197,7 +206,7 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         Compared::Tenths => Marks::equal(k),
         Compared::Times => Marks::Times,
     };
-    let mut k = first_guess(&pilots.task, stages, goal);
+    let mut k = first_guess(pilots.task, stages, goal);
     let mut marks = marks_of(k);
     let (mut best, mut strikes, mut narrows, mut halts) = (f64::INFINITY, 0, 0, (0, 0.0));
     let mut cause = Obstacle::Unresolved { t: t0 };
@@ -333,13 +342,13 @@ fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, long
 }
 
 /// The steps of any integrator, whose runs are compared with the reference.
-fn by_reference<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, L, N>,
-    integrator: Integrator,
+fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, 'p, L, N>,
+    integrator: &Shared<'p, L, N>,
     found: &Converged<N>,
-) -> Result<Choice, InputError> {
+) -> Result<Choice<'p, L, N>, InputError> {
     let wanted = pilots.wanted;
-    let (order, marks) = (f64::from(integrator.order()), &found.marks);
+    let (order, marks) = (f64::from(integrator.facts().order), &found.marks);
     let whole = |count: f64| marks.whole(count);
     let refuse = |reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
     let mut count = whole((found.k * REFERENCE) as f64 / order.min(4.0));

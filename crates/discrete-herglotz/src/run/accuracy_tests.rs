@@ -2,11 +2,13 @@
 
 use super::accuracy::choose_with;
 use super::pilot::{BUDGET, Pilots};
-use super::{Needs, Problem, Steps, Task, Until, run_of};
-use crate::{InputError, Integrator, Obstacle, Status};
+use super::{Needs, Problem, Shared, Task, Until, run_to};
+use crate::{AnyIntegrator, InputError, Obstacle, Status};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+use std::borrow::Cow;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// `v^2/2 - V(q) + gamma (1 + swing cos t) z`.
@@ -61,7 +63,7 @@ fn jumps_of_the_potential_are_refused() {
         let height = [-0.8, -0.02, 0.003, 0.3][i / 4 % 4];
         let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Jump { at: place, height } };
         let problem = Problem::new(&line, 0.0, at(0.0, 1.0)).unwrap();
-        let cause = match problem.steps(Steps::Accuracy(1e-6)).plan(Until::Time(10.0)) {
+        let cause = match problem.accuracy(1e-6).plan(Until::Time(10.0)) {
             Err(InputError::Accuracy { cause, .. }) => cause,
             other => panic!("{place}, {height}: {:?}", other.map(|plan| plan.count())),
         };
@@ -74,7 +76,7 @@ fn jumps_of_the_potential_are_refused() {
 fn motions_that_come_to_rest_are_followed() {
     let line = Line { gamma: -0.89, swing: 0.0, potential: Potential::Well };
     for span in [40.0, 90.0, 400.0] {
-        let outcome = run_of(&line, at(0.3, -0.5), span, None, Steps::Accuracy(1e-8)).unwrap();
+        let outcome = run_to(&line, at(0.3, -0.5), span, 1e-8).unwrap();
         assert_eq!(outcome.status, Status::Completed, "{span}");
         // At the bottom of the well: its force there is round-off.
         let x = VelocityPoint::new([outcome.q[0]], [outcome.p[0]], 0.0);
@@ -88,22 +90,25 @@ fn motions_that_come_to_rest_are_followed() {
 fn rest_is_followed() {
     let line = Line { gamma: -0.25, swing: 1.0, potential: Potential::Pole };
     let start = VelocityPoint::new([0.0], [0.0], -0.98);
-    let outcome = run_of(&line, start, 20.0, None, Steps::Accuracy(1e-8)).unwrap();
+    let outcome = run_to(&line, start, 20.0, 1e-8).unwrap();
     assert_eq!((outcome.status, outcome.q[0], outcome.p[0]), (Status::Completed, 0.0, 0.0));
     // z' = gamma (1 + cos t) z. The accuracy is not that of z, but steps that do not resolve it to a twentieth are refused.
     let z = -0.98 * (-0.25 * (20.0 + 20.0f64.sin())).exp();
     assert!(outcome.z.is_some_and(|found| (found - z).abs() <= 0.05 * z.abs()), "{:?}, not {z}", outcome.z);
 }
 
-/// The search for the steps of a run, before it begins.
-fn searching<'p, L: Lagrangian<N>, const N: usize>(
-    problem: &'p Problem<'p, L, N>,
+/// The integrator and the steps that are chosen for a run, with what the search for them has cost.
+fn search<L: Lagrangian<N>, const N: usize>(
+    problem: &Problem<'_, L, N>,
     span: f64,
-    integrator: Option<Integrator>,
+    integrator: Option<AnyIntegrator>,
     wanted: f64,
-) -> Pilots<'p, L, N> {
-    let task = Task { problem, span, integrator, steps: Steps::Accuracy(wanted), needs: Needs::default() };
-    Pilots { task, left: BUDGET, wanted, watches_clock: false }
+) -> (Cow<'static, str>, usize, u64) {
+    let integrator = integrator.map(|by| Arc::new(by) as Shared<'_, L, N>);
+    let task = Task { problem, t_end: span, span, integrator, needs: Needs::default() };
+    let mut pilots = Pilots { task: &task, left: BUDGET, wanted, watches_clock: false };
+    let choice = choose_with(&mut pilots).unwrap();
+    (choice.integrator.facts().name, choice.count, BUDGET - pilots.left)
 }
 
 /// Pilot runs cost a small multiple of the run: those with k and 2k steps, and where these do not agree with 4k; before them one that
@@ -113,12 +118,11 @@ fn pilot_runs_cost_little() {
     let pendulum = Pendulum { gamma: -0.01 };
     for (span, wanted) in [(30.0, 1e-4), (30.0, 1e-7), (100.0, 1e-9), (300.0, 1e-6), (1000.0, 1e-8)] {
         let problem = Problem::new(&pendulum, 0.0, at(1.0, 1.0)).unwrap();
-        let mut pilots = searching(&problem, span, None, wanted);
-        let choice = choose_with(&mut pilots).unwrap();
-        let run = problem.steps(Steps::Accuracy(wanted)).run(Until::Time(span)).unwrap();
-        assert_eq!(choice.count, run.steps);
+        let (_, count, spent) = search(&problem, span, None, wanted);
+        let run = problem.accuracy(wanted).run(Until::Time(span)).unwrap();
+        assert_eq!(count, run.steps);
         // Looks count twice their points, of which there are at least 2000 beside those of the steps.
-        let (spent, looks) = ((BUDGET - pilots.left) as f64, 2.5 * 2.0 * 2000.0);
+        let (spent, looks) = (spent as f64, 2.5 * 2.0 * 2000.0);
         let most = 7.0 * run.evaluations as f64 + looks;
         assert!(spent <= most, "{span}, {wanted:e}: {spent} evaluations for {}", run.evaluations);
     }
@@ -133,19 +137,15 @@ fn pilot_runs_by_a_clock_cost_little() {
             let e = if apocentre { -e } else { e };
             let start = VelocityPoint::new([1.0 - e, 0.0], [0.0, f64::sqrt((1.0 + e) / (1.0 - e))], 0.0);
             let problem = Problem::new(&kepler, 0.0, start).unwrap();
-            let search = |integrator| {
-                let mut pilots = searching(&problem, 40.0, integrator, 1e-8);
-                let choice = choose_with(&mut pilots).unwrap();
-                (choice.integrator, BUDGET - pilots.left)
-            };
-            let (integrator, spent) = search(None);
+            let (integrator, _, spent) = search(&problem, 40.0, None, 1e-8);
             if e.abs() < 0.5 {
-                let equal = Integrator::Gauss { stages: 8 };
-                assert_eq!((integrator, spent), search(Some(equal)), "{e}");
+                let equal = AnyIntegrator::Gauss { stages: 8 };
+                let (name, _, by_name) = search(&problem, 40.0, Some(equal), 1e-8);
+                assert_eq!((integrator, spent), (name, by_name), "{e}");
                 continue;
             }
-            assert_eq!(integrator, Integrator::Clocked { stages: 8 }, "{e}");
-            let run = problem.steps(Steps::Accuracy(1e-8)).run(Until::Time(40.0)).unwrap();
+            assert_eq!(integrator, "clocked_gauss_8", "{e}");
+            let run = problem.accuracy(1e-8).run(Until::Time(40.0)).unwrap();
             let most = 7.0 * run.evaluations as f64 + 2.5 * 2.0 * 2000.0;
             assert!(spent as f64 <= most, "{e}: {spent} evaluations for {}", run.evaluations);
         }
@@ -157,9 +157,10 @@ fn pilot_runs_by_a_clock_cost_little() {
 fn singularities_end_the_search_soon() {
     let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Pole };
     for integrator in ["gauss_8", "midpoint", "strang", "midpoint_by_kahan_li_8"] {
-        let integrator: Integrator = integrator.parse().unwrap();
+        let integrator: AnyIntegrator = integrator.parse().unwrap();
         let clock = Instant::now();
-        let refused = run_of(&line, at(0.5, 0.5), 20.0, Some(integrator), Steps::Accuracy(1e-4)).err();
+        let problem = Problem::new(&line, 0.0, at(0.5, 0.5)).unwrap();
+        let refused = problem.by(integrator).accuracy(1e-4).run(Until::Time(20.0)).err();
         assert!(
             matches!(
                 refused,
@@ -177,6 +178,6 @@ fn singularities_end_the_search_soon() {
 fn what_decays_below_the_numbers_is_rounded() {
     let system = contact_geom::systems::HarmonicOscillator { gamma: -0.1 };
     let start = VelocityPoint::new([1e-300], [5e-301], 0.0);
-    let refused = run_of(&system, start, 1e3, None, Steps::Accuracy(1e-9)).err();
+    let refused = run_to(&system, start, 1e3, 1e-9).err();
     assert!(matches!(refused, Some(InputError::Accuracy { cause: Obstacle::RoundOff, .. })), "{refused:?}");
 }

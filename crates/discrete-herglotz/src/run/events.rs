@@ -96,11 +96,11 @@ struct Seen<const N: usize> {
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
-/// use discrete_herglotz::{Event, Events, Integrator, Problem, Steps, Until};
+/// use discrete_herglotz::{Event, Events, GaussCollocation, Problem, Steps, Until};
 /// let pendulum = Pendulum { gamma: -0.1 };
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;
 /// let mut lowest = Events::new([Event::new(|_, x| x.q[0])]);
-/// problem.by(Integrator::Gauss { stages: 8 }).steps(Steps::Size(0.1)).observe(&mut lowest).run(Until::Time(10.0))?;
+/// problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.1)).observe(&mut lowest).run(Until::Time(10.0))?;
 /// println!("passes its lowest point at {:?}", lowest.crossings.iter().map(|c| c.t).collect::<Vec<_>>());
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
@@ -182,6 +182,7 @@ impl<const N: usize> Event<'_, N> {
 impl<const N: usize> Observer<N> for Events<'_, N> {
     fn prepare(&mut self, _course: &Course) -> Result<(), InputError> {
         self.seen.clear();
+        self.crossings.clear();
         Ok(())
     }
 

@@ -1,12 +1,11 @@
 //! Steps against twice as many of half their length: whether given steps resolve the motion at all.
 
-use super::Integrator;
 use super::{Plan, Problem};
 use crate::gauss::velocity;
 use crate::watch::{LEAST, rounding};
-use crate::{Doubt, Flow, Gauss, InputError, Stepper};
+use crate::{Doubt, InputError};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, larger, largest};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
 
 /// The difference from two halves, relative to the motion, from which on a step does not resolve it. Of the orders that there are
 /// a step then has an error of its own of a twentieth, or a fifteenth with order one.
@@ -19,7 +18,7 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         let v = velocity(lagrangian, *t, from, start.v).ok()?;
         let end = t + *steps as f64 * self.h;
         let at_end = |x: &PhasePoint<N>| velocity(lagrangian, end, x, v).ok();
-        if let Integrator::Clocked { .. } = self.integrator {
+        if self.facts.by_clock {
             return None;
         }
         let fine = match self.reach((*t, from), &v, 0.5 * self.h, 2 * steps) {
@@ -45,25 +44,12 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         h: f64,
         count: usize,
     ) -> Result<PhasePoint<N>, InputError> {
-        let Problem { lagrangian, structure, .. } = *self.problem;
-        let end = |run: &mut dyn Stepper<N>| {
-            let reached = run.advance_until(count, t + h);
-            reached.map(|_| run.state()).map_err(|halt| InputError::FirstStep(halt.cause))
-        };
-        match self.integrator {
-            Integrator::Clocked { stages } if const { L::HAS_CLOCK } => {
-                let gauss = Gauss::new(lagrangian, stages, self.h)?;
-                end(&mut gauss.own_clock_stepper(structure, t, *from, *v)?)
-            }
-            Integrator::Gauss { stages } | Integrator::Clocked { stages } => {
-                let gauss = Gauss::new(lagrangian, stages, h)?;
-                end(&mut gauss.verified_stepper(structure, t, *from, *v, self.needs.action)?)
-            }
-            Integrator::Discrete(method) => {
-                let ld = method.discretise(lagrangian, h, t, from)?;
-                end(&mut Flow::with_guess(&ld, t, *from, *v)?)
-            }
-            Integrator::Splitting(_) | Integrator::Composition(..) => end(&mut *self.explicit(h, t, *from, false)?),
-        }
+        let start = VelocityPoint { q: from.q, v: *v, z: from.z };
+        let problem = Problem { t0: t, start, state: *from, ..*self.problem };
+        // A step of the clock is cut where it passes the time.
+        let length = if self.facts.by_clock { self.h } else { h };
+        let mut run = self.make_stepper(&problem, length, false)?;
+        run.advance_until(count, t + h).map_err(|halt| InputError::FirstStep(halt.cause))?;
+        Ok(run.state())
     }
 }

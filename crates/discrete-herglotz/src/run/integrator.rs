@@ -1,121 +1,84 @@
-//! The table of integrators.
+//! Integrators: what advances a run.
 
-use crate::{Gauss, InputError, Method, SplittingScheme};
-use contact_geom::{Lagrangian, Structure};
-use std::fmt::{Display, Formatter};
-use std::str::FromStr;
-use thiserror::Error;
+use super::Problem;
+use crate::{InputError, Stepper};
+use std::borrow::Cow;
 
-/// How a scene is advanced.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Integrator {
-    /// The flow of a discrete Lagrangian, each step by Newton's method.
-    Discrete(Method),
-    /// Contact Gauss collocation with 1 to 16 stages, of order twice their number, for every regular Lagrangian.
-    Gauss {
-        /// The number of stages.
-        stages: usize,
-    },
-    /// The same with steps that are equal in the time of the clock which an autonomous Lagrangian states: short where its motion is
-    /// fast, and the last one shorter, so that it ends where the span does.
-    Clocked {
-        /// The number of stages.
-        stages: usize,
-    },
-    /// A splitting with exact rate, for `v.Mv/2 - V(t, q) + f(z)`.
-    Splitting(SplittingScheme),
-    /// A symmetric composition of a symmetric rule of order 2.
-    Composition(Method, SplittingScheme),
+/// What is known of an integrator.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Facts {
+    /// The name in tables, in lower case with underscores.
+    pub name: Cow<'static, str>,
+    /// The order of the flow; by a clock, in steps of its time.
+    pub order: u32,
+    /// Whether it is its own adjoint: a step back leads to where a step came from.
+    pub symmetric: bool,
+    /// Whether its steps take forces alone, and solve no equation.
+    pub explicit: bool,
+    /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the motion itself.
+    pub exact_rate: bool,
+    /// Whether its steps are equal in the time of the clock that the Lagrangian states, and end where the span does.
+    pub by_clock: bool,
+    /// The number of stages, of contact Gauss collocation.
+    pub collocation: Option<usize>,
+    /// Whether a step consists of others, back and forth.
+    pub substeps: bool,
+    /// What one of its [evaluations](Stepper::evaluations) costs, in evaluations of L at a stage of Gauss collocation.
+    pub price: u64,
+    /// Where it is from: authors, journal, year.
+    pub source: Cow<'static, str>,
 }
 
-impl Integrator {
-    /// Every integrator by one name: quadrature rules, Gauss methods, splittings, the compositions of the symmetric midpoint rule, and
-    /// Gauss methods by a clock.
-    pub fn all() -> Vec<Integrator> {
-        let discrete = Method::RULES.iter().copied().map(Integrator::Discrete);
-        let gauss = (1..=Gauss::<()>::STAGES).map(|stages| Integrator::Gauss { stages });
-        let splittings = SplittingScheme::ALL.into_iter().map(Integrator::Splitting);
-        let compositions = SplittingScheme::ALL.into_iter().filter(|s| !s.is_nystrom() && s.order() > 2);
-        let compositions = compositions.map(|scheme| Integrator::Composition(Method::Midpoint, scheme));
-        let clocked = (1..=Gauss::<()>::STAGES).map(|stages| Integrator::Clocked { stages });
-        discrete.chain(gauss).chain(splittings).chain(compositions).chain(clocked).collect()
-    }
-
-    /// The order of the flow; by a clock, in steps of its time.
-    pub fn order(self) -> u32 {
-        match self {
-            Integrator::Discrete(method) => method.order(),
-            Integrator::Gauss { stages } | Integrator::Clocked { stages } => 2 * stages as u32,
-            Integrator::Splitting(scheme) | Integrator::Composition(_, scheme) => scheme.order(),
+impl Facts {
+    /// Those of an implicit method that is not known to be symmetric: the least that is true of a discrete Lagrangian in N coordinates.
+    pub fn of_discrete<const N: usize>(name: impl Into<Cow<'static, str>>, order: u32) -> Self {
+        Facts {
+            name: name.into(),
+            order,
+            symmetric: false,
+            explicit: false,
+            exact_rate: false,
+            by_clock: false,
+            collocation: None,
+            substeps: false,
+            // Newton's method takes second derivatives.
+            price: 32 * N as u64,
+            source: Cow::Borrowed(""),
         }
     }
+}
 
-    /// Whether a Lagrangian meets the hypotheses of the method.
+/// What is asked of a stepper.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wants {
+    /// The action, also where it does not act back on the motion.
+    pub action: bool,
+    /// That it watches whether its steps resolve the motion, where that has a price; see [`Stepper::suspicion`] and [`Stepper::doubt`].
+    pub watched: bool,
+}
+
+/// A way to advance the motions of Lagrangians L in N coordinates: the rules, the splittings, the compositions and the collocation methods
+/// of this crate, the exact flow, and a user's own.
+///
+/// Who has a [`DiscreteLagrangian`](crate::DiscreteLagrangian) needs no implementation: see [`Discrete`](crate::Discrete).
+pub trait Integrator<'a, L, const N: usize> {
+    /// What is known of it.
+    fn facts(&self) -> Facts;
+
+    /// Whether a Lagrangian meets its hypotheses.
     ///
     /// # Errors
-    /// [`InputError::Unclaimed`] with the claim that is missing, [`InputError::Hypothesis`], and [`InputError::Stages`].
-    pub fn check<const N: usize, L: Lagrangian<N>>(self, lagrangian: &L) -> Result<(), InputError> {
-        self.check_form(&lagrangian.structure(), L::HAS_CLOCK)
-    }
+    /// [`InputError::Unclaimed`] with the claim that is missing, [`InputError::Hypothesis`], [`InputError::Stages`].
+    fn check(&self, lagrangian: &L) -> Result<(), InputError>;
 
-    /// The same for a Lagrangian of a form, with a clock or without.
-    fn check_form(self, structure: &Structure, has_clock: bool) -> Result<(), InputError> {
-        match self {
-            Integrator::Discrete(method) => method.check(structure),
-            Integrator::Gauss { stages } | Integrator::Clocked { stages }
-                if !(1..=Gauss::<()>::STAGES).contains(&stages) =>
-            {
-                Err(InputError::Stages { found: stages })
-            }
-            Integrator::Clocked { .. } if !has_clock => Err(InputError::Hypothesis {
-                hypothesis: "a Lagrangian that states a clock (`HAS_CLOCK`, `clock_rate`)",
-            }),
-            Integrator::Clocked { .. } if !structure.autonomous => Err(InputError::Unclaimed { claim: "autonomous" }),
-            Integrator::Clocked { .. } => Ok(()),
-            Integrator::Gauss { .. } => Ok(()),
-            Integrator::Splitting(_) if !structure.separable => Err(InputError::Unclaimed { claim: "separable" }),
-            // The third flow, that of f(z), leaves the hypothesis of Runge-Kutta-Nyström methods.
-            Integrator::Splitting(scheme) if scheme.is_nystrom() && !structure.is_affine_in_z() => {
-                Err(InputError::Unclaimed { claim: "z_affine" })
-            }
-            Integrator::Splitting(_) => Ok(()),
-            Integrator::Composition(method, scheme) => {
-                if !method.symmetric() || method.order() != 2 || scheme.is_nystrom() {
-                    return Err(InputError::Hypothesis { hypothesis: "a composition of a symmetric rule of order 2" });
-                }
-                method.check(structure)
-            }
-        }
-    }
-}
-
-/// The name in tables: `midpoint`, `gauss_8`, `clocked_gauss_8`, `kahan_li_8`, `midpoint_by_kahan_li_8`.
-impl Display for Integrator {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Integrator::Discrete(method) => f.pad(method.name()),
-            Integrator::Gauss { stages } => f.pad(&format!("gauss_{stages}")),
-            Integrator::Clocked { stages } => f.pad(&format!("clocked_gauss_{stages}")),
-            Integrator::Splitting(scheme) => f.pad(scheme.name()),
-            Integrator::Composition(method, scheme) => f.pad(&format!("{method}_by_{}", scheme.name())),
-        }
-    }
-}
-
-/// From the name.
-impl FromStr for Integrator {
-    type Err = UnknownIntegrator;
-
-    fn from_str(name: &str) -> Result<Self, UnknownIntegrator> {
-        let named = Self::all().into_iter().find(|integrator| integrator.to_string() == name);
-        named.ok_or_else(|| UnknownIntegrator { name: name.into() })
-    }
-}
-
-/// No integrator has this name.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no integrator {name:?}; there are {}", Integrator::all().iter().map(|i| i.to_string()).collect::<Vec<_>>().join(", "))]
-pub struct UnknownIntegrator {
-    /// The name that was asked for.
-    pub name: String,
+    /// A stepper at the start of a problem, by steps of h: negative ones go back in time.
+    ///
+    /// # Errors
+    /// [`InputError`] where the problem does not meet its hypotheses, or the first step cannot be taken.
+    fn stepper(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        wants: Wants,
+    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError>;
 }

@@ -1,9 +1,9 @@
 //! Steps in doubt: whether what turned the velocity is narrower than they are.
 
-use super::{Integrator, Plan, Problem};
+use super::{Plan, Problem};
 use crate::gauss::velocity;
 use crate::watch::{rounding, size};
-use crate::{Doubt, Method, Suspicion};
+use crate::{Doubt, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, herglotz_rates, larger, largest};
 
@@ -33,17 +33,9 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         let start = VelocityPoint { q: from.q, v: velocity(lagrangian, *t, from, first.v).ok()?, z: from.z };
         let end = VelocityPoint { q: to.q, v: velocity(lagrangian, t + span, to, start.v).ok()?, z: to.z };
         // Substeps back and forth meet what lies beside the steps; but nothing is beside the run.
-        let aside = match self.integrator {
-            Integrator::Splitting(_) | Integrator::Composition(..) => 0.5 * self.h,
-            Integrator::Discrete(_) | Integrator::Gauss { .. } | Integrator::Clocked { .. } => 0.0,
-        };
+        let aside = if self.facts.substeps { 0.5 * self.h } else { 0.0 };
         // However strong.
-        let exact_drag = matches!(
-            self.integrator,
-            Integrator::Splitting(_)
-                | Integrator::Discrete(Method::Strang)
-                | Integrator::Composition(Method::Strang, _)
-        );
+        let exact_drag = self.facts.exact_rate;
         let before = if *step > 0 { aside } else { 0.0 };
         let after = if step + steps < self.count { aside } else { 0.0 };
         let (mut accelerations, mut speed) = ([SVector::<f64, N>::zeros(); PARTS + 1], 0.0);

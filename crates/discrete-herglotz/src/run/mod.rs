@@ -3,6 +3,7 @@
 mod accuracy;
 #[cfg(test)]
 mod accuracy_tests;
+mod any_integrator;
 mod events;
 mod explain;
 mod halved;
@@ -17,9 +18,11 @@ mod rows;
 #[cfg(test)]
 mod tests;
 
+pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
 pub use events::{Crossing, Direction, Event, Events};
+pub(crate) use explain::DECOUPLED;
 pub use explain::Item;
-pub use integrator::{Integrator, UnknownIntegrator};
+pub use integrator::{Facts, Integrator, Wants};
 pub use observer::{Course, LastStep, Moment, Needs, Observer, Stop};
 pub use outcome::Outcome;
 pub use plan::Plan;
@@ -32,8 +35,9 @@ use crate::{InputError, StepError};
 use accuracy::Choice;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
+use std::sync::Arc;
 
-/// The time step of a run. Steps go back in time where the run does.
+/// The time steps of a run. They go back in time where the run does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steps {
     /// Steps of this length, made a little shorter so that a whole number of them fills the span; of an integrator by a clock, steps
@@ -41,10 +45,6 @@ pub enum Steps {
     Size(f64),
     /// This many steps; not by a clock, which counts them itself.
     Count(usize),
-    /// One length for the whole run, of time or of the time of the Lagrangian's clock, chosen by pilot runs so that the error of (q, p),
-    /// relative to its size at the time or at the end, is at most this at every tenth of the span. The pilot runs cost a small multiple of
-    /// the run; what is narrower than the distance of their nodes, about the step divided by four times the stages, may go unseen.
-    Accuracy(f64),
 }
 
 /// Where a run ends, if no observer ends it before.
@@ -52,27 +52,40 @@ pub enum Steps {
 pub enum Until {
     /// At this time, before or after that of the start.
     Time(f64),
-    /// After so many steps forward, of the [size](Steps::Size) that is given.
+    /// After this time, negative to go back.
+    After(f64),
+    /// After so many steps of the [size](Steps::Size) that is given; a negative size goes back.
     Steps(usize),
 }
 
-/// What is asked of a run, without its observers.
-#[derive(Debug)]
-struct Task<'p, L, const N: usize> {
-    problem: &'p Problem<'p, L, N>,
-    span: f64,
-    integrator: Option<Integrator>,
-    steps: Steps,
-    needs: Needs,
+/// An integrator for as long as the Lagrangian lives.
+type Shared<'p, L, const N: usize> = Arc<dyn Integrator<'p, L, N> + 'p>;
+
+/// How a step is chosen for an accuracy: in a program that asks for none it is not compiled.
+type Choose<'p, L, const N: usize> = fn(&Task<'p, L, N>, f64) -> Result<Choice<'p, L, N>, InputError>;
+
+/// How long the steps of a run are to be.
+enum Length<'p, L, const N: usize> {
+    Given(Steps),
+    For(f64, Choose<'p, L, N>),
 }
 
-impl<L, const N: usize> Clone for Task<'_, L, N> {
+impl<L, const N: usize> Clone for Length<'_, L, N> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<L, const N: usize> Copy for Task<'_, L, N> {}
+impl<L, const N: usize> Copy for Length<'_, L, N> {}
+
+/// What is asked of a run, without its observers.
+struct Task<'p, L, const N: usize> {
+    problem: &'p Problem<'p, L, N>,
+    t_end: f64,
+    span: f64,
+    integrator: Option<Shared<'p, L, N>>,
+    needs: Needs,
+}
 
 /// A [`Problem`] with an integrator, steps and observers.
 ///
@@ -81,11 +94,11 @@ impl<L, const N: usize> Copy for Task<'_, L, N> {}
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
-/// use discrete_herglotz::{Integrator, Problem, Steps, Until};
+/// use discrete_herglotz::{GaussCollocation, Problem, Until};
 ///
 /// let pendulum = Pendulum { gamma: -0.01 };
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.0], 0.0))?;
-/// let run = problem.by(Integrator::Gauss { stages: 16 }).steps(Steps::Accuracy(1e-9)).without_action();
+/// let run = problem.by(GaussCollocation { stages: 16 }).accuracy(1e-9).without_action();
 /// println!("{}", run.plan(Until::Time(1000.0))?);
 /// let outcome = run.run(Until::Time(1000.0))?;
 /// println!("{}: q = {} after {} steps", outcome.status, outcome.q[0], outcome.steps);
@@ -93,32 +106,42 @@ impl<L, const N: usize> Copy for Task<'_, L, N> {}
 /// ```
 pub struct Run<'p, L, const N: usize> {
     problem: &'p Problem<'p, L, N>,
-    integrator: Option<Integrator>,
-    steps: Steps,
+    integrator: Option<Shared<'p, L, N>>,
+    length: Option<Length<'p, L, N>>,
     needs: Needs,
-    observers: Vec<&'p mut dyn Observer<N>>,
+    observers: Vec<Box<dyn Observer<N> + 'p>>,
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, L, N> {
     fn of(problem: &'p Problem<'p, L, N>) -> Self {
         let needs = Needs { action: true, conformal_factor: false };
-        Run { problem, integrator: None, steps: Steps::Accuracy(1e-9), needs, observers: Vec::new() }
+        Run { problem, integrator: None, length: None, needs, observers: Vec::new() }
     }
 
-    /// The same by this integrator. Where none is named, it is contact Gauss collocation: with stages for the wanted accuracy, and by
-    /// the clock that the Lagrangian states where that takes much fewer steps; or with eight stages where steps are given.
-    pub fn by(self, integrator: Integrator) -> Self {
-        Run { integrator: Some(integrator), ..self }
+    /// The same by this integrator.
+    pub fn by(self, integrator: impl Integrator<'p, L, N> + 'p) -> Self {
+        Run { integrator: Some(Arc::new(integrator)), ..self }
     }
 
-    /// The same with other steps; at first they are for an accuracy of 1e-9.
+    /// The same by steps of a given length or number.
     pub fn steps(self, steps: Steps) -> Self {
-        Run { steps, ..self }
+        Run { length: Some(Length::Given(steps)), ..self }
+    }
+
+    /// The same by steps of one length for the whole run, of time or of the time of the Lagrangian's clock, chosen by pilot runs so that the
+    /// error of (q, p), relative to its size at the time or at the end, is at most this at every tenth of the span. The pilot runs cost
+    /// a small multiple of the run; what is narrower than the distance of their nodes, about the step divided by four times the stages, may
+    /// go unseen.
+    ///
+    /// Where no integrator is named, it is contact Gauss collocation: with stages for the wanted accuracy, and by the clock that the
+    /// Lagrangian states where that takes much fewer steps.
+    pub fn accuracy(self, wanted: f64) -> Self {
+        Run { length: Some(Length::For(wanted, accuracy::choose)), ..self }
     }
 
     /// The same under the eyes of one more observer, which sees what those before it have seen.
-    pub fn observe(mut self, observer: &'p mut dyn Observer<N>) -> Self {
-        self.observers.push(observer);
+    pub fn observe(mut self, observer: &'p mut impl Observer<N>) -> Self {
+        self.observers.push(Box::new(observer::Borrowed(observer)));
         self
     }
 
@@ -135,24 +158,27 @@ impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, L, N> {
     /// Checks everything, chooses the step and the route.
     ///
     /// # Errors
-    /// [`InputError`]: a span or step that is 0 or not finite, a false or a missing claim of structure, an integrator whose hypothesis
-    /// the Lagrangian does not meet, an accuracy that it does not reach.
+    /// [`InputError`]: a span or step that is 0 or not finite, no steps or no integrator, a false or a missing claim of structure, an
+    /// integrator whose hypothesis the Lagrangian does not meet, an accuracy that it does not reach.
     pub fn plan(&self, until: Until) -> Result<Plan<'p, L, N>, InputError> {
         let needs = self.observers.iter().fold(self.needs, |needs, observer| needs.and(observer.needs()));
-        let Run { problem, integrator, steps, .. } = *self;
-        let (span, steps) = match (until, steps) {
-            (Until::Time(t), steps) => (t - problem.t0, steps),
-            (Until::Steps(0), _) => {
-                return Err(InputError::Count { what: "the number of steps", least: 1, found: 0 });
+        let problem = self.problem;
+        let (t0, Some(length)) = (problem.t0, self.length) else { return Err(InputError::NoSteps) };
+        let (t_end, span, length) = match (until, length) {
+            (Until::Time(t), _) => (t, t - t0, length),
+            (Until::After(span), _) => (t0 + span, span, length),
+            (Until::Steps(0), _) => return Err(NO_STEP),
+            (Until::Steps(count), Length::Given(Steps::Size(h))) => {
+                let span = count as f64 * h;
+                (t0 + span, span, Length::Given(Steps::Count(count)))
             }
-            (Until::Steps(count), Steps::Size(h)) => (count as f64 * h, Steps::Count(count)),
             (Until::Steps(_), _) => {
                 return Err(InputError::Hypothesis {
                     hypothesis: "steps of a given size, to be ended after a number of them",
                 });
             }
         };
-        Task { problem, span, integrator, steps, needs }.plan()
+        Task { problem, t_end, span, integrator: self.integrator.clone(), needs }.plan(length)
     }
 
     /// Runs it.
@@ -165,37 +191,20 @@ impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, L, N> {
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Task<'p, L, N> {
-    fn plan(self) -> Result<Plan<'p, L, N>, InputError> {
-        let Task { problem, span, .. } = self;
+    fn plan(&self, length: Length<'p, L, N>) -> Result<Plan<'p, L, N>, InputError> {
+        let Task { problem, span, .. } = *self;
         if !(span != 0.0 && span.is_finite()) {
             return Err(InputError::Span { span });
         }
-        if let Some(integrator) = self.integrator {
+        if let Some(integrator) = &self.integrator {
             integrator.check(problem.lagrangian)?;
         }
         // Pilot runs look at the equations of motion along the whole span.
-        let times = if matches!(self.steps, Steps::Accuracy(_)) { 4 } else { 16 };
+        let times = if let Length::For(..) = length { 4 } else { 16 };
         verified_over(problem.lagrangian, problem.t0, span, &problem.start, times)?;
-        let given = |count: usize| {
-            let h = span / count as f64;
-            Choice { integrator: self.integrator.unwrap_or(DEFAULT), count, h, error: None }
-        };
-        let rate = self.clock_rate()?;
-        let choice = match (self.steps, rate) {
-            (Steps::Count(0), _) => {
-                return Err(InputError::Count { what: "the number of steps", least: 1, found: 0 });
-            }
-            (Steps::Count(_), Some(_)) => return Err(InputError::Hypothesis { hypothesis: SIZED }),
-            (Steps::Count(count), None) => given(count),
-            (Steps::Size(h), _) if !(h > 0.0 && h.is_finite()) => return Err(InputError::Step { h }),
-            // A step that fits the span up to rounding is not made shorter.
-            (Steps::Size(h), _) => {
-                let count = (span.abs() / (h * rate.unwrap_or(1.0)) * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0);
-                check_count(count)?;
-                let choice = given(count as usize);
-                if rate.is_some() { Choice { h: h.copysign(span), ..choice } } else { choice }
-            }
-            (Steps::Accuracy(error), _) => accuracy::choose(self, error)?,
+        let choice = match length {
+            Length::For(wanted, choose) => choose(self, wanted)?,
+            Length::Given(steps) => self.given(steps)?,
         };
         check_count(choice.count as f64)?;
         let plan = Plan::new(self, &choice)?;
@@ -206,16 +215,36 @@ impl<'p, L: Lagrangian<N>, const N: usize> Task<'p, L, N> {
         Ok(plan)
     }
 
-    /// The rate of the clock at the start, where an integrator by a clock is named.
-    fn clock_rate(&self) -> Result<Option<f64>, InputError> {
-        let Some(Integrator::Clocked { .. }) = self.integrator else { return Ok(None) };
+    /// Given steps of a named integrator.
+    fn given(&self, steps: Steps) -> Result<Choice<'p, L, N>, InputError> {
+        let Some(integrator) = self.integrator.clone() else { return Err(InputError::NoIntegrator) };
+        let rate = if integrator.facts().by_clock { Some(self.clock_rate()?) } else { None };
+        let span = self.span;
+        let of = |count: usize, integrator| Choice { integrator, count, h: span / count as f64, error: None };
+        match (steps, rate) {
+            (Steps::Count(0), _) => Err(NO_STEP),
+            (Steps::Count(_), Some(_)) => Err(InputError::Hypothesis { hypothesis: SIZED }),
+            (Steps::Count(count), None) => Ok(of(count, integrator)),
+            (Steps::Size(h), _) if !(h > 0.0 && h.is_finite()) => Err(InputError::Step { h }),
+            // A step that fits the span up to rounding is not made shorter.
+            (Steps::Size(h), _) => {
+                let count = (span.abs() / (h * rate.unwrap_or(1.0)) * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0);
+                check_count(count)?;
+                let choice = of(count as usize, integrator);
+                Ok(if rate.is_some() { Choice { h: h.copysign(span), ..choice } } else { choice })
+            }
+        }
+    }
+
+    /// The rate of the Lagrangian's clock at the start.
+    fn clock_rate(&self) -> Result<f64, InputError> {
         let rate = self.problem.lagrangian.clock_rate(&self.problem.start.q);
-        if rate > 0.0 && rate.is_finite() { Ok(Some(rate)) } else { Err(InputError::Clock { rate }) }
+        if rate > 0.0 && rate.is_finite() { Ok(rate) } else { Err(InputError::Clock { rate }) }
     }
 
     /// The same for the final (q, p) alone.
-    fn bare(self) -> Self {
-        Task { needs: Needs::default(), ..self }
+    fn bare(&self) -> Self {
+        Task { needs: Needs::default(), integrator: self.integrator.clone(), ..*self }
     }
 }
 
@@ -234,21 +263,31 @@ pub(crate) trait Motion<const N: usize> {
     fn inside(&self, from: &(f64, PhasePoint<N>), t: f64) -> Result<PhasePoint<N>, StepError>;
 }
 
-/// A whole run from t = 0, for tests.
+/// A whole run from t = 0 by given steps, for tests.
 #[cfg(test)]
 pub(crate) fn run_of<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     start: contact_geom::VelocityPoint<N>,
     span: f64,
-    integrator: Option<Integrator>,
+    integrator: AnyIntegrator,
     steps: Steps,
 ) -> Result<Outcome<N>, InputError> {
-    let problem = Problem::new(lagrangian, 0.0, start)?;
-    Run { integrator, ..problem.steps(steps) }.run(Until::Time(span))
+    Problem::new(lagrangian, 0.0, start)?.by(integrator).steps(steps).run(Until::Time(span))
 }
 
-/// The integrator where none is named and steps are given.
-const DEFAULT: Integrator = Integrator::Gauss { stages: 8 };
+/// The same by an integrator and steps for an accuracy.
+#[cfg(test)]
+pub(crate) fn run_to<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    start: contact_geom::VelocityPoint<N>,
+    span: f64,
+    wanted: f64,
+) -> Result<Outcome<N>, InputError> {
+    Problem::new(lagrangian, 0.0, start)?.accuracy(wanted).run(Until::Time(span))
+}
+
+/// Runs have steps.
+const NO_STEP: InputError = InputError::Count { what: "the number of steps", least: 1, found: 0 };
 
 /// What an integrator by a clock needs.
 const SIZED: &str =

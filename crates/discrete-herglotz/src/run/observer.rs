@@ -127,7 +127,7 @@ impl<'r, const N: usize> Moment<'r, N> {
 
     /// The state at a time of the last step; see [`LastStep::at`].
     pub(super) fn inside(&self, t: f64) -> Result<PhasePoint<N>, StepError> {
-        self.last_step().map_or(Ok(self.state), |step| step.at(t))
+        self.last_step().ok_or(StepError::NonFinite)?.at(t)
     }
 
     /// The energy `E_L = v.p - L`.
@@ -272,7 +272,28 @@ impl<const N: usize, O: Observer<N>> Observer<N> for Vec<O> {
     }
 }
 
-impl<const N: usize> Observer<N> for &mut dyn Observer<N> {
+/// An observer that someone else keeps.
+pub(super) struct Borrowed<'o, O>(pub &'o mut O);
+
+impl<const N: usize, O: Observer<N>> Observer<N> for Borrowed<'_, O> {
+    fn needs(&self) -> Needs {
+        self.0.needs()
+    }
+    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+        self.0.prepare(course)
+    }
+    fn next(&self, taken: usize) -> usize {
+        self.0.next(taken)
+    }
+    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        self.0.start(at)
+    }
+    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        self.0.step(at)
+    }
+}
+
+impl<const N: usize> Observer<N> for Box<dyn Observer<N> + '_> {
     fn needs(&self) -> Needs {
         (**self).needs()
     }

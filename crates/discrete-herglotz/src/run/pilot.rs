@@ -1,10 +1,10 @@
 //! Pilot runs: a motion followed with some number of steps, seen at a few common times, and looked at between its steps.
 
 use super::accuracy::Choice;
-use super::{Integrator, Plan, Problem, Task};
+use super::{Plan, Problem, Shared, Task, Wants};
 use crate::gauss::{Look, SETS};
 use crate::verified::refuted;
-use crate::{Gauss, GaussRoute, Halt, InputError, StepError, Stepper};
+use crate::{ClockedGauss, GaussCollocation, GaussRoute, Halt, InputError, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Lagrangian, larger};
 
@@ -182,8 +182,8 @@ impl Uneven {
 }
 
 /// Pilot runs of a task, with what is left of their budget.
-pub(super) struct Pilots<'p, L, const N: usize> {
-    pub task: Task<'p, L, N>,
+pub(super) struct Pilots<'t, 'p, L, const N: usize> {
+    pub task: &'t Task<'p, L, N>,
     pub left: u64,
     /// The error that is wanted.
     pub wanted: f64,
@@ -191,7 +191,7 @@ pub(super) struct Pilots<'p, L, const N: usize> {
     pub watches_clock: bool,
 }
 
-impl<L: Lagrangian<N>, const N: usize> Pilots<'_, L, N> {
+impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
     /// Follows the motion by contact Gauss collocation, with a look between the nodes of each step: closely, at so many points of the
     /// span that nothing is narrower, or at a few of each step; and for what is narrow beside the steps or not.
     pub fn gauss(
@@ -202,19 +202,18 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, L, N> {
         closely: bool,
         narrow: bool,
     ) -> Result<Ending<N>, InputError> {
-        let Problem { lagrangian, start, state, t0, structure } = *self.task.problem;
-        let gauss = Gauss::new(lagrangian, stages, self.step(count, marks))?;
+        let (problem, h) = (self.task.problem, self.step(count, marks));
         let points = if closely { POINTS.div_ceil(stages * count).min(SETS) } else { 1 };
         let course = Course { count, marks, points, narrow, price: Price::of::<N>(stages) };
         if const { L::HAS_CLOCK } && matches!(marks, Marks::Times) {
-            let mut stepper = match gauss.own_clock_stepper(structure, t0, state, start.v) {
+            let mut stepper = match (ClockedGauss { stages }).run(problem, h) {
                 Ok(stepper) => stepper,
                 Err(error) => return halted_at_the_start(error),
             };
             let ending = self.watch(&mut stepper, &course, 1, |run, sets| (run.look(sets), 0))?;
             return Ok(ending.with_tau(stepper.tau()));
         }
-        let mut stepper = match gauss.verified_stepper(structure, t0, state, start.v, false) {
+        let mut stepper = match (GaussCollocation { stages }).run(problem, h, Wants::default()) {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),
         };
@@ -274,22 +273,14 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, L, N> {
     }
 
     /// Follows the motion by the integrator of the task.
-    pub fn own(&mut self, integrator: Integrator, count: usize, marks: &Marks) -> Result<Ending<N>, InputError> {
-        let choice = Choice { integrator, count, h: self.step(count, marks), error: None };
-        let plan = match Plan::new(self.task.bare(), &choice) {
-            Ok(plan) => plan,
-            Err(error) => return halted_at_the_start(error),
-        };
-        let mut stepper = match plan.stepper() {
+    pub fn own(&mut self, integrator: &Shared<'p, L, N>, count: usize, marks: &Marks) -> Result<Ending<N>, InputError> {
+        let choice = Choice { integrator: integrator.clone(), count, h: self.step(count, marks), error: None };
+        let stepper = Plan::new(&self.task.bare(), &choice).and_then(|plan| plan.stepper());
+        let mut stepper = match stepper {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),
         };
-        let price = match integrator {
-            Integrator::Gauss { .. } | Integrator::Clocked { .. } => 1,
-            Integrator::Splitting(_) => 4,
-            // Newton's method takes second derivatives.
-            Integrator::Discrete(_) | Integrator::Composition(..) => 32 * N as u64,
-        };
+        let price = integrator.facts().price;
         let look = |run: &(dyn Stepper<N> + '_), _: f64| (None, run.evaluations().saturating_mul(price));
         Ok(self.follow(&mut *stepper, count, marks, CHUNK, look))
     }
@@ -304,7 +295,7 @@ impl<L: Lagrangian<N>, const N: usize> Pilots<'_, L, N> {
         stride: usize,
         mut look: impl FnMut(&R, f64) -> (Option<Ending<N>>, u64),
     ) -> Ending<N> {
-        let Task { problem: &Problem { t0, .. }, span, .. } = self.task;
+        let &Task { problem: &Problem { t0, .. }, span, .. } = self.task;
         let (mut states, mut taken, mut spent) = (Vec::with_capacity(PARTS), 0, 0);
         let mut ending = None;
         while ending.is_none()

@@ -1,24 +1,12 @@
 //! The plan of a run: the route, and the one loop of all runs.
 
 use super::accuracy::Choice;
-use super::{Course, Integrator, Moment, Motion, Needs, Observer, Outcome, Problem, Stop, Task};
+use super::{Course, Facts, Item, Moment, Motion, Needs, Observer, Outcome, Problem, Shared, Stop, Task, Wants};
 use crate::gauss::{FEW, velocity};
 use crate::verified::refuted;
-use crate::watch::size;
-use crate::{
-    ActionSplitting, Composition, Discretised, Doubt, Flow, Gauss, GaussRoute, InputError, Method, Splitting, Status,
-    StepError, Stepper, Suspicion,
-};
+use crate::{Doubt, InputError, Status, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Lagrangian, PhasePoint, VelocityPoint};
-
-/// What all runs of a plan share.
-pub(super) enum Engine<'p, L, const N: usize> {
-    Discrete(Discretised<&'p L, N>),
-    Gauss(Box<Gauss<&'p L>>),
-    /// Explicit: the coefficients are the stepper's.
-    Explicit,
-}
 
 /// The steps that are tried, and probed, before a run.
 const FIRST_STEPS: usize = 64;
@@ -50,53 +38,32 @@ pub struct Plan<'p, L, const N: usize> {
     pub(super) h: f64,
     pub(super) count: usize,
     error: Option<f64>,
-    pub(super) integrator: Integrator,
+    integrator: Shared<'p, L, N>,
+    pub(super) facts: Facts,
     pub(super) needs: Needs,
-    pub(super) engine: Engine<'p, L, N>,
-    /// The route of Gauss collocation by equal steps.
-    pub(super) route: Option<GaussRoute>,
+    /// What its steps compute and skip, as the stepper says.
+    pub(super) account: Vec<Item>,
     /// Whether `sigma_d` is the same in all steps.
     pub(super) constant_rate: bool,
-    /// Whether z can be left out.
-    pub(super) z_decouples: bool,
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// Finds the route of a task.
-    pub(super) fn new(task: Task<'p, L, N>, choice: &Choice) -> Result<Self, InputError> {
-        let Task { problem, span, needs, .. } = task;
-        let &Problem { lagrangian, t0, start, state, structure } = problem;
-        let &Choice { integrator, count, h, error } = choice;
-        let at = PhasePoint { q: start.q, p: start.v, z: start.z };
-        let engine = match integrator {
-            Integrator::Discrete(method) => Engine::Discrete(method.discretise(lagrangian, h, t0, &at)?),
-            Integrator::Gauss { stages } | Integrator::Clocked { stages } => {
-                Engine::Gauss(Box::new(Gauss::new(lagrangian, stages, h)?))
-            }
-            Integrator::Splitting(_) | Integrator::Composition(..) => Engine::Explicit,
-        };
-        let route = match (&engine, integrator) {
-            (Engine::Gauss(gauss), Integrator::Gauss { .. }) => {
-                Some(gauss.verified_stepper(structure, t0, state, start.v, false)?.route())
-            }
-            _ => None,
-        };
-        let condensed = matches!(route, Some(GaussRoute::Linear | GaussRoute::Condensed));
-        let explicit = matches!(integrator, Integrator::Splitting(_));
-        let strang =
-            matches!(integrator, Integrator::Discrete(Method::Strang) | Integrator::Composition(Method::Strang, _));
+    pub(super) fn new(task: &Task<'p, L, N>, choice: &Choice<'p, L, N>) -> Result<Self, InputError> {
+        let Task { problem, t_end, needs, .. } = *task;
+        let Choice { integrator, count, h, error } = choice.clone();
+        let stepper = integrator.stepper(problem, h, Wants::default())?;
         Ok(Plan {
             problem,
-            t_end: t0 + span,
+            t_end,
             h,
             count,
             error,
-            integrator,
+            facts: integrator.facts(),
             needs,
-            engine,
-            route,
-            constant_rate: condensed || (explicit || strang) && structure.has_constant_rate(),
-            z_decouples: condensed || explicit && structure.is_affine_in_z(),
+            account: stepper.account(),
+            constant_rate: stepper.has_constant_rate(),
+            integrator,
         })
     }
 
@@ -110,9 +77,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         self.count
     }
 
-    /// The integrator, where none was named the one that was chosen.
-    pub fn integrator(&self) -> Integrator {
-        self.integrator
+    /// What is known of the integrator, where none was named the one that was chosen.
+    pub fn integrator(&self) -> &Facts {
+        &self.facts
     }
 
     /// The error of (q, p) that the pilot runs found, or predict; `None` where no accuracy was asked for.
@@ -126,79 +93,28 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     ///
     /// # Errors
     /// Those of the method's start.
-    pub fn stepper(&self) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
-        self.make_stepper(false)
+    pub fn stepper(&self) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
+        self.make_stepper(self.problem, self.h, false)
     }
 
-    fn make_stepper(&self, watched: bool) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
-        let Problem { t0, start, state, structure, .. } = *self.problem;
-        let action = self.needs.action || !self.z_decouples;
-        Ok(match &self.engine {
-            Engine::Discrete(ld) => Box::new(Flow::with_guess(ld, t0, state, start.v)?),
-            Engine::Gauss(gauss) if const { L::HAS_CLOCK } && self.by_clock() => {
-                Box::new(gauss.own_clock_stepper(structure, t0, state, start.v)?)
-            }
-            Engine::Gauss(gauss) => {
-                let stepper = gauss.verified_stepper(structure, t0, state, start.v, action)?;
-                Box::new(if watched { stepper.doubting() } else { stepper })
-            }
-            Engine::Explicit => self.explicit(self.h, t0, state, watched)?,
-        })
+    /// A stepper at a start, by steps of h.
+    pub(super) fn make_stepper(
+        &self,
+        problem: &Problem<'p, L, N>,
+        h: f64,
+        watched: bool,
+    ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
+        self.integrator.stepper(problem, h, Wants { action: self.needs.action, watched })
     }
 
     /// Whether steps look at themselves between the nodes of their many stages.
     pub(super) fn many_stages(&self) -> bool {
-        matches!(self.integrator, Integrator::Gauss { stages } if stages > FEW)
-    }
-
-    /// Whether steps follow a clock, which ends the run.
-    fn by_clock(&self) -> bool {
-        matches!(self.integrator, Integrator::Clocked { .. })
+        self.facts.collocation.is_some_and(|stages| stages > FEW)
     }
 
     /// Whether a time is the end of the span, or beyond it.
     fn is_over(&self, t: f64) -> bool {
         if self.h < 0.0 { t <= self.t_end } else { t >= self.t_end }
-    }
-
-    /// A stepper of a splitting or a composition.
-    pub(super) fn explicit(
-        &self,
-        h: f64,
-        t: f64,
-        from: PhasePoint<N>,
-        watched: bool,
-    ) -> Result<Box<dyn Stepper<N> + '_>, InputError> {
-        let lagrangian = self.problem.lagrangian;
-        Ok(match &self.integrator {
-            Integrator::Splitting(scheme) if !self.z_decouples => {
-                let splitting = ActionSplitting::new(lagrangian, scheme, h, t, from)?;
-                let splitting = if watched { splitting.doubting() } else { splitting };
-                Box::new(if self.moves_little(h) { splitting.compensated() } else { splitting })
-            }
-            Integrator::Splitting(scheme) => {
-                let splitting = Splitting::new(lagrangian, scheme, h, t, from)?;
-                let splitting = if watched { splitting.watched() } else { splitting };
-                let splitting = if self.moves_little(h) { splitting.compensated() } else { splitting };
-                if self.needs.action { Box::new(splitting) } else { Box::new(splitting.without_action()) }
-            }
-            Integrator::Composition(method, scheme) => {
-                let rule = |h| method.discretise(lagrangian, h, t, &from);
-                Box::new(Composition::new(rule, scheme, h, t, from)?)
-            }
-            // `new` makes no others.
-            Integrator::Discrete(_) | Integrator::Gauss { .. } | Integrator::Clocked { .. } => {
-                return Err(InputError::Dimension);
-            }
-        })
-    }
-
-    /// Whether steps move by so little of the position that half of the digits are lost in each; they change so little from step to step
-    /// that they are rounded in the same way, and the error piles up.
-    fn moves_little(&self, h: f64) -> bool {
-        let start = &self.problem.start;
-        let moved = h.abs() * size(&start.v);
-        moved > 0.0 && moved < f64::EPSILON.sqrt() * size(&start.q)
     }
 
     /// Runs it with no observer but those of the plan's own outcome.
@@ -210,12 +126,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     }
 
     /// Runs it under the eyes of observers.
-    pub(super) fn observed_by(&self, observers: &mut Vec<&mut dyn Observer<N>>) -> Result<Outcome<N>, InputError> {
-        let by_clock = self.by_clock();
+    pub(super) fn observed_by(&self, observers: &mut Vec<Box<dyn Observer<N> + '_>>) -> Result<Outcome<N>, InputError> {
+        let by_clock = self.facts.by_clock;
         let h = (!by_clock).then_some(self.h);
         let count = (!by_clock || self.error.is_some()).then_some(self.count);
         observers.prepare(&Course { t0: self.problem.t0, t_end: self.t_end, h, count })?;
-        let mut stepper = self.make_stepper(self.error.is_none())?;
+        let mut stepper = self.make_stepper(self.problem, self.h, self.error.is_none())?;
         // The logarithm of the product of the sigma_d; in single steps only where they differ.
         let (mut log_factor, single) = (0.0, self.needs.conformal_factor && !self.constant_rate);
         let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
@@ -231,7 +147,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             let halved = if halves && suspicion.is_none() { halved_step(taken, most) } else { usize::MAX };
             let next_seen = observers.next(taken).max(taken + 1);
             let next_look = if taken == halved { taken + 1 } else { halved };
-            let next = next_seen.min(next_probe(taken)).min(next_look).min(most);
+            // The step that is seen is taken by itself, so that observers can look into it.
+            let next_seen_alone = if next_seen > taken + 1 { next_seen - 1 } else { next_seen };
+            let next = next_seen_alone.min(next_probe(taken)).min(next_look).min(most);
             let chunk = if single { 1 } else { next - taken };
             let before = (taken == halved || next_seen == taken + 1).then(|| (stepper.time(), stepper.state()));
             let (done, cause) = match stepper.advance_until(chunk, self.t_end) {

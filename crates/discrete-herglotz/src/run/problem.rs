@@ -1,6 +1,6 @@
 //! Problems: a Lagrangian with a start.
 
-use super::{Integrator, Observer, Run, Steps};
+use super::{Integrator, Run};
 use crate::gauss::velocity;
 use crate::verified::verified;
 use crate::{DiscreteLagrangian, InputError, StepError, discrete_regularity, legendre_minus};
@@ -35,25 +35,33 @@ impl<const N: usize> From<PhasePoint<N>> for Start<N> {
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
-/// use discrete_herglotz::{Problem, Rows, Steps, Until};
+/// use discrete_herglotz::{Problem, Rows, Until};
 ///
 /// let pendulum = Pendulum { gamma: -0.01 };
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.0], 0.0))?;
 /// let mut rows = Rows::at((0..=100).map(f64::from))?;
-/// let outcome = problem.steps(Steps::Accuracy(1e-9)).observe(&mut rows).run(Until::Time(100.0))?;
+/// let outcome = problem.accuracy(1e-9).observe(&mut rows).run(Until::Time(100.0))?;
 /// println!("{}: q = {} after {} steps", outcome.status, outcome.q[0], outcome.steps);
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Problem<'a, L, const N: usize> {
-    pub(super) lagrangian: &'a L,
-    pub(super) t0: f64,
+    pub(crate) lagrangian: &'a L,
+    pub(crate) t0: f64,
     /// The start with its velocity, and with its momentum.
-    pub(super) start: VelocityPoint<N>,
-    pub(super) state: PhasePoint<N>,
+    pub(crate) start: VelocityPoint<N>,
+    pub(crate) state: PhasePoint<N>,
     /// What the Lagrangian claims, probed at the start.
-    pub(super) structure: Structure,
+    pub(crate) structure: Structure,
 }
+
+impl<L, const N: usize> Clone for Problem<'_, L, N> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<L, const N: usize> Copy for Problem<'_, L, N> {}
 
 impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     /// The motion of a Lagrangian from a point `(q, v, z)` or `(q, p, z)` at the time `t0`.
@@ -99,23 +107,33 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     }
 
     /// A run of it by an integrator.
-    pub fn by(&self, integrator: Integrator) -> Run<'_, L, N> {
+    pub fn by<'p>(&'p self, integrator: impl Integrator<'p, L, N> + 'p) -> Run<'p, L, N> {
         Run::of(self).by(integrator)
     }
 
-    /// A run of it by steps of an integrator that is chosen for it.
-    pub fn steps(&self, steps: Steps) -> Run<'_, L, N> {
-        Run::of(self).steps(steps)
+    /// A run of it to a relative error of (q, p), by an integrator that is chosen for it; see [`Run::accuracy`].
+    pub fn accuracy(&self, wanted: f64) -> Run<'_, L, N> {
+        Run::of(self).accuracy(wanted)
     }
 
-    /// A run of it to a relative error of 1e-9, by an integrator that is chosen for it, under the eyes of an observer.
-    pub fn observe<'r>(&'r self, observer: &'r mut dyn Observer<N>) -> Run<'r, L, N> {
-        Run::of(self).observe(observer)
+    /// The Lagrangian.
+    pub fn lagrangian(&self) -> &'a L {
+        self.lagrangian
+    }
+
+    /// The time of the start.
+    pub fn t0(&self) -> f64 {
+        self.t0
     }
 
     /// The start `(q, v, z)`.
     pub fn start(&self) -> &VelocityPoint<N> {
         &self.start
+    }
+
+    /// The structure that the Lagrangian claims, probed at the start.
+    pub fn structure(&self) -> &Structure {
+        &self.structure
     }
 
     /// The start `(q, p, z)`.

@@ -112,10 +112,11 @@ impl<'f, const N: usize> Rows<'f, N> {
             When::At { times, recorded } => (times, *recorded),
         };
         let backward = self.course.t_end < self.course.t0;
-        let due = |t: &f64| if backward { *t >= at.t } else { *t <= at.t };
-        let due: Vec<f64> = times[recorded..].iter().copied().take_while(due).collect();
+        let passed = |t: f64| if backward { t >= at.t } else { t <= at.t };
+        // The last step ends where the span does but for its rounding.
+        let due: Vec<f64> = times[recorded..].iter().copied().take_while(|t| at.last || passed(*t)).collect();
         for t in due {
-            let state = if t == at.t { at.state } else { at.inside(t)? };
+            let state = if t == at.t || !passed(t) { at.state } else { at.inside(t)? };
             self.record(at, t, &state)?;
             if let When::At { recorded, .. } = &mut self.when {
                 *recorded += 1;
@@ -132,6 +133,10 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
 
     fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
         self.course = *course;
+        self.rows.clear();
+        if let When::At { recorded, .. } = &mut self.when {
+            *recorded = 0;
+        }
         let Course { t0, t_end, count, .. } = *course;
         let rows = match &self.when {
             // By a clock the number of steps shows at the end.

@@ -1,20 +1,20 @@
 //! What a run gives, by every integrator: rows at times, events, the way back, a stop and a start from there.
 
-use super::{Event, Events, Integrator, Moment, Problem, Rows, Run, Steps, Stop, Until, run_of};
+use super::{Event, Events, AnyIntegrator, Moment, Problem, Rows, Run, Steps, Stop, Until, run_of};
 use crate::{Gauss, InputError, Method, Outcome, Status};
 use contact_geom::systems::{Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
 use std::ops::ControlFlow;
 
 /// Every integrator that takes a system.
-fn takers<L: Lagrangian<N>, const N: usize>(system: &L) -> impl Iterator<Item = Integrator> {
-    Integrator::all().into_iter().filter(|integrator| integrator.check(system).is_ok())
+fn takers<L: Lagrangian<N>, const N: usize>(system: &L) -> impl Iterator<Item = AnyIntegrator> {
+    AnyIntegrator::all().into_iter().filter(|integrator| integrator.check(system).is_ok())
 }
 
 /// So many steps up to a time; by a clock, whose rate is about one, of the same size.
-fn steps(integrator: Integrator, count: usize, span: f64) -> Steps {
+fn steps(integrator: AnyIntegrator, count: usize, span: f64) -> Steps {
     match integrator {
-        Integrator::Clocked { .. } => Steps::Size(span.abs() / count as f64),
+        AnyIntegrator::Clocked { .. } => Steps::Size(span.abs() / count as f64),
         _ => Steps::Count(count),
     }
 }
@@ -22,16 +22,16 @@ fn steps(integrator: Integrator, count: usize, span: f64) -> Steps {
 /// A run in so many steps up to a time after the start.
 fn run_in<'r, L: Lagrangian<N>, const N: usize>(
     problem: &'r Problem<'r, L, N>,
-    integrator: Integrator,
+    integrator: AnyIntegrator,
     count: usize,
     span: f64,
 ) -> Run<'r, L, N> {
     problem.by(integrator).steps(steps(integrator, count, span))
 }
 
-fn symmetric(integrator: Integrator) -> bool {
+fn symmetric(integrator: AnyIntegrator) -> bool {
     match integrator {
-        Integrator::Discrete(method) => method.symmetric(),
+        AnyIntegrator::Discrete(method) => method.symmetric(),
         _ => true,
     }
 }
@@ -56,7 +56,7 @@ fn there_and_back() {
             assert_eq!((back.status, back.suspicion), (Status::Completed, None), "{integrator}");
             assert!((back.t - 0.5).abs() <= 4.0 * f64::EPSILON, "{integrator}: {}", back.t);
             // Of 80 steps; by a clock the last step of either way is another, so that the error of the method is left.
-            let clocked = matches!(integrator, Integrator::Clocked { .. });
+            let clocked = matches!(integrator, AnyIntegrator::Clocked { .. });
             let rounded = symmetric(integrator) && !clocked;
             let bound = if rounded { 1e-13 } else { 0.5 * f64::powi(0.3, integrator.order().min(24) as i32) + 1e-13 };
             let off = distance(&back.state(), problem.state());
@@ -77,7 +77,7 @@ fn there_and_back() {
 fn rows_at_times() {
     let (kepler, span) = (Kepler::<2> { mu: 1.0, gamma: -0.05 }, 2.0);
     let start = kepler.initial();
-    let fine = |t: f64| run_of(&kepler, start, t, Some(Integrator::Gauss { stages: 12 }), Steps::Count(40)).unwrap();
+    let fine = |t: f64| run_of(&kepler, start, t, AnyIntegrator::Gauss { stages: 12 }, Steps::Count(40)).unwrap();
     let times: Vec<f64> = (0..=13).map(|k| span * f64::from(k) / 13.0).collect();
     let truth: Vec<_> = times.iter().map(|t| if *t == 0.0 { None } else { Some(fine(*t).state()) }).collect();
     let problem = Problem::new(&kepler, 0.0, start).unwrap();
@@ -104,7 +104,7 @@ fn rows_every_so_many_steps() {
     let problem = Problem::new(&pendulum, 1.0, VelocityPoint::new([1.0], [0.3], 0.2)).unwrap();
     for (to, way) in [(2.0, 1.0), (0.0, -1.0)] {
         let mut rows = Rows::every(4).unwrap().column(|t, x: &PhasePoint<1>| t + x.q[0]);
-        let run = problem.by(Integrator::Discrete(Method::Midpoint)).steps(Steps::Count(10)).observe(&mut rows);
+        let run = problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Count(10)).observe(&mut rows);
         let outcome = run.run(Until::Time(to)).unwrap();
         let times: Vec<f64> = rows.rows.iter().map(|row| row.t).collect();
         assert_eq!(times, [1.0, 1.0 + 0.4 * way, 1.0 + 0.8 * way, to]);
@@ -121,9 +121,9 @@ fn events_by_every_integrator() {
     let problem = Problem::new(&pendulum, 0.0, start).unwrap();
     let lowest = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
     let mut first = None;
-    let all: Vec<Integrator> = takers(&pendulum).collect();
+    let all: Vec<AnyIntegrator> = takers(&pendulum).collect();
     // The truth is found by the first of these.
-    let gauss = Integrator::Gauss { stages: 8 };
+    let gauss = AnyIntegrator::Gauss { stages: 8 };
     for integrator in [gauss].into_iter().chain(all) {
         let mut passes = Events::new([lowest(), lowest().rising(), lowest().falling()]);
         let outcome = run_in(&problem, integrator, 60, 12.0).observe(&mut passes).run(Until::Time(12.0)).unwrap();
@@ -158,7 +158,7 @@ fn events_that_are_not_defined() {
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
     let run = |events: &mut Events<'_, 1>| {
         problem
-            .by(Integrator::Gauss { stages: 4 })
+            .by(AnyIntegrator::Gauss { stages: 4 })
             .steps(Steps::Count(20))
             .observe(events)
             .run(Until::Time(4.0))
@@ -208,7 +208,7 @@ fn observers_ask_and_stop() {
             .unwrap();
         assert_eq!(stopped.status, Status::Stopped { step: 5, t: seen[4].1, by: "the fifth step" });
         let factor = stopped.log_factor.unwrap() + 0.05 * stopped.t;
-        let order = if let Integrator::Discrete(_) = integrator { 1e-3 } else { 1e-4 };
+        let order = if let AnyIntegrator::Discrete(_) = integrator { 1e-3 } else { 1e-4 };
         assert!(factor.abs() <= order, "{integrator}: {factor:e}");
     }
 }
@@ -224,7 +224,7 @@ fn what_cannot_be_observed_is_refused() {
     let run = |times: &[f64], to| {
         let mut rows = Rows::at(times.iter().copied()).unwrap();
         problem
-            .by(Integrator::Gauss { stages: 4 })
+            .by(AnyIntegrator::Gauss { stages: 4 })
             .steps(Steps::Count(4))
             .observe(&mut rows)
             .run(Until::Time(to))

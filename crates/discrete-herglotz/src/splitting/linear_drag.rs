@@ -3,7 +3,8 @@
 use super::drag::{Drag, Drift};
 use super::motion::{Motion, Progress, Reached};
 use super::separable::Separable;
-use crate::{Doubt, Halt, InputError, SplittingScheme, Stepper, Suspicion};
+use crate::run::DECOUPLED;
+use crate::{Doubt, Halt, InputError, Item, SplittingScheme, Stepper, Suspicion};
 use contact_geom::{Lagrangian, PhasePoint};
 
 /// A splitting at work on `L = v.Mv/2 - V(t, q) + gamma(t) z`.
@@ -154,6 +155,14 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
 
     fn evaluations(&self) -> u64 {
         self.progress.evaluations()
+    }
+
+    fn has_constant_rate(&self) -> bool {
+        matches!(self.drag, Drag::Constant(_))
+    }
+
+    fn account(&self) -> Vec<Item> {
+        super::account(Item::skipped("action z", DECOUPLED))
     }
 
     fn suspicion(&self) -> Option<Suspicion> {

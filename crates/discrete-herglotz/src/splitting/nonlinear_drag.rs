@@ -3,7 +3,7 @@
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::motion::{Motion, Progress, Reached};
 use super::separable::Separable;
-use crate::{Doubt, Halt, InputError, SplittingScheme, Stepper, Suspicion};
+use crate::{Doubt, Halt, InputError, Item, SplittingScheme, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
 
@@ -134,6 +134,10 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
 
     fn evaluations(&self) -> u64 {
         self.progress.evaluations()
+    }
+
+    fn account(&self) -> Vec<Item> {
+        super::account(Item::computed("action z", "it drives the motion"))
     }
 
     fn suspicion(&self) -> Option<Suspicion> {

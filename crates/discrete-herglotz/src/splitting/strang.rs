@@ -100,6 +100,14 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
         misfit(velocities, &to.q, self.h, 0.0)
     }
 
+    fn is_explicit(&self) -> bool {
+        true
+    }
+
+    fn constant_rate(&self) -> bool {
+        self.steady.is_some()
+    }
+
     /// Explicit; the guess and the solver are not needed.
     #[inline(always)]
     fn forward(
