@@ -21,66 +21,34 @@
 //!
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
-#[cfg(test)]
-mod coarse_tests;
-mod composition;
-mod discrete_lagrangian;
-mod discretised;
 mod error;
-mod flow;
 mod gauss;
-mod lanes;
-mod legendre;
-#[cfg(test)]
-mod many_coordinates;
-mod method;
-mod momentum;
-mod newton;
-mod path;
-mod quadrature;
-#[cfg(test)]
-mod round_off_tests;
 pub mod rules;
 mod run;
-mod solver;
+mod solve;
 mod splitting;
-pub mod statements;
-mod step_equations;
-mod stepper;
-mod unknowns;
-mod verified;
-mod watch;
-#[cfg(test)]
-mod watch_tests;
+mod theory;
 
-pub use composition::Composition;
-pub use discrete_lagrangian::{DiscreteLagrangian, Transition, derived_jet, derived_second_jet};
-pub use discretised::Discretised;
 pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
-pub use flow::{
-    Flow, FlowStep, HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian,
-};
 pub use gauss::{ClockedGauss, ClockedStepper, DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper};
-pub use legendre::{
-    DiscreteRegularity, discrete_regularity, legendre_minus, legendre_minus_inverse, legendre_plus,
-    legendre_plus_inverse, sigma_d,
+pub use rules::{
+    ByRule, Composed, Composition, Discrete, Discretisation, Discretised, ExtendedJet, Flow, FlowStep, LeftMidpoint,
+    Method, Midpoint, Node, Quadrature, Rectangle, Rule, Trapezoidal, UnknownMethod,
 };
-pub use method::{Method, UnknownMethod};
-pub use momentum::{MomentumDecay, MomentumRow, discrete_momentum, discrete_symmetry_defect};
-pub use newton::{ITERATION_LIMIT, last_correction};
-pub use path::{DiscretePath, discrete_action};
-pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
-pub use rules::{ByRule, Composed, Discrete, Discretisation, LeftMidpoint, Midpoint, Rectangle, Trapezoidal};
 pub use run::{
-    AnyIntegrator, Course, Crossing, Direction, Event, Events, Facts, Integrator, Item, LastStep, Moment, Needs,
-    Observer, Outcome, Plan, Problem, Row, Rows, Run, Start, Steps, Stop, UnknownIntegrator, Until, Wants,
+    AnyIntegrator, Course, Crossing, Direction, Doubt, Event, Events, Facts, Halt, Integrator, Item, LastStep, Moment,
+    MomentumDecay, MomentumRow, Needs, Observer, Outcome, Plan, Problem, Row, Rows, Run, Start, Stepper, Steps, Stop,
+    UnknownIntegrator, Until, Wants, verified,
 };
-pub use solver::{CROSSOVER, Solver};
+pub use solve::{CROSSOVER, ITERATION_LIMIT, Solver, last_correction};
 pub use splitting::{
     ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, RiccatiMap, Splitting, SplittingScheme, Strang,
 };
-pub use stepper::{Halt, Stepper};
-pub use verified::verified;
-pub use watch::Doubt;
+pub use theory::{
+    DiscreteLagrangian, DiscretePath, DiscreteRegularity, HamiltonianFlow, Transition, derived_jet, derived_second_jet,
+    discrete_action, discrete_flow, discrete_flow_jacobian, discrete_momentum, discrete_regularity,
+    discrete_symmetry_defect, hamiltonian_flow, hamiltonian_flow_jacobian, legendre_minus, legendre_minus_inverse,
+    legendre_plus, legendre_plus_inverse, sigma_d, statements,
+};
 
 pub use contact_geom;

@@ -10,7 +10,7 @@ use super::mass::Mass;
 use super::stage_equations::Products;
 use super::sweeps::Progress;
 use super::table::Table;
-use crate::lanes::forget_branches;
+use crate::gauss::lanes::forget_branches;
 use crate::{Halt, ITERATION_LIMIT, InputError, Item, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Clock, Lagrangian, PhasePoint, Scalar, Structure};

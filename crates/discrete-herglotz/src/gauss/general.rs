@@ -12,7 +12,7 @@ use super::simplified::{CorrectStages, StageNewton};
 use super::stages::{StageMap, Stages, blocks};
 use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use super::table::Table;
-use crate::lanes::{Lanes, branched};
+use crate::gauss::lanes::{Lanes, branched};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
 use pulp::{Arch, Simd};

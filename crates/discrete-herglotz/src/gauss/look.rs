@@ -8,7 +8,7 @@ use super::condensed::Condensed;
 use super::dense::Solved;
 use super::extension::Pace;
 use super::stages::{StageMap, Stages, blocks};
-use crate::lanes::Lanes;
+use crate::gauss::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint, larger, largest};
 use pulp::{Simd, WithSimd};

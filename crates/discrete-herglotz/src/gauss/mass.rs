@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::stages::Stages;
-use crate::lanes::Lanes;
+use crate::gauss::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Structure, linear};
 use pulp::Simd;

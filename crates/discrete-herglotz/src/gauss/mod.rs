@@ -13,6 +13,7 @@ mod extension;
 mod general;
 mod general_stages;
 mod integrator;
+pub(crate) mod lanes;
 mod linear;
 mod look;
 mod mass;

@@ -3,8 +3,8 @@
 use super::condensed::Condensed;
 use super::damping::{Damping, ITERATIONS, Verdict, chances};
 use crate::StepError;
-use crate::solver::DenseLu;
-use crate::step_equations::BLOCK;
+use crate::rules::step_equations::BLOCK;
+use crate::solve::solver::DenseLu;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{KernelDual, Lagrangian, VelocityPoint, largest};
 

@@ -11,7 +11,7 @@ use super::simplified::SlopeNewton;
 use super::stages::{Stages, blocks};
 use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use crate::StepError;
-use crate::lanes::{Lanes, branched};
+use crate::gauss::lanes::{Lanes, branched};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, VelocityPoint, largest};
 use pulp::{Arch, Simd};

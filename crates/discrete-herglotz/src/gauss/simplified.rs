@@ -10,7 +10,7 @@ use super::condensed::Condensed;
 use super::modes::Modes;
 use super::stages::{Stages, blocks};
 use super::table::Table;
-use crate::lanes::Lanes;
+use crate::gauss::lanes::Lanes;
 use contact_geom::nalgebra::{Complex, DMatrix, SMatrix, SVector};
 use contact_geom::{Hessian, Scalar, Triple, larger};
 use pulp::{Arch, Simd, WithSimd};

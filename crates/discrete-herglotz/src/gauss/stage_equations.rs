@@ -4,8 +4,8 @@
 
 use super::coefficients::{Coefficients, MOST};
 use super::damping::{Damping, ITERATIONS, Verdict, chances};
-use crate::solver::DenseLu;
-use crate::step_equations::BLOCK;
+use crate::rules::step_equations::BLOCK;
+use crate::solve::solver::DenseLu;
 use crate::{ITERATION_LIMIT, StepError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, seed};

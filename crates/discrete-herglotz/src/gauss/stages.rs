@@ -2,7 +2,7 @@
 
 use super::coefficients::MOST;
 use super::compensated::Twofold;
-use crate::lanes::Lanes;
+use crate::gauss::lanes::Lanes;
 use pulp::Simd;
 use qd::Quad;
 use std::array::from_fn;

@@ -2,7 +2,7 @@
 
 use super::{Plan, Problem};
 use crate::gauss::velocity;
-use crate::watch::{LEAST, rounding};
+use crate::run::watch::{LEAST, rounding};
 use crate::{Doubt, InputError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};

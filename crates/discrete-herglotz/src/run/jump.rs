@@ -2,7 +2,7 @@
 
 use super::{Plan, Problem};
 use crate::gauss::velocity;
-use crate::watch::{rounding, size};
+use crate::run::watch::{rounding, size};
 use crate::{Doubt, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, herglotz_rates, larger, largest};

@@ -1,41 +1,47 @@
 //! Runs: one way from a problem and an integrator to a motion.
 
 mod accuracy;
-#[cfg(test)]
-mod accuracy_tests;
 mod any_integrator;
 mod events;
 mod explain;
 mod halved;
 mod integrator;
 mod jump;
+mod momentum;
 mod observer;
 mod outcome;
 mod pilot;
 mod plan;
 mod problem;
 mod rows;
+mod stepper;
 #[cfg(test)]
 mod tests;
+pub(crate) mod verified;
+pub(crate) mod watch;
 
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
 pub use events::{Crossing, Direction, Event, Events};
 pub(crate) use explain::DECOUPLED;
 pub use explain::Item;
 pub use integrator::{Facts, Integrator, Wants};
+pub use momentum::{MomentumDecay, MomentumRow};
 pub use observer::{Course, LastStep, Moment, Needs, Observer, Stop};
 pub use outcome::Outcome;
 pub use plan::Plan;
 pub use problem::{Problem, Start};
 pub(crate) use problem::{check_time, start_of};
 pub use rows::{Row, Rows};
+pub use stepper::{Halt, Stepper};
+pub use verified::verified;
+pub use watch::Doubt;
 
-use crate::verified::verified_over;
 use crate::{InputError, StepError};
 use accuracy::Choice;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
 use std::sync::Arc;
+use verified::verified_over;
 
 /// The time steps of a run. They go back in time where the run does.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use super::accuracy::Choice;
 use super::{Plan, Problem, Shared, Task, Wants};
 use crate::gauss::{Look, SETS};
-use crate::verified::refuted;
+use crate::run::verified::refuted;
 use crate::{ClockedGauss, GaussCollocation, GaussRoute, Halt, InputError, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Lagrangian, larger};

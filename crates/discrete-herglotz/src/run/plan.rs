@@ -3,7 +3,7 @@
 use super::accuracy::Choice;
 use super::{Course, Facts, Item, Moment, Motion, Needs, Observer, Outcome, Problem, Shared, Stop, Task, Wants};
 use crate::gauss::{FEW, velocity};
-use crate::verified::refuted;
+use crate::run::verified::refuted;
 use crate::{Doubt, InputError, Status, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Lagrangian, PhasePoint, VelocityPoint};

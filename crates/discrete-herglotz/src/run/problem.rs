@@ -2,7 +2,7 @@
 
 use super::{Integrator, Run};
 use crate::gauss::velocity;
-use crate::verified::verified;
+use crate::run::verified::verified;
 use crate::{DiscreteLagrangian, InputError, StepError, discrete_regularity, legendre_minus};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{

@@ -2,7 +2,7 @@
 
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::separable::Separable;
-use crate::watch::misfit;
+use crate::run::watch::misfit;
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};

@@ -1,7 +1,7 @@
 //! Splitting schemes as integrators.
 
 use super::{ActionSplitting, Splitting, SplittingScheme};
-use crate::watch::size;
+use crate::run::watch::size;
 use crate::{Facts, InputError, Integrator, Problem, Stepper, Wants};
 use contact_geom::Lagrangian;
 use std::borrow::Cow;

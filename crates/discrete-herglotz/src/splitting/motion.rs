@@ -1,6 +1,6 @@
 //! What every splitting moves: sums that may carry their rounding, a state of them, and a run in chunks.
 
-use crate::watch::{Watch, sharper, turning};
+use crate::run::watch::{Watch, sharper, turning};
 use crate::{Doubt, Halt, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{PhasePoint, Triple, larger};

@@ -1,7 +1,7 @@
 //! Lagrangians `v.Mv/2 - V(t, q) + f(z)`, as splittings read them.
 
-use crate::step_equations::{inverted, is_identity, kept_mass_matrix};
-use crate::verified::PROBE;
+use crate::rules::step_equations::{inverted, is_identity, kept_mass_matrix};
+use crate::run::verified::PROBE;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Defect, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};

@@ -2,7 +2,7 @@
 
 use super::drag::{Drag, Drift};
 use super::separable::Separable;
-use crate::watch::misfit;
+use crate::run::watch::misfit;
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};

@@ -4,7 +4,7 @@ use super::{GaussStepper, Route};
 use crate::gauss::dense::Start;
 use crate::gauss::extension::Physical;
 use crate::gauss::look::{Compare, Curve, Look, SETS};
-use crate::watch::{misfit, sharper};
+use crate::run::watch::{misfit, sharper};
 use crate::{Doubt, Suspicion};
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;

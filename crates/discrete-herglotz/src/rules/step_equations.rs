@@ -1,7 +1,7 @@
 //! The step equations of a quadrature rule: L along just the directions that a Newton step needs.
 
 use crate::Node;
-use crate::unknowns::Unknowns;
+use crate::solve::unknowns::Unknowns;
 use contact_geom::linear::{self, SingularMatrix};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Border, Dual, Lagrangian, VelocityPoint};

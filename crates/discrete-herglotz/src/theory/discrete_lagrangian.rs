@@ -1,7 +1,7 @@
 //! Discrete Lagrangians on Q x Q x R.
 
-use crate::newton::{Linearised, Start, newton};
-use crate::step_equations::BLOCK;
+use crate::rules::step_equations::BLOCK;
+use crate::solve::newton::{Linearised, Start, newton};
 use crate::{InputError, Solver, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed};

@@ -1,8 +1,8 @@
 //! Discrete Lagrangians by quadrature of the action: what the rules of [`crate::rules`] share.
 
-use crate::newton::{Linearised, Start, largest, newton};
-use crate::step_equations::{BLOCK, Frame, Sums, rates_at};
-use crate::watch::{factor_misfit, misfit};
+use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
+use crate::run::watch::{factor_misfit, misfit};
+use crate::solve::newton::{Linearised, Start, largest, newton};
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
@@ -128,7 +128,7 @@ impl<L, R: Rule> Quadrature<L, R> {
         let mut last = f64::INFINITY;
         // After the value has converged, each further iteration makes one more order of differentials exact.
         let mut extra = 4;
-        for _ in 0..crate::newton::ITERATION_LIMIT {
+        for _ in 0..crate::solve::newton::ITERATION_LIMIT {
             let unknown = Dual { re: z1, d: SVector::<T, 1>::new(T::one()) };
             let mut defect = Dual::constant(x.z0) - unknown;
             for node in R::NODES {
@@ -158,7 +158,7 @@ impl<L, R: Rule> Quadrature<L, R> {
             }
             last = size;
         }
-        Err(StepError::NotConverged { residual: last, iterations: crate::newton::ITERATION_LIMIT })
+        Err(StepError::NotConverged { residual: last, iterations: crate::solve::newton::ITERATION_LIMIT })
     }
 
     #[inline]

@@ -1,8 +1,8 @@
 //! Tests of the choice of steps.
 
-use super::accuracy::choose_with;
-use super::pilot::{BUDGET, Pilots};
-use super::{Needs, Problem, Shared, Task, Until, run_to};
+use crate::run::accuracy::choose_with;
+use crate::run::pilot::{BUDGET, Pilots};
+use crate::run::{Needs, Problem, Shared, Task, Until, run_to};
 use crate::{AnyIntegrator, InputError, Obstacle, Status};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum};

@@ -1,7 +1,7 @@
 //! Symmetric compositions of discrete flows.
 
-use crate::flow::account_of;
-use crate::watch::{Watch, sharper, turning};
+use crate::rules::flow::account_of;
+use crate::run::watch::{Watch, sharper, turning};
 use crate::{
     DiscreteLagrangian, Doubt, Halt, InputError, Item, Solver, SplittingScheme, StepError, Stepper, Suspicion,
     Transition,

@@ -1,6 +1,6 @@
 //! What a run gives, by every integrator: rows at times, events, the way back, a stop and a start from there.
 
-use super::{Event, Events, AnyIntegrator, Moment, Problem, Rows, Run, Steps, Stop, Until, run_of};
+use crate::run::{AnyIntegrator, Event, Events, Moment, Problem, Rows, Run, Steps, Stop, Until, run_of};
 use crate::{Gauss, InputError, Method, Outcome, Status};
 use contact_geom::systems::{Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
@@ -86,7 +86,7 @@ fn rows_at_times() {
         let observed = run_in(&problem, integrator, 40, span).observe(&mut rows).run(Until::Time(span)).unwrap();
         assert_eq!(observed, run_in(&problem, integrator, 40, span).run(Until::Time(span)).unwrap(), "{integrator}");
         assert_eq!(rows.rows.iter().map(|row| row.t).collect::<Vec<_>>(), times, "{integrator}");
-        let error = |row: &super::Row<2>, truth: &Option<PhasePoint<2>>| {
+        let error = |row: &crate::Row<2>, truth: &Option<PhasePoint<2>>| {
             let state = PhasePoint { q: row.q, p: row.p, z: row.z.unwrap() };
             assert_eq!(row.v, Some(row.p));
             truth.map_or(0.0, |truth| distance(&state, &truth))

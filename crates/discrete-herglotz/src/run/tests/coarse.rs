@@ -1,7 +1,7 @@
 //! Steps that are far too long are marked or refused, by every integrator; and what must not decide about them.
 
 use crate::run::run_of;
-use crate::{Gauss, InputError, AnyIntegrator, Method, SplittingScheme, Status, StepError, Stepper, Steps, Suspicion};
+use crate::{AnyIntegrator, Gauss, InputError, Method, SplittingScheme, Status, StepError, Stepper, Steps, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
