@@ -92,7 +92,8 @@ fn relative_number(a: f64, b: f64, least: f64) -> f64 {
 /// The contact condition, flat, sharp and Reeb field of one form: closed against generic, and against their definitions.
 fn form_residual<const N: usize>(form: &impl ContactForm<N>, x: &Triple<N>) -> Result<f64, GeometryError> {
     let (eta, d_eta, reeb) = (form.eta(x)?, form.d_eta(x)?, form.reeb(x)?);
-    let contraction = crate::smooth::apply_transposed(&d_eta, &reeb).largest() / (d_eta.largest() * reeb.largest());
+    let contraction =
+        crate::forms::smooth::apply_transposed(&d_eta, &reeb).largest() / (d_eta.largest() * reeb.largest());
     let mut worst = contraction.larger((eta.dot(&reeb) - 1.0).abs() / (eta.largest() * reeb.largest()).larger(1.0));
     worst = worst.larger(relative(reeb, generic::reeb(form, x)?, 0.0));
     worst = worst.larger(relative(form.flat(x, &reeb)?, eta, 0.0));
@@ -299,7 +300,7 @@ fn legendre_is_contact<const N: usize>(
     if let Some(h) = known_hamiltonian(system) {
         let energy = Energy(system).value(t, &velocity);
         worst = worst.larger(relative_number(energy, h.value(t, &phase), 1.0));
-        let pushed = crate::smooth::apply(&jacobian, &herglotz_field(system, t, x)?);
+        let pushed = crate::forms::smooth::apply(&jacobian, &herglotz_field(system, t, x)?);
         worst = worst.larger(relative(pushed, DarbouxField { hamiltonian: &h, t }.at(&phase)?, 1.0));
     }
     Ok(worst)

@@ -1,6 +1,6 @@
 //! Contact forms: what follows from eta and d eta at a point.
 
-use crate::smooth::apply_transposed;
+use crate::forms::smooth::apply_transposed;
 use crate::{GeometryError, Smooth, Triple};
 use nalgebra::{DMatrix, DVector};
 

@@ -1,6 +1,6 @@
 //! Regularity, energy, the Legendre transformation and the Herglotz vector field of a Lagrangian.
 
-use crate::blocks::BLOCK;
+use crate::dynamics::blocks::BLOCK;
 use crate::linear::{SingularMatrix, solve};
 use crate::{Border, Dual, GeometryError, Lagrangian, Module, PhasePoint, Scalar, Smooth, SmoothFunction};
 use crate::{OneParameterGroup, Triple, VelocityPoint};

@@ -1,6 +1,6 @@
 //! The derivatives of a Lagrangian at one point along a few directions, each with the size of its terms.
 
-use crate::rounded::Rounded;
+use crate::number::rounded::Rounded;
 use crate::{Dual, Lagrangian, VelocityPoint, largest};
 use nalgebra::{SMatrix, SVector};
 

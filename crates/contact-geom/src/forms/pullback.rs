@@ -1,6 +1,6 @@
 //! Pullbacks of contact forms: is a map contact, and with which conformal factor?
 
-use crate::smooth::apply_transposed;
+use crate::forms::smooth::apply_transposed;
 use crate::{ContactForm, GeometryError, Largest, Smooth, Triple};
 use nalgebra::DMatrix;
 

@@ -1,6 +1,6 @@
 //! Smooth functions, maps, vector fields and one-forms in a chart, given as generic functions.
 
-use crate::points::seed;
+use crate::forms::points::seed;
 use crate::{Dual, GeometryError, Scalar, Triple};
 use nalgebra::DMatrix;
 

@@ -1,7 +1,7 @@
 //! What is known of a Lagrangian's form, and how to see whether a claim holds.
 
-use crate::probe::{Moving, Probe, entries};
-use crate::rounded::Rounded;
+use crate::dynamics::probe::{Moving, Probe, entries};
+use crate::number::rounded::Rounded;
 use crate::{Lagrangian, VelocityPoint, larger, largest};
 
 /// The declared structure of a Lagrangian: claims that let a method skip work. A claim that is not made costs time only; a

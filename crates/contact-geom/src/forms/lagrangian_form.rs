@@ -1,6 +1,6 @@
 //! The contact form of a Lagrangian on TQ x R.
 
-use crate::fibre_form::{FibreForm, contact_form_by_fibre};
+use crate::forms::fibre_form::{FibreForm, contact_form_by_fibre};
 use crate::{ContactForm, GeometryError, Lagrangian, Scalar, Smooth, Triple};
 use nalgebra::{DMatrix, SVector};
 

@@ -1,6 +1,6 @@
 //! Forms `dz - P(x, y, z) dx`, the pullbacks of Darboux' form along fibre maps: eta_L and eta-.
 
-use crate::darboux::canonical_volume;
+use crate::forms::darboux::canonical_volume;
 use crate::linear::solve;
 use crate::{GeometryError, Triple};
 use nalgebra::{DMatrix, SMatrix, SVector};

@@ -1,6 +1,6 @@
 //! Contact Hamiltonian vector fields, the Jacobi bracket and dissipated quantities.
 
-use crate::smooth::{apply, apply_transposed};
+use crate::forms::smooth::{apply, apply_transposed};
 use crate::{ContactForm, GeometryError, Largest, Module, Scalar, Smooth, SmoothFunction, Triple};
 
 /// The contact Hamiltonian vector field `X_f` of any contact form: `flat(X_f) = df - (f + R(f)) eta`; paper, section 2.1.

@@ -1,7 +1,7 @@
 //! Lagrangians L(t, q, v, z) and their derivatives.
 
-use crate::blocks::{self, BLOCK};
-use crate::points::seed;
+use crate::dynamics::blocks::{self, BLOCK};
+use crate::forms::points::seed;
 use crate::{Dual, KernelDual, Module, Scalar, Structure, Triple, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 use num_traits::One;

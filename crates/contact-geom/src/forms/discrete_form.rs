@@ -1,6 +1,6 @@
 //! The contact forms eta+ and eta- of a discrete Lagrangian on Q x Q x R.
 
-use crate::fibre_form::{FibreForm, contact_form_by_fibre};
+use crate::forms::fibre_form::{FibreForm, contact_form_by_fibre};
 use crate::linear::solve;
 use crate::{ContactForm, DiscretePoint, GeometryError, Regularity, Triple};
 use nalgebra::{DMatrix, SMatrix, SVector};
