@@ -8,11 +8,11 @@
 
 use crate::systems::{FreeParticle, HarmonicOscillator, System};
 use crate::{
-    ContactForm, Darboux, DarbouxBracket, DarbouxField, Dual, Energy, Form, GeometryError, HerglotzField, Lagrangian,
-    LagrangianForm, Larger, Largest, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, PhasePoint, Quotient,
-    Scalar, Smooth, SmoothFunction, Triple, VelocityPoint, conformal_factor_along, conformality, dissipation_defect,
-    generic, hamiltonian_vector_field, herglotz_field, infinitesimal_conformality, jacobi_bracket, legendre,
-    legendre_jacobian, lie_bracket, lie_derivative, regularity,
+    ContactForm, Darboux, DarbouxBracket, DarbouxField, Derivatives, Dual, Energy, Form, GeometryError, HerglotzField,
+    Lagrangian, LagrangianForm, Larger, Largest, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup,
+    PhasePoint, Quotient, Scalar, Smooth, SmoothFunction, Triple, VelocityPoint, conformal_factor_along, conformality,
+    dissipation_defect, generic, hamiltonian_vector_field, herglotz_field, infinitesimal_conformality, jacobi_bracket,
+    legendre, legendre_jacobian, lie_bracket, lie_derivative, regularity,
 };
 use nalgebra::SVector;
 

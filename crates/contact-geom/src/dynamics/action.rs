@@ -1,6 +1,6 @@
 //! One-parameter groups acting on Q, their lifts to the contact manifolds, and their momenta.
 
-use crate::{Dual, GeometryError, Lagrangian, Scalar, Triple, VelocityPoint, largest};
+use crate::{Derivatives, Dual, GeometryError, Lagrangian, Scalar, Triple, VelocityPoint, largest};
 use nalgebra::SVector;
 
 type Line<T> = SVector<T, 1>;

@@ -1,6 +1,6 @@
 //! Derivatives of systems of many coordinates: by blocks of directions, so that the numbers stay small enough for the stack.
 
-use crate::{Hessian, KernelDual, Lagrangian, Scalar, Triple, VelocityPoint};
+use crate::{Derivatives, Hessian, KernelDual, Lagrangian, Scalar, Triple, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// The largest dimension whose directions are carried all at once: nested, those of all coordinates take memory as the third

@@ -2,7 +2,7 @@
 
 use crate::dynamics::blocks::BLOCK;
 use crate::linear::{SingularMatrix, solve};
-use crate::{Border, Dual, GeometryError, Lagrangian, Module, PhasePoint, Scalar, Smooth, SmoothFunction};
+use crate::{Border, Derivatives, Dual, GeometryError, Lagrangian, Module, PhasePoint, Scalar, Smooth, SmoothFunction};
 use crate::{OneParameterGroup, Triple, VelocityPoint};
 use nalgebra::{DMatrix, SMatrix, SVector};
 use num_traits::One;

@@ -3,6 +3,7 @@
 mod action;
 pub(crate) mod blocks;
 mod clock;
+mod derivatives;
 mod hamiltonian;
 mod herglotz;
 mod lagrangian;
@@ -11,6 +12,7 @@ mod structure;
 
 pub use action::{OneParameterGroup, Symmetry};
 pub use clock::Clock;
+pub use derivatives::{Derivatives, Hessian, derived_gradient, derived_hessian};
 pub use hamiltonian::{
     DarbouxBracket, DarbouxField, InfinitesimalConformality, Quotient, conformal_factor_along, derivative_along,
     dissipation_defect, hamiltonian_vector_field, infinitesimal_conformality, jacobi_bracket, lie_bracket,
@@ -20,6 +22,6 @@ pub use herglotz::{
     Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, Regularity, herglotz_field, herglotz_rates,
     legendre, legendre_jacobian, regularity,
 };
-pub use lagrangian::{Hessian, Lagrangian, ValueOnly, derived_gradient, derived_hessian};
+pub use lagrangian::{Lagrangian, ValueOnly};
 pub use probe::check_closed_derivatives;
 pub use structure::{Defect, Defects, Structure};

@@ -1,7 +1,7 @@
 //! The contact form of a Lagrangian on TQ x R.
 
 use crate::forms::fibre_form::{FibreForm, contact_form_by_fibre};
-use crate::{ContactForm, GeometryError, Lagrangian, Scalar, Smooth, Triple};
+use crate::{ContactForm, Derivatives, GeometryError, Lagrangian, Scalar, Smooth, Triple};
 use nalgebra::{DMatrix, SVector};
 
 /// `eta_L = dz - theta_L` with `theta_L = L_v dq`, at a fixed time; contact exactly where L is regular. Its Reeb field is

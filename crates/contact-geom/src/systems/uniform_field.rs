@@ -2,7 +2,7 @@
 
 use super::closed_form::{relative_exp_m1, second_relative_exp, third_relative_exp};
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use crate::{Derivatives, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
 /// A particle falling in a uniform field with linear drag, `L = |v|^2/2 + a . q + gamma z` in R^D. Dimensionless: any units

@@ -14,7 +14,7 @@ use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use super::table::Table;
 use crate::gauss::lanes::{Lanes, branched};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
+use contact_geom::{Derivatives, Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
 use pulp::{Arch, Simd};
 use std::array::from_fn;
 

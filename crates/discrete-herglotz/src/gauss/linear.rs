@@ -6,7 +6,7 @@ use super::condensed::Condensed;
 use super::dense::Start;
 use super::double_double::solve_exactly;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Hessian, Lagrangian, VelocityPoint};
+use contact_geom::{Derivatives, Hessian, Lagrangian, VelocityPoint};
 use num_traits::{One, Zero};
 use qd::Quad;
 use std::array::from_fn;

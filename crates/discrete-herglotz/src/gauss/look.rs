@@ -10,7 +10,7 @@ use super::extension::Pace;
 use super::stages::{StageMap, Stages, blocks};
 use crate::gauss::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint, larger, largest};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint, larger, largest};
 use pulp::{Simd, WithSimd};
 use std::array::from_fn;
 use std::sync::OnceLock;

@@ -40,7 +40,8 @@ use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use coefficients::MOST;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    Clock, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed,
+    Clock, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Triple,
+    seed,
 };
 use stage_equations::{Given, Products, StageEquations, Workspace};
 

@@ -13,7 +13,7 @@ use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use crate::StepError;
 use crate::gauss::lanes::{Lanes, branched};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, VelocityPoint, largest};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, largest};
 use pulp::{Arch, Simd};
 
 /// The steps after which a matrix is expected to last.

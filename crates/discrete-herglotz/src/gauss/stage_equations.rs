@@ -8,7 +8,7 @@ use crate::rules::step_equations::BLOCK;
 use crate::solve::solver::DenseLu;
 use crate::{ITERATION_LIMIT, StepError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, seed};
+use contact_geom::{Derivatives, Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, seed};
 use std::array::from_fn;
 
 /// The products of the coefficients with a step, which may be negative.

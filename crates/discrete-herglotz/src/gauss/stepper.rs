@@ -20,7 +20,7 @@ use crate::rules::step_equations::is_identity;
 use crate::run::watch::Watch;
 use crate::{Doubt, Halt, InputError, Item, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 pub(crate) use marks::FEW;
 use marks::Sequence;
 use pulp::{Arch, Simd, WithSimd};

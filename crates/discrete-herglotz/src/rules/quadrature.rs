@@ -6,8 +6,8 @@ use crate::solve::newton::{Linearised, Start, largest, newton};
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
-    Border, DiscreteJet, DiscretePoint, Dual, GeometryError, Hessian, Lagrangian, Module, PhasePoint, Regularity,
-    Scalar, SecondDiscreteJet, Triple, VelocityPoint,
+    Border, Derivatives, DiscreteJet, DiscretePoint, Dual, GeometryError, Hessian, Lagrangian, Module, PhasePoint,
+    Regularity, Scalar, SecondDiscreteJet, Triple, VelocityPoint,
 };
 use std::marker::PhantomData;
 

@@ -4,7 +4,7 @@ use crate::Node;
 use crate::solve::unknowns::Unknowns;
 use contact_geom::linear::{self, SingularMatrix};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Border, Dual, Lagrangian, VelocityPoint};
+use contact_geom::{Border, Derivatives, Dual, Lagrangian, VelocityPoint};
 
 /// The largest dimension whose directions are carried at once; larger ones go in blocks, so that the numbers stay small
 /// enough for the stack and for registers.

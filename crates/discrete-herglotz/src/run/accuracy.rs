@@ -3,7 +3,7 @@
 use super::pilot::{BUDGET, Ending, Marks, Pilots, Track};
 use super::{MOST_STEPS, Problem, Shared, Task};
 use crate::{ClockedGauss, GaussCollocation, InputError, Obstacle};
-use contact_geom::{Lagrangian, larger};
+use contact_geom::{Derivatives, Lagrangian, larger};
 use std::sync::Arc;
 
 /// The searches that may follow each other: each makes the steps shorter, or ends.

@@ -6,7 +6,7 @@ use crate::gauss::{FEW, velocity};
 use crate::run::verified::refuted;
 use crate::{Doubt, InputError, Status, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Defect, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Defect, Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 
 /// The steps that are tried, and probed, before a run.
 const FIRST_STEPS: usize = 64;

@@ -6,7 +6,8 @@ use crate::run::verified::verified;
 use crate::{DiscreteLagrangian, InputError, StepError, discrete_regularity, legendre_minus};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    DiscretePoint, GeometryError, Lagrangian, PhasePoint, Regularity, Structure, VelocityPoint, largest, legendre,
+    Derivatives, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Regularity, Structure, VelocityPoint, largest,
+    legendre,
 };
 
 /// Where a motion starts.

@@ -4,7 +4,7 @@ use super::separable::Separable;
 use crate::InputError;
 use crate::gauss::coefficients::Coefficients;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Dual, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, VelocityPoint};
 
 /// The nodes of the quadrature along a drift: its error is that of order 12, far below that of any scheme here.
 const NODES: usize = 6;

@@ -4,7 +4,7 @@ use crate::rules::step_equations::{inverted, is_identity, kept_mass_matrix};
 use crate::run::verified::PROBE;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Defect, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use contact_geom::{Defect, Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
 /// What is left of a false claim's derivative by the rounding of a true one, with some margin.
 pub(super) const FALSE_CLAIM: f64 = 1e-9;

@@ -1,6 +1,8 @@
 //! By blocks as by all directions at once.
 
-use crate::{Dual, Lagrangian, Scalar, Structure, Triple, VelocityPoint, derived_gradient, herglotz_rates, seed};
+use crate::{
+    Derivatives, Dual, Lagrangian, Scalar, Structure, Triple, VelocityPoint, derived_gradient, herglotz_rates, seed,
+};
 use nalgebra::SVector;
 
 /// Neither a multiple of the block, nor is `2N + 1`.
