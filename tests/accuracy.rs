@@ -265,9 +265,8 @@ fn claims_are_probed_along_the_motion() {
         let system = Bench { kind, claims: Some(structure), ..FREE };
         for steps in [Steps::Count(400), Steps::Size(0.01), Steps::Accuracy(1e-6)] {
             for integrator in ["gauss_6", "strang"] {
-                let run = |problem: Problem<'_, Bench, 1>| {
-                    problem.by(by(integrator)).steps(steps).run(Until::Time(8.0))
-                };
+                let run =
+                    |problem: Problem<'_, Bench, 1>| problem.by(by(integrator)).steps(steps).run(Until::Time(8.0));
                 let found = match Problem::new(&system, 0.0, start).and_then(run) {
                     Err(InputError::FalseClaim { claim, .. }) => Some(claim),
                     Ok(outcome) => match outcome.status {

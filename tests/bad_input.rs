@@ -47,7 +47,8 @@ fn sigma_crosses_zero() {
     // sigma = 1 - h t_mid with t_mid = (k + 1/2) h: not positive from k = 100 on, for h = 0.1.
     let start = PhasePoint::new([0.0], [1.0], 0.0);
     let (Outcome { status, t, .. }, rows) = every_step(&GrowingDrag, start, Method::LeftMidpoint, (0.1, 200));
-    let failed = matches!(status, Status::Failed { step: 100, cause: StepError::SigmaVanished { .. }, t: at } if at == t);
+    let failed =
+        matches!(status, Status::Failed { step: 100, cause: StepError::SigmaVanished { .. }, t: at } if at == t);
     assert!(failed, "{status:?}");
     assert_eq!((rows.len(), rows[100].t), (101, t));
     assert!(all_finite(&rows));

@@ -348,8 +348,7 @@ fn a_fall_into_the_centre_ends() {
     let problem = Problem::new(&kepler, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0)).unwrap();
     let refused = problem.steps(Steps::Accuracy(1e-6)).plan(Until::Time(2.0)).err();
     assert!(matches!(refused, Some(InputError::Accuracy { .. })), "{refused:?}");
-    let outcome =
-        problem.by(Integrator::Clocked { stages: 8 }).steps(Steps::Size(0.1)).run(Until::Time(2.0)).unwrap();
+    let outcome = problem.by(Integrator::Clocked { stages: 8 }).steps(Steps::Size(0.1)).run(Until::Time(2.0)).unwrap();
     assert!(matches!(outcome.status, Status::Failed { .. }), "{outcome:?}");
     // It takes pi / 8^(1/2) without another force.
     assert!(outcome.t <= std::f64::consts::PI / 8.0f64.sqrt() && outcome.t > 1.0, "{}", outcome.t);

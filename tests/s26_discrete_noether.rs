@@ -32,7 +32,12 @@ fn along_a_run() {
                 let mut decay = MomentumDecay::new(group);
                 let run = problem.by(Integrator::Discrete(method)).steps(Steps::Size(h)).observe(&mut decay);
                 let outcome = run.run(Until::Steps(1000)).unwrap();
-                assert_eq!((outcome.status, outcome.steps), (Status::Completed, 1000), "{} with {method}", system.name());
+                assert_eq!(
+                    (outcome.status, outcome.steps),
+                    (Status::Completed, 1000),
+                    "{} with {method}",
+                    system.name()
+                );
                 assert_eq!(decay.rows.len(), 1001);
                 let scale = decay.rows.iter().map(|row| row.momentum.abs()).fold(1e-3, larger);
                 for (k, row) in decay.rows.iter().enumerate() {

@@ -6,9 +6,7 @@
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
-use discrete_herglotz::{
-    InputError, Integrator, Outcome, Problem, Rows, Run, SplittingScheme, Status, Steps, Until,
-};
+use discrete_herglotz::{InputError, Integrator, Outcome, Problem, Rows, Run, SplittingScheme, Status, Steps, Until};
 use std::hint::black_box;
 use std::io::Write;
 use std::time::Instant;
