@@ -3,8 +3,10 @@
 
 #[path = "discrete/lagrangians.rs"]
 mod lagrangians;
-#[path = "discrete/scenes.rs"]
-mod scenes;
+#[path = "discrete/observers.rs"]
+mod observers;
+#[path = "discrete/runs.rs"]
+mod runs;
 #[path = "discrete/steppers.rs"]
 mod steppers;
 
@@ -24,10 +26,10 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Integrator::all", "takes no number"),
     ("Integrator::order", "takes no number; that of any number of stages is in the attack on check"),
     ("ActionFlow::*", "the implementor's; that of Riccati is attacked with what calls it"),
-    ("Observer::*", "the implementor's; those of the library see finite steps only"),
+    ("Observer::*", "the implementor's; what a run makes of odd ones is in the attack on Run::observe"),
 ];
 
-pub const ATTACKS: &[&[Attack]] = &[lagrangians::ATTACKS, scenes::ATTACKS, steppers::ATTACKS];
+pub const ATTACKS: &[&[Attack]] = &[lagrangians::ATTACKS, observers::ATTACKS, runs::ATTACKS, steppers::ATTACKS];
 
 /// Times and states to start from, and whether they are finite.
 fn starts() -> Vec<(f64, PhasePoint<1>)> {
@@ -35,4 +37,4 @@ fn starts() -> Vec<(f64, PhasePoint<1>)> {
 }
 
 /// Steps beside those that are refused.
-const STEPS: [f64; 5] = [1e-300, 1e-12, 0.1, 1e3, 1e300];
+const STEPS: [f64; 8] = [1e-300, 1e-12, 0.1, 1e3, 1e300, -1e-12, -0.1, -1e3];

@@ -70,6 +70,7 @@ pub fn refused(error: &InputError) -> Verdict {
         InputError::Step { .. } => "step",
         InputError::Span { .. } => "span",
         InputError::Accuracy { .. } => "accuracy",
+        InputError::Times { .. } => "times",
         InputError::Stages { .. } => "stages",
         InputError::Clock { .. } => "clock",
         InputError::Dimension => "dimension",
@@ -95,6 +96,7 @@ pub fn ended(cause: &StepError) -> Verdict {
         StepError::OutsideDomain { .. } => "outside the domain",
         StepError::ConjugatePoint { .. } => "conjugate point",
         StepError::NonFinite => "not finite",
+        StepError::Event { .. } => "event",
         #[allow(unreachable_patterns)] // As above.
         _ => "another",
     })

@@ -1,22 +1,29 @@
-//! Attacks on scenes.
+//! Attacks on problems, runs of them and their plans.
 
 use crate::Attack;
-use crate::numbers::{Claiming, HOSTILE, Report, places, triples};
+use crate::numbers::{Claiming, Grade, HOSTILE, Report, grade, places, triples};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, Scalar, VelocityPoint};
-use discrete_herglotz::{InputError, Integrator, Method, Scene, SplittingScheme, Steps, Wanted};
+use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use discrete_herglotz::{
+    InputError, Integrator, Method, Midpoint, Outcome, Problem, Rows, Run, SplittingScheme, Start, Status, Steps, Until,
+};
 
 pub const ATTACKS: &[Attack] = &[
     Attack { on: &["Integrator::check"], run: integrators },
     Attack {
+        on: &["Problem::new", "Problem::from_points", "Problem::start", "Problem::state", "Outcome::state"],
+        run: problems,
+    },
+    Attack {
         on: &[
-            "Scene::new",
-            "Scene::from_time",
-            "Scene::by",
-            "Scene::steps",
-            "Scene::wanting",
-            "Scene::wanted",
-            "Scene::plan",
+            "Problem::by",
+            "Problem::steps",
+            "Run::by",
+            "Run::steps",
+            "Run::without_action",
+            "Run::with_conformal_factor",
+            "Run::plan",
+            "Run::run",
             "Plan::step_size",
             "Plan::count",
             "Plan::error",
@@ -25,7 +32,7 @@ pub const ATTACKS: &[Attack] = &[
             "Plan::stepper",
             "Plan::run",
         ],
-        run: scenes,
+        run: runs,
     },
 ];
 
@@ -35,6 +42,15 @@ struct Silent;
 impl Lagrangian<1> for Silent {
     fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
         v[0] * v[0] * 0.5
+    }
+}
+
+/// Without coordinates.
+struct Empty;
+
+impl Lagrangian<0> for Empty {
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 0>, _v: &SVector<T, 0>, z: T) -> T {
+        z
     }
 }
 
@@ -50,60 +66,123 @@ fn integrators(report: &mut Report) {
     report.check(matches!(pair, Err(InputError::Hypothesis { .. })), || format!("{pair:?}"));
 }
 
-fn scenes(report: &mut Report) {
-    let start = VelocityPoint::from(triples()[0]);
-    let scene = |span: f64| Scene::new(&Claiming, start, span).steps(Steps::Count(7));
-    let run = |scene: &Scene<'_, Claiming, 1>| {
-        scene.plan().and_then(|plan| plan.run()).map(|o| ((o.q, o.p), (o.z, o.t), o.conformal_factor))
-    };
+/// Each kind of integrator for [`Claiming`], and none.
+pub const BY: [Option<Integrator>; 5] = [
+    None,
+    Some(Integrator::Gauss { stages: 6 }),
+    Some(Integrator::Discrete(Method::Trapezoidal)),
+    Some(Integrator::Splitting(SplittingScheme::BLANES_MOAN_6)),
+    Some(Integrator::Composition(Method::Midpoint, SplittingScheme::YOSHIDA_4)),
+];
+
+/// [`Claiming`] from a tame start at t = 0.
+pub fn tame() -> Problem<'static, Claiming, 1> {
+    Problem::new(&Claiming, 0.0, VelocityPoint::from(triples()[0])).unwrap()
+}
+
+/// A run in seven steps.
+pub fn seven<'p>(problem: &'p Problem<'p, Claiming, 1>, by: Option<Integrator>) -> Run<'p, Claiming, 1> {
+    let run = problem.steps(Steps::Count(7));
+    if let Some(by) = by { run.by(by) } else { run }
+}
+
+/// All numbers of an outcome.
+type Ends = ((SVector<f64, 1>, SVector<f64, 1>), (Option<f64>, f64), (Option<SVector<f64, 1>>, Option<f64>));
+
+fn numbers(o: Outcome<1>) -> Ends {
+    ((o.q, o.p), (o.z, o.t), (o.v, o.log_factor))
+}
+
+fn problems(report: &mut Report) {
+    let state: PhasePoint<1> = triples()[0].into();
+    let rules = [0.1, -0.1].map(|h| Midpoint::new(Claiming, h).unwrap());
     for (t, x) in places() {
-        let scene = Scene::new(&Claiming, x.into(), 0.5).from_time(t).steps(Steps::Count(7));
-        for integrator in [
-            Integrator::Gauss { stages: 6 },
-            Integrator::Discrete(Method::Trapezoidal),
-            Integrator::Splitting(SplittingScheme::BLANES_MOAN_6),
-            Integrator::Composition(Method::Midpoint, SplittingScheme::YOSHIDA_4),
-        ] {
-            let made = Scene::new(&Claiming, x.into(), 0.5).from_time(t).steps(Steps::Count(7)).by(integrator);
-            report.door(&(t, x), run(&made));
+        let velocity = Problem::new(&Claiming, t, VelocityPoint::from(x));
+        report.door(&(t, x), velocity.map(|problem| (*problem.start(), *problem.state())));
+        let momentum = Problem::new(&Claiming, t, PhasePoint::from(x));
+        report.door(&(t, x), momentum.map(|problem| (*problem.start(), *problem.state())));
+        for ld in &rules {
+            let points = Problem::from_points(&Claiming, ld, t, DiscretePoint::from(x));
+            report.door(&(t, x), points.map(|problem| (*problem.start(), *problem.state())));
         }
-        report.door(&(t, x), run(&scene));
+        // What a run leads to is a start.
+        let outcome = velocity.and_then(|problem| seven(&problem, None).without_action().run(Until::Time(t + 0.5)));
+        let again = outcome.as_ref().ok().map(|o| (o.state(), Problem::new(&Claiming, o.t, o)));
+        let good = again.as_ref().is_none_or(|(state, _)| state.check().is_ok() && state.z == x.z);
+        report.check(good, || format!("{outcome:?} leads to {again:?}"));
+        let again = again.and_then(|(state, problem)| Some((state, *problem.ok()?.state())));
+        report.check(again.is_none_or(|(end, start)| end == start), || format!("{again:?}"));
     }
+    for guess in HOSTILE {
+        // A poor guess costs iterations, or the start: never a velocity that is none.
+        let made = Problem::new(&Claiming, 0.4, Start::Momentum(state, SVector::from([guess])));
+        let good = made.is_ok_and(|problem| grade(&problem.start().v) != Grade::Bad && problem.state() == &state);
+        report.check(good || made.is_err(), || format!("the guess {guess} leads to {made:?}"));
+    }
+    let nowhere = VelocityPoint { q: SVector::zeros(), v: SVector::zeros(), z: 0.3 };
+    report.check(Problem::<_, 0>::new(&Empty, 0.0, nowhere).err() == Some(InputError::Dimension), || "empty".into());
+}
+
+fn runs(report: &mut Report) {
+    for (t, x) in places() {
+        for integrator in BY {
+            let problem = Problem::new(&Claiming, t, VelocityPoint::from(x));
+            let run = |problem: Problem<'_, _, 1>| seven(&problem, integrator).run(Until::Time(t + 0.5)).map(numbers);
+            report.door(&(t, x), problem.and_then(run));
+        }
+    }
+    let problem = tame();
+    let in_seven = |until| seven(&problem, None).with_conformal_factor().run(until).map(numbers);
+    let by_steps = |steps| problem.steps(steps).run(Until::Time(0.5)).map(numbers);
     for span in HOSTILE {
-        let refused = !(span > 0.0 && span.is_finite());
-        report.check(!refused || matches!(run(&scene(span)), Err(InputError::Span { .. })), || {
+        let refused = span == 0.0 || !span.is_finite();
+        report.check(!refused || matches!(in_seven(Until::Time(span)), Err(InputError::Span { .. })), || {
             format!("a span of {span}")
         });
-        report.door(&span, run(&scene(span)));
+        report.door(&span, in_seven(Until::Time(span)));
     }
     for h in HOSTILE.into_iter().filter(|h| !(*h > 0.0 && *h < 1e-3)) {
-        let made = scene(0.5).steps(Steps::Size(h));
         let refused = !(h > 0.0 && h.is_finite());
-        report.check(!refused || matches!(run(&made), Err(InputError::Step { .. })), || format!("steps of {h}"));
-        report.door(&h, run(&made));
+        report.check(!refused || matches!(by_steps(Steps::Size(h)), Err(InputError::Step { .. })), || {
+            format!("steps of {h}")
+        });
+        report.door(&h, by_steps(Steps::Size(h)));
+    }
+    // A number of steps of a size, none too small.
+    for h in HOSTILE {
+        for count in [0, 1, 7, usize::MAX] {
+            let ended = problem.steps(Steps::Size(h)).run(Until::Steps(count));
+            let refused = h == 0.0 || !h.is_finite() || count == 0 || count == usize::MAX;
+            report.check(!refused || ended.is_err(), || format!("{count} steps of {h}: {ended:?}"));
+            report.door(&h, ended.map(numbers));
+        }
     }
     for error in HOSTILE {
-        let made = scene(0.5).steps(Steps::Accuracy(error));
+        let made = problem.steps(Steps::Accuracy(error));
         let refused = !(error > 0.0 && error.is_finite());
-        report.check(!refused || matches!(run(&made), Err(InputError::Tolerance { .. })), || {
+        let ended = by_steps(Steps::Accuracy(error));
+        report.check(!refused || matches!(ended, Err(InputError::Tolerance { .. })), || {
             format!("to an error of {error}")
         });
-        if let Ok(plan) = made.plan() {
+        if let Ok(plan) = made.plan(Until::Time(0.5)) {
             let kept = plan.error().is_some_and(|found| found <= error) && plan.integrator().order() > 0;
             report.check(kept, || format!("{:?} where {error} is asked for", plan.error()));
         }
-        report.door(&error, run(&made));
+        report.door(&error, ended);
     }
-    report.check(run(&scene(0.5).steps(Steps::Count(0))).is_err(), || "no step".into());
-    for rows in [0, 1, usize::MAX] {
-        let wanted = Wanted { rows: Some(rows), conformal_factor: true, ..Wanted::default() };
-        let made = scene(0.5).wanting(wanted.clone());
-        report.check(made.wanted() == &wanted, || "what is wanted".into());
-        let outcome = made.plan().and_then(|plan| plan.run());
-        let expected = [None, Some(8), Some(2)][[0, 1, usize::MAX].iter().position(|r| *r == rows).unwrap()];
-        report.check(outcome.ok().map(|o| o.rows.len()) == expected, || format!("a row every {rows} steps"));
+    report.check(by_steps(Steps::Count(0)).is_err(), || "no step".into());
+    let unsized_steps = problem.steps(Steps::Count(7)).run(Until::Steps(7));
+    report.check(matches!(unsized_steps, Err(InputError::Hypothesis { .. })), || "steps of no size".into());
+    for (until, way) in [(0.5, 1.0), (-0.5, -1.0)] {
+        let mut rows = Rows::every(1).unwrap();
+        let run = seven(&problem, None).observe(&mut rows);
+        let plan = run.plan(Until::Time(until)).unwrap();
+        let good = plan.count() == 7 && (plan.step_size() - way * 0.5 / 7.0).abs() < 1e-16;
+        report.check(good, || format!("seven steps of {}", plan.step_size()));
+        report.check(!plan.items().is_empty() && plan.stepper().is_ok(), || "a plan says what it does".into());
+        // By itself it has no observers.
+        let (alone, observed) = (plan.run(), run.run(Until::Time(until)));
+        report.check(alone == observed && alone.is_ok_and(|o| o.status == Status::Completed), || format!("{alone:?}"));
+        report.check(rows.rows.len() == 8, || format!("{} rows", rows.rows.len()));
     }
-    let plan = scene(0.5).plan().unwrap();
-    report.check(plan.count() == 7 && (plan.step_size() - 0.5 / 7.0).abs() < 1e-16, || "seven steps".into());
-    report.check(!plan.items().is_empty() && plan.stepper().is_ok(), || "a plan says what it does".into());
 }
