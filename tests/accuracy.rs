@@ -2,7 +2,7 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, legendre};
-use discrete_herglotz::{InputError, Integrator, Obstacle, Problem, Rows, Run, Status, StepError, Steps, Until};
+use discrete_herglotz::{AnyIntegrator, InputError, Obstacle, Problem, Rows, Run, Status, StepError, Steps, Until};
 use exact_lagrangian::herglotz_flow;
 
 /// One type for all systems of this file, since each is compiled with every integrator: a mechanical system, and others that claim more
@@ -105,7 +105,7 @@ fn problem(system: &Bench, start: VelocityPoint<1>) -> Problem<'_, Bench, 1> {
 }
 
 /// The error in (q, p) of a run up to a time, relative to their size.
-fn error(run: Run<'_, Bench, 1>, t: f64, truth: [f64; 2]) -> Result<f64, InputError> {
+fn error(run: Run<'_, '_, Bench, 1>, t: f64, truth: [f64; 2]) -> Result<f64, InputError> {
     let outcome = run.run(Until::Time(t))?;
     assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
     let size = truth[0].hypot(truth[1]);
@@ -116,7 +116,7 @@ fn error(run: Run<'_, Bench, 1>, t: f64, truth: [f64; 2]) -> Result<f64, InputEr
     })
 }
 
-fn by(name: &str) -> Integrator {
+fn by(name: &str) -> AnyIntegrator {
     name.parse().unwrap()
 }
 
@@ -128,7 +128,7 @@ fn steps_that_resonate_with_the_drive() {
     let truth = truth(&driven, &start, 16.0);
     for name in ["strang", "midpoint", "gauss_2", "gauss_8", "blanes_moan_6"] {
         let problem = problem(&driven, start);
-        let error = error(problem.by(by(name)).steps(Steps::Accuracy(1e-6)), 16.0, truth).unwrap();
+        let error = error(problem.by(by(name)).accuracy(1e-6), 16.0, truth).unwrap();
         assert!(error <= 1e-6, "{name}: {error:e}");
     }
 }
@@ -140,7 +140,7 @@ fn steps_far_beyond_the_period() {
     for span in [1e3, 3.3e4, 1.7e6, 9.1e6] {
         let (sin, cos) = f64::sin_cos(span);
         let problem = problem(&OSCILLATOR, start);
-        let to = |wanted| problem.steps(Steps::Accuracy(wanted));
+        let to = |wanted| problem.accuracy(wanted);
         for (run, wanted) in [(to(1e-2).by(by("gauss_8")), 1e-2), (to(1e-7), 1e-7)] {
             let error = error(run, span, [cos, -sin]).unwrap();
             assert!(error <= wanted, "{span}: {error:e}");
@@ -149,8 +149,8 @@ fn steps_far_beyond_the_period() {
 }
 
 /// A run to an error of a millionth, by an integrator or by the one that is chosen.
-fn to_a_millionth<'p>(problem: &'p Problem<'p, Bench, 1>, name: Option<&str>) -> Run<'p, Bench, 1> {
-    let run = problem.steps(Steps::Accuracy(1e-6));
+fn to_a_millionth<'p, 'o>(problem: &'p Problem<'p, Bench, 1>, name: Option<&str>) -> Run<'p, 'o, Bench, 1> {
+    let run = problem.accuracy(1e-6);
     if let Some(name) = name { run.by(by(name)) } else { run }
 }
 
@@ -263,10 +263,13 @@ fn claims_are_probed_along_the_motion() {
     ];
     for (kind, structure, start, claim) in cases {
         let system = Bench { kind, claims: Some(structure), ..FREE };
-        for steps in [Steps::Count(400), Steps::Size(0.01), Steps::Accuracy(1e-6)] {
+        for steps in [Some(Steps::Count(400)), Some(Steps::Size(0.01)), None] {
             for integrator in ["gauss_6", "strang"] {
-                let run =
-                    |problem: Problem<'_, Bench, 1>| problem.by(by(integrator)).steps(steps).run(Until::Time(8.0));
+                let run = |problem: Problem<'_, Bench, 1>| {
+                    let run = problem.by(by(integrator));
+                    let run = if let Some(steps) = steps { run.steps(steps) } else { run.accuracy(1e-6) };
+                    run.run(Until::Time(8.0))
+                };
                 let found = match Problem::new(&system, 0.0, start).and_then(run) {
                     Err(InputError::FalseClaim { claim, .. }) => Some(claim),
                     Ok(outcome) => match outcome.status {
@@ -293,14 +296,14 @@ fn the_estimate_is_of_the_run() {
     let truth = truth(&DUFFING, &start, 20.0);
     let (problem, until) = (problem(&DUFFING, start), Until::Time(20.0));
     for wanted in [1e-4, 1e-8] {
-        let plan = problem.steps(Steps::Accuracy(wanted)).plan(until).unwrap();
+        let plan = problem.accuracy(wanted).plan(until).unwrap();
         assert!(plan.error().is_some_and(|e| e <= wanted));
         let mut rows = Rows::every(3).unwrap();
-        let with_all = problem.steps(Steps::Accuracy(wanted)).with_conformal_factor().observe(&mut rows);
+        let with_all = problem.accuracy(wanted).with_conformal_factor().observe(&mut rows);
         let planned = with_all.plan(until).unwrap();
         assert_eq!((plan.integrator(), plan.count()), (planned.integrator(), planned.count()));
         assert_eq!(plan.run().unwrap().q, with_all.run(until).unwrap().q);
         assert_eq!(rows.rows.len(), plan.count().div_ceil(3) + 1);
-        assert!(error(problem.steps(Steps::Accuracy(wanted)), 20.0, truth).unwrap() <= wanted);
+        assert!(error(problem.accuracy(wanted), 20.0, truth).unwrap() <= wanted);
     }
 }

@@ -5,8 +5,8 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{FreeParticle, Pendulum};
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
-    DiscreteLagrangian, Flow, InputError, Integrator, Method, Midpoint, Outcome, Problem, Rectangle, Row, Rows, Status,
-    StepError, Steps, Until,
+    AnyIntegrator, DiscreteLagrangian, Flow, InputError, Method, Midpoint, Outcome, Problem, Rectangle, Row, Rows,
+    Status, StepError, Steps, Until,
 };
 use exact_lagrangian::{ContactExponential, Curve, ExactError, ExactLagrangian, SplineCurve, compose, error_orders};
 
@@ -26,7 +26,7 @@ fn every_step(
 ) -> (Outcome<1>, Vec<Row<1>>) {
     let problem = Problem::new(lagrangian, 0.0, start).unwrap();
     let mut rows = Rows::every(1).unwrap();
-    let run = problem.by(Integrator::Discrete(method)).steps(Steps::Size(h)).observe(&mut rows);
+    let run = problem.by(AnyIntegrator::Discrete(method)).steps(Steps::Size(h)).observe(&mut rows);
     let outcome = run.run(Until::Steps(steps)).unwrap();
     (outcome, rows.rows)
 }

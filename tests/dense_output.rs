@@ -4,8 +4,8 @@ use crate::gauss::{Claims, cut};
 use contact_geom::systems::{HarmonicOscillator, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, Larger, Largest, PhasePoint, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{
-    Crossing, Event, Events, Gauss, GaussRoute, InputError, Integrator, Outcome, Problem, Status, StepError, Stepper,
-    Steps, Until,
+    AnyIntegrator, Crossing, Event, Events, Gauss, GaussRoute, InputError, Outcome, Problem, Status, StepError,
+    Stepper, Steps, Until,
 };
 
 /// By each route one curve, and of order s between the nodes: halving the step divides the largest error along two units of time
@@ -60,7 +60,7 @@ fn events<'f, const N: usize, L: Lagrangian<N>>(
 ) -> (Outcome<N>, Vec<Crossing<N>>) {
     let mut events = Events::new(events);
     let problem = Problem::new(system, 0.0, x).unwrap();
-    let run = problem.by(Integrator::Gauss { stages }).steps(Steps::Count(steps)).observe(&mut events);
+    let run = problem.by(AnyIntegrator::Gauss { stages }).steps(Steps::Count(steps)).observe(&mut events);
     let outcome = run.run(Until::Time(until)).unwrap();
     (outcome, events.crossings)
 }

@@ -4,7 +4,7 @@
 use crate::common::{TOLERANCE, around, bounded, on_some, step_from, visit_kinds};
 use crate::gauss::distance;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{Lagrangian, Larger, Largest, PhasePoint, Triple, VelocityPoint, legendre};
+use contact_geom::{Derivatives, Lagrangian, Larger, Largest, PhasePoint, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{DiscreteLagrangian, Gauss, Stepper, derived_jet, statements};
 
 /// The stepper agrees with Newton's steps at random points of every system, and so does its `sigma_d`: to 1e-12, round-off times

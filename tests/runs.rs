@@ -10,7 +10,7 @@ use contact_geom::{
     legendre,
 };
 use discrete_herglotz::{
-    Flow, InputError, Integrator, Method, Midpoint, MomentumDecay, Obstacle, Outcome, Plan, Problem, Rows, Run,
+    AnyIntegrator, Flow, InputError, Method, Midpoint, MomentumDecay, Obstacle, Outcome, Plan, Problem, Rows, Run,
     SplittingScheme, Status, Steps, Until,
 };
 use exact_lagrangian::herglotz_flow;
@@ -33,8 +33,8 @@ fn start() -> VelocityPoint<1> {
     VelocityPoint::new([START[0]], [START[1]], START[2])
 }
 
-fn gauss(stages: usize) -> Integrator {
-    Integrator::Gauss { stages }
+fn gauss(stages: usize) -> AnyIntegrator {
+    AnyIntegrator::Gauss { stages }
 }
 
 /// The problem of a system from [`START`] at t = 0.
@@ -43,7 +43,10 @@ fn from_start<L: Lagrangian<1>>(lagrangian: &L) -> Problem<'_, L, 1> {
 }
 
 /// A run in ten steps.
-fn ten_steps<'p, L: Lagrangian<N>, const N: usize>(problem: &'p Problem<'p, L, N>, by: Integrator) -> Run<'p, L, N> {
+fn ten_steps<'p, 'o, L: Lagrangian<N>, const N: usize>(
+    problem: &'p Problem<'p, L, N>,
+    by: AnyIntegrator,
+) -> Run<'p, 'o, L, N> {
     problem.by(by).steps(Steps::Count(10))
 }
 
@@ -62,12 +65,12 @@ fn every_integrator() {
             let (t0, initial) = (system.initial_time(), system.initial());
             let truth = legendre(system, t0 + 0.5, &motion(system, t0, &initial, 0.5));
             let problem = Problem::new(system, t0, initial).unwrap();
-            for integrator in Integrator::all() {
+            for integrator in AnyIntegrator::all() {
                 if integrator.check(system).is_err() {
                     continue;
                 }
                 // In Kepler's problem from this start 1/32 of the clock's time is less than that of time.
-                let by_clock = matches!(integrator, Integrator::Clocked { .. });
+                let by_clock = matches!(integrator, AnyIntegrator::Clocked { .. });
                 let steps = if by_clock { Steps::Size(0.5 / 16.0) } else { Steps::Count(16) };
                 let outcome = problem.by(integrator).steps(steps).run(Until::Time(t0 + 0.5));
                 let Ok(Outcome { status: Status::Completed, q, p, z: Some(z), .. }) = outcome else {
@@ -102,7 +105,7 @@ fn what_is_left_out_changes_nothing() {
     fn compare<L: Lagrangian<N>, const N: usize>(
         lagrangian: &L,
         start: VelocityPoint<N>,
-        by: Integrator,
+        by: AnyIntegrator,
         group: Option<Symmetry<N>>,
     ) {
         let problem = Problem::new(lagrangian, 0.0, start).unwrap();
@@ -128,10 +131,11 @@ fn what_is_left_out_changes_nothing() {
         assert_eq!(observed, nothing, "{by}");
         assert!(bare.rows.iter().zip(&rows).all(|(a, b)| (a.q, a.p, a.z) == (b.q, b.p, None)), "{by}");
     }
-    let nystrom = Integrator::Splitting(SplittingScheme::BLANES_MOAN_6);
-    let drift_first = Integrator::Splitting(SplittingScheme::BLANES_CASAS_8);
-    let composition = Integrator::Splitting(SplittingScheme::KAHAN_LI_8);
-    for by in [gauss(3), gauss(8), gauss(16), nystrom, drift_first, composition, Integrator::Discrete(Method::Midpoint)]
+    let nystrom = AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6);
+    let drift_first = AnyIntegrator::Splitting(SplittingScheme::BLANES_CASAS_8);
+    let composition = AnyIntegrator::Splitting(SplittingScheme::KAHAN_LI_8);
+    for by in
+        [gauss(3), gauss(8), gauss(16), nystrom, drift_first, composition, AnyIntegrator::Discrete(Method::Midpoint)]
     {
         compare(&pendulum, start(), by, None);
         compare(&kepler, kepler.initial(), by, Some(Symmetry::Rotation(0, 1)));
@@ -146,8 +150,8 @@ fn what_is_left_out_changes_nothing() {
 fn the_conformal_factor() {
     let kepler = Kepler::<2> { mu: 1.0, gamma: -0.05 };
     let problem = Problem::new(&kepler, 0.0, kepler.initial()).unwrap();
-    let nystrom = Integrator::Splitting(SplittingScheme::BLANES_MOAN_6);
-    for by in [gauss(6), nystrom, Integrator::Composition(Method::Midpoint, SplittingScheme::KAHAN_LI_8)] {
+    let nystrom = AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6);
+    for by in [gauss(6), nystrom, AnyIntegrator::Composition(Method::Midpoint, SplittingScheme::KAHAN_LI_8)] {
         let group = Symmetry::Rotation(0, 1);
         let mut rows = Rows::every(10).unwrap().column(|_, x| group.momentum(&x.q, &x.p));
         // It asks for the factor.
@@ -216,9 +220,9 @@ fn plans_in_words() {
     assert!(said(&ten_steps(&of_double, gauss(8)).plan(until).unwrap(), true).contains(&"mass matrix"));
     // Splittings are explicit, discrete flows are not.
     for (by, computed) in [
-        (Integrator::Splitting(SplittingScheme::STRANG), false),
-        (Integrator::Discrete(Method::Strang), false),
-        (Integrator::Discrete(Method::Midpoint), true),
+        (AnyIntegrator::Splitting(SplittingScheme::STRANG), false),
+        (AnyIntegrator::Discrete(Method::Strang), false),
+        (AnyIntegrator::Discrete(Method::Midpoint), true),
     ] {
         let plan = ten_steps(&of_pendulum, by).plan(until).unwrap();
         assert!(said(&plan, computed).contains(&"Newton's method"), "{plan}");
@@ -235,11 +239,11 @@ fn steps_from_an_error() {
     for by in [
         gauss(2),
         gauss(6),
-        Integrator::Splitting(SplittingScheme::BLANES_MOAN_6),
-        Integrator::Discrete(Method::Midpoint),
+        AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6),
+        AnyIntegrator::Discrete(Method::Midpoint),
     ] {
         for wanted in [1e-3, 1e-6] {
-            let plan = problem.by(by).steps(Steps::Accuracy(wanted)).plan(until).unwrap();
+            let plan = problem.by(by).accuracy(wanted).plan(until).unwrap();
             let outcome = plan.run().unwrap();
             let error = ((outcome.q - truth.q).norm_squared() + (outcome.p - truth.p).norm_squared()).sqrt() / size;
             assert!(error <= wanted, "{by}: {error:e} for {wanted:e}");
@@ -249,7 +253,7 @@ fn steps_from_an_error() {
             assert!(error > wanted, "{by}: a fourth of the steps would do, {error:e} for {wanted:e}");
         }
     }
-    let refused = problem.by(gauss(8)).steps(Steps::Accuracy(1e-30)).plan(until).err();
+    let refused = problem.by(gauss(8)).accuracy(1e-30).plan(until).err();
     let Some(InputError::Accuracy { wanted: 1e-30, reached, cause: Obstacle::RoundOff }) = refused else {
         panic!("{refused:?}")
     };
@@ -275,14 +279,17 @@ fn bad_runs() {
     }
     assert!(matches!(steps(Steps::Count(0)), Some(InputError::Count { found: 0, .. })));
     for wanted in [-1.0, 0.0, f64::INFINITY] {
-        assert_eq!(steps(Steps::Accuracy(wanted)), Some(InputError::Tolerance { wanted }));
+        assert_eq!(problem.accuracy(wanted).plan(until).err(), Some(InputError::Tolerance { wanted }));
     }
     // A number of steps to end after: there is one at least, and their size is given.
     let until_steps = |steps: Steps, count: usize| problem.steps(steps).plan(Until::Steps(count)).err();
     assert!(matches!(until_steps(Steps::Size(0.1), 0), Some(InputError::Count { found: 0, .. })));
-    for steps in [Steps::Count(10), Steps::Accuracy(1e-6)] {
-        assert!(matches!(until_steps(steps, 10), Some(InputError::Hypothesis { .. })), "{steps:?}");
-    }
+    assert!(matches!(until_steps(Steps::Count(10), 10), Some(InputError::Hypothesis { .. })));
+    let accurate = problem.accuracy(1e-6).plan(Until::Steps(10)).err();
+    assert!(matches!(accurate, Some(InputError::Hypothesis { .. })));
+    // A run has steps, and given steps an integrator.
+    assert_eq!(problem.by(gauss(4)).plan(until).err(), Some(InputError::NoSteps));
+    assert_eq!(problem.accuracy(1e-6).steps(Steps::Count(4)).plan(until).err(), Some(InputError::NoIntegrator));
     // More steps than times can be told apart, and more rows than can be kept.
     for many in [Steps::Size(1e-300), Steps::Size(1e-17), Steps::Count(usize::MAX), Steps::Count(1 << 61)] {
         assert!(matches!(steps(many), Some(InputError::TooMany { .. })), "{many:?}");
@@ -294,15 +301,15 @@ fn bad_runs() {
     let nowhere = VelocityPoint::new([f64::NAN], [0.0], 0.0);
     assert!(matches!(Problem::new(&pendulum, 0.0, nowhere).err(), Some(InputError::Geometry(_))));
     // Hypotheses are named.
-    let nystrom = Integrator::Splitting(SplittingScheme::BLANES_MOAN_6);
+    let nystrom = AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6);
     let unclaimed = Claiming(pendulum, Structure::default());
     let refused = ten_steps(&from_start(&unclaimed), nystrom).plan(until).err();
     assert_eq!(refused, Some(InputError::Unclaimed { claim: "separable" }));
     let refused = ten_steps(&from_start(&square), nystrom).plan(until).err();
     assert_eq!(refused, Some(InputError::Unclaimed { claim: "z_affine" }));
-    let of_nystrom = Integrator::Composition(Method::Midpoint, SplittingScheme::BLANES_MOAN_6);
+    let of_nystrom = AnyIntegrator::Composition(Method::Midpoint, SplittingScheme::BLANES_MOAN_6);
     assert!(matches!(by(of_nystrom), Some(InputError::Hypothesis { .. })));
-    let of_rectangle = Integrator::Composition(Method::Rectangle, SplittingScheme::YOSHIDA_4);
+    let of_rectangle = AnyIntegrator::Composition(Method::Rectangle, SplittingScheme::YOSHIDA_4);
     assert!(matches!(by(of_rectangle), Some(InputError::Hypothesis { .. })));
     // A false claim is found by the probe.
     let quadratic = Claiming(pendulum, Structure { quadratic: true, ..pendulum.structure() });
@@ -333,7 +340,7 @@ fn from_two_points() {
     assert_eq!(problem.state(), flow.state());
     assert_eq!((problem.start().q, problem.start().z), (points.q0, points.z0));
     // Its first step by the same rule leads to the second point.
-    let run = problem.by(Integrator::Discrete(Method::Midpoint)).steps(Steps::Size(0.1));
+    let run = problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Size(0.1));
     let first = run.run(Until::Steps(1)).unwrap();
     assert!((first.q - points.q1).largest() <= 4.0 * f64::EPSILON, "{}", first.q);
     let not_finite = DiscretePoint::new([0.3], [f64::NAN], 0.1);
@@ -344,11 +351,11 @@ fn from_two_points() {
 /// Names are read back; an unknown one lists those that are known.
 #[test]
 fn names() {
-    for integrator in Integrator::all() {
+    for integrator in AnyIntegrator::all() {
         assert_eq!(integrator.to_string().parse(), Ok(integrator));
         assert!(integrator.order() >= 1);
     }
-    let error = "gauss_17".parse::<Integrator>().err().map(|e| e.to_string()).unwrap_or_default();
+    let error = "gauss_17".parse::<AnyIntegrator>().err().map(|e| e.to_string()).unwrap_or_default();
     for known in ["midpoint", "gauss_16", "clocked_gauss_8", "kahan_li_8", "midpoint_by_yoshida_4"] {
         assert!(error.contains(known), "{error}");
     }

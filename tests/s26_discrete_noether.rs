@@ -5,7 +5,7 @@ use crate::common::{over_discretisations, pairs};
 use contact_geom::systems::{Kepler, SphericalPendulum, System};
 use contact_geom::{DiscretePoint, larger};
 use discrete_herglotz::{
-    Integrator, LeftMidpoint, Method, MomentumDecay, Problem, Status, Steps, Until, discrete_symmetry_defect,
+    AnyIntegrator, LeftMidpoint, Method, MomentumDecay, Problem, Status, Steps, Until, discrete_symmetry_defect,
 };
 
 /// Statement 25, with every discretisation of every system that has a symmetry. Cartesian rules keep the linear symmetries
@@ -30,7 +30,7 @@ fn along_a_run() {
         for method in Method::applicable(&system.structure()) {
             for group in system.symmetries() {
                 let mut decay = MomentumDecay::new(group);
-                let run = problem.by(Integrator::Discrete(method)).steps(Steps::Size(h)).observe(&mut decay);
+                let run = problem.by(AnyIntegrator::Discrete(method)).steps(Steps::Size(h)).observe(&mut decay);
                 let outcome = run.run(Until::Steps(1000)).unwrap();
                 assert_eq!(
                     (outcome.status, outcome.steps),

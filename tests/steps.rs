@@ -5,8 +5,8 @@ use crate::common::{around, discretise, on_random, step_from};
 use contact_geom::systems::{Chain, Pendulum, System, SystemVisitor, visit_catalogue};
 use contact_geom::{DiscretePoint, Larger, Largest, PhasePoint, Scalar, Triple, legendre};
 use discrete_herglotz::{
-    DiscreteLagrangian, Flow, Integrator, Method, Midpoint, Moment, Problem, Rows, Solver, Status, StepError, Stepper,
-    Steps, Stop, Until, legendre_minus,
+    AnyIntegrator, DiscreteLagrangian, Flow, Method, Midpoint, Moment, Problem, Rows, Solver, Status, StepError,
+    Stepper, Steps, Stop, Until, legendre_minus,
 };
 use std::ops::ControlFlow;
 
@@ -112,7 +112,7 @@ fn a_large_chain() {
 fn records() {
     let pendulum = Pendulum::default();
     let problem = Problem::new(&pendulum, 2.0, PhasePoint::new([1.0], [0.5], 0.2)).unwrap();
-    let by_rule = Integrator::Discrete(Method::LeftMidpoint);
+    let by_rule = AnyIntegrator::Discrete(Method::LeftMidpoint);
     let counter = |at: &Moment<'_, 1>| match at.k {
         25 => ControlFlow::Break(Stop::here("the counter")),
         _ => ControlFlow::Continue(()),

@@ -4,7 +4,7 @@
 
 use contact_geom::VelocityPoint;
 use contact_geom::systems::Pendulum;
-use discrete_herglotz::{InputError, Integrator, Outcome, Problem, Row, Rows, Steps, Until};
+use discrete_herglotz::{InputError, AnyIntegrator, Outcome, Problem, Row, Rows, Steps, Until};
 use libfuzzer_sys::fuzz_target;
 
 /// The most steps of a run.
@@ -23,7 +23,7 @@ fuzz_target!(|input: ([f64; 6], u8, u16, Option<u16>, bool)| {
 
 fn run(input: ([f64; 6], u8, u16, Option<u16>, bool)) -> Result<(Outcome<1>, Vec<Row<1>>), InputError> {
     let ([q, v, z, t0, span, gamma], integrator, count, stride, action) = input;
-    let all = Integrator::all();
+    let all = AnyIntegrator::all();
     let system = Pendulum { gamma };
     let mut rows = stride.map(|stride| Rows::every(usize::from(stride))).transpose()?;
     if !action {

@@ -23,8 +23,8 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Method::check", "takes no number"),
     ("Method::applicable", "takes no number"),
     ("SplittingScheme::*", "tables: take no number"),
-    ("Integrator::all", "takes no number"),
-    ("Integrator::order", "takes no number; that of any number of stages is in the attack on check"),
+    ("AnyIntegrator::all", "takes no number"),
+    ("AnyIntegrator::order", "takes no number; that of any number of stages is in the attack on check"),
     ("ActionFlow::*", "the implementor's; that of Riccati is attacked with what calls it"),
     ("Observer::*", "the implementor's; what a run makes of odd ones is in the attack on Run::observe"),
 ];

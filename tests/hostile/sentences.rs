@@ -7,7 +7,7 @@ use contact_geom::{
     herglotz_field, linear,
 };
 use discrete_herglotz::{
-    Composition, DiscreteLagrangian, Event, Events, Flow, Gauss, InputError, Integrator, LeftMidpoint, Method,
+    AnyIntegrator, Composition, DiscreteLagrangian, Event, Events, Flow, Gauss, InputError, LeftMidpoint, Method,
     Midpoint, Moment, Obstacle, Problem, Rectangle, Rows, Solver, SplittingScheme, Status, StepError, Stepper, Steps,
     Stop, Strang, Suspicion, UnknownIntegrator, UnknownMethod, Until,
 };
@@ -129,14 +129,16 @@ fn input_errors() {
     let kepler = Kepler::<2>::default();
     let circle = PhasePoint::new([1.0, 0.0], [0.0, 1.0], 0.0);
     every!(InputError {
-        InputError::Step { .. } => in_steps(Steps::Size(-0.25)), ["-0.25", "finite number, not 0", "positive where the span tells"];
+        InputError::Step { .. } => in_steps(Steps::Size(-0.25)), ["-0.25", "finite number and not 0", "positive where the end of the run tells"];
         InputError::Span { .. } => problem.steps(Steps::Count(1)).plan(Until::Time(0.5)).err().unwrap(), ["is 0;", "finite and not 0", "negative to go back"];
         InputError::Accuracy { .. } => {
-            let run = problem.by(Integrator::Gauss { stages: 8 }).steps(Steps::Accuracy(1e-17));
+            let run = problem.by(AnyIntegrator::Gauss { stages: 8 }).accuracy(1e-17);
             run.plan(Until::Time(5.5)).err().unwrap()
         }, ["1e-17", "ask for less"];
-        InputError::Tolerance { .. } => in_steps(Steps::Accuracy(-0.5)), ["-0.5", "positive and finite"];
+        InputError::Tolerance { .. } => problem.accuracy(-0.5).plan(Until::Time(5.5)).err().unwrap(), ["-0.5", "positive and finite"];
         InputError::TooMany { .. } => in_steps(Steps::Size(1e-300)), ["the number of steps", "e300", "longer steps"];
+        InputError::NoSteps => problem.by(AnyIntegrator::Gauss { stages: 8 }).plan(Until::Time(5.5)).err().unwrap(), ["`steps`", "`accuracy`"];
+        InputError::NoIntegrator => problem.accuracy(0.5).steps(Steps::Count(1)).plan(Until::Time(5.5)).err().unwrap(), ["`by`", "`accuracy`"];
         InputError::Times { .. } => {
             let mut rows = Rows::at([0.5, 7.25]).unwrap();
             problem.steps(Steps::Count(1)).observe(&mut rows).run(Until::Time(5.5)).unwrap_err()
@@ -202,7 +204,7 @@ fn obstacles() {
     let start = VelocityPoint::new([1.0], [0.0], 1.0);
     let obstacle = |system: &Odd, by: &str, span: f64, wanted: f64| {
         let problem = Problem::new(system, 0.0, start).unwrap();
-        let run = problem.by(by.parse().unwrap()).steps(Steps::Accuracy(wanted));
+        let run = problem.by(by.parse::<AnyIntegrator>().unwrap()).accuracy(wanted);
         match run.plan(Until::Time(span)).err() {
             Some(InputError::Accuracy { cause, .. }) => cause,
             other => panic!("{other:?}"),
@@ -278,7 +280,7 @@ fn step_errors() {
 fn statuses() {
     let (pendulum, explosive) = (Pendulum::default(), Explosive);
     let problem = Problem::new(&pendulum, 0.0, pendulum_at(0.5)).unwrap();
-    let run = || problem.by(Integrator::Discrete(Method::Midpoint)).steps(Steps::Size(0.1));
+    let run = || problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Size(0.1));
     let blows_up = Problem::new(&explosive, 0.0, PhasePoint::new([0.0], [0.1], 1.0)).unwrap();
     every!(Status {
         Status::Completed => run().run(Until::Steps(3)).unwrap().status, ["completed"];
@@ -295,14 +297,14 @@ fn statuses() {
             problem.steps(Steps::Count(1000)).run(Until::Time(10.0)).unwrap().status
         }, ["unreliable: after step ", "not quadratic", "correct its structure"];
         Status::Failed { .. } => {
-            let run = blows_up.by(Integrator::Discrete(Method::LeftMidpoint)).steps(Steps::Size(0.01));
+            let run = blows_up.by(AnyIntegrator::Discrete(Method::LeftMidpoint)).steps(Steps::Size(0.01));
             run.run(Until::Steps(4000)).unwrap().status
         }, ["failed in step", "at t = ", "without bound"];
     });
     // The ways in which a run with events ends; what was found before is kept.
     let run = |event: Event<'_, 1>, steps| {
         let mut events = Events::new([event]);
-        let run = blows_up.by(Integrator::Gauss { stages: 2 }).steps(Steps::Size(0.1)).observe(&mut events);
+        let run = blows_up.by(AnyIntegrator::Gauss { stages: 2 }).steps(Steps::Size(0.1)).observe(&mut events);
         (run.run(Until::Steps(steps)).unwrap().status, events.crossings.len())
     };
     assert_eq!(run(Event::new(|_, _| 1.0), 2), (Status::Completed, 0));
@@ -375,7 +377,7 @@ fn names_that_are_none() {
     let UnknownMethod { name } = "mid-point".parse::<Method>().unwrap_err();
     let sentence = UnknownMethod { name }.to_string();
     assert!(sentence.contains("\"mid-point\"") && sentence.contains("left_midpoint, midpoint"), "{sentence}");
-    let UnknownIntegrator { name } = "gauss_17".parse::<Integrator>().unwrap_err();
+    let UnknownIntegrator { name } = "gauss_17".parse::<AnyIntegrator>().unwrap_err();
     let sentence = UnknownIntegrator { name }.to_string();
     assert!(sentence.contains("\"gauss_17\"") && sentence.contains("gauss_16"), "{sentence}");
     let sentence = Suspicion { step: 7, misfit: 12.5 }.to_string();

@@ -4,7 +4,7 @@ use super::dice::Dice;
 use super::problem::{Problem, integrators};
 use super::truth::{NoTruth, truth};
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
-use discrete_herglotz::{Status, Steps};
+use discrete_herglotz::Status;
 
 /// The most steps that a case may take.
 const STEPS: usize = 200_000;
@@ -20,7 +20,7 @@ pub fn accurate<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checke
         Ok(posed) => posed,
         Err(error) => return Ok(refused(&error)),
     };
-    let run = posed.by(integrator).steps(Steps::Accuracy(tolerance));
+    let run = posed.by(integrator).accuracy(tolerance);
     let run = if action { run } else { run.without_action() };
     let plan = match run.plan(problem.until()) {
         Ok(plan) => plan,

@@ -34,7 +34,7 @@ struct Asked<const N: usize> {
 }
 
 impl<const N: usize> Asked<N> {
-    fn of<'p>(&self, run: Run<'p, RandomSystem<N>, N>) -> Run<'p, RandomSystem<N>, N> {
+    fn of<'p, 'o>(&self, run: Run<'p, 'o, RandomSystem<N>, N>) -> Run<'p, 'o, RandomSystem<N>, N> {
         let run = if self.action { run } else { run.without_action() };
         if self.conformal_factor { run.with_conformal_factor() } else { run }
     }

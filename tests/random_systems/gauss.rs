@@ -5,7 +5,7 @@ use super::flows::{is_conformal, step_solves_its_equations};
 use super::problem::Problem;
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
 use contact_geom::{PhasePoint, Triple, larger, largest, legendre};
-use discrete_herglotz::{Event, Events, Gauss, Halt, Integrator, Start, Status, Stepper, Steps, Until};
+use discrete_herglotz::{AnyIntegrator, Event, Events, Gauss, Halt, Start, Status, Stepper, Steps, Until};
 
 pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let Problem { system, t0, start, .. } = problem;
@@ -85,7 +85,7 @@ fn with_events<const N: usize>(
     let mut events = Events::new([if terminal { event.terminal() } else { event }]);
     // A run is refused more than a stepper: it looks at the claims along the whole span.
     let Ok(posed) = problem.posed() else { return Ok(()) };
-    let by_steps = posed.by(Integrator::Gauss { stages }).steps(Steps::Size(h)).observe(&mut events);
+    let by_steps = posed.by(AnyIntegrator::Gauss { stages }).steps(Steps::Size(h)).observe(&mut events);
     let Ok(plan) = by_steps.plan(Until::Steps(steps)) else { return Ok(()) };
     // It may differ from h in the last digit.
     let of_run = plan.step_size();

@@ -4,11 +4,11 @@ use super::dice::Dice;
 use super::system::RandomSystem;
 use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::SVector;
-use discrete_herglotz::{InputError, Integrator, Until};
+use discrete_herglotz::{AnyIntegrator, InputError, Until};
 
 /// The integrators that may apply: random systems state no clock.
-pub fn integrators() -> Vec<Integrator> {
-    Integrator::all().into_iter().filter(|integrator| !matches!(integrator, Integrator::Clocked { .. })).collect()
+pub fn integrators() -> Vec<AnyIntegrator> {
+    AnyIntegrator::all().into_iter().filter(|integrator| !matches!(integrator, AnyIntegrator::Clocked { .. })).collect()
 }
 
 /// A system with the time, the place and the span of a motion.

@@ -6,7 +6,9 @@
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
-use discrete_herglotz::{InputError, Integrator, Outcome, Problem, Rows, Run, SplittingScheme, Status, Steps, Until};
+use discrete_herglotz::{
+    AnyIntegrator, InputError, Outcome, Problem, Rows, Run, SplittingScheme, Status, Steps, Until,
+};
 use std::hint::black_box;
 use std::io::Write;
 use std::time::Instant;
@@ -84,14 +86,14 @@ fn line<const N: usize>(
 fn lines() -> Result<Vec<Line>, InputError> {
     let start = VelocityPoint::new([1.0], [1.0], 0.0);
     let late = Until::Time(1000.0);
-    let sixteen = Integrator::Gauss { stages: 16 };
-    let eight = Integrator::Gauss { stages: 8 };
-    let nystrom = Integrator::Splitting(SplittingScheme::BLANES_MOAN_6);
+    let sixteen = AnyIntegrator::Gauss { stages: 16 };
+    let eight = AnyIntegrator::Gauss { stages: 8 };
+    let nystrom = AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6);
 
     let pendulum = Pendulum { gamma: -0.01 };
     let swing = Problem::new(&pendulum, 0.0, start)?;
-    let with_z = |by: Integrator, h: f64| steps(&swing.by(by).steps(Steps::Size(h)), late);
-    let without_z = |by: Integrator, h: f64| steps(&swing.by(by).steps(Steps::Size(h)).without_action(), late);
+    let with_z = |by: AnyIntegrator, h: f64| steps(&swing.by(by).steps(Steps::Size(h)), late);
+    let without_z = |by: AnyIntegrator, h: f64| steps(&swing.by(by).steps(Steps::Size(h)).without_action(), late);
     let affine = Structure { separable: false, ..pendulum.structure() };
     let constant_mass = Claiming(pendulum, affine);
     let plain = Claiming(pendulum, Structure { constant_mass: false, ..affine });
@@ -119,7 +121,7 @@ fn lines() -> Result<Vec<Line>, InputError> {
     let without_factor = decaying().plan(Until::Time(100.0))?;
     let double = DoublePendulum::default();
     let chaos = Problem::new(&double, 0.0, double.initial())?;
-    let by = |integrator: Integrator| steps(&chaos.by(integrator).steps(Steps::Size(0.05)), Until::Time(20.0));
+    let by = |integrator: AnyIntegrator| steps(&chaos.by(integrator).steps(Steps::Size(0.05)), Until::Time(20.0));
 
     Ok(vec![
         line(("z", "pendulum, gauss_16"), with_z(sixteen, 2.5), without_z(sixteen, 2.5))?,
@@ -138,8 +140,8 @@ fn lines() -> Result<Vec<Line>, InputError> {
         line(("mass matrix at the stages", "pendulum, gauss_8"), general(&plain), general(&constant_mass))?,
         line(
             ("Newton's method", "double pendulum, midpoint by composition or gauss_3"),
-            by(Integrator::Composition(discrete_herglotz::Method::Midpoint, SplittingScheme::YOSHIDA_6)),
-            by(Integrator::Gauss { stages: 3 }),
+            by(AnyIntegrator::Composition(discrete_herglotz::Method::Midpoint, SplittingScheme::YOSHIDA_6)),
+            by(AnyIntegrator::Gauss { stages: 3 }),
         )?,
         line(("rows", "pendulum, blanes_moan_6"), whole(recorded), whole(unrecorded))?,
         line(

@@ -6,8 +6,10 @@ use thiserror::Error;
 /// Bad input, found before the first step.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum InputError {
-    /// The step is 0 or not finite, or negative where the direction of a run is that of its span.
-    #[error("the step h = {h} must be a finite number, not 0, and positive where the span tells the direction")]
+    /// The step is 0 or not finite, or negative where something else tells the direction, as the end of a run does.
+    #[error(
+        "the step h = {h} must be a finite number and not 0; and positive where the end of the run tells its direction"
+    )]
     Step {
         /// The step that was passed.
         h: f64,

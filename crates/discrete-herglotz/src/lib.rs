@@ -36,7 +36,7 @@ pub use rules::{
     Method, Midpoint, Node, Quadrature, Rectangle, Rule, Trapezoidal, UnknownMethod,
 };
 pub use run::{
-    AnyIntegrator, Course, Crossing, Direction, Doubt, Event, Events, Facts, Halt, Integrator, Item, LastStep, Moment,
+    AnyIntegrator, Course, Crossing, Doubt, Event, Events, Facts, Halt, Integrator, Item, LastStep, Moment,
     MomentumDecay, MomentumRow, Needs, Observer, Outcome, Plan, Problem, Row, Rows, Run, Start, Stepper, Steps, Stop,
     UnknownIntegrator, Until, Wants, verified,
 };

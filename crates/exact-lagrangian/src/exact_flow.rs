@@ -22,12 +22,7 @@ pub struct ExactFlow;
 
 impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for ExactFlow {
     fn facts(&self) -> Facts {
-        Facts {
-            symmetric: true,
-            explicit: true,
-            exact_rate: true,
-            ..Facts::of_discrete::<N>("exact", u32::MAX)
-        }
+        Facts { symmetric: true, explicit: true, exact_rate: true, ..Facts::of_discrete::<N>("exact", u32::MAX) }
     }
 
     fn check(&self, _lagrangian: &L) -> Result<(), InputError> {

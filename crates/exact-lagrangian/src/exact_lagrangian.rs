@@ -5,7 +5,8 @@ use crate::{ContactExponential, ExactError, Motion, herglotz_flow};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Triple, VelocityPoint,
+    Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Triple,
+    VelocityPoint,
 };
 use discrete_herglotz::{
     DiscreteLagrangian, ITERATION_LIMIT, InputError, Solver, StepError, Transition, last_correction,

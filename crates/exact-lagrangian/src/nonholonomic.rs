@@ -6,7 +6,8 @@ use crate::{ExactError, Motion};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{
-    Border, Dual, GeometryError, Lagrangian, Module, Regularity, Scalar, Triple, VelocityPoint, larger, seed,
+    Border, Derivatives, Dual, GeometryError, Lagrangian, Module, Regularity, Scalar, Triple, VelocityPoint, larger,
+    seed,
 };
 
 /// A point `(q, z, v, w)` of T(Q x R); on `M_L` where `w = L(q, v, z)`.

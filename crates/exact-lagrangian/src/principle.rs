@@ -4,7 +4,7 @@ use crate::flow::{ACCURACY, Work, integrate};
 use crate::panel::{Rate, Rates, State};
 use crate::{ExactError, herglotz_flow};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{GeometryError, Lagrangian, Scalar, VelocityPoint};
+use contact_geom::{Derivatives, GeometryError, Lagrangian, Scalar, VelocityPoint};
 
 /// A curve in Q, or a variation of one: position and velocity at each time, counted from the curve's start.
 ///

@@ -22,8 +22,8 @@ use crate::{
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::systems::System;
 use contact_geom::{
-    DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, Larger, Largest, PhasePoint, Scalar, SecondDiscreteJet,
-    Smooth, Triple, VelocityPoint, herglotz_rates, larger, legendre, seed,
+    Derivatives, DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, Larger, Largest, PhasePoint, Scalar,
+    SecondDiscreteJet, Smooth, Triple, VelocityPoint, herglotz_rates, larger, legendre, seed,
 };
 use discrete_herglotz::{
     DiscreteLagrangian, InputError, StepError, derived_jet, derived_second_jet, discrete_flow, legendre_minus_inverse,

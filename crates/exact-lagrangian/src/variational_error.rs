@@ -1,7 +1,7 @@
 //! Variational error analysis: how well a discrete Lagrangian matches the exact one, and what order its flow has.
 
 use crate::{ExactError, herglotz_flow};
-use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Triple, VelocityPoint, larger};
+use contact_geom::{Derivatives, DiscretePoint, Lagrangian, PhasePoint, Triple, VelocityPoint, larger};
 use discrete_herglotz::{DiscreteLagrangian, InputError, Solver, legendre_minus, legendre_plus};
 
 /// What the errors at all time steps say of an order.

@@ -7,7 +7,7 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{Pendulum, QuadraticInZ};
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Structure, Symmetry, Triple};
 use discrete_herglotz::{
-    ActionStrang, DiscreteLagrangian, DiscretePath, Gauss, HamiltonianFlow, Integrator, Method, Midpoint,
+    ActionStrang, AnyIntegrator, DiscreteLagrangian, DiscretePath, Gauss, HamiltonianFlow, Method, Midpoint,
     MomentumDecay, MomentumRow, Problem, Rectangle, Riccati, Solver, Steps, Strang, Transition, Trapezoidal, Until,
     derived_jet, derived_second_jet, discrete_action, discrete_flow, discrete_flow_jacobian, discrete_momentum,
     discrete_regularity, discrete_symmetry_defect, hamiltonian_flow, hamiltonian_flow_jacobian, last_correction,
@@ -234,7 +234,7 @@ fn momenta(report: &mut Report) {
         let mut decay = MomentumDecay::new(Symmetry::Translation(SVector::from([1.0])));
         let problem = Problem::new(&Claiming, 0.4, PhasePoint::new([0.1], [value], 0.0));
         let observed = problem.and_then(|problem| {
-            let run = problem.by(Integrator::Discrete(Method::Midpoint)).steps(Steps::Count(3)).observe(&mut decay);
+            let run = problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Count(3)).observe(&mut decay);
             run.run(Until::Time(0.6)).map(|outcome| outcome.p)
         });
         let rows = decay.rows.iter().map(|row| (row.momentum, row.predicted)).collect::<Vec<_>>();

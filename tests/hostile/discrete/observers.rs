@@ -5,8 +5,8 @@ use crate::Attack;
 use crate::numbers::{Everything, HOSTILE, Report, fine, triples};
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::{
-    Course, Event, Events, InputError, Integrator, Moment, Needs, Observer, Outcome, Problem, Rows, Status, StepError,
-    Steps, Stop, Until,
+    AnyIntegrator, Course, Event, Events, InputError, Moment, Needs, Observer, Outcome, Problem, Rows, Status,
+    StepError, Steps, Stop, Until,
 };
 use std::ops::ControlFlow;
 
@@ -87,7 +87,7 @@ fn rows(report: &mut Report) {
 /// A run of [`Everything`] by Gauss steps of a tenth with events, from t = 0.
 fn with_events(events: &mut Events<'_, 1>, until: Until) -> Result<Outcome<1>, InputError> {
     let problem = Problem::new(&Everything, 0.0, VelocityPoint::from(triples()[0]))?;
-    problem.by(Integrator::Gauss { stages: 4 }).steps(Steps::Size(0.1)).observe(events).run(until)
+    problem.by(AnyIntegrator::Gauss { stages: 4 }).steps(Steps::Size(0.1)).observe(events).run(until)
 }
 
 fn events(report: &mut Report) {
@@ -195,7 +195,7 @@ fn odd_observers(report: &mut Report) {
     }
     // To the accuracy of every run of which nothing is said.
     let mut last = AsksFor(usize::MAX, Vec::new());
-    let outcome = problem.observe(&mut last).run(Until::Time(0.5)).unwrap();
+    let outcome = problem.accuracy(1e-9).observe(&mut last).run(Until::Time(0.5)).unwrap();
     report.check(last.1 == [outcome.steps] && outcome.status == Status::Completed, || format!("{outcome:?}"));
     let all = [(false, false), (false, true), (true, false), (true, true)];
     for (a, b) in all.into_iter().flat_map(|a| all.map(|b| (a, b))) {

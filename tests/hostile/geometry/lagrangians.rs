@@ -6,7 +6,7 @@ use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::statements::ActionSquared;
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField};
 use contact_geom::{
-    Clock, Dual, Lagrangian, Regularity, Structure, ValueOnly, VelocityPoint, check_closed_derivatives,
+    Clock, Derivatives, Dual, Lagrangian, Regularity, Structure, ValueOnly, VelocityPoint, check_closed_derivatives,
     derived_gradient, derived_hessian, herglotz_field, herglotz_rates, legendre, legendre_jacobian, regularity,
     statements,
 };

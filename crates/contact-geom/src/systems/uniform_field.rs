@@ -2,7 +2,7 @@
 
 use super::closed_form::{relative_exp_m1, second_relative_exp, third_relative_exp};
 use super::{System, between};
-use crate::{Derivatives, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
+use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
 /// A particle falling in a uniform field with linear drag, `L = |v|^2/2 + a . q + gamma z` in R^D. Dimensionless: any units
@@ -111,7 +111,7 @@ impl<const D: usize> System<D> for UniformField<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Larger, Largest, OneParameterGroup};
+    use crate::{Derivatives, Larger, Largest, OneParameterGroup};
 
     const GAMMAS: [f64; 9] = [-1e3, -40.0, -2.5, -0.1, -1e-9, 0.0, 1e-15, 0.7, 3.0];
     const EPS: f64 = f64::EPSILON;

@@ -5,15 +5,11 @@ use crate::{InputError, StepError};
 use contact_geom::PhasePoint;
 use std::ops::ControlFlow;
 
-/// Which changes of sign count.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Direction {
-    /// From negative to positive, in the sense of the run.
+/// Which changes of sign count, in the sense of the run.
+#[derive(Clone, Copy)]
+enum Direction {
     Rising,
-    /// From positive to negative.
     Falling,
-    /// Either.
-    #[default]
     Both,
 }
 

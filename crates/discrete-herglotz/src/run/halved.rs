@@ -32,7 +32,8 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         let relative = |apart: f64, size: f64| if apart == 0.0 { 0.0 } else { apart / size };
         let width = larger(size([&from.q, &to.q, &fine.q]), rounding(&start.q, &start.v, self.h));
         let of_v = apart(&coarse_v, &fine_v);
-        let of_v = if of_v * self.h > LEAST * width { relative(of_v, size([&v, &coarse_v, &fine_v])) } else { 0.0 };
+        let of_v =
+            if of_v * self.h.abs() > LEAST * width { relative(of_v, size([&v, &coarse_v, &fine_v])) } else { 0.0 };
         Some(larger(relative(apart(&to.q, &fine.q), width), of_v) / APART)
     }
 

@@ -21,7 +21,7 @@ pub(crate) mod verified;
 pub(crate) mod watch;
 
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
-pub use events::{Crossing, Direction, Event, Events};
+pub use events::{Crossing, Event, Events};
 pub(crate) use explain::DECOUPLED;
 pub use explain::Item;
 pub use integrator::{Facts, Integrator, Wants};
@@ -73,6 +73,8 @@ type Choose<'p, L, const N: usize> = fn(&Task<'p, L, N>, f64) -> Result<Choice<'
 /// How long the steps of a run are to be.
 enum Length<'p, L, const N: usize> {
     Given(Steps),
+    /// So many steps of this length exactly.
+    Exactly(usize, f64),
     For(f64, Choose<'p, L, N>),
 }
 
@@ -110,15 +112,15 @@ struct Task<'p, L, const N: usize> {
 /// println!("{}: q = {} after {} steps", outcome.status, outcome.q[0], outcome.steps);
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
-pub struct Run<'p, L, const N: usize> {
+pub struct Run<'p, 'o, L, const N: usize> {
     problem: &'p Problem<'p, L, N>,
     integrator: Option<Shared<'p, L, N>>,
     length: Option<Length<'p, L, N>>,
     needs: Needs,
-    observers: Vec<Box<dyn Observer<N> + 'p>>,
+    observers: Vec<Box<dyn Observer<N> + 'o>>,
 }
 
-impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, L, N> {
+impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     fn of(problem: &'p Problem<'p, L, N>) -> Self {
         let needs = Needs { action: true, conformal_factor: false };
         Run { problem, integrator: None, length: None, needs, observers: Vec::new() }
@@ -146,7 +148,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, L, N> {
     }
 
     /// The same under the eyes of one more observer, which sees what those before it have seen.
-    pub fn observe(mut self, observer: &'p mut impl Observer<N>) -> Self {
+    pub fn observe(mut self, observer: &'o mut impl Observer<N>) -> Self {
         self.observers.push(Box::new(observer::Borrowed(observer)));
         self
     }
@@ -174,9 +176,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, L, N> {
             (Until::Time(t), _) => (t, t - t0, length),
             (Until::After(span), _) => (t0 + span, span, length),
             (Until::Steps(0), _) => return Err(NO_STEP),
+            (Until::Steps(_), Length::Given(Steps::Size(h))) if !(h != 0.0 && h.is_finite()) => {
+                return Err(InputError::Step { h });
+            }
             (Until::Steps(count), Length::Given(Steps::Size(h))) => {
                 let span = count as f64 * h;
-                (t0 + span, span, Length::Given(Steps::Count(count)))
+                (t0 + span, span, Length::Exactly(count, h))
             }
             (Until::Steps(_), _) => {
                 return Err(InputError::Hypothesis {
@@ -211,6 +216,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Task<'p, L, N> {
         let choice = match length {
             Length::For(wanted, choose) => choose(self, wanted)?,
             Length::Given(steps) => self.given(steps)?,
+            Length::Exactly(count, h) => Choice { h, ..self.given(Steps::Count(count))? },
         };
         check_count(choice.count as f64)?;
         let plan = Plan::new(self, &choice)?;

@@ -1,9 +1,9 @@
 //! Problems: a Lagrangian with a start.
 
-use super::{Integrator, Run};
+use super::{Integrator, Run, Steps};
 use crate::gauss::velocity;
 use crate::run::verified::verified;
-use crate::{DiscreteLagrangian, InputError, StepError, discrete_regularity, legendre_minus};
+use crate::{DiscreteLagrangian, GaussCollocation, InputError, StepError, discrete_regularity, legendre_minus};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
     Derivatives, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Regularity, Structure, VelocityPoint, largest,
@@ -108,12 +108,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     }
 
     /// A run of it by an integrator.
-    pub fn by<'p>(&'p self, integrator: impl Integrator<'p, L, N> + 'p) -> Run<'p, L, N> {
+    pub fn by<'p, 'o>(&'p self, integrator: impl Integrator<'p, L, N> + 'p) -> Run<'p, 'o, L, N> {
         Run::of(self).by(integrator)
     }
 
+    /// A run of it by given steps of contact Gauss collocation with eight stages.
+    pub fn steps<'o>(&self, steps: Steps) -> Run<'_, 'o, L, N> {
+        self.by(GaussCollocation { stages: 8 }).steps(steps)
+    }
+
     /// A run of it to a relative error of (q, p), by an integrator that is chosen for it; see [`Run::accuracy`].
-    pub fn accuracy(&self, wanted: f64) -> Run<'_, L, N> {
+    pub fn accuracy<'o>(&self, wanted: f64) -> Run<'_, 'o, L, N> {
         Run::of(self).accuracy(wanted)
     }
 

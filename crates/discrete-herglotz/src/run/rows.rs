@@ -68,9 +68,10 @@ impl<'f, const N: usize> Rows<'f, N> {
     /// [`InputError::Times`] for times that are not finite or not in order.
     pub fn at(times: impl IntoIterator<Item = f64>) -> Result<Self, InputError> {
         let times: Vec<f64> = times.into_iter().collect();
-        let rising = times.windows(2).all(|pair| pair[0] < pair[1]);
-        let ordered = rising || times.windows(2).all(|pair| pair[0] > pair[1]);
-        match times.iter().position(|t| !t.is_finite()).or((!ordered).then_some(0)) {
+        let rising = times.len() < 2 || times[0] < times[1];
+        let out_of_order = |pair: &[f64]| if rising { !(pair[0] < pair[1]) } else { !(pair[0] > pair[1]) };
+        let out_of_order = times.windows(2).position(out_of_order).map(|index| index + 1);
+        match times.iter().position(|t| !t.is_finite()).or(out_of_order) {
             Some(index) => Err(InputError::Times { index, t: times[index] }),
             None => Ok(Self::when(When::At { times, recorded: 0 })),
         }

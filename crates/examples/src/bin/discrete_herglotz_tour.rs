@@ -9,7 +9,7 @@ use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, f
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Symmetry};
 use discrete_herglotz::{
-    Integrator, Method, Moment, MomentumDecay, MomentumRow, Problem, Row, Rows, Status, Steps, Until,
+    AnyIntegrator, Method, Moment, MomentumDecay, MomentumRow, Problem, Row, Rows, Status, Steps, Until,
 };
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
@@ -64,7 +64,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         ControlFlow::Continue(())
     };
     let end = problem
-        .by(Integrator::Discrete(Method::Midpoint))
+        .by(AnyIntegrator::Discrete(Method::Midpoint))
         .steps(Steps::Size(h))
         .observe(&mut states)
         .observe(&mut momentum)

@@ -6,7 +6,7 @@ use crate::run::{Needs, Problem, Shared, Task, Until, run_to};
 use crate::{AnyIntegrator, InputError, Obstacle, Status};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum};
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint};
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Instant;

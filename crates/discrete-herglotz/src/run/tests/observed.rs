@@ -20,12 +20,12 @@ fn steps(integrator: AnyIntegrator, count: usize, span: f64) -> Steps {
 }
 
 /// A run in so many steps up to a time after the start.
-fn run_in<'r, L: Lagrangian<N>, const N: usize>(
+fn run_in<'r, 'o, L: Lagrangian<N>, const N: usize>(
     problem: &'r Problem<'r, L, N>,
     integrator: AnyIntegrator,
     count: usize,
     span: f64,
-) -> Run<'r, L, N> {
+) -> Run<'r, 'o, L, N> {
     problem.by(integrator).steps(steps(integrator, count, span))
 }
 

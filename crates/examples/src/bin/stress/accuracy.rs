@@ -8,33 +8,33 @@ use crate::report::Report;
 use crate::statistics::quantile;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::{PhasePoint, VelocityPoint, larger};
-use discrete_herglotz::{InputError, Integrator, Method, SplittingScheme, Steps};
+use discrete_herglotz::{AnyIntegrator, InputError, Method, SplittingScheme, Steps};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::time::Instant;
 
 /// The configurations that a careful user would try by hand.
-const CONFIGURATIONS: [Integrator; 8] = [
-    Integrator::Gauss { stages: 4 },
-    Integrator::Gauss { stages: 6 },
-    Integrator::Gauss { stages: 8 },
-    Integrator::Gauss { stages: 12 },
-    Integrator::Gauss { stages: 16 },
-    Integrator::Splitting(SplittingScheme::BLANES_MOAN_6),
-    Integrator::Splitting(SplittingScheme::KAHAN_LI_8),
-    Integrator::Splitting(SplittingScheme::SOFRONIOU_SPALETTA_10),
+const CONFIGURATIONS: [AnyIntegrator; 8] = [
+    AnyIntegrator::Gauss { stages: 4 },
+    AnyIntegrator::Gauss { stages: 6 },
+    AnyIntegrator::Gauss { stages: 8 },
+    AnyIntegrator::Gauss { stages: 12 },
+    AnyIntegrator::Gauss { stages: 16 },
+    AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6),
+    AnyIntegrator::Splitting(SplittingScheme::KAHAN_LI_8),
+    AnyIntegrator::Splitting(SplittingScheme::SOFRONIOU_SPALETTA_10),
 ];
 
 /// The integrators that a third of the problems name, with the tightest tolerance that is asked of each.
-const NAMED: [(Integrator, f64); 8] = [
-    (Integrator::Discrete(Method::Midpoint), 1e-5),
-    (Integrator::Splitting(SplittingScheme::STRANG), 1e-6),
-    (Integrator::Splitting(SplittingScheme::MCLACHLAN_4), 1e-8),
-    (Integrator::Splitting(SplittingScheme::BLANES_MOAN_6), 1e-10),
-    (Integrator::Splitting(SplittingScheme::KAHAN_LI_8), 1e-12),
-    (Integrator::Gauss { stages: 2 }, 1e-8),
-    (Integrator::Gauss { stages: 6 }, 1e-12),
-    (Integrator::Gauss { stages: 16 }, 1e-12),
+const NAMED: [(AnyIntegrator, f64); 8] = [
+    (AnyIntegrator::Discrete(Method::Midpoint), 1e-5),
+    (AnyIntegrator::Splitting(SplittingScheme::STRANG), 1e-6),
+    (AnyIntegrator::Splitting(SplittingScheme::MCLACHLAN_4), 1e-8),
+    (AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6), 1e-10),
+    (AnyIntegrator::Splitting(SplittingScheme::KAHAN_LI_8), 1e-12),
+    (AnyIntegrator::Gauss { stages: 2 }, 1e-8),
+    (AnyIntegrator::Gauss { stages: 6 }, 1e-12),
+    (AnyIntegrator::Gauss { stages: 16 }, 1e-12),
 ];
 
 /// The longest run that is tried by hand.
@@ -101,7 +101,7 @@ fn two(random: &mut Random) -> Problem<2> {
 /// What became of one problem.
 struct Found {
     dimension: usize,
-    named: Option<Integrator>,
+    named: Option<AnyIntegrator>,
     tolerance: f64,
     worth: Worth,
     error: f64,
@@ -167,7 +167,7 @@ fn by_hand<const N: usize>(problem: &Problem<N>, truth: &PhasePoint<N>, toleranc
 fn solve<const N: usize, const D: usize>(
     problem: &Problem<N>,
     tolerance: f64,
-    named: Option<Integrator>,
+    named: Option<AnyIntegrator>,
     compared: bool,
 ) -> Option<Found> {
     let named = named.filter(|integrator| integrator.check(&problem.system).is_ok());
@@ -179,7 +179,7 @@ fn solve<const N: usize, const D: usize>(
     let motion = caught(|| problem.motion());
     let plan = motion.as_ref().and_then(|motion| match motion {
         Ok(motion) => caught(|| {
-            let run = motion.steps(Steps::Accuracy(tolerance));
+            let run = motion.accuracy(tolerance);
             let run = if let Some(integrator) = named { run.by(integrator) } else { run };
             run.plan(problem.end())
         }),

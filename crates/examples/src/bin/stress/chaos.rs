@@ -7,7 +7,7 @@ use crate::random::Random;
 use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::{PhasePoint, Triple, VelocityPoint, larger, largest};
-use discrete_herglotz::{Flow, Gauss, InputError, Integrator, Rows, Run, Stepper, Steps};
+use discrete_herglotz::{AnyIntegrator, Flow, Gauss, InputError, Rows, Run, Stepper, Steps};
 
 /// A particle in a square well with rounded corners, chaotic at this energy.
 fn chaotic(gamma: f64) -> Formula<2> {
@@ -34,8 +34,8 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
 /// The defect against the growth of a small difference on the way back: a symmetric method retraces its steps but for rounding.
 fn reversal(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let spans = if report.quick { vec![4, 16] } else { vec![4, 8, 16, 32, 64] };
-    let symmetric: Vec<Integrator> = FAMILIES.into_iter().collect();
-    let cases: Vec<(f64, Integrator, i32)> = [0.0, -0.01]
+    let symmetric: Vec<AnyIntegrator> = FAMILIES.into_iter().collect();
+    let cases: Vec<(f64, AnyIntegrator, i32)> = [0.0, -0.01]
         .into_iter()
         .flat_map(|g| symmetric.iter().flat_map(|i| spans.iter().map(|s| (g, *i, *s))).collect::<Vec<_>>())
         .collect();
@@ -81,7 +81,7 @@ fn reversal(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
         let name = integrator.to_string();
         rows.push(vec![format!("reversal, gamma {gamma}"), name.clone(), span.to_string(), number(worst)]);
         rows.push(vec![format!("growth, gamma {gamma}"), name.clone(), span.to_string(), number(growth)]);
-        if *gamma == 0.0 && *integrator == (Integrator::Gauss { stages: 8 }) {
+        if *gamma == 0.0 && *integrator == (AnyIntegrator::Gauss { stages: 8 }) {
             points.push((f64::from(*span), worst * growth * f64::EPSILON * (f64::from(*span) / H).sqrt(), growth));
         }
         match of_family.iter_mut().find(|(n, _)| *n == name) {
@@ -127,12 +127,12 @@ fn same_bits(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fai
     let steps = 1001;
     let (mut again, mut pieces, mut recorded) = (0, 0, 0);
     for (name, system) in systems {
-        let applies = |i: &Integrator| i.check(&system).is_ok();
+        let applies = |i: &AnyIntegrator| i.check(&system).is_ok();
         for integrator in FAMILIES.into_iter().filter(applies) {
             let problem = Problem { system, t0: 0.0, start, span: H * f64::from(steps) };
             let motion = problem.motion()?;
             let count = Steps::Count(steps as usize);
-            let whole = |run: Run<'_, Formula<2>, 2>| -> Result<Vec<u64>, InputError> {
+            let whole = |run: Run<'_, '_, Formula<2>, 2>| -> Result<Vec<u64>, InputError> {
                 Ok(bits(&run.run(problem.end())?.state()))
             };
             let one = whole(motion.by(integrator).steps(count))?;

@@ -6,7 +6,7 @@ use crate::parallel::parallel;
 use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::{PhasePoint, Triple, VelocityPoint, larger, largest};
-use discrete_herglotz::{InputError, Integrator, Steps};
+use discrete_herglotz::{AnyIntegrator, InputError, Steps};
 
 /// The drag, and the step: a power of two.
 const GAMMA: f64 = -1e-6;
@@ -24,17 +24,17 @@ struct Row {
 }
 
 /// The logarithm of a step's factor, as the method's own formula has it.
-fn factor(integrator: Integrator) -> f64 {
+fn factor(integrator: AnyIntegrator) -> f64 {
     let half = 0.5 * GAMMA * H;
     let rational = |g: f64| (g * half).ln_1p() - (-g * half).ln_1p();
     match integrator {
         // (1 + gamma h/2) / (1 - gamma h/2).
-        Integrator::Discrete(_) => rational(1.0),
-        Integrator::Composition(_, scheme) => {
+        AnyIntegrator::Discrete(_) => rational(1.0),
+        AnyIntegrator::Composition(_, scheme) => {
             scheme.substeps().map_or(f64::NAN, |g| g.iter().map(|g| rational(*g)).sum())
         }
         // Gauss methods have the Pade approximation of e^x, which at this x is e^x from two stages on; by a clock its steps differ.
-        Integrator::Gauss { .. } | Integrator::Clocked { .. } | Integrator::Splitting(_) => 2.0 * half,
+        AnyIntegrator::Gauss { .. } | AnyIntegrator::Clocked { .. } | AnyIntegrator::Splitting(_) => 2.0 * half,
     }
 }
 
@@ -43,7 +43,7 @@ fn angular(x: &PhasePoint<2>) -> f64 {
 }
 
 /// One step from a state.
-fn step(integrator: Integrator, from: &Triple<2>) -> Result<(PhasePoint<2>, f64), InputError> {
+fn step(integrator: AnyIntegrator, from: &Triple<2>) -> Result<(PhasePoint<2>, f64), InputError> {
     let start = VelocityPoint { q: from.x, v: from.y, z: from.z };
     let problem = Problem { system: Formula::<2>::kepler(GAMMA), t0: 0.0, start, span: H };
     let motion = problem.motion()?;
@@ -54,7 +54,7 @@ fn step(integrator: Integrator, from: &Triple<2>) -> Result<(PhasePoint<2>, f64)
 }
 
 /// How far a step's pullback of `dz - p dq` is from `sigma_d` times it: by differences of fourth order.
-fn contact_defect(integrator: Integrator, at: &PhasePoint<2>) -> Result<f64, InputError> {
+fn contact_defect(integrator: AnyIntegrator, at: &PhasePoint<2>) -> Result<f64, InputError> {
     const DISTANCE: f64 = 1e-3;
     let from = Triple::from(*at);
     let (end, sigma) = step(integrator, &from)?;
@@ -77,7 +77,7 @@ fn contact_defect(integrator: Integrator, at: &PhasePoint<2>) -> Result<f64, Inp
     Ok(worst)
 }
 
-fn along(integrator: Integrator, power: u32) -> Result<Vec<Row>, InputError> {
+fn along(integrator: AnyIntegrator, power: u32) -> Result<Vec<Row>, InputError> {
     let start = VelocityPoint::new([0.7, 0.0], [0.0, (1.3f64 / 0.7).sqrt()], 0.0);
     let problem = Problem { system: Formula::<2>::kepler(GAMMA), t0: 0.0, start, span: H };
     let motion = problem.motion()?;
@@ -119,7 +119,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
             rows.push([integrator.to_string()].into_iter().chain(numbers).collect());
         }
         // A rounding of the momentum each substep, as a random walk; a composition has 17.
-        let stages = if matches!(integrator, Integrator::Composition(..)) { 17.0 } else { 5.0 };
+        let stages = if matches!(integrator, AnyIntegrator::Composition(..)) { 17.0 } else { 5.0 };
         let walk = |steps: f64| 8.0 * f64::EPSILON * (stages * steps).sqrt();
         let momentum = largest(found.iter().map(|r| r.momentum / walk(r.steps)));
         // Each sigma_d is a number beside one, rounded to half of eps.

@@ -8,7 +8,7 @@ use crate::statistics::quantile;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::systems::HarmonicOscillator;
 use contact_geom::{PhasePoint, Triple, VelocityPoint, larger, largest};
-use discrete_herglotz::{Integrator, SplittingScheme, Steps};
+use discrete_herglotz::{AnyIntegrator, SplittingScheme, Steps};
 use std::time::Instant;
 
 /// The time step of the long runs: a power of two, so that times are exact.
@@ -25,7 +25,7 @@ const GAMMA: f64 = -1.0 / 64.0;
 struct Long {
     name: &'static str,
     system: Formula<1>,
-    integrator: Integrator,
+    integrator: AnyIntegrator,
     /// The steps of a full run.
     steps: usize,
     truth: fn(f64) -> PhasePoint<1>,
@@ -62,7 +62,7 @@ fn long_runs() -> [Long; 3] {
         Long {
             name: "damped",
             system: Formula::oscillator(WEAK),
-            integrator: Integrator::Gauss { stages: 8 },
+            integrator: AnyIntegrator::Gauss { stages: 8 },
             steps: 1_000_000_000,
             truth: damped,
             remembered: |steps| steps,
@@ -71,7 +71,7 @@ fn long_runs() -> [Long; 3] {
         Long {
             name: "driven",
             system: forced,
-            integrator: Integrator::Gauss { stages: 8 },
+            integrator: AnyIntegrator::Gauss { stages: 8 },
             steps: 1_000_000_000,
             truth: driven,
             remembered: memory,
@@ -80,7 +80,7 @@ fn long_runs() -> [Long; 3] {
         Long {
             name: "driven",
             system: forced,
-            integrator: Integrator::Splitting(SplittingScheme::KAHAN_LI_8),
+            integrator: AnyIntegrator::Splitting(SplittingScheme::KAHAN_LI_8),
             steps: 100_000_000,
             truth: driven,
             remembered: memory,

@@ -6,7 +6,7 @@ use contact_geom::{PhasePoint, Triple, VelocityPoint, herglotz_rates, larger, le
 use differential_equations::methods::ExplicitRungeKutta;
 use differential_equations::prelude::{IVP, ODE};
 use discrete_herglotz::{
-    InputError, Integrator, Method, Outcome, Run, SplittingScheme, Status, StepError, Steps, Until,
+    AnyIntegrator, InputError, Method, Outcome, Run, SplittingScheme, Status, StepError, Steps, Until,
 };
 use exact_lagrangian::{ExactError, herglotz_flow};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -144,13 +144,13 @@ impl<const N: usize> Problem<N> {
     }
 
     /// The run with a number of steps of one integrator.
-    pub fn by(&self, integrator: Integrator, count: usize) -> End<N> {
+    pub fn by(&self, integrator: AnyIntegrator, count: usize) -> End<N> {
         self.run(|motion| motion.by(integrator).steps(Steps::Count(count)))
     }
 
     /// What a run with fixed steps is worth, and its error: an error of order one in silence is a wrong result where a step of it
     /// has such an error by itself.
-    pub fn worth(&self, integrator: Integrator, count: usize, truth: &PhasePoint<N>, scale: f64) -> (Worth, f64) {
+    pub fn worth(&self, integrator: AnyIntegrator, count: usize, truth: &PhasePoint<N>, scale: f64) -> (Worth, f64) {
         let end = self.by(integrator, count);
         let (worth, error) = (end.worth(truth, scale, ORDER_ONE), end.error(truth, scale));
         let coarse =
@@ -159,7 +159,7 @@ impl<const N: usize> Problem<N> {
     }
 
     /// The largest error of a step of a run, each from where it started; `None` where the exact motion is not known.
-    fn local_error(&self, integrator: Integrator, count: usize, scale: f64) -> Option<f64> {
+    fn local_error(&self, integrator: AnyIntegrator, count: usize, scale: f64) -> Option<f64> {
         let motion = self.motion().ok()?;
         let plan = motion.by(integrator).steps(Steps::Count(count)).plan(self.end()).ok()?;
         let mut stepper = plan.stepper().ok()?;
@@ -179,11 +179,11 @@ impl<const N: usize> Problem<N> {
 
     /// The run to an accuracy, with the integrator that a run takes where none is named.
     pub fn to(&self, accuracy: f64) -> End<N> {
-        self.run(|motion| motion.steps(Steps::Accuracy(accuracy)))
+        self.run(|motion| motion.accuracy(accuracy))
     }
 
     /// The end of a run.
-    fn run(&self, run_of: impl for<'p> FnOnce(&'p Motion<'p, N>) -> Run<'p, Formula<N>, N>) -> End<N> {
+    fn run(&self, run_of: impl for<'p> FnOnce(&'p Motion<'p, N>) -> Run<'p, 'p, Formula<N>, N>) -> End<N> {
         match caught(|| run_of(&self.motion()?).run(self.end())) {
             None => End::Panicked,
             Some(Err(refused)) => End::Refused(refused),
@@ -271,14 +271,14 @@ pub fn dop853_in<const N: usize, const D: usize>(
 }
 
 /// A few integrators of every kind: a rule, splittings, a composition, Gauss methods from low to high order.
-pub const FAMILIES: [Integrator; 9] = [
-    Integrator::Discrete(Method::Midpoint),
-    Integrator::Discrete(Method::Trapezoidal),
-    Integrator::Splitting(SplittingScheme::STRANG),
-    Integrator::Splitting(SplittingScheme::BLANES_MOAN_6),
-    Integrator::Splitting(SplittingScheme::KAHAN_LI_8),
-    Integrator::Composition(Method::Midpoint, SplittingScheme::KAHAN_LI_8),
-    Integrator::Gauss { stages: 2 },
-    Integrator::Gauss { stages: 8 },
-    Integrator::Gauss { stages: 16 },
+pub const FAMILIES: [AnyIntegrator; 9] = [
+    AnyIntegrator::Discrete(Method::Midpoint),
+    AnyIntegrator::Discrete(Method::Trapezoidal),
+    AnyIntegrator::Splitting(SplittingScheme::STRANG),
+    AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6),
+    AnyIntegrator::Splitting(SplittingScheme::KAHAN_LI_8),
+    AnyIntegrator::Composition(Method::Midpoint, SplittingScheme::KAHAN_LI_8),
+    AnyIntegrator::Gauss { stages: 2 },
+    AnyIntegrator::Gauss { stages: 8 },
+    AnyIntegrator::Gauss { stages: 16 },
 ];

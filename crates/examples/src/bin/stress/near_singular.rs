@@ -8,7 +8,7 @@ use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::SMatrix;
 use contact_geom::systems::{HarmonicOscillator, LaneEmden, Radial};
 use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint, larger, legendre};
-use discrete_herglotz::{Gauss, Integrator, Method, Stepper};
+use discrete_herglotz::{AnyIntegrator, Gauss, Method, Stepper};
 use exact_lagrangian::ContactExponential;
 use std::f64::consts::{PI, TAU};
 
@@ -93,7 +93,7 @@ fn mass_condition(report: &mut Report, table: &mut Table) -> Result<Points, Fail
                     worst = larger(worst, error / condition);
                 }
             }
-            if integrator == (Integrator::Gauss { stages: 16 }) && matches!(worth, Worth::Right | Worth::Wrong) {
+            if integrator == (AnyIntegrator::Gauss { stages: 16 }) && matches!(worth, Worth::Right | Worth::Wrong) {
                 points.push((condition, error));
             }
         }
@@ -180,7 +180,7 @@ fn poles(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
             End::Whole(x) => (Worth::Wrong, misses(x)),
             other => (other.worth(&problem.state(), 0.0, bound), f64::NAN),
         };
-        let applies = |i: &Integrator| i.check(&system).is_ok();
+        let applies = |i: &AnyIntegrator| i.check(&system).is_ok();
         for (integrator, count) in FAMILIES.into_iter().filter(applies).flat_map(|i| [20, 400].map(|n| (i, n))) {
             let (worth, error) = worth(&problem.by(integrator, count), ORDER_ONE);
             table.add("pole", integrator, sideways, worth, error);
@@ -201,7 +201,7 @@ fn light(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
         let start = VelocityPoint::new([size], [0.0], 0.0);
         let problem = Problem { system, t0: 0.0, start, span: 2.0 * size };
         let exact = problem.exact_in(64)?;
-        let applies = |i: &Integrator| i.check(&system).is_ok();
+        let applies = |i: &AnyIntegrator| i.check(&system).is_ok();
         for (integrator, count) in FAMILIES.into_iter().filter(applies).flat_map(|i| [8, 64, 512].map(|n| (i, n))) {
             let (worth, error) = problem.worth(integrator, count, &exact, 0.0);
             table.add("light", integrator, size, worth, error);
@@ -249,7 +249,7 @@ fn time_zero(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
 fn vanishing_sigma(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     let mut beyond = 0;
     for method in Method::RULES {
-        let integrator = Integrator::Discrete(*method);
+        let integrator = AnyIntegrator::Discrete(*method);
         for left in [0.5, 1e-1, 1e-2, 1e-4, 1e-8, 1e-15, 0.0, -1e-15, -0.1, -1.0] {
             let gamma = left - 1.0;
             let start = VelocityPoint::new([1.0], [0.5], 0.0);

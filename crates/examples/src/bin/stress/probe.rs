@@ -4,7 +4,7 @@ use crate::formula::{Formula, Kinetic, Rate, Smooth};
 use crate::motion::Problem;
 use contact_geom::systems::Radial;
 use contact_geom::{VelocityPoint, largest, legendre};
-use discrete_herglotz::{Gauss, InputError, Integrator, Method, Rows, Status, Stepper, Steps};
+use discrete_herglotz::{AnyIntegrator, Gauss, InputError, Method, Rows, Status, Stepper, Steps};
 use exact_lagrangian::herglotz_flow;
 use std::io::Read;
 use std::process::{Command, Stdio};
@@ -42,8 +42,8 @@ pub const PROBES: [Probe; 15] = [
     ("as many steps as can be counted", &["refused"], || steps(Steps::Count(usize::MAX), None)),
     ("a drag that is no number, to 1e-9", &["refused"], || to(Formula::oscillator(f64::NAN), 1.0)),
     ("a force that is no number, to 1e-9", &["refused"], || to(nan_spring(), 1.0)),
-    ("a singular W, midpoint rule", &["refused", "halted"], || singular(Integrator::Discrete(Method::Midpoint))),
-    ("a singular W, gauss_8", &["refused", "halted"], || singular(Integrator::Gauss { stages: 8 })),
+    ("a singular W, midpoint rule", &["refused", "halted"], || singular(AnyIntegrator::Discrete(Method::Midpoint))),
+    ("a singular W, gauss_8", &["refused", "halted"], || singular(AnyIntegrator::Gauss { stages: 8 })),
     ("t0 infinite, gauss_8", &["refused"], late),
     ("a relativistic particle from q = 20, to 1e-9", &["right", "refused"], relativistic),
     ("a clock that all but stands still", &["refused", "halted"], standing_clock),
@@ -87,13 +87,16 @@ pub fn ask(name: &str, patience: Duration) -> std::io::Result<Ended> {
 /// What a run came to, with a row for each so many steps where that is asked for.
 fn run<const N: usize>(
     problem: &Problem<N>,
-    steps: Steps,
-    integrator: Option<Integrator>,
+    steps: Option<Steps>,
+    integrator: Option<AnyIntegrator>,
     stride: Option<usize>,
 ) -> Result<String, InputError> {
     let mut rows = stride.map(Rows::every).transpose()?;
     let motion = problem.motion()?;
-    let mut run = motion.steps(steps);
+    let mut run = motion.accuracy(1e-9);
+    if let Some(steps) = steps {
+        run = run.by(AnyIntegrator::Gauss { stages: 8 }).steps(steps);
+    }
     if let Some(integrator) = integrator {
         run = run.by(integrator);
     }
@@ -117,7 +120,7 @@ fn oscillator() -> Problem<1> {
 }
 
 fn steps(steps: Steps, stride: Option<usize>) -> String {
-    said(run(&oscillator(), steps, Some(Integrator::Discrete(Method::Midpoint)), stride))
+    said(run(&oscillator(), Some(steps), Some(AnyIntegrator::Discrete(Method::Midpoint)), stride))
 }
 
 fn nan_spring() -> Formula<1> {
@@ -125,20 +128,20 @@ fn nan_spring() -> Formula<1> {
 }
 
 fn to(system: Formula<1>, span: f64) -> String {
-    said(run(&Problem { system, span, ..oscillator() }, Steps::Accuracy(1e-9), None, None))
+    said(run(&Problem { system, span, ..oscillator() }, None, None, None))
 }
 
 /// `v q - q^2/2 - 0.1 z`.
-fn singular(integrator: Integrator) -> String {
+fn singular(integrator: AnyIntegrator) -> String {
     let smooth = Smooth { spring: 1.0, ..Smooth::default() };
     let system = Formula { kinetic: Kinetic::Singular, smooth, rate: Rate::Constant(-0.1), ..Formula::FREE };
     let start = VelocityPoint::new([1.0], [0.5], 0.0);
-    said(run(&Problem { system, start, span: 10.0, t0: 0.0 }, Steps::Count(100), Some(integrator), None))
+    said(run(&Problem { system, start, span: 10.0, t0: 0.0 }, Some(Steps::Count(100)), Some(integrator), None))
 }
 
 fn late() -> String {
     let problem = Problem { t0: f64::INFINITY, ..oscillator() };
-    said(run(&problem, Steps::Count(10), Some(Integrator::Gauss { stages: 8 }), None))
+    said(run(&problem, Some(Steps::Count(10)), Some(AnyIntegrator::Gauss { stages: 8 }), None))
 }
 
 fn relativistic() -> String {
@@ -209,7 +212,7 @@ fn exact_to_fixed_point() -> String {
 fn at_rest() -> String {
     let start = VelocityPoint::new([0.0], [0.0], 0.0);
     let problem = Problem { start, span: 100.0, ..oscillator() };
-    match run(&problem, Steps::Accuracy(1e-9), None, None) {
+    match run(&problem, None, None, None) {
         Ok(text) if text == "completed q = 0e0" => "right".into(),
         other => said(other),
     }

@@ -13,7 +13,7 @@ use contact_examples::{Axis, Curve, Failure, Line, Panel, draw_row, number};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Radial;
 use contact_geom::{PhasePoint, Structure, VelocityPoint, larger, largest, legendre};
-use discrete_herglotz::{Gauss, InputError, Integrator, Method, SplittingScheme, Stepper, Steps};
+use discrete_herglotz::{AnyIntegrator, Gauss, InputError, Method, SplittingScheme, Stepper, Steps};
 
 /// The starts of an ensemble.
 const STARTS: usize = 64;
@@ -47,7 +47,7 @@ enum Drag {
 /// A method, with the structure that is claimed for it.
 #[derive(Clone, Copy)]
 enum Way {
-    By(Integrator),
+    By(AnyIntegrator),
     /// Gauss collocation by its general route: nothing is claimed.
     General(usize),
     /// A splitting that is not told that the drag is linear.
@@ -103,11 +103,11 @@ struct Growth {
 /// is below round-off, or bounded by 1e-6 for those of order 2.
 fn ensembles() -> Vec<Ensemble> {
     use Motion::{Kepler, Oscillator, Pendulum};
-    let gauss = |stages| Way::By(Integrator::Gauss { stages });
-    let splitting = |scheme| Way::By(Integrator::Splitting(scheme));
-    let (midpoint, strang) = (Way::By(Integrator::Discrete(Method::Midpoint)), splitting(SplittingScheme::STRANG));
+    let gauss = |stages| Way::By(AnyIntegrator::Gauss { stages });
+    let splitting = |scheme| Way::By(AnyIntegrator::Splitting(scheme));
+    let (midpoint, strang) = (Way::By(AnyIntegrator::Discrete(Method::Midpoint)), splitting(SplittingScheme::STRANG));
     let (nystrom, eighth) = (splitting(SplittingScheme::BLANES_MOAN_6), splitting(SplittingScheme::KAHAN_LI_8));
-    let composed = Way::By(Integrator::Composition(Method::Midpoint, SplittingScheme::KAHAN_LI_8));
+    let composed = Way::By(AnyIntegrator::Composition(Method::Midpoint, SplittingScheme::KAHAN_LI_8));
     let action = Way::ActionDriven(SplittingScheme::KAHAN_LI_8);
     let fine = 1.0 / 1024.0;
     // The way, its power of two, and its steps on the oscillator, the pendulum and Kepler's orbit; 0 for none.
@@ -175,8 +175,8 @@ impl Ensemble {
             Rate::Swinging { size, frequency } => {
                 let half = 0.5 * frequency * self.h;
                 let sum = match self.way {
-                    Way::By(Integrator::Discrete(_)) => half / half.sin(),
-                    Way::By(Integrator::Composition(_, scheme)) => half / half.sin() * middles(&scheme, 2.0 * half),
+                    Way::By(AnyIntegrator::Discrete(_)) => half / half.sin(),
+                    Way::By(AnyIntegrator::Composition(_, scheme)) => half / half.sin() * middles(&scheme, 2.0 * half),
                     _ => 1.0,
                 };
                 size / frequency * sum * (frequency * t).sin()
@@ -288,8 +288,8 @@ impl Ensemble {
                     Way::By(_) | Way::General(_) | Way::ActionDriven(_) => {
                         let integrator = match self.way {
                             Way::By(integrator) => integrator,
-                            Way::ActionDriven(scheme) => Integrator::Splitting(scheme),
-                            Way::General(stages) | Way::Clocked(stages) => Integrator::Gauss { stages },
+                            Way::ActionDriven(scheme) => AnyIntegrator::Splitting(scheme),
+                            Way::General(stages) | Way::Clocked(stages) => AnyIntegrator::Gauss { stages },
                         };
                         let motion = problem.motion()?;
                         let plan = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end())?;

@@ -9,7 +9,7 @@ use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{PhasePoint, Triple, VelocityPoint, larger};
-use discrete_herglotz::{Flow, Gauss, InputError, Integrator, Midpoint, Solver, Stepper, Steps, Trapezoidal};
+use discrete_herglotz::{AnyIntegrator, Flow, Gauss, InputError, Midpoint, Solver, Stepper, Steps, Trapezoidal};
 use std::time::{Duration, Instant};
 
 /// A step that does not contract may take this many times one that does.
@@ -226,7 +226,7 @@ fn price(report: &mut Report) -> Result<(), Failure> {
     let pair = VelocityPoint::new([1.0, -0.4], [0.5, 0.3], 0.2);
     let mut curves = Vec::new();
     for (i, stages) in [4, 8, 16].into_iter().enumerate() {
-        let integrator = Integrator::Gauss { stages };
+        let integrator = AnyIntegrator::Gauss { stages };
         let per_step = |time: &dyn Fn(f64) -> [f64; 2]| {
             let steps = [0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4, 12.8];
             steps.map(|h| (h, time(h)))
@@ -268,7 +268,7 @@ fn price(report: &mut Report) -> Result<(), Failure> {
 }
 
 /// The time of a step, from a run that goes on as long as it can, and of one that is given up; zero where there is none.
-fn of_step<const N: usize>(system: Formula<N>, start: VelocityPoint<N>, integrator: Integrator, h: f64) -> [f64; 2] {
+fn of_step<const N: usize>(system: Formula<N>, start: VelocityPoint<N>, integrator: AnyIntegrator, h: f64) -> [f64; 2] {
     let problem = Problem { system, t0: 0.0, start, span: h };
     let Ok(motion) = problem.motion() else { return [f64::NAN; 2] };
     let Ok(plan) = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end()) else {

@@ -2,7 +2,7 @@
 
 use crate::problems::Problem;
 use contact_geom::{Lagrangian, VelocityPoint};
-use discrete_herglotz::{Halt, InputError, Integrator, Steps, Until};
+use discrete_herglotz::{AnyIntegrator, Halt, InputError, Steps, Until};
 use std::time::Instant;
 use thiserror::Error;
 
@@ -63,7 +63,7 @@ pub enum RunError {
 /// An integrator of the library on a problem's Lagrangian.
 struct OfLibrary<L: 'static, const N: usize> {
     lagrangian: &'static L,
-    integrator: Integrator,
+    integrator: AnyIntegrator,
     name: String,
     problem: Problem,
     z: bool,
@@ -73,7 +73,7 @@ struct OfLibrary<L: 'static, const N: usize> {
 /// peers' solvers are.
 pub fn of_library<L: Lagrangian<N>, const N: usize>(
     lagrangian: &'static L,
-    integrator: Integrator,
+    integrator: AnyIntegrator,
     problem: &Problem,
     z: bool,
 ) -> Box<dyn Candidate> {

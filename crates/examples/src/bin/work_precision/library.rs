@@ -3,7 +3,7 @@
 use crate::candidate::{Candidate, of_library};
 use crate::problems::{KEPLER, OSCILLATOR, PENDULUM, Problem, QUADRATIC, System};
 use contact_geom::Lagrangian;
-use discrete_herglotz::Integrator;
+use discrete_herglotz::AnyIntegrator;
 
 /// The integrators of the library that apply to a problem, with or without the action. A flow of a discrete Lagrangian always
 /// has the action; without it, nobody looks.
@@ -18,9 +18,9 @@ pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
 
 fn of<L: Lagrangian<N>, const N: usize>(lagrangian: &'static L, problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
     // Those of one step size: by a clock the number of steps is found by the run.
-    let fixed = |integrator: &Integrator| !matches!(integrator, Integrator::Clocked { .. });
-    let applicable = |integrator: &Integrator| fixed(integrator) && integrator.check(lagrangian).is_ok();
-    let chosen = Integrator::all().into_iter().filter(applicable);
+    let fixed = |integrator: &AnyIntegrator| !matches!(integrator, AnyIntegrator::Clocked { .. });
+    let applicable = |integrator: &AnyIntegrator| fixed(integrator) && integrator.check(lagrangian).is_ok();
+    let chosen = AnyIntegrator::all().into_iter().filter(applicable);
     chosen.map(|integrator| of_library(lagrangian, integrator, problem, z)).collect()
 }
 
