@@ -54,6 +54,11 @@ pub enum InputError {
     /// A run with given steps names no integrator.
     #[error("the run has no integrator; name one by `by`, or ask for an `accuracy` for which one is chosen")]
     NoIntegrator,
+    /// A run is resumed that is not the one which was interrupted.
+    #[error(
+        "the run is not the one that was interrupted; resume it with the same problem, integrator, steps, end and requests"
+    )]
+    AnotherRun,
     /// Times of output are not in order, not finite, or outside of the span of the run.
     #[error(
         "the time t = {t} of row {index} is out of order, not finite or outside of the run's span; give times in the order of the run"

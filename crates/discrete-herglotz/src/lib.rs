@@ -36,9 +36,9 @@ pub use rules::{
     Method, Midpoint, Node, Quadrature, Rectangle, Rule, Trapezoidal, UnknownMethod,
 };
 pub use run::{
-    AnyIntegrator, Course, Crossing, Doubt, Event, Events, Facts, Halt, Integrator, Item, LastStep, Moment,
-    MomentumDecay, MomentumRow, Needs, Observer, Outcome, Plan, Problem, Row, Rows, Run, Start, Stepper, Steps, Stop,
-    UnknownIntegrator, Until, Wants, verified,
+    AnyIntegrator, Checkpoint, CheckpointError, Course, Crossing, Doubt, Event, Events, Facts, Halt, Integrator,
+    Interrupted, Item, LastStep, Moment, MomentumDecay, MomentumRow, Needs, Observer, Outcome, Plan, Problem, Row,
+    Rows, Run, Start, Stepper, Steps, Stop, UnknownIntegrator, Until, Wants, verified,
 };
 pub use solve::{CROSSOVER, ITERATION_LIMIT, Solver, last_correction};
 pub use splitting::{

@@ -1,6 +1,7 @@
 //! The exact flow as an integrator.
 
 use crate::herglotz_flow;
+use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, legendre};
 use discrete_herglotz::{Facts, Halt, InputError, Integrator, Item, Problem, StepError, Stepper, Wants};
 
@@ -76,6 +77,27 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Run<'_, L, N> {
 
     fn evaluations(&self) -> u64 {
         self.evaluations
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let VelocityPoint { q, v, z } = &self.x;
+        let numbers = q.iter().chain(v.iter()).chain([z, &self.b]).map(|x| x.to_bits());
+        Some(numbers.chain([self.k as u64, self.evaluations]).collect())
+    }
+
+    fn restore(&mut self, words: &[u64]) -> bool {
+        let [numbers @ .., k, evaluations] = words else { return false };
+        if numbers.len() != 2 * N + 2 {
+            return false;
+        }
+        let number = |i: usize| f64::from_bits(numbers[i]);
+        self.x = VelocityPoint {
+            q: SVector::from_fn(|i, _| number(i)),
+            v: SVector::from_fn(|i, _| number(N + i)),
+            z: number(2 * N),
+        };
+        (self.b, self.k, self.evaluations) = (number(2 * N + 1), *k as usize, *evaluations);
+        true
     }
 
     fn account(&self) -> Vec<Item> {

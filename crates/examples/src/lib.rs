@@ -11,3 +11,8 @@ pub use checks::{Checks, Subject, TOLERANCE, fractions, title};
 pub use failure::{Failure, finish};
 pub use figure::{Axis, Curve, Line, Panel, draw, draw_row};
 pub use output::{Directory, number, print};
+
+/// The tasks of the guide, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide.md")]
+pub struct Guide;

@@ -11,6 +11,7 @@ use super::stage_equations::Products;
 use super::sweeps::Progress;
 use super::table::Table;
 use crate::gauss::lanes::forget_branches;
+use crate::run::saved::{Saved, load_option, save_option};
 use crate::{Halt, ITERATION_LIMIT, InputError, Item, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Clock, Lagrangian, PhasePoint, Scalar, Structure};
@@ -165,6 +166,21 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         self.arch.dispatch(Advance { general: &mut **general, suspicion, taken, steps })
     }
 
+    /// From the words of another; no look at its last step.
+    fn read(&mut self, from: &mut &[u64]) -> Option<()> {
+        self.general.load(from)?;
+        let mut h = 0.0;
+        h.load(from)?;
+        if h != self.general.table.h {
+            self.general.table = Table::new(self.general.table.s, h);
+        }
+        self.tau.load(from)?;
+        self.taken.load(from)?;
+        self.from = None;
+        self.suspicion = load_option(from, || Suspicion { step: 0, misfit: 0.0 })?;
+        Some(())
+    }
+
     /// Goes back to the full step after one that was made shorter.
     fn lengthen(&mut self) {
         if self.general.table.h != self.h {
@@ -259,6 +275,19 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
 
     fn account(&self) -> Vec<Item> {
         account_by_clock(&self.general.lagrangian.structure())
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        self.general.save(&mut words);
+        [self.general.table.h, self.tau].save(&mut words);
+        self.taken.save(&mut words);
+        save_option(self.suspicion.as_ref(), &mut words);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.read(&mut words).is_some() && words.is_empty()
     }
 
     fn suspicion(&self) -> Option<Suspicion> {

@@ -5,6 +5,7 @@
 
 use super::coefficients::{Coefficients, MOST};
 use super::condensed::Condensed;
+use crate::run::saved::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, linear};
 use std::array::from_fn;
@@ -16,6 +17,8 @@ pub(super) struct Start<const N: usize> {
     pub y: [f64; N],
     pub z: f64,
 }
+
+saved!([const N: usize] Start<N> { q, y, z });
 
 /// The stages of a solved step: V, `rho L_q`, `rho L_z` and L, with 0 beyond the last stage.
 pub(super) struct Solved<const N: usize> {

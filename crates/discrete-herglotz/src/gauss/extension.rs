@@ -2,6 +2,7 @@
 
 use super::compensated::Compensated;
 use super::stages::Stages;
+use crate::run::saved::saved;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Clock, Scalar};
 
@@ -61,3 +62,5 @@ pub(super) struct Values<const N: usize> {
     pub p_t: Compensated,
     pub fallen: f64,
 }
+
+saved!([P] Extension<P> { t, p_t, g });

@@ -60,18 +60,18 @@ pub(super) struct General<'a, L, P, const N: usize> {
     pub z: Compensated,
     /// `1 - rho` at the end of the last step.
     pub fallen: f64,
-    warm: bool,
+    pub(super) warm: bool,
     /// Corrects the sweeps where they do not contract by themselves.
     pub newton: Option<Box<StageNewton<N>>>,
     /// The steps that Newton's Jacobian has served.
-    age: u32,
+    pub(super) age: u32,
     pub(super) tail: Tail,
     /// Above one where the last step has not resolved the motion, or its drag.
     pub misfit: f64,
     /// The same while it is not used.
     parked: Option<Box<StageNewton<N>>>,
     /// Whether the stages of the next step are solved: v, l and falling are theirs.
-    solved: bool,
+    pub(super) solved: bool,
     pub evaluations: u64,
 }
 

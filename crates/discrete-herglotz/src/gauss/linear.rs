@@ -5,6 +5,7 @@ use super::compensated::{Compensated, Twofold};
 use super::condensed::Condensed;
 use super::dense::Start;
 use super::double_double::solve_exactly;
+use crate::run::saved::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Hessian, Lagrangian, VelocityPoint};
 use num_traits::{One, Zero};
@@ -212,3 +213,5 @@ impl<const N: usize> Linear<N> {
         })
     }
 }
+
+saved!([const N: usize] Linear<N> { q, v, z });

@@ -11,6 +11,7 @@ mod dense;
 mod double_double;
 mod extension;
 mod general;
+mod general_saved;
 mod general_stages;
 mod integrator;
 pub(crate) mod lanes;

@@ -12,6 +12,7 @@ use super::stages::{Stages, blocks};
 use super::sweeps::{AGE, Progress, SLOW, Sweeps};
 use crate::StepError;
 use crate::gauss::lanes::{Lanes, branched};
+use crate::run::saved::{Saved, load_option, save_option, saved};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, largest};
 use pulp::{Arch, Simd};
@@ -421,5 +422,30 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             }
             self.left = left;
         }
+    }
+}
+
+saved!([L, const N: usize] Separable<'_, L, N> {
+    rest, x, a, base, q, v, z, far, warm, solved, age, misfit, taken, review, evaluations,
+} and save_solution, load_solution);
+
+impl<L, const N: usize> Separable<'_, L, N> {
+    /// The matrix by its slope and whether it has a tail, and Newton's Jacobian.
+    fn save_solution(&self, to: &mut Vec<u64>) {
+        self.left.kappa.save(to);
+        self.left.tail.is_some().save(to);
+        save_option(self.newton.as_deref(), to);
+    }
+
+    fn load_solution(&mut self, from: &mut &[u64]) -> Option<()> {
+        let (mut kappa, mut refined) = (0.0, false);
+        kappa.load(from)?;
+        refined.load(from)?;
+        self.left = self.table.preconditioned(kappa)?;
+        if refined {
+            self.left.refine(&self.table);
+        }
+        self.newton = load_option(from, || SlopeNewton::new(&self.table))?.map(Box::new);
+        Some(())
     }
 }

@@ -11,6 +11,7 @@ use super::modes::Modes;
 use super::stages::{Stages, blocks};
 use super::table::Table;
 use crate::gauss::lanes::Lanes;
+use crate::run::saved::saved;
 use contact_geom::nalgebra::{Complex, DMatrix, SMatrix, SVector};
 use contact_geom::{Hessian, Scalar, Triple, larger};
 use pulp::{Arch, Simd, WithSimd};
@@ -298,3 +299,7 @@ fn invert<const N: usize>(m: &mut Matrix<N>) -> bool {
     m.copy_from_slice(inverse.as_slice());
     m.iter().all(|e| e.is_finite())
 }
+
+saved!([const N: usize] SlopeNewton<N> { inverses, a });
+saved!([const N: usize] StageNewton<N> { blocks });
+saved!([const N: usize] Block<N> { inverse, z, z_v, rho, rho_v, rho_z, of_z, of_rho });

@@ -1,6 +1,7 @@
 //! Runs of contact Gauss collocation.
 
 mod marks;
+mod words;
 
 use super::account::account;
 use super::beginning::{Beginning, velocity};
@@ -472,6 +473,14 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     /// The collocation polynomial. It costs nothing where it is not asked for.
     fn dense(&self) -> Option<DenseStep<N>> {
         self.curve()
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        Some(self.words())
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.read(&mut words).is_some() && words.is_empty()
     }
 
     /// What was seen along the steps; else what a look at the last step alone shows, between its nodes: a run that wants more asks

@@ -1,6 +1,7 @@
 //! Symmetric compositions of discrete flows.
 
 use crate::rules::flow::account_of;
+use crate::run::saved::{Saved, saved};
 use crate::run::watch::{Watch, sharper, turning};
 use crate::{
     DiscreteLagrangian, Doubt, Halt, InputError, Item, Solver, SplittingScheme, StepError, Stepper, Suspicion,
@@ -230,6 +231,16 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
         self.evaluations
     }
 
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        Saved::save(self, &mut words);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.load(&mut words).is_some() && words.is_empty()
+    }
+
     fn suspicion(&self) -> Option<Suspicion> {
         self.watch.first
     }
@@ -238,3 +249,5 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
         self.watch.doubt.take()
     }
 }
+
+saved!([D, const N: usize] Composition<D, N> { taken, state, velocity, sigma, evaluations, acceleration, change, before, watch });

@@ -1,5 +1,6 @@
 //! The discrete Hamiltonian flow at work on a motion.
 
+use crate::run::saved::{Saved, saved};
 use crate::run::watch::{Watch, at_rest, sharper};
 use crate::run::{check_time, start_of};
 use crate::{DiscreteLagrangian, Doubt, Halt, InputError, Item, Solver, StepError, Stepper, Suspicion, Transition};
@@ -215,6 +216,16 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
         self.evaluations
     }
 
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        Saved::save(self, &mut words);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.load(&mut words).is_some() && words.is_empty()
+    }
+
     fn suspicion(&self) -> Option<Suspicion> {
         self.watch.first
     }
@@ -240,3 +251,5 @@ pub(crate) fn account_of(explicit: bool, what: &str) -> Vec<Item> {
     let action = Item::computed("action z", "the flow of a discrete Lagrangian carries it");
     solved.into_iter().chain([action]).collect()
 }
+
+saved!([D, const N: usize] Flow<D, N> { t0, k, state, velocities, sigma, evaluations, before, watch });

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod any_integrator;
+mod checkpoint;
 mod events;
 mod explain;
 mod halved;
@@ -14,6 +15,7 @@ mod pilot;
 mod plan;
 mod problem;
 mod rows;
+pub(crate) mod saved;
 mod stepper;
 #[cfg(test)]
 mod tests;
@@ -21,6 +23,7 @@ pub(crate) mod verified;
 pub(crate) mod watch;
 
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
+pub use checkpoint::{Checkpoint, CheckpointError, Interrupted};
 pub use events::{Crossing, Event, Events};
 pub(crate) use explain::DECOUPLED;
 pub use explain::Item;
@@ -118,12 +121,13 @@ pub struct Run<'p, 'o, L, const N: usize> {
     length: Option<Length<'p, L, N>>,
     needs: Needs,
     observers: Vec<Box<dyn Observer<N> + 'o>>,
+    from: Option<Interrupted>,
 }
 
 impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     fn of(problem: &'p Problem<'p, L, N>) -> Self {
         let needs = Needs { action: true, conformal_factor: false };
-        Run { problem, integrator: None, length: None, needs, observers: Vec::new() }
+        Run { problem, integrator: None, length: None, needs, observers: Vec::new(), from: None }
     }
 
     /// The same by this integrator.
@@ -163,6 +167,12 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
         Run { needs: Needs { conformal_factor: true, ..self.needs }, ..self }
     }
 
+    /// Goes on with the run where it was interrupted, to the last bit: problem, integrator, steps, end and requests must be the same. The
+    /// observers see what follows, its start included.
+    pub fn resume(self, interrupted: Interrupted) -> Self {
+        Run { from: Some(interrupted), ..self }
+    }
+
     /// Checks everything, chooses the step and the route.
     ///
     /// # Errors
@@ -197,7 +207,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// # Errors
     /// Those of [`plan`](Self::plan), and of observers that cannot observe such a run. Bad luck in mid-run is the outcome's status.
     pub fn run(mut self, until: Until) -> Result<Outcome<N>, InputError> {
-        self.plan(until)?.observed_by(&mut self.observers)
+        self.plan(until)?.observed_by(&mut self.observers, self.from.as_ref())
     }
 }
 
@@ -270,6 +280,9 @@ pub(crate) trait Motion<const N: usize> {
 
     /// The rates `(qdot, pdot, zdot)` there.
     fn rates(&self, t: f64, state: &PhasePoint<N>) -> Result<PhasePoint<N>, StepError>;
+
+    /// What tells the run from others.
+    fn fingerprint(&self) -> u64;
 
     /// The state at a time of the step that starts at a time and a state.
     fn inside(&self, from: &(f64, PhasePoint<N>), t: f64) -> Result<PhasePoint<N>, StepError>;

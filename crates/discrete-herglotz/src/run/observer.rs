@@ -1,8 +1,8 @@
 //! What looks at a run while it goes on.
 
-use super::Motion;
+use super::{Interrupted, Motion};
 use crate::gauss::DenseStep;
-use crate::{InputError, StepError, Stepper};
+use crate::{InputError, StepError, Stepper, Suspicion};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use std::ops::ControlFlow;
@@ -106,6 +106,7 @@ pub struct Moment<'r, const N: usize> {
     pub log_factor: Option<f64>,
     /// Whether the run ends here.
     pub last: bool,
+    pub(super) suspicion: Option<Suspicion>,
     pub(super) before: Option<(f64, PhasePoint<N>)>,
     pub(super) motion: &'r dyn Motion<N>,
     pub(super) stepper: &'r dyn Stepper<N>,
@@ -118,6 +119,13 @@ impl<'r, const N: usize> Moment<'r, N> {
     /// A [`StepError`] where no velocity belongs to the momentum.
     pub fn velocity(&self) -> Result<SVector<f64, N>, StepError> {
         self.motion.velocity(self.t, &self.state)
+    }
+
+    /// The run as it would go on from here; `None` where its stepper cannot be saved.
+    pub(super) fn interrupted(&self) -> Option<Interrupted> {
+        let (fingerprint, words) = (self.motion.fingerprint(), self.stepper.save()?);
+        let (taken, suspicion) = (self.k, self.suspicion);
+        Some(Interrupted { fingerprint, taken, log_factor: self.log_factor.unwrap_or(0.0), suspicion, words })
     }
 
     /// The velocity at a time and a state of the last step.

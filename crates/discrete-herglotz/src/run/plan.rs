@@ -1,7 +1,10 @@
 //! The plan of a run: the route, and the one loop of all runs.
 
 use super::accuracy::Choice;
-use super::{Course, Facts, Item, Moment, Motion, Needs, Observer, Outcome, Problem, Shared, Stop, Task, Wants};
+use super::checkpoint::digest;
+use super::{
+    Course, Facts, Interrupted, Item, Moment, Motion, Needs, Observer, Outcome, Problem, Shared, Stop, Task, Wants,
+};
 use crate::gauss::{FEW, velocity};
 use crate::run::verified::refuted;
 use crate::{Doubt, InputError, Status, StepError, Stepper, Suspicion};
@@ -122,11 +125,15 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// # Errors
     /// Those of [`stepper`](Self::stepper). Bad luck in mid-run is the outcome's status.
     pub fn run(&self) -> Result<Outcome<N>, InputError> {
-        self.observed_by(&mut Vec::new())
+        self.observed_by(&mut Vec::new(), None)
     }
 
     /// Runs it under the eyes of observers.
-    pub(super) fn observed_by(&self, observers: &mut Vec<Box<dyn Observer<N> + '_>>) -> Result<Outcome<N>, InputError> {
+    pub(super) fn observed_by(
+        &self,
+        observers: &mut Vec<Box<dyn Observer<N> + '_>>,
+        from: Option<&Interrupted>,
+    ) -> Result<Outcome<N>, InputError> {
         let by_clock = self.facts.by_clock;
         let h = (!by_clock).then_some(self.h);
         let count = (!by_clock || self.error.is_some()).then_some(self.count);
@@ -135,12 +142,18 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         // The logarithm of the product of the sigma_d; in single steps only where they differ.
         let (mut log_factor, single) = (0.0, self.needs.conformal_factor && !self.constant_rate);
         let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
+        if let Some(from) = from {
+            if from.fingerprint != self.fingerprint() || !stepper.restore(&from.words) {
+                return Err(InputError::AnotherRun);
+            }
+            (taken, log_factor, suspicion) = (from.taken, from.log_factor, from.suspicion);
+        }
         // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes, and are compared
         // with halves in doubt alone.
         let doubts = self.error.is_none() && !by_clock;
         let halves = doubts && !self.many_stages();
         let most = if by_clock { usize::MAX } else { self.count };
-        let start = self.moment(&*stepper, None, 0.0, (0, false));
+        let start = self.moment(&*stepper, None, (log_factor, suspicion), (taken, false));
         let (mut over, mut stop) = (false, observers.start(&start).break_value());
         while !over && stop.is_none() {
             // One mark is enough.
@@ -175,7 +188,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             over = taken == most || by_clock && self.is_over(stepper.time());
             if taken >= next_seen || over {
                 let before = if done == 1 { before } else { None };
-                stop = observers.step(&self.moment(&*stepper, before, log_factor, (taken, over))).break_value();
+                stop = observers
+                    .step(&self.moment(&*stepper, before, (log_factor, suspicion), (taken, over)))
+                    .break_value();
             }
             if over || taken == next_probe(taken - 1) {
                 let doubt = stepper.doubt().filter(|_| doubts && suspicion.is_none());
@@ -216,12 +231,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         &'r self,
         stepper: &'r dyn Stepper<N>,
         before: Option<(f64, PhasePoint<N>)>,
-        log_factor: f64,
+        (log_factor, suspicion): (f64, Option<Suspicion>),
         (k, last): (usize, bool),
     ) -> Moment<'r, N> {
         let log_factor = self.needs.conformal_factor.then_some(log_factor);
         let (t, state, sigma) = (stepper.time(), stepper.state(), stepper.sigma());
-        Moment { k, t, state, sigma, log_factor, last, before, motion: self, stepper }
+        Moment { k, t, state, sigma, log_factor, last, suspicion, before, motion: self, stepper }
     }
 
     /// The first claim that is false at the state of a stepper.
@@ -265,6 +280,19 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
         let v = self.velocity(t, state)?;
         let (value, g) = self.problem.lagrangian.with_gradient(t, &VelocityPoint { q: state.q, v, z: state.z });
         Ok(PhasePoint { q: v, p: g.x + state.p * g.z, z: value })
+    }
+
+    /// Of the start, of L there, of the steps, and of what is computed.
+    fn fingerprint(&self) -> u64 {
+        let Problem { lagrangian, t0, start, state, .. } = self.problem;
+        let (value, slope) = lagrangian.with_gradient(*t0, start);
+        let numbers = [*t0, self.t_end, self.h, start.z, value, slope.z];
+        let vectors = [&start.q, &start.v, &state.p, &slope.x, &slope.y];
+        let numbers = numbers.iter().chain(vectors.into_iter().flat_map(|x| x.iter())).map(|x| x.to_bits());
+        let name = self.facts.name.bytes().map(u64::from);
+        let Needs { action, conformal_factor } = self.needs;
+        let counts = [N as u64, self.count as u64, action.into(), conformal_factor.into()];
+        digest(&numbers.chain(name).chain(counts).collect::<Vec<u64>>())
     }
 
     fn inside(&self, (t0, from): &(f64, PhasePoint<N>), t: f64) -> Result<PhasePoint<N>, StepError> {

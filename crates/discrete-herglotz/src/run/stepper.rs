@@ -53,6 +53,17 @@ pub trait Stepper<const N: usize> {
         Vec::new()
     }
 
+    /// Everything of it that changes from step to step, as words, so that it can go on from them to the last bit; `None` where it does not
+    /// know how.
+    fn save(&self) -> Option<Vec<u64>> {
+        None
+    }
+
+    /// Goes on from the [saved](Self::save) words of a stepper of the same problem, integrator and step; `false` where they are none.
+    fn restore(&mut self, _words: &[u64]) -> bool {
+        false
+    }
+
     /// The first step so far that cannot have resolved the motion, where one was seen.
     fn suspicion(&self) -> Option<Suspicion> {
         None

@@ -1,5 +1,6 @@
 //! What a run sees of steps that do not resolve its motion.
 
+use super::saved::{Saved, load_option, save_option, saved};
 use crate::Suspicion;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{PhasePoint, larger, largest};
@@ -145,4 +146,22 @@ pub(crate) const LEAST: f64 = 1.0 / 256.0;
 #[inline(always)]
 pub(crate) fn factor_misfit(sigma: f64) -> Option<f64> {
     if (1.0 / 3.0..=3.0).contains(&sigma) { None } else { Some(sigma.ln().abs() / 3.0f64.ln()) }
+}
+
+saved!([const N: usize] Doubt<N> { step, steps, t, from, to });
+saved!([] Suspicion { step, misfit });
+
+impl<const N: usize> Saved for Watch<N> {
+    fn save(&self, to: &mut Vec<u64>) {
+        save_option(self.first.as_ref(), to);
+        save_option(self.doubt.as_ref(), to);
+        [self.sharpest, self.floor].save(to);
+    }
+    fn load(&mut self, from: &mut &[u64]) -> Option<()> {
+        self.first = load_option(from, || Suspicion { step: 0, misfit: 0.0 })?;
+        let nowhere = PhasePoint { q: SVector::zeros(), p: SVector::zeros(), z: 0.0 };
+        self.doubt = load_option(from, || Doubt { step: 0, steps: 0, t: 0.0, from: nowhere, to: nowhere })?;
+        self.sharpest.load(from)?;
+        self.floor.load(from)
+    }
 }

@@ -4,6 +4,7 @@ use super::drag::{Drag, Drift};
 use super::motion::{Motion, Progress, Reached};
 use super::separable::Separable;
 use crate::run::DECOUPLED;
+use crate::run::saved::Saved;
 use crate::{Doubt, Halt, InputError, Item, SplittingScheme, Stepper, Suspicion};
 use contact_geom::{Lagrangian, PhasePoint};
 
@@ -163,6 +164,16 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
 
     fn account(&self) -> Vec<Item> {
         super::account(Item::skipped("action z", DECOUPLED))
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        Saved::save(&self.progress, &mut words);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.progress.load(&mut words).is_some() && words.is_empty()
     }
 
     fn suspicion(&self) -> Option<Suspicion> {

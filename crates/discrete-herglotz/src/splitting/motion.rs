@@ -1,5 +1,6 @@
 //! What every splitting moves: sums that may carry their rounding, a state of them, and a run in chunks.
 
+use crate::run::saved::saved;
 use crate::run::watch::{Watch, sharper, turning};
 use crate::{Doubt, Halt, StepError};
 use contact_geom::nalgebra::SVector;
@@ -183,3 +184,7 @@ impl<const N: usize> Progress<N> {
         Ok(())
     }
 }
+
+saved!([const N: usize] Sum<N> { value, carry });
+saved!([const N: usize] Motion<N> { q, p, z, force, value, change, sigma });
+saved!([const N: usize] Progress<N> { taken, motion, state, watch });

@@ -3,6 +3,7 @@
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::motion::{Motion, Progress, Reached};
 use super::separable::Separable;
+use crate::run::saved::Saved;
 use crate::{Doubt, Halt, InputError, Item, SplittingScheme, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
@@ -138,6 +139,16 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
 
     fn account(&self) -> Vec<Item> {
         super::account(Item::computed("action z", "it drives the motion"))
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        Saved::save(&self.progress, &mut words);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.progress.load(&mut words).is_some() && words.is_empty()
     }
 
     fn suspicion(&self) -> Option<Suspicion> {

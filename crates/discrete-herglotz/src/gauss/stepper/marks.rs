@@ -4,6 +4,7 @@ use super::{GaussStepper, Route};
 use crate::gauss::dense::Start;
 use crate::gauss::extension::Physical;
 use crate::gauss::look::{Compare, Curve, Look, SETS};
+use crate::run::saved::saved;
 use crate::run::watch::{misfit, sharper};
 use crate::{Doubt, Suspicion};
 use contact_geom::Lagrangian;
@@ -27,6 +28,8 @@ impl<const N: usize> Sequence<N> {
         Box::new(Sequence { velocities: [SVector::zeros(); 4], q: SVector::from(start.q), ends: [start; 2] })
     }
 }
+
+saved!([const N: usize] Sequence<N> { velocities, q, ends });
 
 /// The stages up to which the nodes of a step do not tell whether it resolves the motion.
 pub(crate) const FEW: usize = 2;

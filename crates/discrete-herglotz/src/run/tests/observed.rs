@@ -1,6 +1,9 @@
 //! What a run gives, by every integrator: rows at times, events, the way back, a stop and a start from there.
 
-use crate::run::{AnyIntegrator, Event, Events, Moment, Problem, Rows, Run, Steps, Stop, Until, run_of};
+use crate::run::{
+    AnyIntegrator, Checkpoint, CheckpointError, Event, Events, Interrupted, Moment, Problem, Rows, Run, Steps, Stop,
+    Until, run_of,
+};
 use crate::{Gauss, InputError, Method, Outcome, Status};
 use contact_geom::systems::{Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
@@ -236,4 +239,87 @@ fn what_cannot_be_observed_is_refused() {
     assert_eq!(run(&[-0.25, -0.5], -1.0), Ok(()));
     assert_eq!(run(&[], 0.0), Err(InputError::Span { span: 0.0 }));
     assert!(Gauss::new(&pendulum, 4, -0.1).is_ok());
+}
+
+/// A run that is interrupted anywhere goes on to the last bit, by every integrator, with what it has compensated and extrapolated.
+#[test]
+fn interrupted_runs_go_on() {
+    fn check<L: Lagrangian<N>, const N: usize>(system: &L, start: VelocityPoint<N>, name: &str) -> usize {
+        let path = std::env::temp_dir().join(format!("interrupted_{name}_{}", std::process::id()));
+        let problem = Problem::new(system, 0.0, start).unwrap();
+        let mut places = 0;
+        for integrator in takers(system) {
+            let whole = run_in(&problem, integrator, 60, 6.0).with_conformal_factor().run(Until::Time(6.0)).unwrap();
+            assert_eq!(whole.status, Status::Completed, "{integrator}");
+            // Places without a period.
+            for place in [1, 2 + whole.steps * 5 / 13, whole.steps - 1] {
+                let mut saved = Checkpoint::every(place, &path).unwrap();
+                let mut killed = |at: &Moment<'_, N>| match at.k {
+                    k if k == place => ControlFlow::Break(Stop::here("a test")),
+                    _ => ControlFlow::Continue(()),
+                };
+                let run = run_in(&problem, integrator, 60, 6.0).with_conformal_factor();
+                let stopped = run.observe(&mut saved).observe(&mut killed).run(Until::Time(6.0)).unwrap();
+                assert_eq!((stopped.steps, saved.error.is_none()), (place, true), "{integrator}");
+                let run = run_in(&problem, integrator, 60, 6.0).with_conformal_factor();
+                let resumed = run.resume(Interrupted::read(&path).unwrap()).run(Until::Time(6.0)).unwrap();
+                assert_eq!(resumed, whole, "{integrator} from {place}");
+                places += 1;
+            }
+        }
+        // Another run is refused.
+        let other = run_in(&problem, AnyIntegrator::Discrete(Method::Midpoint), 61, 6.0);
+        let refused = other.resume(Interrupted::read(&path).unwrap()).run(Until::Time(6.0));
+        assert_eq!(refused, Err(InputError::AnotherRun));
+        std::fs::remove_file(path).unwrap();
+        places
+    }
+    let kepler = Kepler::<2> { mu: 1.0, gamma: -0.05 };
+    let oscillator = contact_geom::systems::HarmonicOscillator { gamma: -0.1 };
+    let start = VelocityPoint::new([1.0], [0.3], 0.2);
+    let places = check(&Pendulum { gamma: -0.1 }, start, "pendulum")
+        + check(&oscillator, start, "oscillator")
+        + check(&QuadraticInZ { c: 0.3 }, start, "square")
+        + check(&kepler, kepler.initial(), "kepler");
+    assert!(places > 400, "{places}");
+}
+
+/// A file that is not there, not one of a run, of another version, cut off or changed.
+#[test]
+fn damaged_checkpoints_are_refused() {
+    let pendulum = Pendulum { gamma: -0.1 };
+    let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.3], 0.2)).unwrap();
+    let path = std::env::temp_dir().join(format!("damaged_{}", std::process::id()));
+    assert!(matches!(Interrupted::read(&path), Err(CheckpointError::Unreadable(_))));
+    let mut saved = Checkpoint::every(5, &path).unwrap();
+    run_in(&problem, AnyIntegrator::Gauss { stages: 8 }, 10, 1.0).observe(&mut saved).run(Until::Time(1.0)).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    let read = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        Interrupted::read(&path)
+    };
+    assert!(read(&whole).is_ok());
+    for cut in [0, 7, 8, 15, 16, whole.len() / 2, whole.len() - 8, whole.len() - 1] {
+        let found = read(&whole[..cut]);
+        let right = if cut < 8 {
+            matches!(found, Err(CheckpointError::Foreign))
+        } else {
+            matches!(found, Err(CheckpointError::Damaged))
+        };
+        assert!(right, "{cut}: {found:?}");
+    }
+    for place in (16..whole.len()).step_by(5) {
+        let mut other = whole.clone();
+        other[place] ^= 1;
+        assert!(matches!(read(&other), Err(CheckpointError::Damaged)), "{place}");
+    }
+    let mut newer = whole.clone();
+    newer[8] = 2;
+    assert!(matches!(read(&newer), Err(CheckpointError::Version { found: 2 })));
+    std::fs::remove_file(path).unwrap();
+    // A place that cannot be written to ends the run, and says so.
+    let mut nowhere = Checkpoint::every(5, "/dev/null/checkpoint").unwrap();
+    let run = run_in(&problem, AnyIntegrator::Gauss { stages: 8 }, 10, 1.0).observe(&mut nowhere);
+    let ended = run.run(Until::Time(1.0)).unwrap();
+    assert!(matches!(ended.status, Status::Stopped { step: 5, .. }) && nowhere.error.is_some());
 }
