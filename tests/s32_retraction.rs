@@ -3,13 +3,13 @@
 use crate::common::{AlongMotion, OverMotions, over_motions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Pendulum, System, visit_catalogue};
-use contact_geom::{DiscretePoint, Lagrangian, Larger, Largest, Scalar, VelocityPoint};
+use contact_geom::{DiscretePoint, Lagrangian, Larger, Largest, Scalar, Statement, VelocityPoint};
 use exact_lagrangian::{ContactExponential, ExactError, Route, herglotz_flow, statements};
 
 /// Along random motions of every system, from a guess on their branch.
 #[test]
 fn on_every_system() {
-    over_motions(32);
+    over_motions(Statement::ExactRetractions);
 }
 
 /// Without a guess the motion that is found joins the points, whether or not it is the one that they were made from.
@@ -48,7 +48,8 @@ fn the_loss_at_small_steps_is_the_condition() {
     for k in 0..=8 {
         let h = 10f64.powi(-k);
         let condition = statements::condition(&system, 0.0, &x, h).unwrap_or(f64::NAN);
-        let residual = statements::residual(32, &system, 0.0, &x, h).ok().flatten().unwrap_or(f64::NAN);
+        let residual =
+            statements::residual(Statement::ExactRetractions, &system, 0.0, &x, h).ok().flatten().unwrap_or(f64::NAN);
         assert!(residual < 4.0 * f64::EPSILON, "h = {h}: {residual:e}");
         assert!((0.2..5.0).contains(&(condition * h)), "h = {h}: condition {condition:e}");
     }

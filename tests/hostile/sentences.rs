@@ -3,13 +3,13 @@
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{
-    Clock, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint,
+    Clock, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, Statement, Structure, Symmetry, VelocityPoint,
     herglotz_field, linear,
 };
 use discrete_herglotz::{
-    AnyIntegrator, Composition, DiscreteLagrangian, Event, Events, Flow, Gauss, InputError, LeftMidpoint, Method,
-    Midpoint, Moment, Obstacle, Problem, Rectangle, Rows, Solver, SplittingScheme, Status, StepError, Stepper, Steps,
-    Stop, Strang, Suspicion, UnknownIntegrator, UnknownMethod, Until,
+    AnyIntegrator, Checkpoint, Composition, DiscreteLagrangian, Event, Events, Flow, Gauss, InputError, Interrupted,
+    LeftMidpoint, Method, Midpoint, Moment, Obstacle, Problem, Rectangle, Rows, Solver, SplittingScheme, Status,
+    StepError, Stepper, Steps, Stop, Strang, Suspicion, UnknownIntegrator, UnknownMethod, Until,
 };
 use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow};
 use std::ops::ControlFlow;
@@ -139,6 +139,14 @@ fn input_errors() {
         InputError::TooMany { .. } => in_steps(Steps::Size(1e-300)), ["the number of steps", "e300", "longer steps"];
         InputError::NoSteps => problem.by(AnyIntegrator::Gauss { stages: 8 }).plan(Until::Time(5.5)).err().unwrap(), ["`steps`", "`accuracy`"];
         InputError::NoIntegrator => problem.accuracy(0.5).steps(Steps::Count(1)).plan(Until::Time(5.5)).err().unwrap(), ["`by`", "`accuracy`"];
+        InputError::AnotherRun => {
+            let path = std::env::temp_dir().join(format!("another_run_{}", std::process::id()));
+            let mut saved = Checkpoint::every(1, &path).unwrap();
+            problem.steps(Steps::Count(1)).observe(&mut saved).run(Until::Time(5.5)).unwrap();
+            let interrupted = Interrupted::read(&path).unwrap();
+            std::fs::remove_file(path).unwrap();
+            problem.steps(Steps::Count(2)).resume(interrupted).run(Until::Time(5.5)).unwrap_err()
+        }, ["not the one that was interrupted", "same problem"];
         InputError::Times { .. } => {
             let mut rows = Rows::at([0.5, 7.25]).unwrap();
             problem.steps(Steps::Count(1)).observe(&mut rows).run(Until::Time(5.5)).unwrap_err()
@@ -331,7 +339,7 @@ fn geometry_errors() {
         GeometryError::Undefined { .. } => {
             let ld = Rectangle::new(Explosive, 0.1).unwrap();
             let outside = DiscretePoint::new([0.0], [f64::NAN], 0.0);
-            discrete_herglotz::statements::residual(13, &ld, &[], 0.0, &outside).unwrap_err()
+            discrete_herglotz::statements::residual(Statement::ActionDifferential, &ld, &[], 0.0, &outside).unwrap_err()
         }, ["not defined", "inside its domain"];
     });
     // The remedy is named, not left to the reader.

@@ -28,6 +28,7 @@ mod dynamics;
 mod error;
 mod forms;
 mod number;
+mod statement;
 pub mod statements;
 pub mod systems;
 
@@ -45,5 +46,6 @@ pub use forms::{
     conformality_with_jacobian, generic, seed,
 };
 pub use number::{Border, Dual, KernelDual, Larger, Largest, Module, Scalar, larger, largest, linear};
+pub use statement::Statement;
 
 pub use nalgebra;

@@ -9,14 +9,14 @@ struct Row {
     text: &'static str,
 }
 
-/// Makes [`Statement`] from the list: the sentence above each variant is both its documentation and its text; then follow its
-/// number, its section of the paper and its title.
+/// Makes [`Statement`] from the list: the sentence above a variant is both its documentation and its text; its number,
+/// section of the paper and title follow.
 macro_rules! statements {
     ($(#[doc = $text:literal] $name:ident = $number:literal, $section:literal, $title:literal;)*) => {
         /// A statement of the paper *On the geometry of discrete contact mechanics*, with the paper's slips corrected.
         ///
-        /// Its number names its test, `tests/sNN_*.rs`, and its rows in `statements.csv`. The functions `residual` of the modules
-        /// `statements` evaluate most of them.
+        /// The number is that of its rows in `statements.csv` and, but for three that share one, of its test
+        /// `tests/sNN_*.rs`. Most are evaluated by the function `residual` in the module `statements` of a library.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Statement {
             $(#[doc = $text] $name = $number,)*
@@ -36,9 +36,9 @@ macro_rules! statements {
 }
 
 statements! {
-    /// The form eta ^ (d eta)^n vanishes nowhere: on T*Q x R, on TQ x R for a regular L, on Q x Q x R for a regular L_d.
+    /// The volume eta ^ (d eta)^n vanishes nowhere on T*Q x R, and on TQ x R and Q x Q x R for a regular L or L_d.
     Volume = 1, "2.1", "contact condition";
-    /// The Reeb field R, d/dz in Darboux coordinates, has i_R d eta = 0 and eta(R) = 1; flat is invertible, flat(R) = eta.
+    /// The Reeb field R, in Darboux coordinates d/dz, has i_R d eta = 0, eta(R) = 1, flat(R) = eta; flat is invertible.
     ReebField = 2, "2.1", "Reeb field, flat and sharp";
     /// The field X_f of a function f is the one with flat(X_f) = df - (f + R(f)) eta, and f = -eta(X_f).
     HamiltonianField = 3, "2.1", "contact Hamiltonian vector field";
@@ -50,11 +50,11 @@ statements! {
     EnergyDecay = 6, "2.1", "X_H(H) = -R(H) H";
     /// L is regular exactly if eta_L is a contact form, and then its Reeb field is d/dz - W^-1 L_vz d/dv.
     Regularity = 7, "2.2", "L regular iff eta_L contact";
-    /// The Herglotz field xi_L, which is that of the energy E_L, is of second order, and its motions solve Herglotz' equations.
+    /// The Herglotz field xi_L, that of the energy E_L, is of second order, and its motions solve Herglotz' equations.
     HerglotzField = 8, "2.2", "Herglotz field is of second order";
     /// The Legendre transformation FL is a local contactomorphism that takes E_L to H and xi_L to X_H.
     LegendreTransformation = 9, "2.2", "FL is a contactomorphism";
-    /// A curve with fixed ends is critical for the action exactly if it solves Herglotz' equations; dZ/dz0 = exp(int L_z).
+    /// A curve with fixed ends has a critical action exactly if it solves Herglotz' equations; dZ/dz0 = exp(int L_z).
     HerglotzPrinciple = 10, "2.2.1", "Herglotz' principle";
     /// A function f is dissipated, X_H(f) = -R(H) f, exactly if f o phi_t = sigma_t f; quotients of two are conserved.
     DissipatedQuantities = 11, "2.2.2", "dissipated quantities";
@@ -64,21 +64,21 @@ statements! {
     ActionDifferential = 13, "3", "differential of the discrete action";
     /// The differential of the discrete action of two steps is the one that the remark writes out.
     TwoSteps = 14, "3", "the same for two steps";
-    /// Where sigma_d is not zero, a path is critical for the discrete action exactly if it solves the discrete equations.
+    /// Where sigma_d is not zero, a path has a critical action exactly if it solves the discrete Herglotz equations.
     DiscreteHerglotzPrinciple = 15, "3", "discrete Herglotz principle";
     /// The condition of Vermeeren, Bravetti and Seri on Q x Q x R^2 is equivalent to the discrete Herglotz equations.
     VermeerenBravettiSeri = 16, "3", "condition on Q x Q x R^2";
     /// The transform F+L_d is a local diffeomorphism exactly if F-L_d is one.
     DiscreteRegularity = 17, "3.1", "F+ and F- regular together";
-    /// The momenta F+L_d(q0, q1, z0) and F-L_d(q1, q2, z1) match exactly on solutions of the discrete Herglotz equations.
+    /// The states F+L_d(q0, q1, z0) and F-L_d(q1, q2, z1) are equal exactly if the discrete Herglotz equations hold.
     MomentumMatching = 18, "3.1", "momentum matching";
-    /// The flow Phi_d, which is F+L_d followed by the inverse of F-L_d, exists exactly if F-L_d is a local diffeomorphism.
+    /// The flow Phi_d, F+L_d and then the inverse of F-L_d, exists exactly if F-L_d is a local diffeomorphism.
     DiscreteFlowExists = 19, "3.1", "existence of the discrete flow";
     /// The three expressions of the discrete Hamiltonian flow are equal, and its diagram commutes.
     HamiltonianFlowExpressions = 20, "3.1", "three expressions of the flow";
     /// The pullbacks eta+ and eta- of eta are contact forms, with the stated local expressions.
     DiscreteContactForms = 21, "3.1", "eta+ and eta- are contact forms";
-    /// The two forms are conformal, eta+ = sigma_d eta-, and Phi_d pulls eta- back to eta+.
+    /// The forms eta+ and eta- are conformal, eta+ = sigma_d eta-, and Phi_d pulls eta- back to eta+.
     DiscreteFormsAreConformal = 22, "3.1", "eta+ = sigma_d eta-, pullback to eta+";
     /// The flow Phi_d pulls eta- back to sigma_d eta-, and eta+ to (sigma_d o Phi_d) eta+.
     DiscreteFlowIsConformal = 23, "3.1", "conformal factors of Phi_d";
@@ -86,7 +86,7 @@ statements! {
     HamiltonianFlowIsConformal = 24, "3.1", "conformal factor of the flow on T*Q x R";
     /// Where L_d is invariant, D1 L_d xi(q0) + D2 L_d xi(q1) = 0 for each generator xi.
     DiscreteInvariance = 25, "3.2", "invariance of L_d";
-    /// Where L_d is invariant, the lifted action is by contactomorphisms of eta+ and eta-, and J_d o Phi_d = sigma_d J_d.
+    /// Where L_d is invariant, the lifted action keeps eta+ and eta-, and the momentum obeys J_d o Phi_d = sigma_d J_d.
     DiscreteNoether = 26, "3.2", "discrete Noether theorem";
     /// The multiplier of Chetaev's principle is -L_z, so that the non-holonomic system has Herglotz' equations.
     ChetaevMultiplier = 27, "4.1", "Chetaev's multiplier";
@@ -94,7 +94,7 @@ statements! {
     ProjectedFlow = 28, "4.1", "flow of the non-holonomic system";
     /// The contact exponential map exp_h is a local diffeomorphism except at conjugate points.
     ExponentialMap = 29, "4.1", "exp_h is a local diffeomorphism";
-    /// The contact exponential map is the non-holonomic one between pi, inverted on M_L, and the projection of M_d.
+    /// The contact exponential map is the inverse of pi on M_L, then the non-holonomic one, then the projection of M_d.
     NonHolonomicExponential = 30, "4.1", "the two exponential maps";
     /// The projection of M_d, the image of the non-holonomic exponential map, to Q x Q x R is a local diffeomorphism.
     ImageProjection = 31, "4.1", "projection of M_d";
@@ -106,7 +106,7 @@ statements! {
     ExactDerivatives = 34, "4.2", "D1, D2, Dz of L_h^e";
     /// The discrete Legendre transforms of L_h^e are FL after the exact retractions.
     ExactLegendreTransforms = 35, "4.2", "F(+-)L_h^e = FL o R_h^(e+-)";
-    /// L_h^e is regular, its F+ is its F- followed by the flow of X_H over h, and its discrete motions sample the true ones.
+    /// L_h^e is regular, its F+ is its F- and then the flow of X_H, and its discrete motions sample the true ones.
     ExactFlow = 36, "4.2", "F+L_h^e = phi_h o F-L_h^e, motion";
     /// The free particle's discrete equations have an explicit q2, and its L_h^e a closed form.
     FreeParticle = 37, "5", "free particle, explicit";
@@ -138,6 +138,7 @@ impl Statement {
 
     /// What it says, in a sentence.
     pub fn text(self) -> &'static str {
+        // What follows `///` begins with a space.
         self.row().text.trim_start()
     }
 
@@ -171,7 +172,7 @@ mod tests {
     #[test]
     fn words_are_its_own() {
         let different = |of: fn(Statement) -> &'static str| BTreeSet::from(Statement::ALL.map(of)).len();
-        assert_eq!((different(Statement::title), different(Statement::text)), (41, 41));
+        assert_eq!([different(Statement::title), different(Statement::text)], [Statement::ALL.len(); 2]);
         for statement in Statement::ALL {
             let text = statement.text();
             assert!(text.starts_with(char::is_uppercase) && text.ends_with('.'), "{statement}: {text}");

@@ -7,7 +7,7 @@ mod failure;
 mod figure;
 mod output;
 
-pub use checks::{Checks, Subject, TOLERANCE, fractions, title};
+pub use checks::{Checks, Subject, TOLERANCE, fractions};
 pub use failure::{Failure, finish};
 pub use figure::{Axis, Curve, Line, Panel, draw, draw_row};
 pub use output::{Directory, number, print};

@@ -5,7 +5,7 @@ use crate::Attack;
 use crate::numbers::{Claiming, Everything, Grade, HOSTILE, Report, fine, grade, places, triples};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{Pendulum, QuadraticInZ};
-use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Structure, Symmetry, Triple};
+use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Statement, Structure, Symmetry, Triple};
 use discrete_herglotz::{
     ActionStrang, AnyIntegrator, DiscreteLagrangian, DiscretePath, Gauss, HamiltonianFlow, Method, Midpoint,
     MomentumDecay, MomentumRow, Problem, Rectangle, Riccati, Solver, Steps, Strang, Transition, Trapezoidal, Until,
@@ -279,11 +279,11 @@ fn solvers(report: &mut Report) {
 fn residuals(report: &mut Report) {
     let ld = Midpoint::new(Pendulum::default(), 0.1).unwrap();
     for (t, x) in places() {
-        for statement in statements::STATEMENTS.into_iter().chain([0, 3, u32::MAX]) {
+        for statement in Statement::ALL {
             let known = statements::STATEMENTS.contains(&statement);
             let found = statements::residual(statement, &ld, &[], t, &DiscretePoint::from(x));
             let good = match &found {
-                Ok(None) => !known || [25, 26].contains(&statement),
+                Ok(None) => !known || [Statement::DiscreteInvariance, Statement::DiscreteNoether].contains(&statement),
                 Ok(Some(r)) => known && (x.is_finite() || !(*r <= 1e-3)),
                 Err(_) => known,
             };

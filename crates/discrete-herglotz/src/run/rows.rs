@@ -4,6 +4,7 @@ use super::{Course, Moment, Needs, Observer, Stop};
 use crate::{InputError, StepError};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
+use std::cmp::Ordering;
 use std::ops::ControlFlow;
 
 /// A state of a motion.
@@ -68,8 +69,8 @@ impl<'f, const N: usize> Rows<'f, N> {
     /// [`InputError::Times`] for times that are not finite or not in order.
     pub fn at(times: impl IntoIterator<Item = f64>) -> Result<Self, InputError> {
         let times: Vec<f64> = times.into_iter().collect();
-        let rising = times.len() < 2 || times[0] < times[1];
-        let out_of_order = |pair: &[f64]| if rising { !(pair[0] < pair[1]) } else { !(pair[0] > pair[1]) };
+        let wanted = if times.len() < 2 || times[0] < times[1] { Ordering::Less } else { Ordering::Greater };
+        let out_of_order = |pair: &[f64]| pair[0].partial_cmp(&pair[1]) != Some(wanted);
         let out_of_order = times.windows(2).position(out_of_order).map(|index| index + 1);
         match times.iter().position(|t| !t.is_finite()).or(out_of_order) {
             Some(index) => Err(InputError::Times { index, t: times[index] }),

@@ -1,8 +1,8 @@
 //! The paper's section 3 as residuals: each statement evaluated at a point of a discrete Lagrangian, relative to its terms'
 //! size.
 //!
-//! The numbers are those of the project's list of statements (NOTATION.md has it). A residual of a true statement is
-//! round-off times the conditions of the matrices involved; a test compares it with a tolerance, this module has none.
+//! A residual of a true statement is round-off times the conditions of the matrices involved; a test compares it with a
+//! tolerance, this module has none.
 
 // In a check `f64::max` and `amax` would lose a NaN.
 #![deny(clippy::disallowed_methods)]
@@ -15,43 +15,60 @@ use crate::{
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
     ContactForm, Darboux, DiscretePoint, Dual, EtaMinus, EtaPlus, GeometryError, Larger, Largest, OneParameterGroup,
-    PhasePoint, Scalar, SecondDiscreteJet, Smooth, Symmetry, Triple, conformality, conformality_with_jacobian, generic,
-    larger, seed,
+    PhasePoint, Scalar, SecondDiscreteJet, Smooth, Statement, Symmetry, Triple, conformality,
+    conformality_with_jacobian, generic, larger, seed,
 };
 
 /// The statements of section 3 that [`residual`] evaluates.
-pub const STATEMENTS: [u32; 16] = [1, 2, 13, 14, 15, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 39];
+pub const STATEMENTS: [Statement; 16] = [
+    Statement::Volume,
+    Statement::ReebField,
+    Statement::ActionDifferential,
+    Statement::TwoSteps,
+    Statement::DiscreteHerglotzPrinciple,
+    Statement::DiscreteRegularity,
+    Statement::MomentumMatching,
+    Statement::DiscreteFlowExists,
+    Statement::HamiltonianFlowExpressions,
+    Statement::DiscreteContactForms,
+    Statement::DiscreteFormsAreConformal,
+    Statement::DiscreteFlowIsConformal,
+    Statement::HamiltonianFlowIsConformal,
+    Statement::DiscreteInvariance,
+    Statement::DiscreteNoether,
+    Statement::MidpointRule,
+];
 
 /// The residual of a statement of section 3 for a discrete Lagrangian at a time and a point of Q x Q x R; `None` where the
-/// statement's hypotheses do not apply, as for symmetries where there is none, or where the number is not one of
-/// [`STATEMENTS`]. Statements 1 and 2 are those of section 2 on Q x Q x R.
+/// statement's hypotheses do not apply, as for symmetries where there is none, or where it is not one of
+/// [`STATEMENTS`]. [`Statement::Volume`] and [`Statement::ReebField`] are those of section 2 on Q x Q x R.
 ///
 /// # Errors
 /// Those of the discrete Lagrangian and of its forms at a point where it is not regular.
 pub fn residual<const N: usize>(
-    statement: u32,
+    statement: Statement,
     ld: &impl DiscreteLagrangian<N>,
     symmetries: &[Symmetry<N>],
     t: f64,
     x: &DiscretePoint<N>,
 ) -> Result<Option<f64>, GeometryError> {
     Ok(match statement {
-        1 => Some(volume(ld, t, x)?),
-        2 => Some(reeb(ld, t, x)?),
-        13 => Some(action_differential(ld, t, x, 12)?),
-        14 => Some(two_steps(ld, t, x)?),
-        15 => Some(principle(ld, t, x)?),
-        17 => Some(both_local_diffeomorphisms(ld, t, x)?),
-        18 => Some(momentum_matching(ld, t, x)?),
-        19 => Some(flow_exists(ld, t, x)?),
-        20 => Some(three_expressions(ld, t, x)?),
-        21 => Some(contact_forms(ld, t, x)?),
-        22 => Some(forms_are_related(ld, t, x)?),
-        23 => Some(discrete_flow_is_conformal(ld, t, x)?),
-        24 => Some(hamiltonian_flow_is_conformal(ld, t, x)?),
-        25 => worst(symmetries, |group| Ok(discrete_symmetry_defect(ld, group, t, x)?))?,
-        26 => worst(symmetries, |group| momentum_is_dissipated(ld, group, t, x))?,
-        39 => Some(sigma_is_positive(ld, t, x)?),
+        Statement::Volume => Some(volume(ld, t, x)?),
+        Statement::ReebField => Some(reeb(ld, t, x)?),
+        Statement::ActionDifferential => Some(action_differential(ld, t, x, 12)?),
+        Statement::TwoSteps => Some(two_steps(ld, t, x)?),
+        Statement::DiscreteHerglotzPrinciple => Some(principle(ld, t, x)?),
+        Statement::DiscreteRegularity => Some(both_local_diffeomorphisms(ld, t, x)?),
+        Statement::MomentumMatching => Some(momentum_matching(ld, t, x)?),
+        Statement::DiscreteFlowExists => Some(flow_exists(ld, t, x)?),
+        Statement::HamiltonianFlowExpressions => Some(three_expressions(ld, t, x)?),
+        Statement::DiscreteContactForms => Some(contact_forms(ld, t, x)?),
+        Statement::DiscreteFormsAreConformal => Some(forms_are_related(ld, t, x)?),
+        Statement::DiscreteFlowIsConformal => Some(discrete_flow_is_conformal(ld, t, x)?),
+        Statement::HamiltonianFlowIsConformal => Some(hamiltonian_flow_is_conformal(ld, t, x)?),
+        Statement::DiscreteInvariance => worst(symmetries, |group| Ok(discrete_symmetry_defect(ld, group, t, x)?))?,
+        Statement::DiscreteNoether => worst(symmetries, |group| momentum_is_dissipated(ld, group, t, x))?,
+        Statement::MidpointRule => Some(sigma_is_positive(ld, t, x)?),
         _ => None,
     })
 }
