@@ -136,9 +136,9 @@ fn events_by_every_integrator() {
         let truth = *first.get_or_insert(of(0)[3]);
         let bound = f64::powi(0.45, integrator.order().min(30) as i32) + 1e-13;
         assert!((of(0)[3] - truth).abs() <= bound, "{integrator}: {:e}", of(0)[3] - truth);
-        // On the curve: the state is that of a run which ends there.
+        // On the curve, to the rounding of the time: the speed is below one.
         for crossing in &passes.crossings {
-            assert!(crossing.state.q[0].abs() <= 4.0 * f64::EPSILON, "{integrator}: {crossing:?}");
+            assert!(crossing.state.q[0].abs() <= 4.0 * f64::EPSILON * crossing.t, "{integrator}: {crossing:?}");
         }
         let mut end = Events::new([lowest().falling().terminal()]);
         let stopped = run_in(&problem, integrator, 60, 12.0).observe(&mut end).run(Until::Time(12.0)).unwrap();
