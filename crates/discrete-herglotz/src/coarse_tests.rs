@@ -223,20 +223,28 @@ fn a_motion_at_rest_is_not_marked() {
     assert!(matches!(end.status, Status::Failed { cause: StepError::NotConverged { .. }, .. }), "{:?}", end.status);
 }
 
-/// A known issue: a step that ends at a centre of force has nodes on one side of it alone.
+/// A step that ends at a centre of force has nodes on one side of it alone: what turns the velocity there is compared with halves.
 #[test]
-fn many_stages_pass_a_centre_at_the_end_of_a_step() {
+fn many_stages_do_not_pass_a_centre_at_the_end_of_a_step() {
     let system = Kepler::<2> { mu: 1.0, gamma: 0.0 };
-    let e = 0.999;
-    let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
-    let run = |count| {
-        let scene = Scene::new(&system, start, std::f64::consts::TAU).by(Integrator::Gauss { stages: 8 });
-        scene.steps(Steps::Count(count)).plan().unwrap().run().unwrap()
-    };
-    let silent = run(20);
-    assert_eq!((silent.status, silent.suspicion), (Status::Completed, None));
-    assert!((silent.q - start.q).norm() > 1.0, "{}", silent.q);
-    assert_ne!(run(21).suspicion, None);
+    let (mut lost, mut silent) = (0, Vec::new());
+    for e in [0.9, 0.95, 0.98, 0.99, 0.995, 0.999] {
+        let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
+        for stages in 3..=16 {
+            for count in 20..=40 {
+                let scene = Scene::new(&system, start, std::f64::consts::TAU).by(Integrator::Gauss { stages });
+                let end = scene.steps(Steps::Count(count)).plan().unwrap().run().unwrap();
+                if end.status == Status::Completed && (end.q - start.q).norm() > 1.0 {
+                    lost += 1;
+                    if end.suspicion.is_none() {
+                        silent.push((e, stages, count));
+                    }
+                }
+            }
+        }
+    }
+    assert!(lost > 100, "{lost}");
+    assert!(silent.is_empty(), "{silent:?} of {lost}");
 }
 
 /// Steps that move by so little that each is rounded in the same way: the sum of many loses none of it.

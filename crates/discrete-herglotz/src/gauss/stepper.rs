@@ -87,7 +87,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     newton_steps: u64,
     /// The misfit of a constant conformal factor.
     of_sigma: f64,
-    /// Of steps that tell nothing between their nodes: the last mean velocities.
+    /// Of steps that tell nothing between their nodes, and where doubts are wanted: the last mean velocities.
     sequence: Option<Box<Sequence<N>>>,
     watch: Watch<N>,
 }
@@ -130,7 +130,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             Route::General(General::new(lagrangian, physical, Table::new(s, h), mass, &state, &start.v))
         };
         let from = Start { q: [0.0; N], y: [0.0; N], z: 0.0 };
-        let velocities = [start.v; 4];
         Ok(GaussStepper {
             lagrangian,
             products: &gauss.forward,
@@ -148,9 +147,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             workspace: None,
             newton_steps: 0,
             of_sigma,
-            sequence: (s <= FEW).then(|| Box::new(Sequence { velocities, q: state.q, ends: [from; 2] })),
+            sequence: (s <= FEW).then(|| Sequence::new(Start { q: state.q.into(), ..from })),
             watch: Watch::new(&state.q, &start.v, h),
         })
+    }
+
+    /// With [`Doubt`]s about steps of any number of stages.
+    pub(crate) fn doubting(mut self) -> Self {
+        if self.sequence.is_none() {
+            self.sequence = Some(Sequence::new(self.values()));
+        }
+        self
     }
 
     /// Without Newton's method: a step whose iteration does not contract then fails with [`StepError::NotConverged`].

@@ -203,9 +203,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             Engine::Gauss(gauss) if const { L::HAS_CLOCK } && self.by_clock() => {
                 Box::new(gauss.own_clock_stepper(self.structure, t0, start, self.guess)?)
             }
-            Engine::Gauss(gauss) => Box::new(gauss.verified_stepper(self.structure, t0, start, self.guess, action)?),
+            Engine::Gauss(gauss) => {
+                let stepper = gauss.verified_stepper(self.structure, t0, start, self.guess, action)?;
+                Box::new(if watched { stepper.doubting() } else { stepper })
+            }
             Engine::Explicit => self.explicit(self.h, t0, start, watched)?,
         })
+    }
+
+    /// Whether steps look at themselves between the nodes of their many stages.
+    fn many_stages(&self) -> bool {
+        matches!(self.integrator, Integrator::Gauss { stages } if stages > FEW)
     }
 
     /// Whether steps follow a clock, which ends the run.
@@ -271,10 +279,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
             rows.push(self.row(&*stepper));
         }
         let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
-        // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes.
-        let halves = self.error.is_none()
-            && !by_clock
-            && !matches!(self.integrator, Integrator::Gauss { stages } if stages > FEW);
+        // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes, and are compared
+        // with halves in doubt alone.
+        let doubts = self.error.is_none() && !by_clock;
+        let halves = doubts && !self.many_stages();
         let most = if by_clock { usize::MAX } else { self.count };
         let mut over = false;
         while !over {
@@ -309,7 +317,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Plan<'a, L, N> {
                 rows.push(self.row(&*stepper));
             }
             if over || taken == next_probe(taken - 1) {
-                let doubt = stepper.doubt().filter(|_| halves && suspicion.is_none());
+                let doubt = stepper.doubt().filter(|_| doubts && suspicion.is_none());
                 suspicion = first(suspicion, doubt.and_then(|doubt| self.settled(&doubt)));
                 suspicion = first(suspicion, stepper.suspicion());
                 if let Some(Defect { claim, size }) = self.refuted(&*stepper) {

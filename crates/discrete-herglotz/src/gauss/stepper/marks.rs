@@ -21,6 +21,13 @@ pub(super) struct Sequence<const N: usize> {
     pub ends: [Start<N>; 2],
 }
 
+impl<const N: usize> Sequence<N> {
+    /// Before the first step.
+    pub fn new(start: Start<N>) -> Box<Self> {
+        Box::new(Sequence { velocities: [SVector::zeros(); 4], q: SVector::from(start.q), ends: [start; 2] })
+    }
+}
+
 /// The stages up to which the nodes of a step do not tell whether it resolves the motion.
 pub(crate) const FEW: usize = 2;
 
@@ -32,7 +39,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         (0..sets).map(at).reduce(Look::and)
     }
 
-    /// Follows the mean velocities of steps of few stages.
+    /// Follows the mean velocities of steps; those of few stages tell whether they resolve the motion, of others the sharpest turns are
+    /// doubts.
     #[inline(never)]
     pub(super) fn follow(&mut self) {
         let (end, h) = (self.values(), self.products.h);
@@ -52,7 +60,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         }
         let [a, b, c, d] = &*velocities;
         let sharper = sharper([&(d - c * 2.0 + b), c, &q], h, self.watch.floor, self.watch.sharpest);
-        if let Some(misfit) = misfit([a, b, c, d], &q, h, self.watch.floor) {
+        let few = self.products.s <= FEW;
+        if let Some(misfit) = misfit([a, b, c, d], &q, h, self.watch.floor).filter(|_| few) {
             // Like those of a rule, seen one step late.
             self.watch.note(self.k.saturating_sub(1), misfit);
         }

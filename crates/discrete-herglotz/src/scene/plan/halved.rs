@@ -1,7 +1,7 @@
 //! Steps against twice as many of half their length: whether given steps resolve the motion at all.
 
 use super::Plan;
-use crate::gauss::{FEW, velocity};
+use crate::gauss::velocity;
 use crate::watch::{LEAST, rounding};
 use crate::{Doubt, Flow, Gauss, Halt, Integrator, Stepper};
 use contact_geom::nalgebra::SVector;
@@ -44,7 +44,6 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         let end = |run: &mut dyn Stepper<N>| Some(run.advance(count).map(|()| run.state()));
         match self.integrator {
             Integrator::Clocked { .. } => None,
-            Integrator::Gauss { stages } if stages > FEW => None,
             Integrator::Gauss { stages } => {
                 let half = Gauss::new(self.lagrangian, stages, h).ok()?;
                 end(&mut half.stepper(t, *from, *v).ok()?)

@@ -17,7 +17,10 @@ const JUMP: f64 = 0.1;
 impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
     /// What becomes of a doubt: a mark, where shorter steps differ or the acceleration jumps.
     pub(super) fn settled(&self, doubt: &Doubt<N>) -> Option<Suspicion> {
-        let misfit = larger(self.against_halves(doubt).unwrap_or(0.0), self.jump(doubt).unwrap_or(0.0));
+        let halves = self.against_halves(doubt).unwrap_or(0.0);
+        // Long steps of many stages are no cubic curves; and they see what jumps between their nodes.
+        let jump = if self.many_stages() { None } else { self.jump(doubt) };
+        let misfit = larger(halves, jump.unwrap_or(0.0));
         // A NaN is a misfit too.
         if misfit <= 1.0 { None } else { Some(Suspicion { step: doubt.step + doubt.steps - 1, misfit }) }
     }
