@@ -78,7 +78,7 @@ impl Door {
             45..60 => Door::Flow,
             60..75 => Door::Gauss,
             75..85 => Door::Splitting,
-            // These cost ten times as much as all others together.
+            // These cost five times as much as all others together, when they were drawn twice as often.
             85..89 => Door::Motion,
             89..92 => Door::BetweenPoints,
             92..96 => Door::Fixed,
