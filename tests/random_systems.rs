@@ -1,7 +1,7 @@
 //! Random systems with random integrators, steps, spans and starts: what comes out is right, or refused, or ended with a
 //! status, or marked; never a panic, a number that is none, a run without end or a wrong answer in silence.
 //!
-//! `RANDOM_SYSTEMS=1000000 cargo test --release --test random_systems` for more than the three thousand cases of every run;
+//! `RANDOM_SYSTEMS=1000000 cargo test --release --test random_systems` for more than the ten thousand cases of every run;
 //! `RANDOM_SYSTEM=12345` for one of them; `RANDOM_DOORS=Motion,Fixed` for those of some doors alone.
 
 #![allow(missing_docs)]
@@ -42,7 +42,7 @@ use std::time::{Duration, Instant};
 use verdict::{Checked, Kind, Verdict, Wrong};
 
 /// The cases of an ordinary run.
-const CASES: u64 = 3_000;
+const CASES: u64 = 10_000;
 
 /// The time after which a case is one without end: ten seconds, and six times as long in the test profile, whose code takes that
 /// much longer for the exact flow.
@@ -53,10 +53,8 @@ const COUNTED: u64 = 10_000;
 
 /// What is known to be wrong, with the cases among [`COUNTED`] in which it is seen. A repair lowers a number or takes the line away;
 /// nothing is added.
-const KNOWN: [(Kind, Door, u64); 2] = [
-    // A coarse step past the end of a motion that blows up has a solution of its equations beyond it (4154).
-    (Kind::BeyondTheEnd, Door::Fixed, 1),
-    // A dozen motions from afar, each within its budget of evaluations, in the test profile (1831, 2776, 5473).
+const KNOWN: [(Kind, Door, u64); 1] = [
+    // A dozen motions from afar, each within its budget of evaluations, in the test profile (5122, 1637).
     (Kind::Hang, Door::BetweenPoints, 4),
 ];
 
@@ -80,8 +78,11 @@ impl Door {
             45..60 => Door::Flow,
             60..75 => Door::Gauss,
             75..85 => Door::Splitting,
-            85..93 => Door::Motion,
-            _ => Door::BetweenPoints,
+            // These cost five times as much as all others together, when they were drawn twice as often.
+            85..89 => Door::Motion,
+            89..92 => Door::BetweenPoints,
+            92..96 => Door::Fixed,
+            _ => Door::Gauss,
         }
     }
 

@@ -64,7 +64,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let [a, b, c, d] = &*velocities;
         let sharper = sharper([&(d - c * 2.0 + b), c, &q], h, self.watch.floor, self.watch.sharpest);
         let few = self.products.s <= FEW;
-        if let Some(misfit) = misfit([a, b, c, d], &q, h, self.watch.floor).filter(|_| few) {
+        if few && let Some(misfit) = misfit([a, b, c, d], &q, h, self.watch.floor) {
             // Like those of a rule, seen one step late.
             self.watch.note(self.k.saturating_sub(1), misfit);
         }

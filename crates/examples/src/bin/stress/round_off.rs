@@ -112,17 +112,17 @@ fn ensembles() -> Vec<Ensemble> {
     let fine = 1.0 / 1024.0;
     // The way, its power of two, and its steps on the oscillator, the pendulum and Kepler's orbit; 0 for none.
     let table = [
-        (midpoint, 18, [0.125, fine, fine]),
-        (strang, 20, [0.125, fine, fine]),
-        (nystrom, 20, [0.125, 1.0 / 512.0, fine]),
-        (eighth, 18, [0.125, 1.0 / 64.0, 1.0 / 256.0]),
-        (action, 18, [0.0, 1.0 / 64.0, 1.0 / 256.0]),
-        (composed, 15, [0.125, 1.0 / 64.0, 1.0 / 256.0]),
-        (gauss(4), 20, [0.25, 1.0 / 16.0, 1.0 / 32.0]),
-        (gauss(8), 20, [0.5, 0.5, 0.125]),
-        (gauss(16), 20, [1.0, 1.0, 0.25]),
-        (Way::General(8), 18, [0.5, 0.5, 0.125]),
-        (Way::Clocked(8), 18, [0.0, 0.0, 0.25]),
+        (midpoint, 16, [0.125, fine, fine]),
+        (strang, 18, [0.125, fine, fine]),
+        (nystrom, 18, [0.125, 1.0 / 512.0, fine]),
+        (eighth, 17, [0.125, 1.0 / 64.0, 1.0 / 256.0]),
+        (action, 16, [0.0, 1.0 / 64.0, 1.0 / 256.0]),
+        (composed, 14, [0.125, 1.0 / 64.0, 1.0 / 256.0]),
+        (gauss(4), 16, [0.25, 1.0 / 16.0, 1.0 / 32.0]),
+        (gauss(8), 16, [0.5, 0.5, 0.125]),
+        (gauss(16), 16, [1.0, 1.0, 0.25]),
+        (Way::General(8), 15, [0.5, 0.5, 0.125]),
+        (Way::Clocked(8), 15, [0.0, 0.0, 0.25]),
     ];
     let mut all = Vec::new();
     for (way, power, steps) in table {
