@@ -48,7 +48,7 @@ fn median<const N: usize>(mut times: Vec<f64>, outcome: Outcome<N>) -> Timed<N> 
 }
 
 /// The steps of a run alone.
-fn steps<L: Lagrangian<N>, const N: usize>(run: &Run<'_, L, N>, until: Until) -> Timed<N> {
+fn steps<L: Lagrangian<N>, const N: usize>(run: &Run<'_, '_, L, N>, until: Until) -> Timed<N> {
     let plan = run.plan(until)?;
     let mut times = Vec::with_capacity(RUNS);
     for _ in 0..RUNS {
