@@ -1,5 +1,5 @@
-//! Bad input is a typed error before the first step; bad luck is a status that keeps what was computed. The sentences of all errors,
-//! and input that is not a number, are those of `tests/hostile.rs`.
+//! Bad input is a typed error before the first step; what goes wrong later is a status that keeps what was computed. The sentences of
+//! all errors, and input that is not a number, are those of `tests/hostile.rs`.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{FreeParticle, Pendulum};

@@ -87,7 +87,7 @@ pub fn refused(error: &InputError) -> Verdict {
     })
 }
 
-/// The name of bad luck, for the tally.
+/// The name of what went wrong along a motion, for the tally.
 pub fn ended(cause: &StepError) -> Verdict {
     Verdict::Ended(match cause {
         StepError::NotConverged { .. } => "not converged",

@@ -1,4 +1,4 @@
-//! Bad input, and bad luck.
+//! Bad input, and what goes wrong along a motion.
 
 use contact_geom::GeometryError;
 use thiserror::Error;
@@ -151,7 +151,7 @@ impl InputError {
     }
 }
 
-/// Why a step could not be taken: bad luck, not bad input.
+/// Why a step could not be taken: for no fault of the input.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum StepError {
     /// Newton's method did not reach round-off.

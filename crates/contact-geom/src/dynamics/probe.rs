@@ -12,7 +12,7 @@ pub(crate) type First = Dual<Moving, SVector<Moving, 3>>;
 pub(crate) type Second = Dual<First, SVector<First, 3>>;
 
 /// A point with directions through it that have no special symmetry: a form that does not vanish, does not vanish on them, but
-/// by bad luck. So one value of L on nested duals of few directions tells what whole matrices would, whatever N.
+/// by chance. So one value of L on nested duals of few directions tells what whole matrices would, whatever N.
 ///
 /// A direction is as long as the coordinates are large, so that derivatives overflow where L does, and not before.
 pub(crate) struct Probe<const N: usize> {

@@ -82,8 +82,8 @@ impl<const N: usize> Solved<N> {
 /// where V, L, `rho L_z` and `rho L_q` are the polynomials of degree `s - 1` through the stages.
 ///
 /// At its ends it is the states of the run to round-off, which have order 2s; between them its order is s. So the curve of
-/// a run is continuous, and its velocity jumps from step to step by `O(h^s)`. Where the stepper was told that nobody wants
-/// the action and z decouples, z stays what it was at the start.
+/// a run is continuous, and its velocity jumps from step to step by `O(h^s)`. Where the action is not requested
+/// and z decouples, z stays what it was at the start.
 #[derive(Clone, Copy, Debug)]
 pub struct DenseStep<const N: usize> {
     s: usize,

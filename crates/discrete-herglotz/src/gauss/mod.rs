@@ -120,7 +120,7 @@ impl<L> Gauss<L> {
         GaussStepper::new(&self.lagrangian, self.forward.clone(), None, t0, state, guess, true)
     }
 
-    /// Like [`stepper`](Self::stepper) for a run of which nobody wants the action: where z decouples it is not computed.
+    /// Like [`stepper`](Self::stepper) for a run whose action is not requested: where z decouples it is not computed.
     ///
     /// # Errors
     /// Those of [`stepper`](Self::stepper).

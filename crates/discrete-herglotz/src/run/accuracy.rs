@@ -60,7 +60,7 @@ fn stages_for(wanted: f64) -> usize {
     if wanted < 1e-10 { 12 } else { 8 }
 }
 
-/// Chooses the steps, and the integrator where the scene names none, so that the error of (q, p), relative to their size, is at most
+/// Chooses the steps, and the integrator where the run names none, so that the error of (q, p), relative to their size, is at most
 /// `wanted` at ten times along the motion.
 ///
 /// By the clock that the motion states, where steps that are equal in its time are much fewer: the first run with equal steps sees

@@ -205,7 +205,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// Runs it.
     ///
     /// # Errors
-    /// Those of [`plan`](Self::plan), and of observers that cannot observe such a run. Bad luck in mid-run is the outcome's status.
+    /// Those of [`plan`](Self::plan), and of observers that cannot observe such a run. What goes wrong in mid-run is the outcome's status.
     pub fn run(mut self, until: Until) -> Result<Outcome<N>, InputError> {
         self.plan(until)?.observed_by(&mut self.observers, self.from.as_ref())
     }

@@ -357,7 +357,7 @@ impl Price {
     }
 }
 
-/// Bad luck at the start calls for shorter steps; bad input ends the search.
+/// A first step that cannot be taken calls for shorter steps; bad input ends the search.
 fn halted_at_the_start<const N: usize>(error: InputError) -> Result<Ending<N>, InputError> {
     match error {
         InputError::Sigma { sigma } => Ok(Ending::Halted { part: 0.0, cause: StepError::SigmaVanished { sigma } }),

@@ -123,7 +123,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// Runs it with no observer but those of the plan's own outcome.
     ///
     /// # Errors
-    /// Those of [`stepper`](Self::stepper). Bad luck in mid-run is the outcome's status.
+    /// Those of [`stepper`](Self::stepper). What goes wrong in mid-run is the outcome's status.
     pub fn run(&self) -> Result<Outcome<N>, InputError> {
         self.observed_by(&mut Vec::new(), None)
     }

@@ -243,7 +243,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     report.at_most("true error above the tolerance, of all", above / all, 0.01)?;
     report.at_most("above ten times the tolerance, or no number, or a panic: count", bad, 0.0)?;
     report.at_most("refused though the library solves it, of all", solvable / all, 0.02)?;
-    report.at_most("where dop853 sides with the scene, not with the exact flow: count", that(&|f| f.doubt), 0.0)?;
+    report.at_most("where dop853 sides with the run, not with the exact flow: count", that(&|f| f.doubt), 0.0)?;
     let of = |value: &dyn Fn(&Found) -> Option<f64>| known.iter().filter_map(|(_, f)| value(f)).collect::<Vec<f64>>();
     let planned = of(&|f| (f.named.is_none() && f.run.is_finite()).then_some(f.plan / f.run));
     report.at_most_timed("time of plan and pilots over the run's, median", quantile(&planned, 0.5), 4.0)?;
@@ -281,7 +281,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         &["problem", "dimension", "integrator", "tolerance", "worth", "error", "steps"],
         known.iter().map(|(i, f)| {
             let numbers = [number(f.tolerance), f.worth.name().into(), number(f.error), f.steps.to_string()];
-            let named = f.named.map_or("scene".into(), |integrator| integrator.to_string());
+            let named = f.named.map_or("chosen".into(), |integrator| integrator.to_string());
             [i.to_string(), f.dimension.to_string(), named].into_iter().chain(numbers).collect()
         }),
     )?;

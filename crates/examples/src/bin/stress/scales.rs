@@ -144,7 +144,7 @@ fn accuracies(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
     for ((size, span), (worth, error, normal)) in cases.iter().zip(&found) {
         *tally.entry(*worth).or_default() += 1;
         refused += u32::from(*normal && matches!(worth, Worth::Refused | Worth::Halted));
-        rows.push(row(&format!("accuracy_over_{span:e}"), "scene", *size, worth.name(), *error));
+        rows.push(row(&format!("accuracy_over_{span:e}"), "chosen", *size, worth.name(), *error));
     }
     // The square of 1e-160, which the action and the energy are, is no number any more; (q, p) are.
     report.at_most("an oscillator of 1e-300 .. 1e150 over 1e-12 .. 1e3, to 1e-9: above 1e-8", bad([&tally]), 0.0)?;
