@@ -113,7 +113,7 @@ fn what_is_left_out_changes_nothing() {
         let nothing = problem.by(by).steps(steps).without_action().run(until).unwrap();
         let rows = Rows::every(7).unwrap();
         let mut rows = match group {
-            Some(group) => rows.column(move |_, x| group.momentum(&x.q, &x.p)),
+            Some(group) => rows.column("J", move |_, x| group.momentum(&x.q, &x.p)),
             None => rows,
         };
         let all = problem.by(by).steps(steps).with_conformal_factor().observe(&mut rows).run(until).unwrap();
@@ -153,7 +153,7 @@ fn the_conformal_factor() {
     let nystrom = AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6);
     for by in [gauss(6), nystrom, AnyIntegrator::Composition(Method::Midpoint, SplittingScheme::KAHAN_LI_8)] {
         let group = Symmetry::Rotation(0, 1);
-        let mut rows = Rows::every(10).unwrap().column(|_, x| group.momentum(&x.q, &x.p));
+        let mut rows = Rows::every(10).unwrap().column("J", |_, x| group.momentum(&x.q, &x.p));
         // It asks for the factor.
         let mut decay = MomentumDecay::new(Symmetry::Rotation(0, 1));
         let run = problem.by(by).steps(Steps::Size(0.05)).observe(&mut rows).observe(&mut decay);

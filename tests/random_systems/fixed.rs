@@ -43,7 +43,7 @@ impl<const N: usize> Asked<N> {
         let rows = Rows::every(self.rows?).ok()?;
         let rows = if self.action { rows } else { rows.without_action() };
         Some(match &self.momentum {
-            Some(group) => rows.column(|_, x| group.momentum(&x.q, &x.p)),
+            Some(group) => rows.column("J", |_, x| group.momentum(&x.q, &x.p)),
             None => rows,
         })
     }

@@ -63,7 +63,7 @@ fn rows(report: &mut Report) {
             report.door(&value, fine(recorded));
         }
         // A column is the caller's: what it makes of a state is handed on.
-        let mut columns = Rows::every(7).unwrap().column(|_, _| value).column(|t, _| t);
+        let mut columns = Rows::every(7).unwrap().column("value", |_, _| value).column("t", |t, _| t);
         let outcome = seven(&problem, None).observe(&mut columns).run(Until::Time(0.5));
         let handed_on = columns.rows.iter().all(|r| r.columns[0].to_bits() == value.to_bits() && r.columns[1] == r.t);
         report.check(handed_on && outcome.is_ok(), || format!("a column {value}: {:?}", columns.rows));

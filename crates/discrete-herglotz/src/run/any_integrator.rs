@@ -123,6 +123,23 @@ impl FromStr for AnyIntegrator {
     }
 }
 
+/// As its name.
+#[cfg(feature = "serde")]
+impl serde::Serialize for AnyIntegrator {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// From the name.
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for AnyIntegrator {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = <String as serde::Deserialize>::deserialize(deserializer)?;
+        name.parse().map_err(serde::de::Error::custom)
+    }
+}
+
 /// No integrator has this name.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("there is no integrator {name:?}; there are {}", AnyIntegrator::all().iter().map(|i| i.to_string()).collect::<Vec<_>>().join(", "))]

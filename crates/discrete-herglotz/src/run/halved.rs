@@ -22,7 +22,7 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
             return None;
         }
         let fine = match self.reach((*t, from), &v, 0.5 * self.h, 2 * steps) {
-            Ok(fine) => fine,
+            Ok((fine, _)) => fine,
             // What shorter steps do not get over a longer one should not.
             Err(_) => return Some(f64::INFINITY),
         };
@@ -37,20 +37,21 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         Some(larger(relative(apart(&to.q, &fine.q), width), of_v) / APART)
     }
 
-    /// The end of some steps of another length, from a state with its velocity; by a clock of one step that ends after the time h.
+    /// The end of some steps of another length, from a state with its velocity, and `sigma_d` of the last of them; by a clock of one step that
+    /// ends after the time h.
     pub(super) fn reach(
         &self,
         (t, from): (f64, &PhasePoint<N>),
         v: &SVector<f64, N>,
         h: f64,
         count: usize,
-    ) -> Result<PhasePoint<N>, InputError> {
+    ) -> Result<(PhasePoint<N>, f64), InputError> {
         let start = VelocityPoint { q: from.q, v: *v, z: from.z };
         let problem = Problem { t0: t, start, state: *from, ..*self.problem };
         // A step of the clock is cut where it passes the time.
         let length = if self.facts.by_clock { self.h } else { h };
         let mut run = self.make_stepper(&problem, length, false)?;
         run.advance_until(count, t + h).map_err(|halt| InputError::FirstStep(halt.cause))?;
-        Ok(run.state())
+        Ok((run.state(), run.sigma()))
     }
 }

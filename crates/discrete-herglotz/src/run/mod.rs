@@ -3,6 +3,8 @@
 mod accuracy;
 mod any_integrator;
 mod checkpoint;
+#[cfg(feature = "csv")]
+mod csv_rows;
 mod events;
 mod explain;
 mod halved;
@@ -14,6 +16,8 @@ mod outcome;
 mod pilot;
 mod plan;
 mod problem;
+mod progress;
+mod quotient;
 mod rows;
 pub(crate) mod saved;
 mod stepper;
@@ -24,6 +28,8 @@ pub(crate) mod watch;
 
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
 pub use checkpoint::{Checkpoint, CheckpointError, Interrupted};
+#[cfg(feature = "csv")]
+pub use csv_rows::CsvRows;
 pub use events::{Crossing, Event, Events};
 pub(crate) use explain::DECOUPLED;
 pub use explain::Item;
@@ -34,6 +40,8 @@ pub use outcome::Outcome;
 pub use plan::Plan;
 pub use problem::{Problem, Start};
 pub(crate) use problem::{check_time, start_of};
+pub use progress::Progress;
+pub use quotient::Quotient;
 pub use rows::{Row, Rows};
 pub use stepper::{Halt, Stepper};
 pub use verified::verified;
@@ -284,8 +292,8 @@ pub(crate) trait Motion<const N: usize> {
     /// What tells the run from others.
     fn fingerprint(&self) -> u64;
 
-    /// The state at a time of the step that starts at a time and a state.
-    fn inside(&self, from: &(f64, PhasePoint<N>), t: f64) -> Result<PhasePoint<N>, StepError>;
+    /// The state at a time of the step that starts at a time and a state, and `sigma_d` from there to it.
+    fn inside(&self, from: &(f64, PhasePoint<N>), t: f64) -> Result<(PhasePoint<N>, f64), StepError>;
 }
 
 /// A whole run from t = 0 by given steps, for tests.

@@ -128,14 +128,11 @@ impl<'r, const N: usize> Moment<'r, N> {
         Some(Interrupted { fingerprint, taken, log_factor: self.log_factor.unwrap_or(0.0), suspicion, words })
     }
 
-    /// The velocity at a time and a state of the last step.
-    pub(super) fn velocity_at(&self, t: f64, state: &PhasePoint<N>) -> Result<SVector<f64, N>, StepError> {
-        self.motion.velocity(t, state)
-    }
-
-    /// The state at a time of the last step; see [`LastStep::at`].
-    pub(super) fn inside(&self, t: f64) -> Result<PhasePoint<N>, StepError> {
-        self.last_step().ok_or(StepError::NonFinite)?.at(t)
+    /// The moment at a time of the last step: see [`LastStep::at`].
+    pub(super) fn inside(&self, t: f64) -> Result<Self, StepError> {
+        let (state, sigma) = self.last_step().ok_or(StepError::NonFinite)?.reach(t)?;
+        let log_factor = self.log_factor.map(|of_end| of_end - self.sigma.ln() + sigma.ln());
+        Ok(Moment { t, state, sigma, log_factor, before: None, ..*self })
     }
 
     /// The energy `E_L = v.p - L`.
@@ -185,13 +182,12 @@ impl<const N: usize> LastStep<'_, N> {
     /// # Errors
     /// Those of a step.
     pub fn at(&self, t: f64) -> Result<PhasePoint<N>, StepError> {
-        if t == self.from.0 {
-            return Ok(self.from.1);
-        }
-        if t == self.to.0 {
-            return Ok(self.to.1);
-        }
-        self.motion.inside(&self.from, t)
+        if t == self.to.0 { Ok(self.to.1) } else { self.reach(t).map(|(state, _)| state) }
+    }
+
+    /// The same by a step of its own, with its `sigma_d`.
+    fn reach(&self, t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
+        if t == self.from.0 { Ok((self.from.1, 1.0)) } else { self.motion.inside(&self.from, t) }
     }
 
     /// The parts in which a search along the step looks at it.

@@ -295,7 +295,7 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
         digest(&numbers.chain(name).chain(counts).collect::<Vec<u64>>())
     }
 
-    fn inside(&self, (t0, from): &(f64, PhasePoint<N>), t: f64) -> Result<PhasePoint<N>, StepError> {
+    fn inside(&self, (t0, from): &(f64, PhasePoint<N>), t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
         let v = self.velocity(*t0, from)?;
         self.reach((*t0, from), &v, t - t0, 1).map_err(step_error)
     }

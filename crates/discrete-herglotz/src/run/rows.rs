@@ -20,12 +20,25 @@ pub struct Row<const N: usize> {
     pub p: SVector<f64, N>,
     /// The action, if the rows are not [without](Rows::without_action) it.
     pub z: Option<f64>,
+    /// The energy `E_L = v.p - L`, where the rows are [with](Rows::with_energy) it.
+    pub energy: Option<f64>,
+    /// The logarithm of the conformal factor of the motion since the start, where the rows are [with](Rows::with_conformal_factor) it.
+    pub log_factor: Option<f64>,
     /// The values of the [columns](Rows::column), in their order.
     pub columns: Vec<f64>,
 }
 
-/// A function of time and state.
-type Column<'f, const N: usize> = Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 'f>;
+impl<const N: usize> Row<N> {
+    /// All numbers of the row, in the order of [`Rows::header`].
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        let vectors = self.q.iter().chain(self.v.iter().flatten()).chain(self.p.iter());
+        let numbers = [self.z, self.energy, self.log_factor].into_iter().flatten();
+        [self.t].into_iter().chain(vectors.copied()).chain(numbers).chain(self.columns.iter().copied())
+    }
+}
+
+/// A function of time and state, with its name.
+type Column<'f, const N: usize> = (String, Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 'f>);
 
 /// Which states are recorded.
 #[derive(Clone, Debug)]
@@ -42,8 +55,9 @@ pub struct Rows<'f, const N: usize> {
     pub rows: Vec<Row<N>>,
     when: When,
     columns: Vec<Column<'f, N>>,
-    action: bool,
+    needs: Needs,
     velocity: bool,
+    energy: bool,
     course: Course,
 }
 
@@ -80,18 +94,29 @@ impl<'f, const N: usize> Rows<'f, N> {
 
     fn when(when: When) -> Self {
         let course = Course { t0: 0.0, t_end: 0.0, h: None, count: None };
-        Rows { rows: Vec::new(), when, columns: Vec::new(), action: true, velocity: false, course }
+        let needs = Needs { action: true, conformal_factor: false };
+        Rows { rows: Vec::new(), when, columns: Vec::new(), needs, velocity: false, energy: false, course }
     }
 
-    /// With one more column: a function of time and state.
-    pub fn column(mut self, f: impl FnMut(f64, &PhasePoint<N>) -> f64 + 'f) -> Self {
-        self.columns.push(Box::new(f));
+    /// With one more column: a function of time and state, with a name.
+    pub fn column(mut self, name: impl Into<String>, f: impl FnMut(f64, &PhasePoint<N>) -> f64 + 'f) -> Self {
+        self.columns.push((name.into(), Box::new(f)));
         self
     }
 
     /// Without the action, so that a run of which no one else wants it need not compute it.
     pub fn without_action(self) -> Self {
-        Rows { action: false, ..self }
+        Rows { needs: Needs { action: false, ..self.needs }, ..self }
+    }
+
+    /// With the conformal factor.
+    pub fn with_conformal_factor(self) -> Self {
+        Rows { needs: Needs { conformal_factor: true, ..self.needs }, ..self }
+    }
+
+    /// With the energy, which costs an inverse Legendre transformation and a value of L a row.
+    pub fn with_energy(self) -> Self {
+        Rows { energy: true, ..self }
     }
 
     /// With the velocity, which costs an inverse Legendre transformation a row.
@@ -99,17 +124,35 @@ impl<'f, const N: usize> Rows<'f, N> {
         Rows { velocity: true, ..self }
     }
 
-    fn record(&mut self, at: &Moment<'_, N>, t: f64, state: &PhasePoint<N>) -> Result<(), StepError> {
-        let v = if self.velocity { Some(at.velocity_at(t, state)?) } else { None };
-        let columns = self.columns.iter_mut().map(|f| f(t, state)).collect();
-        self.rows.push(Row { t, q: state.q, v, p: state.p, z: self.action.then_some(state.z), columns });
+    /// The names of the [numbers](Row::numbers) of a row: `t`, `q0`, .. `v0`, .. `p0`, .. `z`, `energy`, `log_factor`, and the columns' own.
+    pub fn header(&self) -> Vec<String> {
+        let of = |letter: &'static str, there: bool| (0..if there { N } else { 0 }).map(move |i| format!("{letter}{i}"));
+        let one = |name: &str, there: bool| there.then(|| name.to_owned());
+        let vectors = of("q", true).chain(of("v", self.velocity)).chain(of("p", true));
+        let numbers = [
+            one("z", self.needs.action),
+            one("energy", self.energy),
+            one("log_factor", self.needs.conformal_factor),
+        ];
+        let columns = self.columns.iter().map(|(name, _)| name.clone());
+        one("t", true).into_iter().chain(vectors).chain(numbers.into_iter().flatten()).chain(columns).collect()
+    }
+
+    fn record(&mut self, at: &Moment<'_, N>) -> Result<(), StepError> {
+        let v = if self.velocity { Some(at.velocity()?) } else { None };
+        let energy = if self.energy { Some(at.energy()?) } else { None };
+        let Moment { t, state, log_factor, .. } = *at;
+        let columns = self.columns.iter_mut().map(|(_, f)| f(t, &state)).collect();
+        let z = self.needs.action.then_some(state.z);
+        let log_factor = log_factor.filter(|_| self.needs.conformal_factor);
+        self.rows.push(Row { t, q: state.q, v, p: state.p, z, energy, log_factor, columns });
         Ok(())
     }
 
     /// Records the rows up to a moment.
     fn record_up_to(&mut self, at: &Moment<'_, N>) -> Result<(), StepError> {
         let (times, recorded) = match &self.when {
-            When::Every(stride) if at.k.is_multiple_of(*stride) || at.last => return self.record(at, at.t, &at.state),
+            When::Every(stride) if at.k.is_multiple_of(*stride) || at.last => return self.record(at),
             When::Every(_) => return Ok(()),
             When::At { times, recorded } => (times, *recorded),
         };
@@ -118,8 +161,13 @@ impl<'f, const N: usize> Rows<'f, N> {
         // The last step ends where the span does but for its rounding.
         let due: Vec<f64> = times[recorded..].iter().copied().take_while(|t| at.last || passed(*t)).collect();
         for t in due {
-            let state = if t == at.t || !passed(t) { at.state } else { at.inside(t)? };
-            self.record(at, t, &state)?;
+            if t == at.t {
+                self.record(at)?;
+            } else if passed(t) {
+                self.record(&at.inside(t)?)?;
+            } else {
+                self.record(&Moment { t, ..*at })?;
+            }
             if let When::At { recorded, .. } = &mut self.when {
                 *recorded += 1;
             }
@@ -130,7 +178,8 @@ impl<'f, const N: usize> Rows<'f, N> {
 
 impl<const N: usize> Observer<N> for Rows<'_, N> {
     fn needs(&self) -> Needs {
-        Needs { action: self.action, conformal_factor: false }
+        // The energy has L, and with it z.
+        Needs { action: self.needs.action || self.energy, ..self.needs }
     }
 
     fn prepare(&mut self, course: &Course) -> Result<(), InputError> {

@@ -106,7 +106,7 @@ fn rows_every_so_many_steps() {
     let pendulum = Pendulum { gamma: -0.1 };
     let problem = Problem::new(&pendulum, 1.0, VelocityPoint::new([1.0], [0.3], 0.2)).unwrap();
     for (to, way) in [(2.0, 1.0), (0.0, -1.0)] {
-        let mut rows = Rows::every(4).unwrap().column(|t, x: &PhasePoint<1>| t + x.q[0]);
+        let mut rows = Rows::every(4).unwrap().column("t + q", |t, x: &PhasePoint<1>| t + x.q[0]);
         let run = problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Count(10)).observe(&mut rows);
         let outcome = run.run(Until::Time(to)).unwrap();
         let times: Vec<f64> = rows.rows.iter().map(|row| row.t).collect();
