@@ -355,6 +355,11 @@ fn names() {
         assert_eq!(integrator.to_string().parse(), Ok(integrator));
         assert!(integrator.order() >= 1);
     }
+    for scheme in SplittingScheme::ALL {
+        let composed = AnyIntegrator::Composition(Method::Trapezoidal, scheme);
+        assert_eq!(composed.to_string().parse(), Ok(composed));
+    }
+    assert!("trapezoidal_by_none".parse::<AnyIntegrator>().is_err());
     let error = "gauss_17".parse::<AnyIntegrator>().err().map(|e| e.to_string()).unwrap_or_default();
     for known in ["midpoint", "gauss_16", "clocked_gauss_8", "kahan_li_8", "midpoint_by_yoshida_4"] {
         assert!(error.contains(known), "{error}");

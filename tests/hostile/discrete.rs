@@ -1,6 +1,8 @@
 //! Attacks on discrete-herglotz. What starts a motion refuses what is not finite, and what it hands out is finite; formulas hand
 //! on what is not a number, or refuse it.
 
+#[path = "discrete/integrators.rs"]
+mod integrators;
 #[path = "discrete/lagrangians.rs"]
 mod lagrangians;
 #[path = "discrete/observers.rs"]
@@ -25,11 +27,15 @@ pub const EXCEPTIONS: Exceptions = &[
     ("SplittingScheme::*", "tables: take no number"),
     ("AnyIntegrator::all", "takes no number"),
     ("AnyIntegrator::order", "takes no number; that of any number of stages is in the attack on check"),
+    ("DiscreteLagrangian::is_explicit", "takes no number"),
+    ("DiscreteLagrangian::constant_rate", "takes no number"),
+    ("Rule::is_symmetric", "takes no number"),
     ("ActionFlow::*", "the implementor's; that of Riccati is attacked with what calls it"),
     ("Observer::*", "the implementor's; what a run makes of odd ones is in the attack on Run::observe"),
 ];
 
-pub const ATTACKS: &[&[Attack]] = &[lagrangians::ATTACKS, observers::ATTACKS, runs::ATTACKS, steppers::ATTACKS];
+pub const ATTACKS: &[&[Attack]] =
+    &[integrators::ATTACKS, lagrangians::ATTACKS, observers::ATTACKS, runs::ATTACKS, steppers::ATTACKS];
 
 /// Times and states to start from, and whether they are finite.
 fn starts() -> Vec<(f64, PhasePoint<1>)> {

@@ -17,7 +17,7 @@ pub const ATTACKS: &[Attack] = &[
     },
     Attack { on: &["Event::new", "Event::rising", "Event::falling", "Event::terminal", "Events::new"], run: events },
     Attack {
-        on: &["Problem::observe", "Run::observe", "Stop::here", "Stop::failed", "Needs::and"],
+        on: &["Run::observe", "Stop::here", "Stop::failed", "Needs::and"],
         run: odd_observers,
     },
     Attack {

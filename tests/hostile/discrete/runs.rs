@@ -12,13 +12,23 @@ use discrete_herglotz::{
 pub const ATTACKS: &[Attack] = &[
     Attack { on: &["AnyIntegrator::check"], run: integrators },
     Attack {
-        on: &["Problem::new", "Problem::from_points", "Problem::start", "Problem::state", "Outcome::state"],
+        on: &[
+            "Problem::new",
+            "Problem::from_points",
+            "Problem::lagrangian",
+            "Problem::t0",
+            "Problem::start",
+            "Problem::state",
+            "Problem::structure",
+            "Outcome::state",
+        ],
         run: problems,
     },
     Attack {
         on: &[
             "Problem::by",
             "Problem::steps",
+            "Problem::accuracy",
             "Run::by",
             "Run::steps",
             "Run::without_action",
@@ -100,6 +110,8 @@ fn problems(report: &mut Report) {
     for (t, x) in places() {
         let velocity = Problem::new(&Claiming, t, VelocityPoint::from(x));
         report.door(&(t, x), velocity.map(|problem| (*problem.start(), *problem.state())));
+        let kept = velocity.is_ok_and(|p| p.t0() == t && *p.structure() == p.lagrangian().structure());
+        report.check(kept || velocity.is_err(), || format!("{velocity:?}"));
         let momentum = Problem::new(&Claiming, t, PhasePoint::from(x));
         report.door(&(t, x), momentum.map(|problem| (*problem.start(), *problem.state())));
         for ld in &rules {

@@ -119,7 +119,13 @@ impl FromStr for AnyIntegrator {
 
     fn from_str(name: &str) -> Result<Self, UnknownIntegrator> {
         let named = Self::all().into_iter().find(|integrator| integrator.to_string() == name);
-        named.ok_or_else(|| UnknownIntegrator { name: name.into() })
+        // Of compositions those of the other rules too.
+        let composed = || {
+            let (rule, scheme) = name.split_once("_by_")?;
+            let scheme = SplittingScheme::ALL.into_iter().find(|known| known.name() == scheme)?;
+            Some(AnyIntegrator::Composition(rule.parse().ok()?, scheme))
+        };
+        named.or_else(composed).ok_or_else(|| UnknownIntegrator { name: name.into() })
     }
 }
 

@@ -227,6 +227,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Task<'p, L, N> {
         }
         if let Some(integrator) = &self.integrator {
             integrator.check(problem.lagrangian)?;
+            // A step for an accuracy is a root of that order.
+            if integrator.facts().order == 0 {
+                return Err(InputError::Hypothesis { hypothesis: "an order of at least one" });
+            }
         }
         // Pilot runs look at the equations of motion along the whole span.
         let times = if let Length::For(..) = length { 4 } else { 16 };

@@ -153,8 +153,11 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let doubts = self.error.is_none() && !by_clock;
         let halves = doubts && !self.many_stages();
         let most = if by_clock { usize::MAX } else { self.count };
-        let start = self.moment(&*stepper, None, (log_factor, suspicion), (taken, false));
-        let (mut over, mut stop) = (false, observers.start(&start).break_value());
+        let ended = |taken: usize, t: f64| taken == most || by_clock && self.is_over(t);
+        // A run may be resumed at its end.
+        let mut over = ended(taken, stepper.time());
+        let start = self.moment(&*stepper, None, (log_factor, suspicion), (taken, over));
+        let mut stop = observers.start(&start).break_value();
         while !over && stop.is_none() {
             // One mark is enough.
             let halved = if halves && suspicion.is_none() { halved_step(taken, most) } else { usize::MAX };
@@ -185,21 +188,23 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
                 status = Status::Failed { step: taken, t: stepper.time(), cause };
                 break;
             }
-            over = taken == most || by_clock && self.is_over(stepper.time());
+            over = ended(taken, stepper.time());
+            let probed = over || taken == next_probe(taken - 1);
+            // Before the step is seen, so that it is not forgotten by who saves the run there.
+            if probed {
+                let doubt = stepper.doubt().filter(|_| doubts && suspicion.is_none());
+                suspicion = first(suspicion, doubt.and_then(|doubt| self.settled(&doubt)));
+                suspicion = first(suspicion, stepper.suspicion());
+            }
             if taken >= next_seen || over {
                 let before = if done == 1 { before } else { None };
                 stop = observers
                     .step(&self.moment(&*stepper, before, (log_factor, suspicion), (taken, over)))
                     .break_value();
             }
-            if over || taken == next_probe(taken - 1) {
-                let doubt = stepper.doubt().filter(|_| doubts && suspicion.is_none());
-                suspicion = first(suspicion, doubt.and_then(|doubt| self.settled(&doubt)));
-                suspicion = first(suspicion, stepper.suspicion());
-                if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
-                    status = Status::FalseClaim { step: taken, claim, size };
-                    break;
-                }
+            if probed && let Some(Defect { claim, size }) = self.refuted(&*stepper) {
+                status = Status::FalseClaim { step: taken, claim, size };
+                break;
             }
         }
         let (mut t, mut state) = (stepper.time(), stepper.state());

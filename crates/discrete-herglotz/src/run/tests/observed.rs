@@ -284,6 +284,37 @@ fn interrupted_runs_go_on() {
     assert!(places > 400, "{places}");
 }
 
+/// What a run has seen of steps that do not resolve its motion it goes on with, wherever it is interrupted: where it looks, and at its end.
+#[test]
+fn marks_are_resumed() {
+    let system = Kepler::<2> { mu: 1.0, gamma: 0.0 };
+    let path = std::env::temp_dir().join(format!("interrupted_marks_{}", std::process::id()));
+    let mut marked = 0;
+    for e in [0.9, 0.99] {
+        let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
+        let problem = Problem::new(&system, 0.0, start).unwrap();
+        for integrator in takers(&system) {
+            let run = || run_in(&problem, integrator, 40, std::f64::consts::TAU).with_conformal_factor();
+            let until = Until::Time(std::f64::consts::TAU);
+            let whole = run().run(until).unwrap();
+            marked += usize::from(whole.suspicion.is_some());
+            for place in [1, 8, 16, 17, 32, whole.steps].into_iter().filter(|k| (1..=whole.steps).contains(k)) {
+                let mut saved = Checkpoint::every(place, &path).unwrap();
+                let mut killed = |at: &Moment<'_, 2>| match at.k {
+                    k if k == place => ControlFlow::Break(Stop::here("a test")),
+                    _ => ControlFlow::Continue(()),
+                };
+                let stopped = run().observe(&mut saved).observe(&mut killed).run(until).unwrap();
+                let resumed = run().resume(Interrupted::read(&path).unwrap()).run(until).unwrap();
+                // In words, since a misfit may be no number.
+                assert_eq!(format!("{resumed:?}"), format!("{whole:?}"), "{integrator} from {place}: {stopped:?}");
+            }
+        }
+    }
+    std::fs::remove_file(path).unwrap();
+    assert!(marked > 30, "{marked}");
+}
+
 /// A file that is not there, not one of a run, of another version, cut off or changed.
 #[test]
 fn damaged_checkpoints_are_refused() {
