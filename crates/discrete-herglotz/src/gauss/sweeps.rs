@@ -43,10 +43,6 @@ pub(super) const SLOW: u32 = 18;
 /// steps.
 pub(super) const AGE: u32 = 16;
 
-/// The part of round-off that an iteration may leave. What it leaves has the same direction in every step, and so it adds up
-/// like the number of steps, where round-off adds up like its root.
-const LEFT: f64 = 1.0 / 4.0;
-
 /// The changes of the sweeps of one step.
 ///
 /// The iteration ends when the next change, predicted from the last two, is a small part of the round-off of the terms, or when
@@ -54,6 +50,8 @@ const LEFT: f64 = 1.0 / 4.0;
 /// at the limit: so it neither stalls nor loops.
 #[derive(Default)]
 pub(super) struct Sweeps {
+    enough: f64,
+    left: f64,
     count: u32,
     /// The change of the first sweep, and the largest term in it.
     first: (f64, f64),
@@ -68,6 +66,13 @@ pub(super) struct Sweeps {
 }
 
 impl Sweeps {
+    /// An iteration that ends with a change of so many times the round-off of its terms, or when the next one is expected to be so small
+    /// as what may be left. What is left has the same direction in every step, and so it adds up like the number of steps, where
+    /// round-off adds up like its root.
+    pub fn until(enough: f64, left: f64) -> Self {
+        Sweeps { enough, left, ..Sweeps::default() }
+    }
+
     pub fn count(&self) -> u32 {
         self.count
     }
@@ -82,7 +87,7 @@ impl Sweeps {
     pub fn judge(&mut self, change: f64, size: f64) -> Progress {
         self.count += 1;
         let round_off = 0.5 * f64::EPSILON * size;
-        if change <= round_off || self.last && change <= 256.0 * round_off {
+        if change <= self.enough * round_off || self.last && change <= 256.0 * round_off {
             return Progress::Done;
         }
         if !(change + size).is_finite() {
@@ -95,10 +100,10 @@ impl Sweeps {
             let ratio = change / self.before;
             let expected = f64::max(ratio, if self.count > 2 { self.ratio } else { 0.1 });
             let next = change * expected;
-            if next <= LEFT * round_off {
+            if next <= self.left * round_off {
                 return Progress::Done;
             }
-            self.last = next * expected <= LEFT * round_off;
+            self.last = next * expected <= self.left * round_off;
             if ratio >= 1.0 {
                 if change <= 256.0 * round_off || self.still {
                     return Progress::Done;

@@ -275,7 +275,8 @@ impl<L, R: Rule> Quadrature<L, R> {
         let pivot = 1.0 - h * slope_1;
         // One more Newton step for z1, free here, so that its last digits are those of this evaluation.
         let z = root.z + (from.z - root.z + h * value) / pivot;
-        let end = PhasePoint { q, p: from.p + change / pivot, z };
+        // A quotient by the pivot, which is rounded alike in all steps, would stretch each change by the same part of its size.
+        let end = PhasePoint { q, p: from.p + (change + change * (h * slope_1 / pivot)), z };
         Ok(Transition { end, velocity: u, sigma: sigma / pivot, iterations: root.iterations })
     }
 }

@@ -58,14 +58,16 @@ fn assert_random_walk(name: &str, rate: f64, motion: &Start<'_>, undamped: &Star
         rms[2]
     );
     println!("{report}");
-    assert!(mean.abs() <= LARGEST_BIAS * rms[2] / 8.0, "{report}");
+    let largest_bias = if name.starts_with("Rectangle") { BIAS_OF_RECTANGLE } else { LARGEST_BIAS };
+    assert!(mean.abs() <= largest_bias * rms[2] / 8.0, "{report}");
     assert!(exponent <= 0.65, "{report}");
     Ok(())
 }
 
-/// The law asks for three. Some of the thirty means here are beyond: the rectangle rule has 4.0 without drag, midpoint and
-/// trapezoidal rule 4.8 and 4.6 at gamma = -1e-14, which is 4e-19 to 5e-19 a step; why is not known.
-const LARGEST_BIAS: f64 = 5.0;
+/// In standard errors. The largest of thirty means has 2.2, but for the rectangle rule: 4.0 without drag, which is 4e-19 a step; why is
+/// not known.
+const LARGEST_BIAS: f64 = 3.0;
+const BIAS_OF_RECTANGLE: f64 = 4.5;
 
 /// The step of all motions here.
 const H: f64 = 0.1;
