@@ -35,13 +35,13 @@ pub use rules::{
     ByRule, Composed, Composition, Discrete, Discretisation, Discretised, ExtendedJet, Flow, FlowStep, LeftMidpoint,
     Method, Midpoint, Node, Quadrature, Rectangle, Rule, Trapezoidal, UnknownMethod,
 };
-pub use run::{
-    AnyIntegrator, Checkpoint, CheckpointError, Course, Crossing, Doubt, Event, Events, Facts, Halt, Integrator,
-    Interrupted, Item, LastStep, Moment, MomentumDecay, MomentumRow, Needs, Observer, Outcome, Plan, Problem, Progress, Quotient, Row,
-    Rows, Run, Start, Stepper, Steps, Stop, UnknownIntegrator, Until, Wants, verified,
-};
 #[cfg(feature = "csv")]
 pub use run::CsvRows;
+pub use run::{
+    AnyIntegrator, Checkpoint, CheckpointError, Course, Crossing, Doubt, Event, Events, Facts, Halt, Integrator,
+    Interrupted, Item, LastStep, Moment, MomentumDecay, MomentumRow, Needs, Observer, Outcome, Plan, Problem, Progress,
+    Quotient, Row, Rows, Run, Start, Stepper, Steps, Stop, UnknownIntegrator, Until, Wants, verified,
+};
 pub use solve::{CROSSOVER, ITERATION_LIMIT, Solver, last_correction};
 pub use splitting::{
     ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, RiccatiMap, Splitting, SplittingScheme, Strang,

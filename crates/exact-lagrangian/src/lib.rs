@@ -42,7 +42,6 @@
 
 #[cfg(test)]
 mod bad_numbers;
-mod composition;
 mod conjugate;
 mod error;
 mod exact_flow;
@@ -57,9 +56,9 @@ mod quadratic_exact;
 mod retraction;
 mod spline_curve;
 pub mod statements;
+mod two_steps;
 mod variational_error;
 
-pub use composition::{Composition, compose, through};
 pub use conjugate::ConjugatePoint;
 pub use error::ExactError;
 pub use exact_flow::ExactFlow;
@@ -69,6 +68,7 @@ pub use flow::{EVALUATIONS, Motion, herglotz_flow};
 pub use nonholonomic::{Chetaev, ExtendedMotion, ExtendedPoint, NonHolonomic};
 pub use principle::{Curve, CurveAction, MotionCurve, VariedCurve, action, action_derivative};
 pub use quadratic_exact::QuadraticExact;
-pub use retraction::{Retraction, Route};
+pub use retraction::{Retraction, RetractionRoute};
 pub use spline_curve::SplineCurve;
+pub use two_steps::{TwoSteps, compose, through};
 pub use variational_error::{ErrorOrders, MeasuredOrder, Order, error_orders};

@@ -40,7 +40,7 @@ fn reverses<const N: usize>(mut m: SMatrix<f64, N, N>) -> bool {
 
 /// How the motion between two points was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Route {
+pub enum RetractionRoute {
     /// By collocation with both positions given: the shortest way, taken where its iteration contracts.
     Collocation,
     /// By Newton's method on the exponential map.
@@ -66,7 +66,7 @@ pub struct Retraction<const N: usize> {
     /// of even multiplicity.
     pub conjugate: Option<f64>,
     /// How it was found.
-    pub route: Route,
+    pub route: RetractionRoute,
     /// The evaluations of the vector field that the last pass took.
     pub evaluations: u64,
 }
@@ -125,7 +125,11 @@ impl<L> ContactExponential<L> {
         L: Lagrangian<N>,
     {
         let found = self.between(t, x)?;
-        if found.route == Route::Collocation && found.conjugate.is_none() { Ok(found) } else { self.marked(t, found) }
+        if found.route == RetractionRoute::Collocation && found.conjugate.is_none() {
+            Ok(found)
+        } else {
+            self.marked(t, found)
+        }
     }
 
     /// The retraction of two points without a search for the first conjugate point, which a jet does not need: `conjugate` is the
@@ -160,7 +164,7 @@ impl<L> ContactExponential<L> {
             Err(failed) => failed,
         };
         match self.lead(t, x, &mut work) {
-            Some(found) => Ok(Retraction { route: Route::Continuation, ..found.retraction }),
+            Some(found) => Ok(Retraction { route: RetractionRoute::Continuation, ..found.retraction }),
             None if x.q0 == x.q1 => Err(InputError::EqualPoints.into()),
             None => Err(failed),
         }
@@ -296,7 +300,7 @@ impl<L> ContactExponential<L> {
                     b: panel.change.b,
                     // The iteration contracts before the first conjugate point only.
                     conjugate: None,
-                    route: Route::Collocation,
+                    route: RetractionRoute::Collocation,
                     evaluations,
                 },
                 panel.contraction,
@@ -369,7 +373,7 @@ impl<L> ContactExponential<L> {
         if regular && let Some((found, _)) = self.by_collocation(t, x, &mut { near }, &rough.inverse, 1.0)? {
             // Still the motion that Newton's method has found, not another one.
             if (found.start.v - near).amax() <= ROUGH.sqrt() * near.amax() {
-                return Ok(Retraction { route: Route::Newton, ..found });
+                return Ok(Retraction { route: RetractionRoute::Newton, ..found });
             }
         }
         Ok(self.shoot(t, x, &near, (self.h, ACCURACY), work)?.retraction)
@@ -490,7 +494,7 @@ fn moved<const N: usize>(
         action: along(&shot.action),
         b: along(&shot.b),
         conjugate: None,
-        route: Route::Newton,
+        route: RetractionRoute::Newton,
         evaluations: shot.evaluations,
     }
 }

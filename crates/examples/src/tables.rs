@@ -11,7 +11,8 @@ pub fn integrators() -> String {
     for integrator in AnyIntegrator::all() {
         let facts = facts(&integrator);
         let same = |other: &Facts| {
-            let of = |f: &Facts| (f.explicit, f.symmetric, f.exact_rate, f.by_clock, f.substeps, f.collocation.is_some());
+            let of =
+                |f: &Facts| (f.explicit, f.symmetric, f.exact_rate, f.by_clock, f.substeps, f.collocation.is_some());
             of(other) == of(&facts) && (facts.collocation.is_some() || other.order == facts.order)
         };
         match kinds.iter_mut().find(|(of_kind, _)| same(of_kind)) {

@@ -3,13 +3,13 @@
 use super::account::account_by_clock;
 use super::beginning::Beginning;
 use super::compensated::Compensated;
-use super::extension::{Extension, Fictitious, Values};
 use super::general::General;
 use super::look::{Compare, Curve, Look};
 use super::mass::Mass;
 use super::stage_equations::Products;
-use super::sweeps::Progress;
-use super::table::Table;
+use super::sweeps::Verdict;
+use super::table::StageTable;
+use super::time_transformation::{Extension, Fictitious, Values};
 use crate::gauss::lanes::forget_branches;
 use crate::run::saved::{Saved, load_option, save_option};
 use crate::{Halt, ITERATION_LIMIT, InputError, Item, StepError, Stepper, Suspicion};
@@ -88,7 +88,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
             return Err(InputError::FirstStep(StepError::NonFinite));
         }
         let extension = Extension::new(Fictitious(clock), t0, -energy);
-        let (table, mass) = (Table::new(s, h), Mass::new(&structure, inverse));
+        let (table, mass) = (StageTable::new(s, h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, &state, &start.v));
         Ok(ClockedStepper { general, arch: Arch::new(), h, tau: 0.0, taken: 0, from: None, suspicion: None })
     }
@@ -119,10 +119,12 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         let (general, from) = (&*self.general, self.from.as_ref()?);
         let value = |x: &[Compensated; N]| SVector::from(x.map(|x| x.value));
         let start = PhasePoint { q: value(&from.q), p: value(&from.p), z: from.z.value };
-        let (&Table { s, h, .. }, clock) = (&general.table, &general.extension.pace);
+        let (&StageTable { s, h, .. }, clock) = (&general.table, &general.extension.transformation);
         let mut curve = Curve::new(s, from.t.value, h, &start);
         curve.of_clock(&general.solved_by_clock(), [clock.0.rate(&start.q), general.rate()]);
-        let at = |set| self.arch.dispatch(Compare { lagrangian: general.lagrangian, pace: clock, curve: &curve, set });
+        let at = |set| {
+            self.arch.dispatch(Compare { lagrangian: general.lagrangian, transformation: clock, curve: &curve, set })
+        };
         (0..sets).map(at).reduce(Look::and)
     }
 
@@ -137,7 +139,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
             let newton = length - over / self.general.rate();
             length = if short < newton && newton < long { newton } else { 0.5 * (short + long) };
             self.general.reset(before);
-            self.general.table = Table::new(self.general.table.s, length * way);
+            self.general.table = StageTable::new(self.general.table.s, length * way);
             self.sweep(1).map_err(|halt| halt.cause)?;
             over = (self.time() - t_end) * way;
             if self.ends_at(t_end, before.t.value) {
@@ -172,7 +174,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         let mut h = 0.0;
         h.load(from)?;
         if h != self.general.table.h {
-            self.general.table = Table::new(self.general.table.s, h);
+            self.general.table = StageTable::new(self.general.table.s, h);
         }
         self.tau.load(from)?;
         self.taken.load(from)?;
@@ -184,7 +186,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
     /// Goes back to the full step after one that was made shorter.
     fn lengthen(&mut self) {
         if self.general.table.h != self.h {
-            self.general.table = Table::new(self.general.table.s, self.h);
+            self.general.table = StageTable::new(self.general.table.s, self.h);
         }
     }
 }
@@ -207,7 +209,7 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for Advance<'_, '_,
             // L does not depend on it.
             let t = self.general.extension.t.value;
             let progress = self.general.step::<S>(t);
-            if progress != Progress::Done {
+            if progress != Verdict::Done {
                 return Err(Halt { taken, cause: progress.into() });
             }
             if self.general.misfit > 1.0 && self.suspicion.is_none() {
@@ -266,7 +268,7 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
     }
 
     fn sigma(&self) -> f64 {
-        1.0 / (1.0 - self.general.fallen)
+        1.0 / (1.0 - self.general.one_minus_rho)
     }
 
     fn evaluations(&self) -> u64 {

@@ -12,13 +12,13 @@ use std::array::from_fn;
 
 /// The state at the start of a step as a route holds it: momenta, or velocities in the condensed routes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Start<const N: usize> {
+pub(super) struct StepStart<const N: usize> {
     pub q: [f64; N],
     pub y: [f64; N],
     pub z: f64,
 }
 
-saved!([const N: usize] Start<N> { q, y, z });
+saved!([const N: usize] StepStart<N> { q, y, z });
 
 /// The stages of a solved step: V, `rho L_q`, `rho L_z` and L, with 0 beyond the last stage.
 pub(super) struct Solved<const N: usize> {
@@ -37,7 +37,7 @@ impl<const N: usize> Solved<N> {
         table: &Condensed,
         mass: &SMatrix<f64, N, N>,
         t: f64,
-        start: &Start<N>,
+        start: &StepStart<N>,
         a: &[[f64; MOST]; N],
         wants_z: bool,
     ) -> Self {

@@ -33,7 +33,8 @@ fn facts(stages: usize, by_clock: bool) -> Facts {
         collocation: Some(stages),
         substeps: false,
         price: 1,
-        source: "Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3, doi:10.1007/3-540-30666-8".into(),
+        source: "Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3, doi:10.1007/3-540-30666-8"
+            .into(),
     }
 }
 

@@ -3,7 +3,7 @@
 use super::coefficients::MOST;
 use super::compensated::{Compensated, Twofold};
 use super::condensed::Condensed;
-use super::dense::Start;
+use super::dense::StepStart;
 use super::double_double::solve_exactly;
 use crate::run::saved::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
@@ -131,7 +131,7 @@ impl<const N: usize> Linear<N> {
     ///
     /// Only a run that leaves the finite numbers is looked at step by step, again from its start.
     #[inline(always)]
-    pub fn advance(&mut self, steps: usize) -> (usize, Start<N>) {
+    pub fn advance(&mut self, steps: usize) -> (usize, StepStart<N>) {
         let start = (self.q, self.v, self.z);
         (1..steps).for_each(|_| self.step());
         let last = self.start();
@@ -152,8 +152,8 @@ impl<const N: usize> Linear<N> {
         }
     }
 
-    fn start(&self) -> Start<N> {
-        Start { q: self.q.map(|q| q.value), y: self.v.map(|v| v.value), z: self.z.value }
+    fn start(&self) -> StepStart<N> {
+        StepStart { q: self.q.map(|q| q.value), y: self.v.map(|v| v.value), z: self.z.value }
     }
 
     fn is_finite(&self) -> bool {

@@ -9,7 +9,6 @@ mod condensed;
 mod damping;
 mod dense;
 mod double_double;
-mod extension;
 mod general;
 mod general_saved;
 mod general_stages;
@@ -28,6 +27,7 @@ mod stages;
 mod stepper;
 mod sweeps;
 mod table;
+mod time_transformation;
 
 pub(crate) use beginning::velocity;
 pub use clocked::ClockedStepper;

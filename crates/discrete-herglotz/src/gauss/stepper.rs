@@ -6,16 +6,16 @@ mod words;
 use super::account::account;
 use super::beginning::{Beginning, velocity};
 use super::condensed::Condensed;
-use super::dense::{DenseStep, Solved, Start};
-use super::extension::{Extension, Physical};
+use super::dense::{DenseStep, Solved, StepStart};
 use super::general::General;
 use super::linear::Linear;
 use super::mass::Mass;
 use super::resolution;
-use super::separable::Separable;
+use super::separable::SeparableStages;
 use super::stage_equations::{Given, Products, StageEquations, Workspace};
-use super::sweeps::Progress;
-use super::table::Table;
+use super::sweeps::Verdict;
+use super::table::StageTable;
+use super::time_transformation::{Extension, Physical};
 use crate::gauss::lanes::forget_branches;
 use crate::rules::step_equations::is_identity;
 use crate::run::watch::Watch;
@@ -47,7 +47,7 @@ const MOST_LINEAR: usize = 32;
 enum Route<'a, L, const N: usize> {
     /// In a box of its own: its matrices are larger than all that others hold.
     Linear(Box<Linear<N>>, Condensed),
-    Condensed(Separable<'a, L, N>),
+    Condensed(SeparableStages<'a, L, N>),
     General(General<'a, L, Physical, N>),
 }
 
@@ -75,7 +75,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     t0: f64,
     k: usize,
     /// The state at the start of the last step.
-    from: Start<N>,
+    from: StepStart<N>,
     /// Whether the stages of the last step are in the route's workspace.
     solved: bool,
     newton: bool,
@@ -123,15 +123,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
                 None => {
                     let left = table.preconditioned(0.0).ok_or(InputError::Step { h })?;
                     let inverse = (!unit).then_some(inverse);
-                    Route::Condensed(Separable::new(lagrangian, table, left, inverse, &start, wants_z))
+                    Route::Condensed(SeparableStages::new(lagrangian, table, left, inverse, &start, wants_z))
                 }
             }
         } else {
             let mass = Mass::new(&structure, inverse);
             let physical = Extension::new(Physical, t0, 0.0);
-            Route::General(General::new(lagrangian, physical, Table::new(s, h), mass, &state, &start.v))
+            Route::General(General::new(lagrangian, physical, StageTable::new(s, h), mass, &state, &start.v))
         };
-        let from = Start { q: [0.0; N], y: [0.0; N], z: 0.0 };
+        let from = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
         Ok(GaussStepper {
             lagrangian,
             products,
@@ -149,7 +149,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             workspace: None,
             newton_steps: 0,
             of_sigma,
-            sequence: (s <= FEW).then(|| Sequence::new(Start { q: state.q.into(), ..from })),
+            sequence: (s <= FEW).then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
             watch: Watch::new(&state.q, &start.v, h),
         })
     }
@@ -207,17 +207,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
 
     /// The state as the route holds it.
     #[inline(always)]
-    fn values(&self) -> Start<N> {
+    fn values(&self) -> StepStart<N> {
         let (q, y, z) = match &*self.route {
             Route::Linear(run, _) => (&run.q, &run.v, run.z),
             Route::Condensed(run) => (&run.q, &run.v, run.z),
             Route::General(run) => (&run.q, &run.p, run.z),
         };
-        Start { q: q.map(|q| q.value), y: y.map(|y| y.value), z: z.value }
+        StepStart { q: q.map(|q| q.value), y: y.map(|y| y.value), z: z.value }
     }
 
     /// With momenta for the velocities of the condensed routes.
-    fn phase(&self, x: &Start<N>) -> PhasePoint<N> {
+    fn phase(&self, x: &StepStart<N>) -> PhasePoint<N> {
         let y = SVector::from(x.y);
         PhasePoint { q: SVector::from(x.q), p: self.mass.as_ref().map_or(y, |mass| **mass * y), z: x.z }
     }
@@ -359,7 +359,7 @@ struct Advance<'b, 'a, L, const N: usize> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
-    type Output = Result<(), (usize, Progress)>;
+    type Output = Result<(), (usize, Verdict)>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
@@ -370,7 +370,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
             let (taken, from) = linear.advance(steps);
             run.k += taken;
             run.from = from;
-            return if taken == steps { Ok(()) } else { Err((taken, Progress::NonFinite)) };
+            return if taken == steps { Ok(()) } else { Err((taken, Verdict::NonFinite)) };
         }
         for taken in 0..steps {
             // Dense output is of the last step.
@@ -379,11 +379,11 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
             }
             let t = t0 + run.k as f64 * h;
             let progress = match &mut *run.route {
-                Route::Linear(..) => Progress::Done,
+                Route::Linear(..) => Verdict::Done,
                 Route::Condensed(condensed) => condensed.step::<S>(t),
                 Route::General(general) => general.step::<S>(t),
             };
-            if progress != Progress::Done {
+            if progress != Verdict::Done {
                 return Err((taken, progress));
             }
             let misfit = match &*run.route {
@@ -450,7 +450,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             _ if self.k == 0 => 1.0,
             Route::Linear(_, table) => 1.0 + table.grow.head,
             Route::Condensed(run) => 1.0 + run.table.grow.head,
-            Route::General(run) => 1.0 / (1.0 - run.fallen),
+            Route::General(run) => 1.0 / (1.0 - run.one_minus_rho),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
 use crate::run::watch::{factor_misfit, misfit};
-use crate::solve::newton::{Linearised, Start, largest, newton};
+use crate::solve::newton::{Linearised, NewtonStart, largest, newton};
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
@@ -247,7 +247,7 @@ impl<L, R: Rule> Quadrature<L, R> {
         L: Lagrangian<N>,
     {
         let (resolution, impulse) = ((largest(&from.q) / h).abs(), largest(&from.p) * h.abs());
-        let start = Start { u: *guess, z: from.z, resolution, impulse };
+        let start = NewtonStart { u: *guess, z: from.z, resolution, impulse };
         let root = newton(start, solver, |u, z1| Ok(self.linearise::<N, ADJOINT>(t, h, from, u, z1)))?;
         let (u, mut force) = (root.u, SVector::<f64, N>::zeros());
         let (mut value, mut slope_0, mut slope_1) = (0.0, 0.0, 0.0);

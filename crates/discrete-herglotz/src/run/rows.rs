@@ -126,14 +126,12 @@ impl<'f, const N: usize> Rows<'f, N> {
 
     /// The names of the [numbers](Row::numbers) of a row: `t`, `q0`, .. `v0`, .. `p0`, .. `z`, `energy`, `log_factor`, and the columns' own.
     pub fn header(&self) -> Vec<String> {
-        let of = |letter: &'static str, there: bool| (0..if there { N } else { 0 }).map(move |i| format!("{letter}{i}"));
+        let of =
+            |letter: &'static str, there: bool| (0..if there { N } else { 0 }).map(move |i| format!("{letter}{i}"));
         let one = |name: &str, there: bool| there.then(|| name.to_owned());
         let vectors = of("q", true).chain(of("v", self.velocity)).chain(of("p", true));
-        let numbers = [
-            one("z", self.needs.action),
-            one("energy", self.energy),
-            one("log_factor", self.needs.conformal_factor),
-        ];
+        let numbers =
+            [one("z", self.needs.action), one("energy", self.energy), one("log_factor", self.needs.conformal_factor)];
         let columns = self.columns.iter().map(|(name, _)| name.clone());
         one("t", true).into_iter().chain(vectors).chain(numbers.into_iter().flatten()).chain(columns).collect()
     }

@@ -21,7 +21,7 @@ pub(crate) struct Linearised<const N: usize> {
 }
 
 /// Where Newton's method starts, and the sizes that tell round-off.
-pub(crate) struct Start<const N: usize> {
+pub(crate) struct NewtonStart<const N: usize> {
     /// The guess of the mean velocity.
     pub u: SVector<f64, N>,
     /// The guess of the unknown action.
@@ -69,11 +69,11 @@ pub fn last_correction(now: f64, before: f64, tolerance: f64) -> bool {
 /// as an iteration; after [`ITERATION_LIMIT`] the step fails.
 #[inline(always)]
 pub(crate) fn newton<const N: usize>(
-    start: Start<N>,
+    start: NewtonStart<N>,
     solver: &mut Solver<N>,
     mut linearise: impl FnMut(&SVector<f64, N>, f64) -> Result<Linearised<N>, StepError>,
 ) -> Result<Root<N>, StepError> {
-    let Start { mut u, mut z, resolution, impulse } = start;
+    let NewtonStart { mut u, mut z, resolution, impulse } = start;
     let (mut last, mut last_z) = (SVector::<f64, N>::zeros(), 0.0f64);
     // The size of the last correction; infinite before the first.
     let (mut last_size, mut last_z_size) = (f64::INFINITY, f64::INFINITY);
@@ -127,7 +127,7 @@ mod tests {
     /// `u = 1`, known from the start, and `z^2 = 2`: the iteration goes on until z is there as well.
     #[test]
     fn an_exact_guess_of_u_does_not_end_the_search_for_z() {
-        let start = Start { u: SVector::from([1.0]), z: 1.5, resolution: 1.0, impulse: 1.0 };
+        let start = NewtonStart { u: SVector::from([1.0]), z: 1.5, resolution: 1.0, impulse: 1.0 };
         let root = newton(start, &mut Solver::default(), |u: &SVector<f64, 1>, z| {
             Ok(Linearised {
                 residual: SVector::from([u[0] - 1.0]),

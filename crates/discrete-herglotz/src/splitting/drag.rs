@@ -1,6 +1,6 @@
 //! A linear drag, and the flow of the kinetic part with it.
 
-use super::separable::Separable;
+use super::separable::SeparableForm;
 use crate::InputError;
 use crate::gauss::coefficients::Coefficients;
 use contact_geom::nalgebra::SVector;
@@ -21,7 +21,7 @@ pub(super) enum Drag<const N: usize> {
 impl<const N: usize> Drag<N> {
     /// That of a separable Lagrangian.
     pub(super) fn of<L: Lagrangian<N>>(
-        form: &Separable<L, N>,
+        form: &SeparableForm<L, N>,
         t: f64,
         state: &PhasePoint<N>,
     ) -> Result<Self, InputError> {

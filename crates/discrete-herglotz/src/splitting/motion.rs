@@ -116,7 +116,7 @@ const CHUNK: usize = 256;
 
 /// How far a run has come.
 #[derive(Clone, Debug)]
-pub(super) struct Progress<const N: usize> {
+pub(super) struct Advance<const N: usize> {
     pub(super) h: f64,
     pub(super) t0: f64,
     pub(super) taken: usize,
@@ -128,10 +128,10 @@ pub(super) struct Progress<const N: usize> {
     pub(super) watch: Watch<N>,
 }
 
-impl<const N: usize> Progress<N> {
+impl<const N: usize> Advance<N> {
     pub(super) fn new(h: f64, t0: f64, forces: usize, state: PhasePoint<N>, kick: (f64, SVector<f64, N>)) -> Self {
         let watch = Watch::new(&state.q, &SVector::zeros(), h);
-        Progress { h, t0, taken: 0, forces, motion: Motion::new(state, kick), state, watch }
+        Advance { h, t0, taken: 0, forces, motion: Motion::new(state, kick), state, watch }
     }
 
     /// The time after so many steps more.
@@ -187,4 +187,4 @@ impl<const N: usize> Progress<N> {
 
 saved!([const N: usize] Sum<N> { value, carry });
 saved!([const N: usize] Motion<N> { q, p, z, force, value, change, sigma });
-saved!([const N: usize] Progress<N> { taken, motion, state, watch });
+saved!([const N: usize] Advance<N> { taken, motion, state, watch });

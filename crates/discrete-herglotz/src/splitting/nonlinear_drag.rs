@@ -1,8 +1,8 @@
 //! Splittings where the drag is not linear in the action.
 
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
-use super::motion::{Motion, Progress, Reached};
-use super::separable::Separable;
+use super::motion::{Advance, Motion, Reached};
+use super::separable::SeparableForm;
 use crate::run::saved::Saved;
 use crate::{Doubt, Halt, InputError, Item, SplittingScheme, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
@@ -16,16 +16,16 @@ use contact_geom::{Lagrangian, PhasePoint};
 /// the momentum. One force a substep; the C of two substeps is one.
 #[derive(Clone, Debug)]
 pub struct ActionSplitting<'a, L, F: ActionFlow, const N: usize> {
-    form: Separable<&'a L, N>,
-    table: Table<F::Map>,
-    progress: Progress<N>,
+    form: SeparableForm<&'a L, N>,
+    table: DragTable<F::Map>,
+    progress: Advance<N>,
     compensated: bool,
     doubting: bool,
 }
 
 /// The substeps of a step.
 #[derive(Clone, Debug)]
-struct Table<C> {
+struct DragTable<C> {
     stages: Vec<Stage<C>>,
     /// The map that ends a step.
     closing: C,
@@ -55,7 +55,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> ActionSplitting<'a, L, Riccati, N> {
         t0: f64,
         state: PhasePoint<N>,
     ) -> Result<Self, InputError> {
-        let flow = Riccati::of(&Separable::read(lagrangian, h, t0, &state)?.lagrangian, t0, &state)?;
+        let flow = Riccati::of(&SeparableForm::read(lagrangian, h, t0, &state)?.lagrangian, t0, &state)?;
         Self::with_flow(lagrangian, &flow, scheme, h, t0, state)
     }
 }
@@ -76,7 +76,7 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
         t0: f64,
         state: PhasePoint<N>,
     ) -> Result<Self, InputError> {
-        let form = Separable::read(lagrangian, h, t0, &state)?;
+        let form = SeparableForm::read(lagrangian, h, t0, &state)?;
         form.check_steady_drag(t0, &state)?;
         let Some(substeps) = scheme.substeps() else {
             return Err(InputError::Hypothesis {
@@ -93,9 +93,9 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
             Stage { action, half: 0.5 * g * h, length: g * h, time: time * h }
         });
         let stages = stages.collect();
-        let table = Table { stages, closing: flow.over(0.5 * before * h), rest: (state.z, flow.rate(state.z)) };
+        let table = DragTable { stages, closing: flow.over(0.5 * before * h), rest: (state.z, flow.rate(state.z)) };
         let (value, force) = form.first_kick(t0, &state.q, state.z)?;
-        let progress = Progress::new(h, t0, scheme.stages(), state, (value - table.rest.1, force));
+        let progress = Advance::new(h, t0, scheme.stages(), state, (value - table.rest.1, force));
         Ok(ActionSplitting { form, table, progress, compensated: false, doubting: false })
     }
 
@@ -163,9 +163,9 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
 /// The motion after some steps more, and its state.
 #[inline(never)]
 fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool, const DOUBTING: bool>(
-    form: &Separable<&L, N>,
-    table: &Table<C>,
-    from: &Progress<N>,
+    form: &SeparableForm<&L, N>,
+    table: &DragTable<C>,
+    from: &Advance<N>,
     steps: usize,
 ) -> Reached<N> {
     let (mut m, mut seen, (z, constant)) = (from.motion, from.seen(), table.rest);

@@ -30,8 +30,10 @@ enum Coefficients {
 }
 
 const KAHAN_LI: &str = "Kahan and Li, Math. Comp. 66 (1997) 1089-1099, doi:10.1090/S0025-5718-97-00873-9";
-const SOFRONIOU_SPALETTA: &str = "Sofroniou and Spaletta, Optim. Methods Softw. 20 (2005) 597-613, doi:10.1080/10556780500140664";
-const BLANES_MOAN: &str = "Blanes and Moan, J. Comput. Appl. Math. 142 (2002) 313-330, table 3, doi:10.1016/S0377-0427(01)00492-7";
+const SOFRONIOU_SPALETTA: &str =
+    "Sofroniou and Spaletta, Optim. Methods Softw. 20 (2005) 597-613, doi:10.1080/10556780500140664";
+const BLANES_MOAN: &str =
+    "Blanes and Moan, J. Comput. Appl. Math. 142 (2002) 313-330, table 3, doi:10.1016/S0377-0427(01)00492-7";
 
 impl SplittingScheme {
     /// The Strang splitting, of order 2: Strang, SIAM J. Numer. Anal. 5 (1968) 506-517.

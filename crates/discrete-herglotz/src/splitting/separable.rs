@@ -11,14 +11,14 @@ pub(super) const FALSE_CLAIM: f64 = 1e-9;
 
 /// A separable Lagrangian with its mass matrix, read once.
 #[derive(Clone, Debug)]
-pub(crate) struct Separable<L, const N: usize> {
+pub(crate) struct SeparableForm<L, const N: usize> {
     pub(crate) lagrangian: L,
     mass: Box<SMatrix<f64, N, N>>,
     /// `None` for the identity: a product with it would cost a third of a step of the oscillator.
     inverse: Option<Box<SMatrix<f64, N, N>>>,
 }
 
-impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
+impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
     /// Reads M, and verifies what the Lagrangian claims, at a state and beside it.
     pub(crate) fn read(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
         if N == 0 {
@@ -46,7 +46,7 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
         } else {
             Some(inverted(&mass).map_err(|e| e.of("the mass matrix L_vv", "take a regular Lagrangian"))?)
         };
-        Ok(Separable { lagrangian, mass, inverse })
+        Ok(SeparableForm { lagrangian, mass, inverse })
     }
 
     /// Verifies, at some times, that `L_z` does not depend on time.

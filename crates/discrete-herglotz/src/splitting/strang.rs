@@ -1,7 +1,7 @@
 //! The Strang splitting as a discrete Lagrangian.
 
 use super::drag::{Drag, Drift};
-use super::separable::Separable;
+use super::separable::SeparableForm;
 use crate::run::watch::misfit;
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::SVector;
@@ -29,7 +29,7 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 /// ```
 #[derive(Clone, Debug)]
 pub struct Strang<L, const N: usize> {
-    form: Separable<L, N>,
+    form: SeparableForm<L, N>,
     h: f64,
     drag: Drag<N>,
     /// Where the drag is constant, its drifts over h and -h.
@@ -42,7 +42,7 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
     /// # Errors
     /// Those of [`Splitting::new`](crate::Splitting::new), but for the last.
     pub fn new(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
-        let form = Separable::read(lagrangian, h, t, state)?;
+        let form = SeparableForm::read(lagrangian, h, t, state)?;
         let drag = Drag::of(&form, t, state)?;
         let drift = |s| drag.drift(&form.lagrangian, t, s);
         let steady = matches!(drag, Drag::Constant(_)).then(|| (drift(h), drift(-h)));

@@ -1,7 +1,7 @@
 //! Discrete Lagrangians on Q x Q x R.
 
 use crate::rules::step_equations::BLOCK;
-use crate::solve::newton::{Linearised, Start, newton};
+use crate::solve::newton::{Linearised, NewtonStart, newton};
 use crate::{InputError, Solver, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed};
@@ -78,7 +78,8 @@ pub trait DiscreteLagrangian<const N: usize> {
     ) -> Result<Transition<N>, StepError> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>| DiscretePoint { q0: from.q, q1: from.q + u * h, z0: from.z };
-        let start = Start { u: *guess, z: 0.0, resolution: from.q.amax() / h.abs(), impulse: from.p.amax() * h.abs() };
+        let start =
+            NewtonStart { u: *guess, z: 0.0, resolution: from.q.amax() / h.abs(), impulse: from.p.amax() * h.abs() };
         let root = newton(start, solver, |u, _| {
             let jet = self.second_jet(t, &point(u))?;
             Ok(Linearised {
@@ -111,7 +112,7 @@ pub trait DiscreteLagrangian<const N: usize> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>, z0: f64| DiscretePoint { q0: from.q - u * h, q1: from.q, z0 };
         let start =
-            Start { u: *guess, z: from.z, resolution: from.q.amax() / h.abs(), impulse: from.p.amax() * h.abs() };
+            NewtonStart { u: *guess, z: from.z, resolution: from.q.amax() / h.abs(), impulse: from.p.amax() * h.abs() };
         let root = newton(start, solver, |u, z0| {
             let jet = self.second_jet(t, &point(u, z0))?;
             let defect = z0 + jet.first.value - from.z;

@@ -8,7 +8,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::HarmonicOscillator;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 
-type Start<'a> = dyn Fn(f64, PhasePoint<1>) -> Result<Box<dyn Stepper<1> + 'a>, InputError> + 'a;
+type MakeStepper<'a> = dyn Fn(f64, PhasePoint<1>) -> Result<Box<dyn Stepper<1> + 'a>, InputError> + 'a;
 
 /// The steps after which the walk is looked at.
 const LENGTHS: [usize; 3] = [1 << 10, 1 << 12, 1 << 14];
@@ -17,7 +17,12 @@ const LENGTHS: [usize; 3] = [1 << 10, 1 << 12, 1 << 14];
 /// so it keeps a quadratic form of its own, which contracts as `e^(gamma t)`, and is left from it by rounding alone. Asserted:
 /// the mean of that is zero within [`LARGEST_BIAS`] of its deviations, and the root of its mean square grows with the power 1/2 of the
 /// steps, within 0.15 (64 walks tell it to 0.09 over a factor 16), or less. `rate` is the logarithm of a step's contraction.
-fn assert_random_walk(name: &str, rate: f64, motion: &Start<'_>, undamped: &Start<'_>) -> Result<(), InputError> {
+fn assert_random_walk(
+    name: &str,
+    rate: f64,
+    motion: &MakeStepper<'_>,
+    undamped: &MakeStepper<'_>,
+) -> Result<(), InputError> {
     let step = |q: f64, p: f64| {
         let mut motion = undamped(0.0, PhasePoint::new([q], [p], 0.0))?;
         assert_eq!(motion.advance(1), Ok(()), "{name}");

@@ -7,7 +7,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{Clock, Scalar};
 
 /// The time that steps are equal in.
-pub(super) trait Pace<const N: usize> {
+pub(super) trait TimeTransformation<const N: usize> {
     /// Whether it is t itself: nothing is computed for it then.
     const PHYSICAL: bool;
     /// The rate `g = dt/dtau`.
@@ -17,7 +17,7 @@ pub(super) trait Pace<const N: usize> {
 /// The time t.
 pub(super) struct Physical;
 
-impl<const N: usize> Pace<N> for Physical {
+impl<const N: usize> TimeTransformation<N> for Physical {
     const PHYSICAL: bool = true;
     #[inline(always)]
     fn rate<T: Scalar>(&self, _q: &SVector<T, N>) -> T {
@@ -28,7 +28,7 @@ impl<const N: usize> Pace<N> for Physical {
 /// The time of a clock.
 pub(super) struct Fictitious<C>(pub C);
 
-impl<const N: usize, C: Clock<N>> Pace<N> for Fictitious<C> {
+impl<const N: usize, C: Clock<N>> TimeTransformation<N> for Fictitious<C> {
     const PHYSICAL: bool = false;
     #[inline(always)]
     fn rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
@@ -38,7 +38,7 @@ impl<const N: usize, C: Clock<N>> Pace<N> for Fictitious<C> {
 
 /// What the time of a clock adds to a step.
 pub(super) struct Extension<P> {
-    pub pace: P,
+    pub transformation: P,
     pub t: Compensated,
     /// The momentum of t.
     pub p_t: Compensated,
@@ -47,8 +47,8 @@ pub(super) struct Extension<P> {
 }
 
 impl<P> Extension<P> {
-    pub fn new(pace: P, t: f64, p_t: f64) -> Self {
-        Extension { pace, t: t.into(), p_t: p_t.into(), g: Stages::ZERO }
+    pub fn new(transformation: P, t: f64, p_t: f64) -> Self {
+        Extension { transformation, t: t.into(), p_t: p_t.into(), g: Stages::ZERO }
     }
 }
 
@@ -60,7 +60,7 @@ pub(super) struct Values<const N: usize> {
     pub z: Compensated,
     pub t: Compensated,
     pub p_t: Compensated,
-    pub fallen: f64,
+    pub one_minus_rho: f64,
 }
 
 saved!([P] Extension<P> { t, p_t, g });
