@@ -79,7 +79,7 @@ impl<const N: usize> From<ExactError<N>> for StepError {
             ExactError::Input(_) => StepError::NonFinite,
             ExactError::OutsideDomain { t, .. } | ExactError::Unfinished { t, .. } => StepError::OutsideDomain { t },
             ExactError::NotConverged { residual, .. } => {
-                StepError::NotConverged { residual, iterations: crate::retraction::ITERATIONS }
+                StepError::NotConverged { residual, iterations: crate::map::ITERATIONS }
             }
             ExactError::ConjugatePoint { smallest, .. } => StepError::ConjugatePoint { smallest },
         }

@@ -42,33 +42,24 @@
 
 #[cfg(test)]
 mod bad_numbers;
-mod conjugate;
 mod error;
-mod exact_flow;
-mod exact_lagrangian;
-mod exponential;
-mod flow;
-mod gauss;
-mod nonholonomic;
-mod panel;
+mod map;
+mod numerics;
 mod principle;
 mod quadratic_exact;
-mod retraction;
-mod spline_curve;
 pub mod statements;
-mod two_steps;
 mod variational_error;
 
-pub use conjugate::ConjugatePoint;
 pub use error::ExactError;
-pub use exact_flow::ExactFlow;
-pub use exact_lagrangian::ExactLagrangian;
-pub use exponential::{ContactExponential, ExponentialDifferential, HerglotzFlow};
-pub use flow::{EVALUATIONS, Motion, herglotz_flow};
-pub use nonholonomic::{Chetaev, ExtendedMotion, ExtendedPoint, NonHolonomic};
-pub use principle::{Curve, CurveAction, MotionCurve, VariedCurve, action, action_derivative};
+pub use map::conjugate::ConjugatePoint;
+pub use map::exact_flow::ExactFlow;
+pub use map::exact_lagrangian::ExactLagrangian;
+pub use map::exponential::{ContactExponential, ExponentialDifferential, HerglotzFlow};
+pub use map::retraction::{Retraction, RetractionRoute};
+pub use map::two_steps::{TwoSteps, compose, through};
+pub use numerics::flow::{EVALUATIONS, Motion, herglotz_flow};
+pub use principle::curve::{Curve, CurveAction, MotionCurve, VariedCurve, action, action_derivative};
+pub use principle::nonholonomic::{Chetaev, ExtendedMotion, ExtendedPoint, NonHolonomic};
+pub use principle::spline_curve::SplineCurve;
 pub use quadratic_exact::QuadraticExact;
-pub use retraction::{Retraction, RetractionRoute};
-pub use spline_curve::SplineCurve;
-pub use two_steps::{TwoSteps, compose, through};
 pub use variational_error::{ErrorOrders, MeasuredOrder, Order, error_orders};

@@ -13,8 +13,8 @@
 // In a check `f64::max` and `amax` would lose a NaN.
 #![deny(clippy::disallowed_methods)]
 
-use crate::exponential::HerglotzFlow;
-use crate::gauss::collocations;
+use crate::map::exponential::HerglotzFlow;
+use crate::numerics::gauss::collocations;
 use crate::{
     ContactExponential, ExactError, ExactLagrangian, MotionCurve, NonHolonomic, VariedCurve, action, action_derivative,
     compose, herglotz_flow, through,

@@ -1,6 +1,6 @@
 //! The exact discrete Lagrangian.
 
-use crate::retraction::Retraction;
+use crate::map::retraction::Retraction;
 use crate::{ContactExponential, ExactError, Motion, herglotz_flow};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};

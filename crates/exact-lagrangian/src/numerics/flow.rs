@@ -4,7 +4,7 @@
 mod tests;
 
 use crate::ExactError;
-use crate::panel::{Floor, Panel, Problem, Rate, Rates, Refused, SMALLEST, Size, State, collocate};
+use crate::numerics::panel::{Floor, Panel, Problem, Rate, Rates, Refused, SMALLEST, Size, State, collocate};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{GeometryError, Lagrangian, Scalar, Triple, VelocityPoint, herglotz_rates, larger};
 

@@ -1,7 +1,7 @@
 //! Herglotz' principle: the action of a curve, and how it changes with the curve.
 
-use crate::flow::{ACCURACY, Work, integrate};
-use crate::panel::{Rate, Rates, State};
+use crate::numerics::flow::{ACCURACY, Work, integrate};
+use crate::numerics::panel::{Rate, Rates, State};
 use crate::{ExactError, herglotz_flow};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, GeometryError, Lagrangian, Scalar, VelocityPoint};

@@ -1,6 +1,6 @@
 //! Conjugate points: where the exponential map stops being a local diffeomorphism.
 
-use crate::exact_lagrangian::seeded;
+use crate::map::exact_lagrangian::seeded;
 use crate::{ContactExponential, ExactError, herglotz_flow};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{Dual, Lagrangian, Regularity, VelocityPoint, largest};

@@ -1,7 +1,7 @@
 //! The non-holonomic system (L~, M_L) that is equivalent to Herglotz' equations.
 
-use crate::flow::{ACCURACY, Work, integrate};
-use crate::panel::{Rate, Rates, State};
+use crate::numerics::flow::{ACCURACY, Work, integrate};
+use crate::numerics::panel::{Rate, Rates, State};
 use crate::{ExactError, Motion};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};

@@ -1,6 +1,6 @@
 //! One panel of a motion: collocation at Gauss points, solved by iteration to round-off.
 
-use crate::gauss::{Gauss, MOST, PROBES, Probe, collocations};
+use crate::numerics::gauss::{Gauss, MOST, PROBES, Probe, collocations};
 use contact_geom::larger;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{GeometryError, Scalar};
@@ -267,7 +267,7 @@ pub(crate) fn collocate<const N: usize, T: Scalar>(
 /// the end.
 ///
 /// There are so many probes that a motion is looked at in all at [`PROBES`] places and more if it is long, which is to say, if it
-/// changes its position or its velocity by as much as they are; and at [`PROBES_STILL`](crate::gauss::PROBES_STILL) if there is no
+/// changes its position or its velocity by as much as they are; and at [`PROBES_STILL`](crate::numerics::gauss::PROBES_STILL) if there is no
 /// force at all.
 #[expect(clippy::too_many_arguments)]
 fn between_nodes<const N: usize, T: Scalar>(
