@@ -71,3 +71,53 @@ impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
         self.written(seen, at)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{GaussCollocation, Problem, Status, Steps, Until};
+    use contact_geom::{VelocityPoint, systems::Pendulum};
+
+    fn run(observer: &mut impl Observer<1>) -> Status {
+        let pendulum = Pendulum { gamma: -0.1 };
+        let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.3], 0.0)).unwrap();
+        let run = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.1)).observe(observer);
+        run.run(Until::Time(2.0)).unwrap().status
+    }
+
+    fn rows<'f>() -> Rows<'f, 1> {
+        Rows::every(3).unwrap().with_energy().column("q^2", |_, x| x.q[0] * x.q[0])
+    }
+
+    /// What is read is what the rows have, to the last bit.
+    #[test]
+    fn the_file_has_the_rows() {
+        let (mut kept, mut text) = (rows(), Vec::new());
+        assert_eq!(run(&mut kept), Status::Completed);
+        let mut csv = CsvRows::new(rows(), &mut text);
+        assert_eq!((run(&mut csv), csv.error.is_none()), (Status::Completed, true));
+        drop(csv);
+        let mut reader = csv::Reader::from_reader(text.as_slice());
+        assert_eq!(reader.headers().unwrap(), vec!["t", "q0", "p0", "z", "energy", "q^2"]);
+        let read: Vec<Vec<f64>> = reader.deserialize().map(Result::unwrap).collect();
+        assert_eq!(read, kept.rows.iter().map(|row| row.numbers().collect::<Vec<_>>()).collect::<Vec<_>>());
+    }
+
+    /// A full disk ends the run, with the cause.
+    #[test]
+    fn a_row_that_cannot_be_written_ends_the_run() {
+        struct Full;
+        impl Write for Full {
+            fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+                Err(std::io::ErrorKind::StorageFull.into())
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        let mut csv = CsvRows::new(rows(), Full);
+        let status = run(&mut csv);
+        assert!(matches!(status, Status::Stopped { by: "a row that could not be written", .. }), "{status:?}");
+        assert!(csv.error.is_some());
+    }
+}

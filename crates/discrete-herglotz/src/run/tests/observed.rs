@@ -1,8 +1,8 @@
 //! What a run gives, by every integrator: rows at times, events, the way back, a stop and a start from there.
 
 use crate::run::{
-    AnyIntegrator, Checkpoint, CheckpointError, Event, Events, Interrupted, Moment, Problem, Rows, Run, Steps, Stop,
-    Until, run_of,
+    AnyIntegrator, Checkpoint, CheckpointError, Event, Events, Interrupted, Moment, Problem, Progress, Quotient, Rows,
+    Run, Steps, Stop, Until, run_of,
 };
 use crate::{Gauss, InputError, Method, Outcome, Status};
 use contact_geom::systems::{Kepler, Pendulum, QuadraticInZ, System};
@@ -113,6 +113,63 @@ fn rows_every_so_many_steps() {
         assert_eq!(times, [1.0, 1.0 + 0.4 * way, 1.0 + 0.8 * way, to]);
         assert_eq!(rows.rows[3].q, outcome.q);
         assert!(rows.rows.iter().all(|row| row.columns == [row.t + row.q[0]]));
+    }
+}
+
+/// Velocity, energy and conformal factor at given times: the energy decays as the factor, also between the ends of steps.
+#[test]
+fn what_rows_hold() {
+    let system = QuadraticInZ::default();
+    let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
+    for integrator in takers(&system) {
+        let mut rows = Rows::at((0..=7).map(|k| f64::from(k) / 7.0)).unwrap();
+        rows = rows.with_velocity().with_energy().with_conformal_factor();
+        let names = ["t", "q0", "v0", "p0", "z", "energy", "log_factor"];
+        assert_eq!(rows.header(), names);
+        run_in(&problem, integrator, 20, 1.0).observe(&mut rows).run(Until::Time(1.0)).unwrap();
+        let numbers: Vec<Vec<f64>> = rows.rows.iter().map(|row| row.numbers().collect()).collect();
+        assert_eq!((numbers.len(), numbers[0][6]), (8, 0.0), "{integrator}");
+        for row in &numbers {
+            let &[t, q, v, p, z, energy, log_factor] = row.as_slice() else { panic!("{row:?}") };
+            let x = VelocityPoint::new([q], [v], z);
+            assert!((p - contact_geom::legendre(&system, t, &x).p[0]).abs() <= 4.0 * f64::EPSILON * p.abs());
+            assert!((energy - (v * p - system.value(t, &x.q, &x.v, z))).abs() <= 8.0 * f64::EPSILON);
+            // By the order of the steps; by those of order one the energy is off by a step's size.
+            let bound = 4.0 * f64::powi(0.15, integrator.order().min(16) as i32) + 1e-13;
+            let off = energy / numbers[0][5] / log_factor.exp() - 1.0;
+            assert!(off.abs() <= bound, "{integrator}, t = {t}: {off:e}");
+        }
+    }
+}
+
+/// A hundred times at the most, from 0 to 1; by a clock too, which counts its steps itself.
+#[test]
+fn progress_is_told() {
+    let kepler = Kepler::<2>::default();
+    let problem = Problem::new(&kepler, 0.0, kepler.initial()).unwrap();
+    for (integrator, count) in [(AnyIntegrator::Gauss { stages: 2 }, 777), (AnyIntegrator::Clocked { stages: 2 }, 7000)]
+    {
+        let mut parts = Vec::new();
+        let mut progress = Progress::new(|part| parts.push(part));
+        run_in(&problem, integrator, count, 5.0).observe(&mut progress).run(Until::Time(5.0)).unwrap();
+        assert!(parts.len() > 5 && parts.len() <= 102, "{integrator}: {}", parts.len());
+        assert_eq!((parts[0], parts[parts.len() - 1]), (0.0, 1.0));
+        assert!(parts.windows(2).all(|pair| pair[0] < pair[1]), "{parts:?}");
+    }
+}
+
+/// Two momenta of one motion decay alike: their quotient is that of the start, by steps of any method; a quotient of others is not.
+#[test]
+fn quotients_are_conserved() {
+    let system = contact_geom::systems::UniformField { field: [0.0, 0.0], gamma: -0.3 };
+    let problem = Problem::new(&system, 0.0, VelocityPoint::new([0.0, 0.0], [0.3, 0.7], 0.0)).unwrap();
+    for integrator in takers(&system) {
+        let mut momenta = Quotient::new(|_, x: &PhasePoint<2>| x.p[0], |_, x| x.p[1]);
+        let mut other = Quotient::new(|_, x: &PhasePoint<2>| x.p[0], |_, x| x.p[1] * x.p[1]);
+        run_in(&problem, integrator, 30, 3.0).observe(&mut momenta).observe(&mut other).run(Until::Time(3.0)).unwrap();
+        assert_eq!(momenta.rows.len(), 31, "{integrator}");
+        assert!(momenta.largest_change() <= 30.0 * f64::EPSILON, "{integrator}: {:e}", momenta.largest_change());
+        assert!(other.largest_change() > 0.5, "{integrator}");
     }
 }
 
