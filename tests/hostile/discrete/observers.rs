@@ -16,10 +16,7 @@ pub const ATTACKS: &[Attack] = &[
         run: rows,
     },
     Attack { on: &["Event::new", "Event::rising", "Event::falling", "Event::terminal", "Events::new"], run: events },
-    Attack {
-        on: &["Run::observe", "Stop::here", "Stop::failed", "Needs::and"],
-        run: odd_observers,
-    },
+    Attack { on: &["Run::observe", "Stop::here", "Stop::failed", "Needs::and"], run: odd_observers },
     Attack {
         on: &[
             "Moment::velocity",
