@@ -351,8 +351,11 @@ fn from_two_points() {
 /// Names are read back; an unknown one lists those that are known.
 #[test]
 fn names() {
-    for integrator in AnyIntegrator::all() {
+    for integrator in AnyIntegrator::all().into_iter().chain([AnyIntegrator::Discrete(Method::Strang)]) {
         assert_eq!(integrator.to_string().parse(), Ok(integrator));
+        let text = serde_json::to_string(&integrator).unwrap();
+        assert_eq!(text, format!("\"{integrator}\""));
+        assert_eq!(serde_json::from_str::<AnyIntegrator>(&text).unwrap(), integrator);
         assert!(integrator.order() >= 1);
     }
     for scheme in SplittingScheme::ALL {
@@ -360,6 +363,7 @@ fn names() {
         assert_eq!(composed.to_string().parse(), Ok(composed));
     }
     assert!("trapezoidal_by_none".parse::<AnyIntegrator>().is_err());
+    assert!(serde_json::from_str::<AnyIntegrator>("\"gauss_17\"").unwrap_err().to_string().contains("gauss_16"));
     let error = "gauss_17".parse::<AnyIntegrator>().err().map(|e| e.to_string()).unwrap_or_default();
     for known in ["midpoint", "gauss_16", "clocked_gauss_8", "kahan_li_8", "midpoint_by_yoshida_4"] {
         assert!(error.contains(known), "{error}");

@@ -5,16 +5,28 @@ use crate::Attack;
 use crate::numbers::{Everything, HOSTILE, Report, fine, triples};
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::{
-    AnyIntegrator, Course, Event, Events, InputError, Moment, Needs, Observer, Outcome, Problem, Rows, Status,
-    StepError, Steps, Stop, Until,
+    AnyIntegrator, Course, CsvRows, Event, Events, InputError, Moment, Needs, Observer, Outcome, Problem, Progress,
+    Quotient, Rows, Status, StepError, Steps, Stop, Until,
 };
 use std::ops::ControlFlow;
 
 pub const ATTACKS: &[Attack] = &[
     Attack {
-        on: &["Rows::every", "Rows::at", "Rows::column", "Rows::with_velocity", "Rows::without_action"],
+        on: &[
+            "Rows::every",
+            "Rows::at",
+            "Rows::column",
+            "Rows::with_velocity",
+            "Rows::with_energy",
+            "Rows::with_conformal_factor",
+            "Rows::without_action",
+            "Rows::header",
+            "Row::numbers",
+            "CsvRows::new",
+        ],
         run: rows,
     },
+    Attack { on: &["Progress::new", "Quotient::new", "Quotient::largest_change"], run: told },
     Attack { on: &["Event::new", "Event::rising", "Event::falling", "Event::terminal", "Events::new"], run: events },
     Attack { on: &["Run::observe", "Stop::here", "Stop::failed", "Needs::and"], run: odd_observers },
     Attack {
@@ -39,6 +51,13 @@ fn rows(report: &mut Report) {
         report.check(rows.rows.len() == expected, || format!("a row every {stride} steps: {outcome:?}"));
         report.door(&0.5, outcome.map(|_| rows.rows.iter().map(|r| (r.t, r.q, (r.p, r.v, r.z))).collect::<Vec<_>>()));
         report.check(rows.rows.iter().all(|r| r.v.is_some() && r.z.is_none()), || format!("{:?}", rows.rows));
+        // The energy has z in it, whether or not z is shown.
+        let mut whole = Rows::every(stride).unwrap().without_action().with_energy().with_conformal_factor();
+        let mut csv = CsvRows::new(Rows::every(stride).unwrap(), Vec::new());
+        let outcome = seven(&problem, None).observe(&mut whole).observe(&mut csv).run(Until::Time(0.5));
+        report.door(&0.5, outcome.map(|_| whole.rows.iter().map(|r| (r.energy, r.log_factor)).collect::<Vec<_>>()));
+        let of_header = whole.rows.iter().all(|r| r.numbers().count() == whole.header().len());
+        report.check(of_header && csv.error.is_none(), || format!("{:?}: {:?}", whole.header(), whole.rows));
     }
     for value in HOSTILE {
         // In order, and inside of the span.
@@ -79,6 +98,24 @@ fn rows(report: &mut Report) {
         let recorded: Vec<f64> = back.rows.iter().map(|r| r.t).collect();
         report.check(outcome.is_ok() == good && (!good || recorded == times), || format!("{times:?}: {recorded:?}"));
     }
+}
+
+fn told(report: &mut Report) {
+    let problem = tame();
+    for value in HOSTILE {
+        let mut parts = Vec::new();
+        let mut progress = Progress::new(|part| parts.push(part));
+        let outcome = seven(&problem, None).observe(&mut progress).run(Until::Time(value));
+        let completed = outcome.is_ok_and(|o| o.status == Status::Completed);
+        report.check(!completed || parts.last() == Some(&1.0), || format!("to {value}: {parts:?}"));
+        // What is no quotient is said to be none.
+        let mut quotient = Quotient::new(move |_, _: &PhasePoint<1>| value, |_, _| 1.0);
+        let outcome = seven(&problem, None).observe(&mut quotient).run(Until::Time(0.5));
+        let change = quotient.largest_change();
+        let good = if value.is_finite() && value != 0.0 { change == 0.0 } else { change.is_nan() };
+        report.check(outcome.is_ok() && good, || format!("{value} over one changes by {change}"));
+    }
+    report.check(Quotient::<1>::new(|_, _| 1.0, |_, _| 1.0).largest_change() == 0.0, || "of no run".into());
 }
 
 /// A run of [`Everything`] by Gauss steps of a tenth with events, from t = 0.

@@ -83,7 +83,8 @@ impl AnyIntegrator {
 
 impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyIntegrator {
     fn facts(&self) -> Facts {
-        each!(*self, integrator => Integrator::<'a, L, N>::facts(&integrator))
+        let facts = each!(*self, integrator => Integrator::<'a, L, N>::facts(&integrator));
+        Facts { name: self.to_string().into(), ..facts }
     }
 
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
@@ -104,6 +105,8 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyInte
 impl Display for AnyIntegrator {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         match self {
+            // As a splitting it has a stepper of its own.
+            AnyIntegrator::Discrete(Method::Strang) => f.pad("discrete_strang"),
             AnyIntegrator::Discrete(method) => f.pad(method.name()),
             AnyIntegrator::Gauss { stages } => f.pad(&format!("gauss_{stages}")),
             AnyIntegrator::Clocked { stages } => f.pad(&format!("clocked_gauss_{stages}")),
@@ -118,7 +121,8 @@ impl FromStr for AnyIntegrator {
     type Err = UnknownIntegrator;
 
     fn from_str(name: &str) -> Result<Self, UnknownIntegrator> {
-        let named = Self::all().into_iter().find(|integrator| integrator.to_string() == name);
+        let all = Self::all().into_iter().chain([AnyIntegrator::Discrete(Method::Strang)]);
+        let named = all.into_iter().find(|integrator| integrator.to_string() == name);
         // Of compositions those of the other rules too.
         let composed = || {
             let (rule, scheme) = name.split_once("_by_")?;

@@ -86,7 +86,7 @@ struct Seen<const N: usize> {
 /// function has different signs at two neighbours, or at the ends, the change is found on states as exact as those of the run, by steps of
 /// the same integrator that end there. Of two changes of sign within one part neither is seen, so a function that changes faster than
 /// the motion needs shorter steps; nor is a root that the function only touches. A function that vanishes at the start of the run has
-/// no sign there, and the first that it takes is none of its changes. Where a function is not finite the run ends.
+/// no sign there, and the first that it takes is none of its changes; one that vanishes at the very end has not changed its sign. Where a function is not finite the run ends.
 ///
 /// A terminal event ends the run with its own time and state. Observers after this one do not see a step that ends in such an event.
 ///
@@ -113,42 +113,66 @@ impl<'f, const N: usize> Events<'f, N> {
         Events { crossings: Vec::new(), events: events.into_iter().collect(), seen: Vec::new() }
     }
 
-    /// The crossings in a step, in the order of the run.
-    fn in_step(&mut self, step: &mut LastStep<'_, N>) -> Result<Vec<Crossing<N>>, StepError> {
-        let mut found = Vec::new();
-        let (_, end) = step.ends();
+    /// The crossings in a step, in the order of the run, and why there are no more.
+    fn in_step(&mut self, step: &mut LastStep<'_, N>) -> (Vec<Crossing<N>>, Option<StepError>) {
+        let (mut found, mut cause) = (Vec::new(), None);
         let parts = step.parts();
-        let mut sketch = Vec::with_capacity(parts - 1);
-        for k in 1..parts {
-            sketch.push(step.about(k as f64 / parts as f64)?);
-        }
-        for (i, (event, seen)) in self.events.iter_mut().zip(&mut self.seen).enumerate() {
-            let value = event.at(end.0, &end.1)?;
-            let times = (1..parts).map(|k| step.time(k as f64 / parts as f64));
-            let same = |value: f64| value * seen.sign > 0.0;
-            // A sketch may leave the domain of the function where the motion does not.
-            let quiet = same(value) && times.zip(&sketch).all(|(t, x)| same((event.function)(t, x)));
-            if quiet && seen.zero.is_none() {
-                seen.value = value;
-                continue;
-            }
-            for k in 1..=parts {
-                let tau = k as f64 / parts as f64;
-                let (t, state) = if k == parts { end } else { (step.time(tau), step.at(step.time(tau))?) };
-                let value = event.at(t, &state)?;
-                let from = (k - 1) as f64 / parts as f64;
-                if let Some((t, state)) = event.between(step, [from, tau], seen, value, (t, &state))? {
-                    found.push(Crossing { t, event: i, state });
-                }
-            }
-        }
+        let sketch: Result<Vec<_>, _> = (1..parts).map(|k| step.about(k as f64 / parts as f64)).collect();
+        let sketch = match sketch {
+            Ok(sketch) => sketch,
+            Err(cause) => return (found, Some(cause)),
+        };
         let backward = step.span().1 < step.span().0;
+        let before = |a: f64, b: f64| if backward { a > b } else { a < b };
+        for (index, (event, seen)) in self.events.iter_mut().zip(&mut self.seen).enumerate() {
+            if let Err(error) = event.in_step(index, step, &sketch, seen, &mut found) {
+                cause = match (cause, error) {
+                    (Some(StepError::Event { t: first }), StepError::Event { t }) if !before(t, first) => cause,
+                    _ => Some(error),
+                };
+            }
+        }
+        if let Some(StepError::Event { t }) = cause {
+            // What lies before the place where a function is not defined.
+            found.retain(|crossing| !before(t, crossing.t));
+        }
         found.sort_by(|a, b| if backward { b.t.total_cmp(&a.t) } else { a.t.total_cmp(&b.t) });
-        Ok(found)
+        (found, cause)
     }
 }
 
 impl<const N: usize> Event<'_, N> {
+    /// Its changes of sign in a step of which there is a sketch.
+    fn in_step(
+        &mut self,
+        index: usize,
+        step: &LastStep<'_, N>,
+        sketch: &[PhasePoint<N>],
+        seen: &mut Seen<N>,
+        found: &mut Vec<Crossing<N>>,
+    ) -> Result<(), StepError> {
+        let ((_, end), parts) = (step.ends(), sketch.len() + 1);
+        let value = self.at(end.0, &end.1)?;
+        let times = (1..parts).map(|k| step.time(k as f64 / parts as f64));
+        let same = |value: f64| value * seen.sign > 0.0;
+        // A sketch may leave the domain of the function where the motion does not.
+        let quiet = same(value) && times.zip(sketch).all(|(t, x)| same((self.function)(t, x)));
+        if quiet && seen.zero.is_none() {
+            seen.value = value;
+            return Ok(());
+        }
+        for k in 1..=parts {
+            let tau = k as f64 / parts as f64;
+            let (t, state) = if k == parts { end } else { (step.time(tau), step.at(step.time(tau))?) };
+            let value = self.at(t, &state)?;
+            let from = (k - 1) as f64 / parts as f64;
+            if let Some((t, state)) = self.between(step, [from, tau], seen, value, (t, &state))? {
+                found.push(Crossing { t, event: index, state });
+            }
+        }
+        Ok(())
+    }
+
     /// The change of sign between the point last seen and the next one, if there is one that counts.
     fn between(
         &mut self,
@@ -198,17 +222,17 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
 
     fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
         let Some(mut step) = at.last_step() else { return ControlFlow::Continue(()) };
-        let found = match self.in_step(&mut step) {
-            Ok(found) => found,
-            Err(cause) => return ControlFlow::Break(Stop::failed(cause)),
-        };
+        let (found, cause) = self.in_step(&mut step);
         for crossing in found {
             self.crossings.push(crossing);
             if self.events[crossing.event].terminal {
                 return ControlFlow::Break(Stop { at: Some((crossing.t, crossing.state)), ..Stop::here("an event") });
             }
         }
-        ControlFlow::Continue(())
+        match cause {
+            Some(cause) => ControlFlow::Break(Stop::failed(cause)),
+            None => ControlFlow::Continue(()),
+        }
     }
 }
 

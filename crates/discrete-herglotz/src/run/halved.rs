@@ -3,7 +3,7 @@
 use super::{Plan, Problem};
 use crate::gauss::velocity;
 use crate::run::watch::{LEAST, rounding};
-use crate::{Doubt, InputError};
+use crate::{Doubt, InputError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
 
@@ -11,7 +11,7 @@ use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
 /// a step then has an error of its own of a twentieth, or a fifteenth with order one.
 const APART: f64 = 0.05;
 
-impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
+impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// The misfit of some steps; above one where they do not resolve the motion. `None` where there is nothing to compare with.
     pub(super) fn against_halves(&self, Doubt { steps, t, from, to, .. }: &Doubt<N>) -> Option<f64> {
         let Problem { lagrangian, start, .. } = *self.problem;
@@ -21,11 +21,12 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         if self.facts.by_clock {
             return None;
         }
-        let fine = match self.reach((*t, from), &v, 0.5 * self.h, 2 * steps) {
-            Ok((fine, _)) => fine,
+        let mut fine = self.part((*t, from), &v, 0.5 * self.h).ok()?;
+        if fine.advance_until(2 * steps, end).is_err() {
             // What shorter steps do not get over a longer one should not.
-            Err(_) => return Some(f64::INFINITY),
-        };
+            return Some(f64::INFINITY);
+        }
+        let fine = fine.state();
         let (coarse_v, fine_v) = (at_end(to)?, at_end(&fine)?);
         let size = |x: [&SVector<f64, N>; 3]| largest(x.into_iter().flat_map(|x| x.iter().copied()));
         let apart = |a: &SVector<f64, N>, b: &SVector<f64, N>| largest((a - b).iter().copied());
@@ -37,21 +38,16 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         Some(larger(relative(apart(&to.q, &fine.q), width), of_v) / APART)
     }
 
-    /// The end of some steps of another length, from a state with its velocity, and `sigma_d` of the last of them; by a clock of one step that
-    /// ends after the time h.
-    pub(super) fn reach(
+    /// A stepper by steps of another length, from a state with its velocity; by a clock, of the same length in its time: they are cut
+    /// where they pass the time that they are to reach.
+    pub(super) fn part(
         &self,
         (t, from): (f64, &PhasePoint<N>),
         v: &SVector<f64, N>,
         h: f64,
-        count: usize,
-    ) -> Result<(PhasePoint<N>, f64), InputError> {
+    ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
         let start = VelocityPoint { q: from.q, v: *v, z: from.z };
         let problem = Problem { t0: t, start, state: *from, ..*self.problem };
-        // A step of the clock is cut where it passes the time.
-        let length = if self.facts.by_clock { self.h } else { h };
-        let mut run = self.make_stepper(&problem, length, false)?;
-        run.advance_until(count, t + h).map_err(|halt| InputError::FirstStep(halt.cause))?;
-        Ok((run.state(), run.sigma()))
+        self.make_stepper(&problem, if self.facts.by_clock { self.h } else { h }, false)
     }
 }

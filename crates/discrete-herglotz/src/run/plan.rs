@@ -192,19 +192,24 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             let probed = over || taken == next_probe(taken - 1);
             // Before the step is seen, so that it is not forgotten by who saves the run there.
             if probed {
+                if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
+                    status = Status::FalseClaim { step: taken, claim, size };
+                    break;
+                }
                 let doubt = stepper.doubt().filter(|_| doubts && suspicion.is_none());
                 suspicion = first(suspicion, doubt.and_then(|doubt| self.settled(&doubt)));
                 suspicion = first(suspicion, stepper.suspicion());
             }
             if taken >= next_seen || over {
                 let before = if done == 1 { before } else { None };
-                stop = observers
-                    .step(&self.moment(&*stepper, before, (log_factor, suspicion), (taken, over)))
-                    .break_value();
-            }
-            if probed && let Some(Defect { claim, size }) = self.refuted(&*stepper) {
-                status = Status::FalseClaim { step: taken, claim, size };
-                break;
+                let end = self.moment(&*stepper, before, (log_factor, suspicion), (taken, over));
+                stop = observers.step(&end).break_value();
+                // It ends within the step.
+                if let Some(Stop { at: Some((t, _)), .. }) = stop
+                    && let Ok(Moment { log_factor: Some(there), .. }) = end.inside(t)
+                {
+                    log_factor = there;
+                }
             }
         }
         let (mut t, mut state) = (stepper.time(), stepper.state());
@@ -302,7 +307,9 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
 
     fn inside(&self, (t0, from): &(f64, PhasePoint<N>), t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
         let v = self.velocity(*t0, from)?;
-        self.reach((*t0, from), &v, t - t0, 1).map_err(step_error)
+        let mut run = self.part((*t0, from), &v, t - t0).map_err(step_error)?;
+        run.advance_until(1, t).map_err(|halt| halt.cause)?;
+        Ok((run.state(), run.sigma()))
     }
 }
 

@@ -230,6 +230,11 @@ fn events_that_are_not_defined() {
         matches!(outcome.status, Status::Failed { cause: crate::StepError::Event { t }, .. } if t > 2.1),
         "{outcome:?}"
     );
+    // What another function does before, in the same step of 2.0 to 2.2, is not lost.
+    let undefined = || Event::new(|t, _: &PhasePoint<1>| if t < 2.1 { 1.0 } else { f64::NAN });
+    let mut with_another = Events::new([undefined(), Event::new(|t, _| t - 2.05)]);
+    assert!(matches!(run(&mut with_another).status, Status::Failed { .. }));
+    assert_eq!(with_another.crossings.iter().map(|c| (c.event, c.t)).collect::<Vec<_>>(), [(1, 2.05)]);
     let mut from_zero = Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0])]);
     assert_eq!(run(&mut from_zero).status, Status::Completed);
     assert_eq!(from_zero.crossings.len(), 1);
