@@ -56,7 +56,7 @@ pub use map::exact_flow::ExactFlow;
 pub use map::exact_lagrangian::ExactLagrangian;
 pub use map::exponential::{ContactExponential, ExponentialDifferential, HerglotzFlow};
 pub use map::retraction::{Retraction, RetractionRoute};
-pub use map::two_steps::{TwoSteps, compose, through};
+pub use map::joined_steps::{JoinedSteps, compose, through};
 pub use numerics::flow::{EVALUATIONS, Motion, herglotz_flow};
 pub use principle::curve::{Curve, CurveAction, MotionCurve, VariedCurve, action, action_derivative};
 pub use principle::nonholonomic::{Chetaev, ExtendedMotion, ExtendedPoint, NonHolonomic};

@@ -7,7 +7,7 @@ use discrete_herglotz::{DiscreteLagrangian, ITERATION_LIMIT, StepError, last_cor
 
 /// Two steps through a point `q1` in between, and the action's change over both.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TwoSteps<const N: usize> {
+pub struct JoinedSteps<const N: usize> {
     /// The point in between.
     pub q1: SVector<f64, N>,
     /// The action there.
@@ -28,12 +28,12 @@ pub fn through<const N: usize>(
     t: f64,
     (ends, z0): (&[SVector<f64, N>; 2], f64),
     q1: &SVector<f64, N>,
-) -> Result<TwoSteps<N>, StepError> {
+) -> Result<JoinedSteps<N>, StepError> {
     let [q0, q2] = *ends;
     let one = first.jet(t, &DiscretePoint { q0, q1: *q1, z0 })?;
     let z1 = z0 + one.value;
     let two = second.jet(t + first.step_size(), &DiscretePoint { q0: *q1, q1: q2, z0: z1 })?;
-    Ok(TwoSteps { q1: *q1, z1, value: one.value + two.value, slope: one.d2 * two.sigma() + two.d1 })
+    Ok(JoinedSteps { q1: *q1, z1, value: one.value + two.value, slope: one.d2 * two.sigma() + two.d1 })
 }
 
 /// The composition at its critical point: the `q1` at which the action's change over two steps is critical, from a guess, by
@@ -51,7 +51,7 @@ pub fn compose<const N: usize>(
     t: f64,
     (ends, z0): (&[SVector<f64, N>; 2], f64),
     guess: &SVector<f64, N>,
-) -> Result<TwoSteps<N>, StepError> {
+) -> Result<JoinedSteps<N>, StepError> {
     let [q0, q2] = *ends;
     let (mut q1, mut before, mut residual) = (*guess, f64::INFINITY, f64::INFINITY);
     for _ in 0..ITERATION_LIMIT {
