@@ -4,8 +4,8 @@ pub(crate) mod conjugate;
 pub(crate) mod exact_flow;
 pub(crate) mod exact_lagrangian;
 pub(crate) mod exponential;
+pub(crate) mod joined_steps;
 pub(crate) mod retraction;
 mod shooting;
-pub(crate) mod two_steps;
 
 pub(crate) use shooting::ITERATIONS;
