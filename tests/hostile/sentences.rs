@@ -7,9 +7,10 @@ use contact_geom::{
     herglotz_field, linear,
 };
 use discrete_herglotz::{
-    AnyIntegrator, Checkpoint, Composition, DiscreteLagrangian, Event, Events, Flow, Gauss, InputError, Interrupted,
-    LeftMidpoint, Method, Midpoint, Moment, Obstacle, Problem, Rectangle, Rows, Solver, SplittingScheme, Status,
-    StepError, Stepper, Steps, Stop, Strang, Suspicion, UnknownIntegrator, UnknownMethod, Until,
+    AnyIntegrator, Checkpoint, Composition, DiscreteLagrangian, Event, Events, Facts, Flow, Gauss, Halt, InputError,
+    Integrator, Interrupted, LeftMidpoint, Method, Midpoint, Moment, Obstacle, Problem, Rectangle, Rows, Solver,
+    SplittingScheme, Status, StepError, Stepper, Steps, Stop, Strang, Suspicion, UnknownIntegrator, UnknownMethod,
+    Until, Wants,
 };
 use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow};
 use std::ops::ControlFlow;
@@ -121,6 +122,46 @@ impl DiscreteLagrangian<1> for Length {
     }
 }
 
+/// An integrator with no more than what it must have.
+struct Forgetful;
+
+struct Bare<'a>(Box<dyn Stepper<1> + 'a>);
+
+impl<'a> Integrator<'a, Pendulum, 1> for Forgetful {
+    fn facts(&self) -> Facts {
+        Facts::of_discrete::<1>("forgetful", 2)
+    }
+    fn check(&self, _: &Pendulum) -> Result<(), InputError> {
+        Ok(())
+    }
+    fn stepper(
+        &self,
+        problem: &Problem<'a, Pendulum, 1>,
+        h: f64,
+        wants: Wants,
+    ) -> Result<Box<dyn Stepper<1> + 'a>, InputError> {
+        Ok(Box::new(Bare(Method::Midpoint.stepper(problem, h, wants)?)))
+    }
+}
+
+impl Stepper<1> for Bare<'_> {
+    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        self.0.advance(steps)
+    }
+    fn state(&self) -> PhasePoint<1> {
+        self.0.state()
+    }
+    fn time(&self) -> f64 {
+        self.0.time()
+    }
+    fn sigma(&self) -> f64 {
+        self.0.sigma()
+    }
+    fn evaluations(&self) -> u64 {
+        self.0.evaluations()
+    }
+}
+
 #[test]
 fn input_errors() {
     let (pendulum, start) = (Pendulum::default(), VelocityPoint::new([0.3], [0.5], 0.1));
@@ -147,6 +188,10 @@ fn input_errors() {
             std::fs::remove_file(path).unwrap();
             problem.steps(Steps::Count(2)).resume(interrupted).run(Until::Time(5.5)).unwrap_err()
         }, ["not the one that was interrupted", "same problem"];
+        InputError::Unsaved => {
+            let mut saved = Checkpoint::every(1, std::env::temp_dir().join("never_written")).unwrap();
+            problem.by(Forgetful).steps(Steps::Count(1)).observe(&mut saved).run(Until::Time(5.5)).unwrap_err()
+        }, ["cannot be saved", "leave the checkpoint out", "`restore`"];
         InputError::Times { .. } => {
             let mut rows = Rows::at([0.5, 7.25]).unwrap();
             problem.steps(Steps::Count(1)).observe(&mut rows).run(Until::Time(5.5)).unwrap_err()

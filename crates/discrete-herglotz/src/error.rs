@@ -59,6 +59,11 @@ pub enum InputError {
         "the run is not the one that was interrupted; resume it with the same problem, integrator, steps, end and requests"
     )]
     AnotherRun,
+    /// A run is to be saved whose stepper does not know how.
+    #[error(
+        "the integrator's stepper cannot be saved; leave the checkpoint out, or give it `Stepper::save` and `restore`"
+    )]
+    Unsaved,
     /// Times of output are not in order, not finite, or outside of the span of the run.
     #[error(
         "the time t = {t} of row {index} is out of order, not finite or outside of the run's span; give times in the order of the run"

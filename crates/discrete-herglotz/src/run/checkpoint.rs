@@ -1,8 +1,8 @@
 //! Checkpoints: a run that is interrupted goes on as if it had not been.
 
 use super::saved::{Saved, load_option, save_option, word};
-use super::{Moment, Needs, Observer, Stop};
-use crate::Suspicion;
+use super::{Course, Moment, Needs, Observer, Stop};
+use crate::{InputError, Suspicion};
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -110,10 +110,10 @@ impl Checkpoint {
     /// To a file, every so many steps and at the end.
     ///
     /// # Errors
-    /// [`InputError::Count`](crate::InputError::Count) for 0 steps.
-    pub fn every(steps: usize, path: impl Into<PathBuf>) -> Result<Self, crate::InputError> {
+    /// [`InputError::Count`] for 0 steps.
+    pub fn every(steps: usize, path: impl Into<PathBuf>) -> Result<Self, InputError> {
         if steps == 0 {
-            return Err(crate::InputError::Count { what: "the steps between two checkpoints", least: 1, found: 0 });
+            return Err(InputError::Count { what: "the steps between two checkpoints", least: 1, found: 0 });
         }
         Ok(Checkpoint { path: path.into(), every: steps, error: None })
     }
@@ -124,6 +124,10 @@ impl<const N: usize> Observer<N> for Checkpoint {
         Needs::default()
     }
 
+    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+        if course.can_be_saved { Ok(()) } else { Err(InputError::Unsaved) }
+    }
+
     fn next(&self, taken: usize) -> usize {
         (taken / self.every + 1) * self.every
     }
@@ -132,10 +136,8 @@ impl<const N: usize> Observer<N> for Checkpoint {
         if !at.k.is_multiple_of(self.every) && !at.last {
             return ControlFlow::Continue(());
         }
-        let Some(interrupted) = at.interrupted() else {
-            return ControlFlow::Break(Stop::here("a checkpoint of an integrator that cannot be saved"));
-        };
-        match interrupted.write(&self.path) {
+        // Its stepper can be saved, or the run would not have begun.
+        match at.interrupted().map_or(Ok(()), |interrupted| interrupted.write(&self.path)) {
             Ok(()) => ControlFlow::Continue(()),
             Err(error) => {
                 self.error = Some(error);

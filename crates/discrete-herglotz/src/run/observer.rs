@@ -35,6 +35,13 @@ pub struct Course {
     pub h: Option<f64>,
     /// The number of its steps, where that is known before: of a clock it shows at the end.
     pub count: Option<usize>,
+    /// Whether its stepper can be [saved](Stepper::save).
+    pub can_be_saved: bool,
+}
+
+impl Course {
+    /// Of an observer that has not been told its own.
+    pub(super) const NONE: Course = Course { t0: 0.0, t_end: 0.0, h: None, count: None, can_be_saved: false };
 }
 
 /// What a run does with its states: it is shown the start, at least the steps that it asks for, and the last one.

@@ -204,7 +204,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
     ) -> Result<Ending<N>, InputError> {
         let (problem, h) = (self.task.problem, self.step(count, marks));
         let points = if closely { POINTS.div_ceil(stages * count).min(SETS) } else { 1 };
-        let course = Course { count, marks, points, narrow, price: Price::of::<N>(stages) };
+        let course = PilotCourse { count, marks, points, narrow, price: Price::of::<N>(stages) };
         if const { L::HAS_CLOCK } && matches!(marks, Marks::Times) {
             let mut stepper = match (ClockedGauss { stages }).run(problem, h) {
                 Ok(stepper) => stepper,
@@ -220,7 +220,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
         // Of a linear motion nothing is to be seen between the nodes that the order does not show.
         let linear = stepper.route() == GaussRoute::Linear;
         let (stride, points) = if linear { (CHUNK, 0) } else { (1, course.points) };
-        let course = Course { points, ..course };
+        let course = PilotCourse { points, ..course };
         self.watch(&mut stepper, &course, stride, |run, sets| (run.look(sets), run.newton_steps()))
     }
 
@@ -235,11 +235,11 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
     fn watch<R: Stepper<N>>(
         &mut self,
         run: &mut R,
-        course: &Course<'_>,
+        course: &PilotCourse<'_>,
         stride: usize,
         look: impl Fn(&R, usize) -> (Option<Look>, u64),
     ) -> Result<Ending<N>, InputError> {
-        let Course { count, marks, points, narrow, price } = course;
+        let PilotCourse { count, marks, points, narrow, price } = course;
         let Problem { lagrangian, start, .. } = *self.task.problem;
         let floor = larger(0.1 * self.wanted, 1e-11);
         let watches_clock = self.watches_clock;
@@ -324,7 +324,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
 }
 
 /// What a run that is watched is asked for.
-struct Course<'m> {
+struct PilotCourse<'m> {
     count: usize,
     marks: &'m Marks,
     /// The sets of points of a look.

@@ -137,8 +137,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let by_clock = self.facts.by_clock;
         let h = (!by_clock).then_some(self.h);
         let count = (!by_clock || self.error.is_some()).then_some(self.count);
-        observers.prepare(&Course { t0: self.problem.t0, t_end: self.t_end, h, count })?;
         let mut stepper = self.make_stepper(self.problem, self.h, self.error.is_none())?;
+        let can_be_saved = stepper.save().is_some();
+        observers.prepare(&Course { t0: self.problem.t0, t_end: self.t_end, h, count, can_be_saved })?;
         // The logarithm of the product of the sigma_d; in single steps only where they differ.
         let (mut log_factor, single) = (0.0, self.needs.conformal_factor && !self.constant_rate);
         let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);

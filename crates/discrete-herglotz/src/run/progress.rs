@@ -26,7 +26,7 @@ pub struct Progress<F> {
 impl<F: FnMut(f64)> Progress<F> {
     /// Told to this function.
     pub fn new(tell: F) -> Self {
-        Progress { tell, course: Course { t0: 0.0, t_end: 0.0, h: None, count: None } }
+        Progress { tell, course: Course::NONE }
     }
 
     fn stride(&self) -> usize {

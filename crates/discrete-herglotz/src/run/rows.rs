@@ -93,9 +93,16 @@ impl<'f, const N: usize> Rows<'f, N> {
     }
 
     fn when(when: When) -> Self {
-        let course = Course { t0: 0.0, t_end: 0.0, h: None, count: None };
         let needs = Needs { action: true, conformal_factor: false };
-        Rows { rows: Vec::new(), when, columns: Vec::new(), needs, velocity: false, energy: false, course }
+        Rows {
+            rows: Vec::new(),
+            when,
+            columns: Vec::new(),
+            needs,
+            velocity: false,
+            energy: false,
+            course: Course::NONE,
+        }
     }
 
     /// With one more column: a function of time and state, with a name.
