@@ -13,7 +13,8 @@ pub fn integrators() -> String {
         let same = |other: &Facts| {
             let of =
                 |f: &Facts| (f.explicit, f.symmetric, f.exact_rate, f.by_clock, f.substeps, f.collocation.is_some());
-            of(other) == of(&facts) && (facts.collocation.is_some() || other.order == facts.order)
+            let of_any_order = facts.collocation.is_some() || facts.substeps && !facts.explicit;
+            of(other) == of(&facts) && (of_any_order || other.order == facts.order)
         };
         match kinds.iter_mut().find(|(of_kind, _)| same(of_kind)) {
             Some((_, kind)) => kind.push(integrator),
@@ -27,12 +28,11 @@ pub fn integrators() -> String {
     for (facts, kind) in &kinds {
         let names: Vec<String> = kind.iter().map(|integrator| format!("`{integrator}`")).collect();
         let last = kind.last().map_or(0, |integrator| integrator.order());
-        let (names, order) = match (facts.collocation, names.as_slice()) {
-            (Some(_), [first, .., last_name]) => {
-                (format!("{first} .. {last_name}"), format!("{} .. {last}", facts.order))
-            }
-            _ => (names.join(", "), facts.order.to_string()),
+        let names = match (facts.collocation, names.as_slice()) {
+            (Some(_), [first, .., last_name]) => format!("{first} .. {last_name}"),
+            _ => names.join(", "),
         };
+        let order = if last == facts.order { last.to_string() } else { format!("{} .. {last}", facts.order) };
         let step = if facts.explicit { "explicit" } else { "implicit" };
         let rate = if facts.exact_rate { "`e^(gamma h)`" } else { "to the order" };
         let taken = kind.first().map_or(0, taken);
