@@ -227,8 +227,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Task<'p, L, N> {
         }
         if let Some(integrator) = &self.integrator {
             integrator.check(problem.lagrangian)?;
+            let facts = integrator.facts();
+            if facts.by_clock {
+                self.clock_rate()?;
+            }
             // A step for an accuracy is a root of that order.
-            if integrator.facts().order == 0 {
+            if facts.order == 0 {
                 return Err(InputError::Hypothesis { hypothesis: "an order of at least one" });
             }
         }
