@@ -99,6 +99,9 @@ pub fn error_orders<D: DiscreteLagrangian<N>, const N: usize>(
     x: &VelocityPoint<N>,
     largest: f64,
 ) -> Result<ErrorOrders, ExactError<N>> {
+    if !(largest > 0.0 && largest.is_finite()) {
+        return Err(InputError::Step { h: largest }.into());
+    }
     let p0 = lagrangian.gradient(t, x).y;
     let start = PhasePoint { q: x.q, p: p0, z: x.z };
     let mut rows: [Vec<Row>; 4] = Default::default();
