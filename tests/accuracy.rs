@@ -2,7 +2,7 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, legendre};
-use discrete_herglotz::{InputError, Integrator, Obstacle, Scene, Status, StepError, Steps, Wanted};
+use discrete_herglotz::{AnyIntegrator, InputError, Obstacle, Problem, Rows, Run, Status, StepError, Steps, Until};
 use exact_lagrangian::herglotz_flow;
 
 /// One type for all systems of this file, since each is compiled with every integrator: a mechanical system, and others that claim more
@@ -100,9 +100,13 @@ fn truth(system: &Bench, start: &VelocityPoint<1>, span: f64) -> [f64; 2] {
     [end.q[0], end.p[0]]
 }
 
-/// The error of a run in (q, p), relative to their size.
-fn error(scene: &Scene<'_, Bench, 1>, truth: [f64; 2]) -> Result<f64, InputError> {
-    let outcome = scene.plan()?.run()?;
+fn problem(system: &Bench, start: VelocityPoint<1>) -> Problem<'_, Bench, 1> {
+    Problem::new(system, 0.0, start).unwrap()
+}
+
+/// The error in (q, p) of a run up to a time, relative to their size.
+fn error(run: Run<'_, '_, Bench, 1>, t: f64, truth: [f64; 2]) -> Result<f64, InputError> {
+    let outcome = run.run(Until::Time(t))?;
     assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
     let size = truth[0].hypot(truth[1]);
     Ok(if size == 0.0 {
@@ -112,7 +116,7 @@ fn error(scene: &Scene<'_, Bench, 1>, truth: [f64; 2]) -> Result<f64, InputError
     })
 }
 
-fn by(name: &str) -> Integrator {
+fn by(name: &str) -> AnyIntegrator {
     name.parse().unwrap()
 }
 
@@ -123,8 +127,8 @@ fn steps_that_resonate_with_the_drive() {
     let start = VelocityPoint::new([0.3], [0.0], 0.0);
     let truth = truth(&driven, &start, 16.0);
     for name in ["strang", "midpoint", "gauss_2", "gauss_8", "blanes_moan_6"] {
-        let scene = Scene::new(&driven, start, 16.0).by(by(name)).steps(Steps::Accuracy(1e-6));
-        let error = error(&scene, truth).unwrap();
+        let problem = problem(&driven, start);
+        let error = error(problem.by(by(name)).accuracy(1e-6), 16.0, truth).unwrap();
         assert!(error <= 1e-6, "{name}: {error:e}");
     }
 }
@@ -135,14 +139,19 @@ fn steps_far_beyond_the_period() {
     let start = VelocityPoint::new([1.0], [0.0], 0.0);
     for span in [1e3, 3.3e4, 1.7e6, 9.1e6] {
         let (sin, cos) = f64::sin_cos(span);
-        for (scene, wanted) in [
-            (Scene::new(&OSCILLATOR, start, span).by(by("gauss_8")), 1e-2),
-            (Scene::new(&OSCILLATOR, start, span), 1e-7),
-        ] {
-            let error = error(&scene.steps(Steps::Accuracy(wanted)), [cos, -sin]).unwrap();
+        let problem = problem(&OSCILLATOR, start);
+        let to = |wanted| problem.accuracy(wanted);
+        for (run, wanted) in [(to(1e-2).by(by("gauss_8")), 1e-2), (to(1e-7), 1e-7)] {
+            let error = error(run, span, [cos, -sin]).unwrap();
             assert!(error <= wanted, "{span}: {error:e}");
         }
     }
+}
+
+/// A run to an error of a millionth, by an integrator or by the one that is chosen.
+fn to_a_millionth<'p, 'o>(problem: &'p Problem<'p, Bench, 1>, name: Option<&str>) -> Run<'p, 'o, Bench, 1> {
+    let run = problem.accuracy(1e-6);
+    if let Some(name) = name { run.by(by(name)) } else { run }
 }
 
 /// A kick that is short beside the span is found, by methods of low and high order, down to a thousandth of it.
@@ -157,10 +166,9 @@ fn short_kicks() {
         for (from, to) in [(0.0, before), (before, after), (after, 16.0)] {
             x = herglotz_flow(&kicked, from, &x, to - from).unwrap().end;
         }
+        let problem = problem(&kicked, start);
         for name in [None, Some("strang"), Some("gauss_3")] {
-            let scene = Scene::new(&kicked, start, 16.0).steps(Steps::Accuracy(1e-6));
-            let scene = if let Some(name) = name { scene.by(by(name)) } else { scene };
-            let error = error(&scene, [x.q[0], x.v[0]]).unwrap();
+            let error = error(to_a_millionth(&problem, name), 16.0, [x.q[0], x.v[0]]).unwrap();
             assert!(error <= 1e-6, "{width}, {name:?}: {error:e}");
         }
     }
@@ -177,9 +185,24 @@ fn tiny_motions_and_none() {
         let (sin, cos) = (10.0 * w).sin_cos();
         let decay = size * (-0.5f64).exp();
         let truth = [decay * (cos + 0.05 / w * sin), -decay * sin / w];
-        for scene in [Scene::new(&damped, start, 10.0), Scene::new(&damped, start, 10.0).by(by("strang"))] {
-            let error = error(&scene.steps(Steps::Accuracy(1e-6)), truth).unwrap();
+        let problem = problem(&damped, start);
+        for name in [None, Some("strang")] {
+            let error = error(to_a_millionth(&problem, name), 10.0, truth).unwrap();
             assert!(error <= 1e-6, "{size:e}: {error:e}");
+        }
+    }
+}
+
+/// A run that goes back keeps the accuracy as one that goes on: what is damped grows there, and a kick is met from its other side.
+#[test]
+fn spans_that_go_back() {
+    let start = VelocityPoint::new([1.0], [0.5], 0.0);
+    let kicked = Bench { gamma: -0.1, kick: 1.0, at: -4.0, ..OSCILLATOR };
+    for (system, span) in [(DUFFING, -5.0), (kicked, -12.0)] {
+        let (problem, truth) = (problem(&system, start), truth(&system, &start, span));
+        for name in [None, Some("strang"), Some("midpoint"), Some("gauss_3"), Some("gauss_8")] {
+            let error = error(to_a_millionth(&problem, name), span, truth).unwrap();
+            assert!(error <= 1e-6, "{span}, {name:?}: {error:e}");
         }
     }
 }
@@ -188,27 +211,30 @@ fn tiny_motions_and_none() {
 #[test]
 fn causes() {
     let start = VelocityPoint::new([1.0], [0.0], 0.0);
-    let refused = |scene: Scene<'_, Bench, 1>, wanted: f64| scene.steps(Steps::Accuracy(wanted)).plan().err();
+    let refused = |system: &Bench, start: VelocityPoint<1>, span: f64| {
+        let problem = Problem::new(system, 0.0, start);
+        problem.and_then(|problem| to_a_millionth(&problem, None).plan(Until::Time(span)).map(drop)).err()
+    };
     let chaotic = Bench { gamma: -0.1, force: 0.35, omega: 1.4, ..DUFFING };
-    let cause = refused(Scene::new(&chaotic, start, 500.0), 1e-6);
+    let cause = refused(&chaotic, start, 500.0);
     let Some(InputError::Accuracy { cause: Obstacle::Chaos { t }, .. }) = cause else { panic!("{cause:?}") };
     assert!(t < 500.0);
     // Up to that time it is not refused, and right: the exact flow's own round-off grows there to no more than 1e-7.
     let trusted = 0.5 * t;
-    let error =
-        error(&Scene::new(&chaotic, start, trusted).steps(Steps::Accuracy(1e-6)), truth(&chaotic, &start, trusted));
+    let problem = problem(&chaotic, start);
+    let error = error(to_a_millionth(&problem, None), trusted, truth(&chaotic, &start, trusted));
     assert!(error.as_ref().is_ok_and(|e| *e <= 1e-6), "{trusted}: {error:?}");
     // Blow-up of z in a finite time.
     let pole = Bench { c: -1.0, ..FREE };
-    let cause = refused(Scene::new(&pole, VelocityPoint::new([0.0], [1.0], 1.0), 3.0), 1e-6);
+    let cause = refused(&pole, VelocityPoint::new([0.0], [1.0], 1.0), 3.0);
     let Some(InputError::Accuracy { cause: Obstacle::Halted { t, .. }, .. }) = cause else { panic!("{cause:?}") };
     // v' = 2 z v and z' = v^2/2 + z^2: with w = z + v/sqrt(2) and u = z - v/sqrt(2), w' = w^2 and u' = u^2, so w has its pole at 1/w0.
     let pole = 1.0 / (1.0 + 0.5f64.sqrt());
     assert!((t - pole).abs() < 1e-3, "{t}, not {pole}");
     let nan = Bench { gamma: f64::NAN, ..OSCILLATOR };
-    assert_eq!(refused(Scene::new(&nan, start, 10.0), 1e-6), Some(InputError::Undefined));
+    assert_eq!(refused(&nan, start, 10.0), Some(InputError::Undefined));
     let singular = Bench { kind: Kind::Singular, claims: Some(Structure::default()), ..FREE };
-    let refused = refused(Scene::new(&singular, start, 10.0), 1e-6);
+    let refused = refused(&singular, start, 10.0);
     assert!(matches!(refused, Some(InputError::FirstStep(StepError::Singular { .. }))), "{refused:?}");
 }
 
@@ -237,10 +263,14 @@ fn claims_are_probed_along_the_motion() {
     ];
     for (kind, structure, start, claim) in cases {
         let system = Bench { kind, claims: Some(structure), ..FREE };
-        for steps in [Steps::Count(400), Steps::Size(0.01), Steps::Accuracy(1e-6)] {
+        for steps in [Some(Steps::Count(400)), Some(Steps::Size(0.01)), None] {
             for integrator in ["gauss_6", "strang"] {
-                let scene = Scene::new(&system, start, 8.0).by(by(integrator)).steps(steps);
-                let found = match scene.plan().and_then(|plan| plan.run()) {
+                let run = |problem: Problem<'_, Bench, 1>| {
+                    let run = problem.by(by(integrator));
+                    let run = if let Some(steps) = steps { run.steps(steps) } else { run.accuracy(1e-6) };
+                    run.run(Until::Time(8.0))
+                };
+                let found = match Problem::new(&system, 0.0, start).and_then(run) {
                     Err(InputError::FalseClaim { claim, .. }) => Some(claim),
                     Ok(outcome) => match outcome.status {
                         Status::FalseClaim { claim, step, .. } => {
@@ -264,14 +294,16 @@ fn claims_are_probed_along_the_motion() {
 fn the_estimate_is_of_the_run() {
     let start = VelocityPoint::new([1.5], [0.0], 0.0);
     let truth = truth(&DUFFING, &start, 20.0);
+    let (problem, until) = (problem(&DUFFING, start), Until::Time(20.0));
     for wanted in [1e-4, 1e-8] {
-        let scene = Scene::new(&DUFFING, start, 20.0).steps(Steps::Accuracy(wanted));
-        let plan = scene.plan().unwrap();
+        let plan = problem.accuracy(wanted).plan(until).unwrap();
         assert!(plan.error().is_some_and(|e| e <= wanted));
-        let all = Wanted { conformal_factor: true, rows: Some(3), ..Wanted::default() };
-        let with_all = Scene::new(&DUFFING, start, 20.0).steps(Steps::Accuracy(wanted)).wanting(all).plan().unwrap();
-        assert_eq!((plan.integrator(), plan.count()), (with_all.integrator(), with_all.count()));
-        assert_eq!(plan.run().unwrap().q, with_all.run().unwrap().q);
-        assert!(error(&scene, truth).unwrap() <= wanted);
+        let mut rows = Rows::every(3).unwrap();
+        let with_all = problem.accuracy(wanted).with_conformal_factor().observe(&mut rows);
+        let planned = with_all.plan(until).unwrap();
+        assert_eq!((plan.integrator(), plan.count()), (planned.integrator(), planned.count()));
+        assert_eq!(plan.run().unwrap().q, with_all.run(until).unwrap().q);
+        assert_eq!(rows.rows.len(), plan.count().div_ceil(3) + 1);
+        assert!(error(problem.accuracy(wanted), 20.0, truth).unwrap() <= wanted);
     }
 }

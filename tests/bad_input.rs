@@ -1,11 +1,12 @@
-//! Bad input is a typed error before the first step; bad luck is a status that keeps what was computed. The sentences of all errors,
-//! and input that is not a number, are those of `tests/hostile.rs`.
+//! Bad input is a typed error before the first step; what goes wrong later is a status that keeps what was computed. The sentences of
+//! all errors, and input that is not a number, are those of `tests/hostile.rs`.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{FreeParticle, Pendulum};
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
-    DiscreteLagrangian, Flow, InputError, LeftMidpoint, Midpoint, Record, Rectangle, Status, StepError,
+    AnyIntegrator, DiscreteLagrangian, Flow, InputError, Method, Midpoint, Outcome, Problem, Rectangle, Row, Rows,
+    Status, StepError, Steps, Until,
 };
 use exact_lagrangian::{ContactExponential, Curve, ExactError, ExactLagrangian, SplineCurve, compose, error_orders};
 
@@ -14,6 +15,24 @@ use exact_lagrangian::{ContactExponential, Curve, ExactError, ExactLagrangian, S
 fn equal_points() {
     let ld = Rectangle::new(FreeParticle::default(), 0.1).unwrap();
     assert!(Flow::from_points(&ld, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).is_ok());
+}
+
+/// A run of a rule by so many steps of a size from t = 0, with a row of each.
+fn every_step(
+    lagrangian: &impl Lagrangian<1>,
+    start: PhasePoint<1>,
+    method: Method,
+    (h, steps): (f64, usize),
+) -> (Outcome<1>, Vec<Row<1>>) {
+    let problem = Problem::new(lagrangian, 0.0, start).unwrap();
+    let mut rows = Rows::every(1).unwrap();
+    let run = problem.by(AnyIntegrator::Discrete(method)).steps(Steps::Size(h)).observe(&mut rows);
+    let outcome = run.run(Until::Steps(steps)).unwrap();
+    (outcome, rows.rows)
+}
+
+fn all_finite(rows: &[Row<1>]) -> bool {
+    rows.iter().all(|row| [row.t, row.q[0], row.p[0], row.z.unwrap_or(f64::NAN)].iter().all(|x| x.is_finite()))
 }
 
 /// sigma_d crosses zero in mid-run: a status with the step, and every row before it.
@@ -26,13 +45,13 @@ fn sigma_crosses_zero() {
         }
     }
     // sigma = 1 - h t_mid with t_mid = (k + 1/2) h: not positive from k = 100 on, for h = 0.1.
-    let ld = LeftMidpoint::new(GrowingDrag, 0.1).unwrap();
-    let mut record = Record::default();
-    let status = Flow::new(&ld, 0.0, PhasePoint::new([0.0], [1.0], 0.0)).and_then(|mut f| f.run(200, &mut record));
-    let failed = matches!(status, Ok(Status::Failed { step: 100, cause: StepError::SigmaVanished { .. } }));
+    let start = PhasePoint::new([0.0], [1.0], 0.0);
+    let (Outcome { status, t, .. }, rows) = every_step(&GrowingDrag, start, Method::LeftMidpoint, (0.1, 200));
+    let failed =
+        matches!(status, Status::Failed { step: 100, cause: StepError::SigmaVanished { .. }, t: at } if at == t);
     assert!(failed, "{status:?}");
-    assert_eq!(record.rows.len(), 101);
-    assert!(record.rows.iter().all(|(t, x)| t.is_finite() && x.check().is_ok()));
+    assert_eq!((rows.len(), rows[100].t), (101, t));
+    assert!(all_finite(&rows));
 }
 
 /// Motion that blows up ends with a status, not with a NaN: `z' = z^2` leaves the real line at t = 1.
@@ -44,16 +63,13 @@ fn blow_up() {
             v[0] * v[0] * 0.5 + z * z
         }
     }
-    let explicit = LeftMidpoint::new(Explosive, 0.01).unwrap();
-    let implicit = Midpoint::new(Explosive, 0.01).unwrap();
     let start = PhasePoint::new([0.0], [0.1], 1.0);
-    let mut rows = (Record::default(), Record::default());
-    let explicit = Flow::new(&explicit, 0.0, start).and_then(|mut f| f.run(400, &mut rows.0));
-    let implicit = Flow::new(&implicit, 0.0, start).and_then(|mut f| f.run(400, &mut rows.1));
-    for (status, rows) in [(explicit, rows.0.rows), (implicit, rows.1.rows)] {
-        let failed = matches!(status, Ok(Status::Failed { step, .. }) if step + 1 == rows.len());
+    // Explicit in z and implicit.
+    for method in [Method::LeftMidpoint, Method::Midpoint] {
+        let (Outcome { status, .. }, rows) = every_step(&Explosive, start, method, (0.01, 400));
+        let failed = matches!(status, Status::Failed { step, .. } if step + 1 == rows.len());
         assert!(failed, "{status:?} with {} rows", rows.len());
-        assert!(rows.iter().all(|(_, x)| x.check().is_ok()));
+        assert!(all_finite(&rows));
     }
 }
 

@@ -6,7 +6,8 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum, PerturbedKepler, Radial, System};
 use contact_geom::{Clock, Lagrangian, Larger, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
 use discrete_herglotz::{
-    ClockedStepper, Gauss, InputError, Integrator, Outcome, Scene, Status, StepError, Stepper, Steps, Wanted,
+    AnyIntegrator, ClockedStepper, Facts, Gauss, InputError, Outcome, Problem, Rows, Status, StepError, Stepper, Steps,
+    Until,
 };
 
 type Planar = Kepler<2>;
@@ -188,20 +189,18 @@ fn on_orbit(e: f64, t: f64) -> SVector<f64, 4> {
 }
 
 /// The orbit for a span of three revolutions and a little, to an error, by an integrator or none; the true error.
-fn to_accuracy(e: f64, wanted: f64, by: Option<Integrator>) -> (Integrator, Outcome<2>, f64) {
+fn to_accuracy(e: f64, wanted: f64, by: Option<AnyIntegrator>) -> (Facts, Outcome<2>, f64) {
     let (kepler, span) = (Planar { gamma: 0.0, mu: 1.0 }, 20.0);
-    let scene = Scene::new(&kepler, pericentre(e), span).steps(Steps::Accuracy(wanted));
-    let plan = by.map_or_else(
-        || scene.plan(),
-        |by| Scene::new(&kepler, pericentre(e), span).steps(Steps::Accuracy(wanted)).by(by).plan(),
-    );
-    let plan = plan.unwrap();
+    let problem = Problem::new(&kepler, 0.0, pericentre(e)).unwrap();
+    let run = problem.accuracy(wanted);
+    let run = if let Some(by) = by { run.by(by) } else { run };
+    let plan = run.plan(Until::Time(span)).unwrap();
     let outcome = plan.run().unwrap();
     assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
     assert_eq!(outcome.steps, plan.count(), "{plan}");
     let (q, p, truth) = (outcome.q, outcome.p, on_orbit(e, span));
     let error = (SVector::from([q[0], q[1], p[0], p[1]]) - truth).norm() / truth.norm();
-    (plan.integrator(), outcome, error)
+    (plan.integrator().clone(), outcome, error)
 }
 
 /// Eccentric orbits are followed by the clock, to the accuracy that is wanted, and for a part of the evaluations of equal steps. Of
@@ -212,7 +211,7 @@ fn eccentric_orbits_choose_the_clock() {
     for e in [0.9, 0.99] {
         for wanted in [1e-6, 1e-8, 1e-10, 1e-11] {
             let (integrator, outcome, error) = to_accuracy(e, wanted, None);
-            assert!(matches!(integrator, Integrator::Clocked { .. }), "{e}, {wanted:e}: {integrator}");
+            assert!(integrator.by_clock, "{e}, {wanted:e}: {integrator:?}");
             assert!(error <= wanted, "{e}, {wanted:e}: {error:e}");
             assert_eq!(outcome.t, 20.0);
         }
@@ -229,12 +228,12 @@ fn starts_at_the_apocentre() {
     let kepler = Planar { gamma: 0.0, mu: 1.0 };
     for e in [0.9, 0.99] {
         // The pericentre of -e.
-        let scene = Scene::new(&kepler, pericentre(-e), 20.0).steps(Steps::Accuracy(1e-8));
-        let plan = scene.plan().unwrap();
+        let problem = Problem::new(&kepler, 0.0, pericentre(-e)).unwrap();
+        let plan = problem.accuracy(1e-8).plan(Until::Time(20.0)).unwrap();
         let Outcome { status, q, p, .. } = plan.run().unwrap();
         let truth = -on_orbit(e, 20.0 + std::f64::consts::PI);
         let error = (SVector::from([q[0], q[1], p[0], p[1]]) - truth).norm() / truth.norm();
-        assert!(matches!(plan.integrator(), Integrator::Clocked { .. }) && status == Status::Completed, "{plan}");
+        assert!(plan.integrator().by_clock && status == Status::Completed, "{plan}");
         assert!(error <= 1e-8, "{e}: {error:e}");
     }
 }
@@ -244,7 +243,7 @@ fn starts_at_the_apocentre() {
 fn round_orbits_take_equal_steps() {
     for e in [0.0, 0.1] {
         let (integrator, _, error) = to_accuracy(e, 1e-8, None);
-        assert!(matches!(integrator, Integrator::Gauss { .. }) && error <= 1e-8, "{e}: {integrator}, {error:e}");
+        assert!(!integrator.by_clock && error <= 1e-8, "{e}: {integrator:?}, {error:e}");
         for name in ["clocked_gauss_4", "clocked_gauss_8"] {
             let (_, _, error) = to_accuracy(e, 1e-8, name.parse().ok());
             assert!(error <= 1e-8, "{e}, {name}: {error:e}");
@@ -256,21 +255,24 @@ fn round_orbits_take_equal_steps() {
 #[test]
 fn rows_of_a_clocked_run_change_nothing() {
     let kepler = Planar { gamma: -0.01, mu: 1.0 };
-    for steps in [Steps::Size(0.25), Steps::Accuracy(1e-8)] {
-        let run = |wanted: Wanted<2>| {
-            let scene = Scene::new(&kepler, pericentre(0.9), 20.0).by(Integrator::Clocked { stages: 8 }).steps(steps);
-            let outcome = scene.wanting(wanted).plan().unwrap().run().unwrap();
-            assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
-            outcome
+    let problem = Problem::new(&kepler, 0.0, pericentre(0.9)).unwrap();
+    for to_accuracy in [false, true] {
+        let by_clock = || {
+            let run = problem.by(AnyIntegrator::Clocked { stages: 8 });
+            if to_accuracy { run.accuracy(1e-8) } else { run.steps(Steps::Size(0.25)) }
         };
-        let nothing = run(Wanted { action: false, ..Wanted::default() });
-        let all = run(Wanted { action: true, conformal_factor: true, rows: Some(7), momentum: None });
+        let nothing = by_clock().without_action().run(Until::Time(20.0)).unwrap();
+        let mut rows = Rows::every(7).unwrap();
+        let all = by_clock().with_conformal_factor().observe(&mut rows).run(Until::Time(20.0)).unwrap();
+        let rows = rows.rows;
+        assert_eq!((nothing.status, nothing.suspicion), (Status::Completed, None));
+        assert_eq!((all.status, all.suspicion), (Status::Completed, None));
         assert_eq!((nothing.q, nothing.p, nothing.t, nothing.steps), (all.q, all.p, all.t, all.steps));
-        assert_eq!(all.rows.len(), all.steps.div_ceil(7) + 1);
-        assert_eq!(all.rows.last().map(|row| (row.t, row.q, row.z)), Some((all.t, all.q, all.z)));
-        assert!(all.rows.windows(2).all(|rows| rows[0].t < rows[1].t));
+        assert_eq!(rows.len(), all.steps.div_ceil(7) + 1);
+        assert_eq!(rows.last().map(|row| (row.t, row.q, row.z)), Some((all.t, all.q, all.z)));
+        assert!(rows.windows(2).all(|rows| rows[0].t < rows[1].t));
         assert_eq!(all.t, 20.0);
-        let factor = all.conformal_factor.unwrap();
+        let factor = all.log_factor.unwrap().exp();
         assert!((factor - (-0.2f64).exp()).abs() <= 1e-8, "{factor}");
     }
 }
@@ -297,20 +299,25 @@ impl Lagrangian<1> for Clocked {
 
 #[test]
 fn clocks_that_cannot_be_followed_are_refused() {
-    let by = Integrator::Clocked { stages: 4 };
-    assert_eq!(Integrator::Clocked { stages: 17 }.check(&Planar::default()), Err(InputError::Stages { found: 17 }));
+    let by = AnyIntegrator::Clocked { stages: 4 };
+    assert_eq!(AnyIntegrator::Clocked { stages: 17 }.check(&Planar::default()), Err(InputError::Stages { found: 17 }));
     assert!(matches!(by.check(&Pendulum { gamma: -0.1 }), Err(InputError::Hypothesis { .. })));
     assert!(matches!(by.check(&PerturbedKepler::default()), Err(InputError::Hypothesis { .. })));
     let driven = Clocked { rate: 1.0, autonomous: false };
     assert_eq!(by.check(&driven), Err(InputError::Unclaimed { claim: "autonomous" }));
     let start = VelocityPoint::new([0.0], [1.0], 0.0);
     let refused = |rate: f64, autonomous: bool, steps: Steps| {
-        Scene::new(&Clocked { rate, autonomous }, start, 2.0).by(by).steps(steps).plan().err()
+        let system = Clocked { rate, autonomous };
+        Problem::new(&system, 0.0, start).unwrap().by(by).steps(steps).plan(Until::Time(2.0)).err()
+    };
+    let inaccurate = |rate: f64| {
+        let system = Clocked { rate, autonomous: true };
+        Problem::new(&system, 0.0, start).unwrap().by(by).accuracy(1e-6).plan(Until::Time(2.0)).err()
     };
     assert_eq!(refused(1.0, false, Steps::Size(0.1)), Some(InputError::Unclaimed { claim: "autonomous" }));
     for rate in [0.0, -1.0, f64::INFINITY, f64::NAN] {
         assert!(matches!(refused(rate, true, Steps::Size(0.1)), Some(InputError::Clock { .. })), "{rate}");
-        assert!(matches!(refused(rate, true, Steps::Accuracy(1e-6)), Some(InputError::Clock { .. })), "{rate}");
+        assert!(matches!(inaccurate(rate), Some(InputError::Clock { .. })), "{rate}");
     }
     assert!(matches!(refused(1e-300, true, Steps::Size(0.1)), Some(InputError::TooMany { .. })));
     assert_eq!(refused(1.0, true, Steps::Size(-0.1)), Some(InputError::Step { h: -0.1 }));
@@ -319,27 +326,37 @@ fn clocks_that_cannot_be_followed_are_refused() {
     // A clock that gains nothing is not chosen, whatever its rate.
     for rate in [1.0, 1e-3, -1.0, f64::NAN] {
         let system = Clocked { rate, autonomous: true };
-        let plan = Scene::new(&system, start, 2.0).steps(Steps::Accuracy(1e-8)).plan().unwrap();
-        assert!(matches!(plan.integrator(), Integrator::Gauss { .. }), "{rate}: {plan}");
+        let problem = Problem::new(&system, 0.0, start).unwrap();
+        let plan = problem.accuracy(1e-8).plan(Until::Time(2.0)).unwrap();
+        assert!(!plan.integrator().by_clock, "{rate}: {plan}");
     }
     let system = Clocked { rate: 0.5, autonomous: true };
-    let plan = Scene::new(&system, start, 2.0).by(by).steps(Steps::Size(0.3)).plan().unwrap();
+    let problem = Problem::new(&system, 0.0, start).unwrap();
+    let plan = problem.by(by).steps(Steps::Size(0.3)).plan(Until::Time(2.0)).unwrap();
     let outcome = plan.run().unwrap();
-    let tenths = Scene::new(&system, start, 2.0).by(by).steps(Steps::Size(0.4)).plan().unwrap().run().unwrap();
+    let tenths = problem.by(by).steps(Steps::Size(0.4)).run(Until::Time(2.0)).unwrap();
     assert_eq!((tenths.steps, tenths.t), (10, 2.0));
     // Thirteen steps of 0.15, and one of a third of that; and the tenth of 0.2 ends the span, for all its rounding.
     assert_eq!((outcome.steps, plan.count(), outcome.t), (14, 14, 2.0));
     assert!(plan.to_string().contains("14 steps of 0.3 of the clock's time by clocked_gauss_4, t = 0 .. 2"), "{plan}");
+    // The same number of steps back, each as long.
+    let plan = problem.by(by).steps(Steps::Size(0.3)).plan(Until::Time(-2.0)).unwrap();
+    let back = plan.run().unwrap();
+    assert_eq!((back.steps, plan.count(), back.t, plan.step_size()), (14, 14, -2.0, -0.3));
+    // A clock has no number of steps to end after.
+    let counted = problem.by(by).steps(Steps::Size(0.3)).plan(Until::Steps(14)).err();
+    assert!(matches!(counted, Some(InputError::Hypothesis { .. })), "{counted:?}");
 }
 
 /// A fall into the centre comes to an end, whoever asks for it.
 #[test]
 fn a_fall_into_the_centre_ends() {
     let kepler = Planar { gamma: 0.0, mu: 1.0 };
-    let scene = || Scene::new(&kepler, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0), 2.0);
-    let refused = scene().steps(Steps::Accuracy(1e-6)).plan().err();
+    let problem = Problem::new(&kepler, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0)).unwrap();
+    let refused = problem.accuracy(1e-6).plan(Until::Time(2.0)).err();
     assert!(matches!(refused, Some(InputError::Accuracy { .. })), "{refused:?}");
-    let outcome = scene().by(Integrator::Clocked { stages: 8 }).steps(Steps::Size(0.1)).plan().unwrap().run().unwrap();
+    let outcome =
+        problem.by(AnyIntegrator::Clocked { stages: 8 }).steps(Steps::Size(0.1)).run(Until::Time(2.0)).unwrap();
     assert!(matches!(outcome.status, Status::Failed { .. }), "{outcome:?}");
     // It takes pi / 8^(1/2) without another force.
     assert!(outcome.t <= std::f64::consts::PI / 8.0f64.sqrt() && outcome.t > 1.0, "{}", outcome.t);

@@ -4,7 +4,7 @@
 use crate::common::{bounded, on_some, step_from};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{Darboux, Larger, Largest, PhasePoint, Triple, conformality_with_jacobian, legendre};
+use contact_geom::{Darboux, Derivatives, Larger, Largest, PhasePoint, Triple, conformality_with_jacobian, legendre};
 use discrete_herglotz::{Composition, InputError, Midpoint, Splitting, SplittingScheme, Stepper};
 
 /// The random cases for each system and scheme.

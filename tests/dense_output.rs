@@ -4,7 +4,8 @@ use crate::gauss::{Claims, cut};
 use contact_geom::systems::{HarmonicOscillator, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, Larger, Largest, PhasePoint, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{
-    Direction, Event, EventRun, EventStatus, Gauss, GaussRoute, InputError, Stepper, run_with_events,
+    AnyIntegrator, Crossing, Event, Events, Gauss, GaussRoute, InputError, Outcome, Problem, Status, StepError,
+    Stepper, Steps, Until,
 };
 
 /// By each route one curve, and of order s between the nodes: halving the step divides the largest error along two units of time
@@ -50,19 +51,18 @@ fn curves_have_the_order_of_the_stages() {
     }
 }
 
-/// A run with events of a system from its natural start.
-fn events<const N: usize, L: Lagrangian<N>>(
+/// A run with events, by Gauss steps of some stages up to a time, with what it has found.
+fn events<'f, const N: usize, L: Lagrangian<N>>(
     system: &L,
     x: VelocityPoint<N>,
-    (s, h, steps): (usize, f64, usize),
-    events: &mut [Event<'_, N>],
-) -> EventRun<N> {
-    let gauss = Gauss::new(system, s, h);
-    let stepper = gauss.as_ref().map(|g| g.stepper(0.0, legendre(system, 0.0, &x), x.v));
-    let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
-    let run = run_with_events(&mut stepper, steps, events);
-    let Ok(run) = run else { panic!("{run:?}") };
-    run
+    (stages, steps, until): (usize, usize, f64),
+    events: impl IntoIterator<Item = Event<'f, N>>,
+) -> (Outcome<N>, Vec<Crossing<N>>) {
+    let mut events = Events::new(events);
+    let problem = Problem::new(system, 0.0, x).unwrap();
+    let run = problem.by(AnyIntegrator::Gauss { stages }).steps(Steps::Count(steps)).observe(&mut events);
+    let outcome = run.run(Until::Time(until)).unwrap();
+    (outcome, events.crossings)
 }
 
 /// The zeros of a damped oscillation are where the closed form has them, by direction, and the states are those there; to
@@ -71,22 +71,14 @@ fn events<const N: usize, L: Lagrangian<N>>(
 fn crossings_are_those_of_the_closed_form() {
     let system = HarmonicOscillator { gamma: -0.1 };
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
-    let run = events(
-        &system,
-        x,
-        (16, 0.7, 30),
-        &mut [
-            Event::new(|_, x: &PhasePoint<1>| x.q[0]),
-            Event::new(|_, x: &PhasePoint<1>| x.q[0]).in_direction(Direction::Rising),
-            Event::new(|_, x: &PhasePoint<1>| x.q[0]).in_direction(Direction::Falling),
-        ],
-    );
-    assert_eq!((run.status, run.t), (EventStatus::Completed, 30.0 * 0.7));
-    let of = |event: usize| run.crossings.iter().filter(|c| c.event == event).collect::<Vec<_>>();
     // q = e^(a t) (cos w t - (a/w) sin w t) vanishes where tan w t = w/a, a < 0.
     let a = 0.5 * system.gamma;
     let w = (1.0 - a * a).sqrt();
     let expected = |k: usize| (k as f64 * std::f64::consts::PI + (w.atan2(a))) / w;
+    let zero = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
+    let (outcome, crossings) = events(&system, x, (16, 30, 21.0), [zero(), zero().rising(), zero().falling()]);
+    assert_eq!((outcome.status, outcome.t), (Status::Completed, 21.0));
+    let of = |event: usize| crossings.iter().filter(|c| c.event == event).collect::<Vec<_>>();
     assert_eq!((of(0).len(), of(1).len(), of(2).len()), (7, 3, 4));
     for (k, c) in of(0).iter().enumerate() {
         assert!((c.t - expected(k)).abs() <= 1e-13 * expected(k), "{k}: {} {}", c.t, expected(k));
@@ -96,7 +88,18 @@ fn crossings_are_those_of_the_closed_form() {
         // Falling first.
         assert_eq!(c.t, of(if k % 2 == 0 { 2 } else { 1 })[k / 2].t);
     }
-    assert!(run.crossings.is_sorted_by(|a, b| a.t <= b.t));
+    assert!(crossings.is_sorted_by(|a, b| a.t <= b.t));
+    // The way back from q > 0 leads through the zeros before t = 0, in their order, and what rises there is what the run meets so.
+    let (outcome, crossings) = events(&system, x, (16, 15, -10.5), [zero(), zero().rising(), zero().falling()]);
+    assert_eq!((outcome.status, outcome.t), (Status::Completed, -10.5));
+    let of = |event: usize| crossings.iter().filter(|c| c.event == event).collect::<Vec<_>>();
+    assert_eq!((of(0).len(), of(1).len(), of(2).len()), (3, 1, 2));
+    for (k, c) in of(0).iter().enumerate() {
+        let before = expected(0) - (k as f64 + 1.0) * std::f64::consts::PI / w;
+        assert!((c.t - before).abs() <= 1e-13 * before.abs(), "{k}: {} {before}", c.t);
+        assert_eq!(c.t, of(if k % 2 == 0 { 2 } else { 1 })[k / 2].t);
+    }
+    assert!(crossings.is_sorted_by(|a, b| a.t >= b.t));
 }
 
 /// Two changes of sign within one step are both seen; a terminal event ends the run at its state; later ones are not recorded;
@@ -107,48 +110,50 @@ fn events_within_one_step() {
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
     // q > -0.8 but for a short time around the first turning point, within one step.
     let dip = || Event::new(|_, x: &PhasePoint<1>| x.q[0] + 0.8);
-    let run = events(&system, x, (16, 5.0, 1), &mut [dip()]);
-    assert_eq!(run.crossings.len(), 2, "{run:?}");
+    let (_, crossings) = events(&system, x, (16, 1, 5.0), [dip()]);
+    assert_eq!(crossings.len(), 2, "{crossings:?}");
     let turn = Event::new(|_, x: &PhasePoint<1>| x.p[0]).terminal();
-    let run = events(&system, x, (16, 5.0, 3), &mut [dip(), turn]);
-    assert_eq!(run.status, EventStatus::Terminated { event: 1 });
-    assert_eq!(run.crossings.iter().map(|c| c.event).collect::<Vec<_>>(), [0, 1]);
+    let (outcome, crossings) = events(&system, x, (16, 3, 15.0), [dip(), turn]);
+    assert_eq!(outcome.status, Status::Stopped { step: 1, t: outcome.t, by: "an event" });
+    assert_eq!(crossings.iter().map(|c| c.event).collect::<Vec<_>>(), [0, 1]);
     let turning = std::f64::consts::PI / (1.0f64 - 0.0025).sqrt();
-    assert!((run.t - turning).abs() <= 1e-11, "{} {turning}", run.t);
-    assert_eq!(run.crossings.last().map(|c| (c.t, c.state)), Some((run.t, run.state)));
+    assert!((outcome.t - turning).abs() <= 1e-11, "{} {turning}", outcome.t);
+    assert_eq!(crossings.last().map(|c| (c.t, c.state)), Some((outcome.t, outcome.state())));
 }
 
 /// A function that vanishes exactly at the end of a step, or part, changes its sign there and once.
 #[test]
 fn a_zero_at_a_node_is_one_crossing() {
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
-    let run = events(&Pendulum::default(), x, (4, 0.5, 6), &mut [Event::new(|t, _: &PhasePoint<1>| t - 1.0)]);
-    assert_eq!(run.crossings.iter().map(|c| c.t).collect::<Vec<_>>(), [1.0]);
+    let steps = (4, 6, 3.0);
+    let (_, crossings) = events(&Pendulum::default(), x, steps, [Event::new(|t, _: &PhasePoint<1>| t - 1.0)]);
+    assert_eq!(crossings.iter().map(|c| c.t).collect::<Vec<_>>(), [1.0]);
     // It touches and does not cross.
-    let run = events(&Pendulum::default(), x, (4, 0.5, 6), &mut [Event::new(|t, _: &PhasePoint<1>| (t - 1.0).powi(2))]);
-    assert_eq!(run.crossings, []);
+    let (_, crossings) = events(&Pendulum::default(), x, steps, [Event::new(|t, _: &PhasePoint<1>| (t - 1.0).powi(2))]);
+    assert_eq!(crossings, []);
 }
 
-/// A function that is not finite ends the run with its time; what was found before is kept. So does a step that fails.
+/// A function that is not finite ends the run with its time; what was found before is kept.
 #[test]
 fn bad_luck_is_a_status() {
     let x = VelocityPoint::new([1.0], [0.0], 1.0);
-    let mut all = [
-        Event::new(|_, x: &PhasePoint<1>| x.q[0]),
-        Event::new(|t, _: &PhasePoint<1>| if t > 2.0 { f64::NAN } else { 1.0 }),
-    ];
-    let run = events(&QuadraticInZ { c: 0.1 }, x, (5, 0.3, 20), &mut all);
-    assert!(matches!(run.status, EventStatus::Undefined { event: 1, t } if t > 2.0 && t < 2.1), "{:?}", run.status);
-    assert_eq!(run.crossings.len(), 1);
-    assert!(run.t <= 2.0);
-    let gauss = Gauss::new(Pendulum::default(), 4, 0.1);
-    let stepper = gauss.as_ref().map(|g| g.stepper(0.0, PhasePoint::new([1.0], [0.0], 0.0), [0.0].into()));
-    let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
-    let refused = run_with_events(&mut stepper, 0, &mut []);
+    let passes = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
+    let undefined = Event::new(|t, _: &PhasePoint<1>| if t > 2.0 { f64::NAN } else { 1.0 });
+    let (outcome, crossings) = events(&QuadraticInZ { c: 0.1 }, x, (5, 20, 6.0), [passes(), undefined]);
+    let Status::Failed { step, t: ended, cause: StepError::Event { t } } = outcome.status else {
+        panic!("{outcome:?}")
+    };
+    // The step from 1.8 to 2.1, at whose end it is noticed.
+    assert!(t > 2.0 && t <= 2.1 && ended <= 2.1, "{t}, {ended}");
+    assert_eq!((outcome.steps, outcome.t, crossings.len()), (step, ended, 1));
+    // No step is no run.
+    let (pendulum, mut none) = (Pendulum::default(), Events::new([]));
+    let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let refused = problem.steps(Steps::Count(0)).observe(&mut none).run(Until::Time(1.0));
     assert!(matches!(refused, Err(InputError::Count { found: 0, .. })), "{refused:?}");
 }
 
-/// Where nobody wants the action, z stays what it was, and the rest of the curve is the same.
+/// Where the action is not requested, z stays what it was, and the rest of the curve is the same.
 #[test]
 fn without_action() {
     let system = Pendulum { gamma: -0.1 };

@@ -4,7 +4,8 @@ use crate::common::{on_random, within};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Pendulum, System, SystemVisitor, visit_catalogue};
 use contact_geom::{
-    Dual, Hessian, Lagrangian, Larger, Largest, Scalar, Triple, ValueOnly, VelocityPoint, check_closed_derivatives,
+    Derivatives, Dual, Hessian, Lagrangian, Larger, Largest, Scalar, Triple, ValueOnly, VelocityPoint,
+    check_closed_derivatives,
 };
 use num_dual::HyperDual64;
 

@@ -4,7 +4,7 @@
 use crate::common::{TOLERANCE, around, bounded, on_some, step_from, visit_kinds};
 use crate::gauss::distance;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{Lagrangian, Larger, Largest, PhasePoint, Triple, VelocityPoint, legendre};
+use contact_geom::{Derivatives, Lagrangian, Larger, Largest, PhasePoint, Statement, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{DiscreteLagrangian, Gauss, Stepper, derived_jet, statements};
 
 /// The stepper agrees with Newton's steps at random points of every system, and so does its `sigma_d`: to 1e-12, round-off times
@@ -94,7 +94,11 @@ fn the_forms_are_conformal() {
                     let h = step_from(u[0]);
                     let gauss = Gauss::new(system, s, h).map_err(|e| e.to_string())?;
                     let point = around(&x, h);
-                    for (statement, bound) in [(21, TOLERANCE), (23, 1e-12), (24, 1e-12)] {
+                    for (statement, bound) in [
+                        (Statement::DiscreteContactForms, TOLERANCE),
+                        (Statement::DiscreteFlowIsConformal, 1e-12),
+                        (Statement::HamiltonianFlowIsConformal, 1e-12),
+                    ] {
                         match statements::residual(statement, &gauss, &[], t, &point) {
                             Ok(Some(r)) if r <= bound => {}
                             other => return Err(format!("statement {statement}, h = {h}: {other:?}")),

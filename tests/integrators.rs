@@ -1,4 +1,4 @@
-//! The integrators: steppers, scenes, dense output and events, over the catalogue of systems.
+//! The integrators: steppers, runs, dense output and events, over the catalogue of systems.
 
 #![allow(missing_docs)]
 // In a check `f64::max` and `amax` would lose a NaN.
@@ -14,8 +14,9 @@ mod accuracy;
 mod clocked;
 mod conformal_steppers;
 mod dense_output;
+mod every_run;
 mod gauss;
 mod gauss_catalogue;
 mod gauss_stress;
 mod round_off;
-mod scenes;
+mod runs;

@@ -8,8 +8,8 @@
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, legendre};
-use discrete_herglotz::{DiscreteLagrangian, FinalOnly, Flow, Gauss, GaussRoute, Method, Status, Stepper};
-use exact_lagrangian::{ContactExponential, ExactLagrangian, Route};
+use discrete_herglotz::{DiscreteLagrangian, Flow, Gauss, GaussRoute, Method, Stepper};
+use exact_lagrangian::{ContactExponential, ExactLagrangian, RetractionRoute};
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
 
@@ -57,9 +57,9 @@ fn steps() {
             let ld = ld.unwrap();
             let flow = Flow::new(&ld, 0.0, start);
             let mut flow = flow.unwrap();
-            let mut status = Ok(Status::Completed);
-            let count = allocations(|| status = flow.run(1000, &mut FinalOnly));
-            assert_eq!((status, count), (Ok(Status::Completed), 0), "{name}");
+            let mut outcome = Ok(());
+            let count = allocations(|| outcome = flow.advance(1000));
+            assert_eq!((outcome, count), (Ok(()), 0), "{name}");
         }
     }
     run(&Pendulum::default());
@@ -115,7 +115,7 @@ fn collocation() {
 /// The exact discrete Lagrangian, its jets and steps, by each route to the motion between two points.
 #[test]
 fn exact() {
-    fn run<const N: usize, S: System<N>>(system: &S, h: f64, expected: Route) {
+    fn run<const N: usize, S: System<N>>(system: &S, h: f64, expected: RetractionRoute) {
         let x = system.initial();
         let ld = ExactLagrangian::<_, N>::new(system, h);
         let point = ContactExponential::new(system, h).ok().and_then(|e| e.at(0.0, &x).ok());
@@ -138,9 +138,9 @@ fn exact() {
         assert!(all.1.is_some() && all.2.is_some() && all.3.is_some());
         assert_eq!((all.0.map(|r| r.route), count), (Some(expected), 0), "{}", system.name());
     }
-    run(&Pendulum::default(), 0.5, Route::Collocation);
-    run(&DoublePendulum::default(), 0.1, Route::Collocation);
-    run(&Kepler::<3>::default(), 0.1, Route::Collocation);
-    run(&Kepler::<2>::default(), 1.0, Route::Collocation);
-    run(&HarmonicOscillator::default(), 3.0, Route::Newton);
+    run(&Pendulum::default(), 0.5, RetractionRoute::Collocation);
+    run(&DoublePendulum::default(), 0.1, RetractionRoute::Collocation);
+    run(&Kepler::<3>::default(), 0.1, RetractionRoute::Collocation);
+    run(&Kepler::<2>::default(), 1.0, RetractionRoute::Collocation);
+    run(&HarmonicOscillator::default(), 3.0, RetractionRoute::Newton);
 }

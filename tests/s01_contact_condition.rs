@@ -2,18 +2,18 @@
 //! a regular L_d.
 
 use crate::common::{over_catalogue, over_discretisations, pairs, systems};
-use contact_geom::{Darboux, Form, GeometryError, Scalar, Smooth, Triple, generic};
+use contact_geom::{Darboux, Form, GeometryError, Scalar, Smooth, Statement, Triple, generic};
 
 /// On every system of the catalogue.
 #[test]
 fn on_the_catalogue() {
-    assert_eq!(over_catalogue(1), systems());
+    assert_eq!(over_catalogue(Statement::Volume), systems());
 }
 
 /// With every discretisation of every system.
 #[test]
 fn with_every_discretisation() {
-    assert_eq!(over_discretisations(1), pairs().all);
+    assert_eq!(over_discretisations(Statement::Volume), pairs().all);
 }
 
 /// The form dz is closed, so nowhere contact: the volume vanishes.

@@ -2,12 +2,12 @@
 //! The Jacobi bracket: `X_{f,g} = [X_f, X_g]`.
 
 use crate::common::{over_catalogue, systems};
-use contact_geom::{Darboux, GeometryError, Scalar, Smooth, Triple, infinitesimal_conformality};
+use contact_geom::{Darboux, GeometryError, Scalar, Smooth, Statement, Triple, infinitesimal_conformality};
 
 /// On every system of the catalogue.
 #[test]
 fn on_the_catalogue() {
-    assert_eq!(over_catalogue(4), systems());
+    assert_eq!(over_catalogue(Statement::InfinitesimalContactomorphism), systems());
 }
 
 /// A field that is no contact Hamiltonian one is seen not to be conformal: `q d/dp`-like shears of z are not.

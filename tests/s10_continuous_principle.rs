@@ -4,14 +4,14 @@
 use crate::common::over_motions;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{CoupledInZ, HarmonicOscillator, Pendulum, System};
-use contact_geom::{Lagrangian, Scalar};
+use contact_geom::{Lagrangian, Scalar, Statement};
 use exact_lagrangian::{Curve, ExactError, MotionCurve, SplineCurve, VariedCurve, action, action_derivative};
 use std::cell::Cell;
 
 /// Along random motions of every system, and along bent curves with the same ends.
 #[test]
 fn on_every_system() {
-    over_motions(10);
+    over_motions(Statement::HerglotzPrinciple);
 }
 
 /// The derivative of the action along a curve that is no solution is the slope of the action itself: central differences of step

@@ -4,12 +4,12 @@
 use crate::common::oracle::motion_with_derivative;
 use crate::common::{over_catalogue, systems};
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{Energy, NoetherMomentum, SmoothFunction, Triple};
+use contact_geom::{Energy, NoetherMomentum, SmoothFunction, Statement, Triple};
 
 /// Infinitesimally, on every system.
 #[test]
 fn on_the_catalogue() {
-    assert_eq!(over_catalogue(11), systems());
+    assert_eq!(over_catalogue(Statement::DissipatedQuantities), systems());
 }
 
 /// Along the motion: the energy where L is autonomous, and every momentum, are multiplied by `sigma_t`; their quotient

@@ -1,13 +1,13 @@
 //! Statement 17 (section 3.1, lemma): F+L_d is a local diffeomorphism exactly if F-L_d is.
 
 use crate::common::{over_discretisations, pairs};
-use contact_geom::{DiscretePoint, Scalar};
+use contact_geom::{DiscretePoint, Scalar, Statement};
 use discrete_herglotz::{DiscreteLagrangian, StepError};
 
 /// Where both are: `det T F+L_d = sigma_d^(n+1) det T F-L_d`, none of them zero.
 #[test]
 fn with_every_discretisation() {
-    assert_eq!(over_discretisations(17), pairs().all);
+    assert_eq!(over_discretisations(Statement::DiscreteRegularity), pairs().all);
 }
 
 /// Where neither is: a discrete Lagrangian whose mixed derivative `D1 D2 L_d` vanishes at one point.

@@ -2,9 +2,10 @@
 //! solved for with the accelerations.
 
 use crate::common::over_motions;
+use contact_geom::Statement;
 
 /// Along random motions of every system.
 #[test]
 fn on_every_system() {
-    over_motions(27);
+    over_motions(Statement::ChetaevMultiplier);
 }

@@ -1,14 +1,14 @@
 //! Statement 28 (section 4.1): `T pi (Gamma) = xi_L o pi`, the flows are pi-related, and the flow keeps to `M_L`.
 
 use crate::common::over_motions;
-use contact_geom::VelocityPoint;
 use contact_geom::systems::CoupledInZ;
+use contact_geom::{Statement, VelocityPoint};
 use exact_lagrangian::{ExtendedPoint, NonHolonomic};
 
 /// Along random motions of every system.
 #[test]
 fn on_every_system() {
-    over_motions(28);
+    over_motions(Statement::ProjectedFlow);
 }
 
 /// Off `M_L` the flow of Chetaev's equations keeps `Phi` constant, and the defect shows it.

@@ -3,13 +3,13 @@
 use crate::common::over_motions;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{ChargedParticle, HarmonicOscillator, Pendulum};
-use contact_geom::{Lagrangian, Largest, Scalar, VelocityPoint};
+use contact_geom::{Lagrangian, Largest, Scalar, Statement, VelocityPoint};
 use exact_lagrangian::{ContactExponential, ExactError};
 
 /// Along random motions of every system.
 #[test]
 fn on_every_system() {
-    over_motions(29);
+    over_motions(Statement::ExponentialMap);
 }
 
 /// The conjugate points of the oscillator are the multiples of `pi/w`, those of no drag and of drag, and there the map folds.

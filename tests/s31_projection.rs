@@ -1,14 +1,14 @@
 //! Statement 31 (section 4.1, lemma): `pr~_1` restricted to `M_d` is a local diffeomorphism.
 
 use crate::common::over_motions;
-use contact_geom::VelocityPoint;
 use contact_geom::systems::HarmonicOscillator;
+use contact_geom::{Statement, VelocityPoint};
 use exact_lagrangian::NonHolonomic;
 
 /// Along random motions of every system.
 #[test]
 fn on_every_system() {
-    over_motions(31);
+    over_motions(Statement::ImageProjection);
 }
 
 /// At a conjugate point it is the exponential map that folds, not the projection: `dz1 = p1 dq1` along the fold, so that the

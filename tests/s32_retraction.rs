@@ -3,13 +3,13 @@
 use crate::common::{AlongMotion, OverMotions, over_motions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Pendulum, System, visit_catalogue};
-use contact_geom::{DiscretePoint, Lagrangian, Larger, Largest, Scalar, VelocityPoint};
-use exact_lagrangian::{ContactExponential, ExactError, Route, herglotz_flow, statements};
+use contact_geom::{DiscretePoint, Lagrangian, Larger, Largest, Scalar, Statement, VelocityPoint};
+use exact_lagrangian::{ContactExponential, ExactError, RetractionRoute, herglotz_flow, statements};
 
 /// Along random motions of every system, from a guess on their branch.
 #[test]
 fn on_every_system() {
-    over_motions(32);
+    over_motions(Statement::ExactRetractions);
 }
 
 /// Without a guess the motion that is found joins the points, whether or not it is the one that they were made from.
@@ -48,7 +48,8 @@ fn the_loss_at_small_steps_is_the_condition() {
     for k in 0..=8 {
         let h = 10f64.powi(-k);
         let condition = statements::condition(&system, 0.0, &x, h).unwrap_or(f64::NAN);
-        let residual = statements::residual(32, &system, 0.0, &x, h).ok().flatten().unwrap_or(f64::NAN);
+        let residual =
+            statements::residual(Statement::ExactRetractions, &system, 0.0, &x, h).ok().flatten().unwrap_or(f64::NAN);
         assert!(residual < 4.0 * f64::EPSILON, "h = {h}: {residual:e}");
         assert!((0.2..5.0).contains(&(condition * h)), "h = {h}: condition {condition:e}");
     }
@@ -63,9 +64,9 @@ fn routes() {
         let found = exp.retract(0.0, &exp.at(0.0, &VelocityPoint::new([q], [v], 0.0))?)?;
         Ok::<_, ExactError<1>>((found.route, found.conjugate.is_some()))
     };
-    assert_eq!(route(1.0, 0.4, 1.2), Ok((Route::Collocation, false)));
-    assert_eq!(route(3.0, 0.4, 1.2), Ok((Route::Newton, false)));
-    assert_eq!(route(3.2, 1.0, 0.0), Ok((Route::Continuation, true)));
+    assert_eq!(route(1.0, 0.4, 1.2), Ok((RetractionRoute::Collocation, false)));
+    assert_eq!(route(3.0, 0.4, 1.2), Ok((RetractionRoute::Newton, false)));
+    assert_eq!(route(3.2, 1.0, 0.0), Ok((RetractionRoute::Continuation, true)));
     // Strong damping: the iteration with both ends given does not contract, Newton's method does.
     for gamma in [-50.0, -20.0, 5.0] {
         let exp = ContactExponential::new(HarmonicOscillator { gamma }, 1.0).unwrap();

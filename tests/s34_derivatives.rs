@@ -3,14 +3,14 @@
 use crate::common::over_motions;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, QuadraticInZ, System};
-use contact_geom::{DiscretePoint, Lagrangian, Largest, Scalar, Triple, VelocityPoint, legendre};
+use contact_geom::{DiscretePoint, Lagrangian, Largest, Scalar, Statement, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{DiscreteLagrangian, Midpoint, Solver};
 use exact_lagrangian::{ContactExponential, ExactLagrangian, error_orders, statements as exact};
 
 /// First and second derivatives, against duals through flow and shooting, along random motions of every system.
 #[test]
 fn on_every_system() {
-    over_motions(34);
+    over_motions(Statement::ExactDerivatives);
 }
 
 /// A third way, without duals: central differences of the value, extrapolated twice. With a step d they err by d^6 and eps/d.

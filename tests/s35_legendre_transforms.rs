@@ -2,14 +2,14 @@
 
 use crate::common::over_motions;
 use contact_geom::systems::FreeParticle;
-use contact_geom::{DiscretePoint, Scalar};
+use contact_geom::{DiscretePoint, Scalar, Statement};
 use discrete_herglotz::{DiscreteLagrangian, StepError, legendre_minus, legendre_plus};
 use exact_lagrangian::ExactLagrangian;
 
 /// Along random motions of every system.
 #[test]
 fn on_every_system() {
-    over_motions(35);
+    over_motions(Statement::ExactLegendreTransforms);
 }
 
 /// The formula that the paper prints for the free particle, with `- z0 (e^(gamma h) - 1)`.

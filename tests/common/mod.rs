@@ -6,7 +6,7 @@ use contact_geom::systems::{
     CoupledPlane, DoublePendulum, Duffing, HarmonicOscillator, Kepler, QuadraticInZ, System, SystemVisitor,
     visit_catalogue,
 };
-use contact_geom::{DiscretePoint, VelocityPoint, legendre, statements as continuous};
+use contact_geom::{DiscretePoint, Statement, VelocityPoint, legendre, statements as continuous};
 use discrete_herglotz::{Discretised, InputError, Method, statements as discrete};
 use exact_lagrangian::{ExactError, statements as exact};
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
@@ -71,8 +71,8 @@ pub fn step_from(u: f64) -> f64 {
 }
 
 /// Checks a statement of section 2 at random points of every system; returns on how many systems it applies.
-pub fn over_catalogue(statement: u32) -> usize {
-    struct Visitor(u32, usize);
+pub fn over_catalogue(statement: Statement) -> usize {
+    struct Visitor(Statement, usize);
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
             let mut applies = false;
@@ -101,14 +101,14 @@ pub fn discretise<'a, const N: usize, S: System<N>>(
 
 /// Checks a statement of section 3 at random points of every system with every method whose hypothesis it meets; returns
 /// with how many pairs the statement applies.
-pub fn over_discretisations(statement: u32) -> usize {
+pub fn over_discretisations(statement: Statement) -> usize {
     over_discretisations_within(statement, TOLERANCE)
 }
 
 /// The same with another bound than the [`TOLERANCE`].
-pub fn over_discretisations_within(statement: u32, bound: f64) -> usize {
+pub fn over_discretisations_within(statement: Statement, bound: f64) -> usize {
     struct Visitor {
-        statement: u32,
+        statement: Statement,
         bound: f64,
         applies: usize,
     }
@@ -205,9 +205,9 @@ impl<F: AlongMotion> SystemVisitor for OverMotions<F> {
 }
 
 /// Checks a statement of section 4 along random motions of every system.
-pub fn over_motions(statement: u32) {
-    struct Statement(u32);
-    impl AlongMotion for Statement {
+pub fn over_motions(statement: Statement) {
+    struct Residual(Statement);
+    impl AlongMotion for Residual {
         fn residual<const N: usize, S: System<N>>(
             &mut self,
             system: &S,
@@ -218,7 +218,7 @@ pub fn over_motions(statement: u32) {
             Ok(exact::residual(self.0, system, t, x, h)?.unwrap_or(f64::INFINITY))
         }
     }
-    visit_catalogue(&mut OverMotions(Statement(statement)));
+    visit_catalogue(&mut OverMotions(Residual(statement)));
 }
 
 /// Visits one system of each kind of structure, for tests of integrators, which are long to compile: linear, separable, time

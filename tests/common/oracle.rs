@@ -3,7 +3,8 @@
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::systems::System;
 use contact_geom::{
-    DarbouxField, HerglotzField, Lagrangian, PhasePoint, Scalar, Smooth, SmoothFunction, Triple, VelocityPoint,
+    DarbouxField, Derivatives, HerglotzField, Lagrangian, PhasePoint, Scalar, Smooth, SmoothFunction, Triple,
+    VelocityPoint,
 };
 use differential_equations::prelude::{ExplicitRungeKutta, IVP, ODE};
 

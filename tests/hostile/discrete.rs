@@ -1,10 +1,14 @@
 //! Attacks on discrete-herglotz. What starts a motion refuses what is not finite, and what it hands out is finite; formulas hand
 //! on what is not a number, or refuse it.
 
+#[path = "discrete/integrators.rs"]
+mod integrators;
 #[path = "discrete/lagrangians.rs"]
 mod lagrangians;
-#[path = "discrete/scenes.rs"]
-mod scenes;
+#[path = "discrete/observers.rs"]
+mod observers;
+#[path = "discrete/runs.rs"]
+mod runs;
 #[path = "discrete/steppers.rs"]
 mod steppers;
 
@@ -21,13 +25,17 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Method::check", "takes no number"),
     ("Method::applicable", "takes no number"),
     ("SplittingScheme::*", "tables: take no number"),
-    ("Integrator::all", "takes no number"),
-    ("Integrator::order", "takes no number; that of any number of stages is in the attack on check"),
+    ("AnyIntegrator::all", "takes no number"),
+    ("AnyIntegrator::order", "takes no number; that of any number of stages is in the attack on check"),
+    ("DiscreteLagrangian::is_explicit", "takes no number"),
+    ("DiscreteLagrangian::constant_rate", "takes no number"),
+    ("Rule::is_symmetric", "takes no number"),
     ("ActionFlow::*", "the implementor's; that of Riccati is attacked with what calls it"),
-    ("Observer::*", "the implementor's; those of the library see finite steps only"),
+    ("Observer::*", "the implementor's; what a run makes of odd ones is in the attack on Run::observe"),
 ];
 
-pub const ATTACKS: &[&[Attack]] = &[lagrangians::ATTACKS, scenes::ATTACKS, steppers::ATTACKS];
+pub const ATTACKS: &[&[Attack]] =
+    &[integrators::ATTACKS, lagrangians::ATTACKS, observers::ATTACKS, runs::ATTACKS, steppers::ATTACKS];
 
 /// Times and states to start from, and whether they are finite.
 fn starts() -> Vec<(f64, PhasePoint<1>)> {
@@ -35,4 +43,4 @@ fn starts() -> Vec<(f64, PhasePoint<1>)> {
 }
 
 /// Steps beside those that are refused.
-const STEPS: [f64; 5] = [1e-300, 1e-12, 0.1, 1e3, 1e300];
+const STEPS: [f64; 8] = [1e-300, 1e-12, 0.1, 1e3, 1e300, -1e-12, -0.1, -1e3];

@@ -10,21 +10,36 @@ use std::path::{Path, PathBuf};
 pub fn of_crate(name: &str) -> BTreeSet<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates").join(name).join("src");
     let lib = fs::read_to_string(root.join("lib.rs")).unwrap();
-    let exported = exported(&lib);
-    let modules: BTreeSet<&str> = lib.lines().filter_map(|l| l.strip_prefix("pub mod ")?.strip_suffix(';')).collect();
+    let of_the_crate = exported(&lib);
     let mut entries = BTreeSet::new();
     for file in sources(&root) {
         let relative = file.strip_prefix(&root).unwrap().with_extension("");
-        let module = relative.iter().next().and_then(|m| m.to_str()).filter(|m| modules.contains(m));
         // Tests stand at the end of a file, or in one of their own.
         let text = fs::read_to_string(&file).unwrap();
         let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
         if relative.ends_with("tests") || relative.ends_with("order_conditions") {
             continue;
         }
-        read(text, module, &exported, &mut entries);
+        let mut parts = relative.iter().filter_map(|part| part.to_str()).filter(|part| *part != "mod");
+        let (folder, inner) = (parts.next().unwrap_or_default(), parts.next());
+        let own = inner.map(|_| fs::read_to_string(root.join(folder).join("mod.rs")).unwrap());
+        // A public module, or one of a private folder that the crate hands on.
+        let handed_on = inner.zip(own.as_deref()).filter(|(m, own)| declares(own, m) && of_the_crate.contains(m));
+        let module = handed_on.map(|(m, _)| m).or(Some(folder).filter(|m| declares(&lib, m)));
+        // All of a public module, but of a folder what its own file exports.
+        let exported = match (module, own.as_deref()) {
+            (Some(m), Some(own)) if m == folder => Some(exported(own)),
+            (Some(_), _) => None,
+            (None, _) => Some(of_the_crate.clone()),
+        };
+        read(text, module, &|name| exported.as_ref().is_none_or(|names| names.contains(name)), &mut entries);
     }
     entries
+}
+
+/// Whether a file declares a public module.
+fn declares(file: &str, module: &str) -> bool {
+    file.lines().any(|line| line.strip_prefix("pub mod ").and_then(|m| m.strip_suffix(';')) == Some(module))
 }
 
 /// The names of `pub use`.
@@ -57,13 +72,13 @@ enum Within {
     Other,
 }
 
-fn read(text: &str, module: Option<&str>, exported: &BTreeSet<&str>, entries: &mut BTreeSet<String>) {
+fn read(text: &str, module: Option<&str>, exported: &dyn Fn(&str) -> bool, entries: &mut BTreeSet<String>) {
     let mut within = Within::File;
     // What a macro makes stands deeper; its blocks are as good as others.
     for line in text.lines() {
         let code = line.trim_start();
         let deep = line.len() - code.len();
-        let is_public = |name: &str| module.is_some() || name.starts_with('$') || exported.contains(name);
+        let is_public = |name: &str| name.starts_with('$') || exported(name);
         if let Some(header) = code.strip_prefix("impl").filter(|h| deep % 8 == 0 && h.starts_with(['<', ' '])) {
             let (name, of_trait) = implemented(header);
             within = if of_trait || !is_public(&name) { Within::Other } else { Within::Type(name) };
@@ -78,8 +93,9 @@ fn read(text: &str, module: Option<&str>, exported: &BTreeSet<&str>, entries: &m
             let qualified = match (&within, module) {
                 (Within::Type(of) | Within::Trait(of), _) => format!("{of}::{function}"),
                 (Within::Module(of), _) => format!("{of}::{function}"),
-                (Within::File, Some(of)) if deep == 0 => format!("{of}::{function}"),
-                (Within::File, None) if deep == 0 && exported.contains(function.as_str()) => function,
+                (Within::File, _) if deep != 0 || !exported(&function) => continue,
+                (Within::File, Some(of)) => format!("{of}::{function}"),
+                (Within::File, None) => function,
                 _ => continue,
             };
             entries.insert(qualified);

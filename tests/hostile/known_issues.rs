@@ -4,8 +4,8 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Pendulum};
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::{
-    Composition, Event, Flow, Gauss, Integrator, Method, Midpoint, Rectangle, Scene, SplittingScheme, Status, Stepper,
-    Steps, Wanted, run_with_events,
+    AnyIntegrator, Composition, Event, Events, Flow, Gauss, Method, Midpoint, Problem, Rectangle, SplittingScheme,
+    Status, Stepper, Steps, Until,
 };
 use std::fs;
 use std::path::Path;
@@ -44,10 +44,9 @@ impl Lagrangian<1> for Pulse {
 }
 
 /// The position after two units of time.
-fn position(system: &Pulse, integrator: Integrator, steps: usize) -> f64 {
-    let scene =
-        Scene::new(system, VelocityPoint::new([1.0], [0.0], 0.0), 2.0).by(integrator).steps(Steps::Count(steps));
-    let outcome = scene.plan().unwrap().run().unwrap();
+fn position(system: &Pulse, integrator: AnyIntegrator, steps: usize) -> f64 {
+    let problem = Problem::new(system, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let outcome = problem.by(integrator).steps(Steps::Count(steps)).run(Until::Time(2.0)).unwrap();
     assert_eq!(outcome.status, Status::Completed);
     outcome.q[0]
 }
@@ -56,7 +55,7 @@ fn position(system: &Pulse, integrator: Integrator, steps: usize) -> f64 {
 fn fixed_steps_pass_over_what_is_narrower() {
     let pulse = Pulse { height: 300.0, width: 1e-3 };
     let quiet = Pulse { height: 0.0, ..pulse };
-    for integrator in [Integrator::Gauss { stages: 4 }, Integrator::Splitting(SplittingScheme::STRANG)] {
+    for integrator in [AnyIntegrator::Gauss { stages: 4 }, AnyIntegrator::Splitting(SplittingScheme::STRANG)] {
         // Four steps: none of their points within forty widths of the pulse. It turns the motion by half a unit.
         assert_eq!(position(&pulse, integrator, 4), position(&quiet, integrator, 4));
         let seen = position(&pulse, integrator, 20_000) - position(&quiet, integrator, 20_000);
@@ -66,17 +65,14 @@ fn fixed_steps_pass_over_what_is_narrower() {
 
 #[test]
 fn two_changes_of_sign_in_a_part_of_a_step_are_not_seen() {
-    let gauss = Gauss::new(Pendulum::default(), 2, 0.4).unwrap();
-    let narrow = |t: f64| (t - 0.45) * (t - 0.46);
+    let pendulum = Pendulum::default();
+    let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let found = |h: f64| {
-        let gauss = Gauss::new(Pendulum::default(), 2, h).unwrap();
-        let mut stepper = gauss.stepper(0.0, PhasePoint::new([1.0], [0.0], 0.0), [0.0].into()).unwrap();
-        run_with_events(&mut stepper, (0.8 / h).round() as usize, &mut [Event::new(|t, _| narrow(t))])
-            .unwrap()
-            .crossings
-            .len()
+        let mut narrow = Events::new([Event::new(|t, _| (t - 0.45) * (t - 0.46))]);
+        let run = problem.by(AnyIntegrator::Gauss { stages: 2 }).steps(Steps::Size(h)).observe(&mut narrow);
+        assert_eq!(run.run(Until::Time(0.8)).unwrap().status, Status::Completed);
+        narrow.crossings.len()
     };
-    assert_eq!(gauss.stages(), 2);
     assert_eq!(found(0.4), 0);
     assert_eq!(found(0.02), 2);
 }
@@ -128,27 +124,17 @@ fn two_points_lose_the_digits_that_their_difference_loses() {
 #[test]
 fn quadrature_rules_have_a_rational_rate() {
     let pendulum = Pendulum { gamma: -3.0 };
+    let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let factor = |integrator| {
-        let wanted = Wanted { conformal_factor: true, ..Wanted::default() };
-        let scene = Scene::new(&pendulum, VelocityPoint::new([1.0], [0.0], 0.0), 1.0).by(integrator);
-        let outcome = scene.steps(Steps::Count(10)).wanting(wanted).plan().unwrap().run().unwrap();
-        outcome.conformal_factor.unwrap()
+        let run = problem.by(integrator).steps(Steps::Count(10)).with_conformal_factor();
+        run.run(Until::Time(1.0)).unwrap().log_factor.unwrap().exp()
     };
     let exact = (-3.0f64).exp();
     let off = |integrator| (factor(integrator) / exact - 1.0).abs();
-    assert!(off(Integrator::Splitting(SplittingScheme::STRANG)) < 1e-14);
+    assert!(off(AnyIntegrator::Splitting(SplittingScheme::STRANG)) < 1e-14);
     // (1 + h gamma/2)/(1 - h gamma/2) ten times, and 1 + h gamma ten times.
-    assert!((off(Integrator::Discrete(Method::Midpoint)) - 0.0229).abs() < 1e-3);
-    assert!(off(Integrator::Discrete(Method::LeftMidpoint)) > 0.4);
-}
-
-#[test]
-fn the_conformal_factor_of_a_long_run_is_below_all_numbers() {
-    let pendulum = Pendulum { gamma: -1.0 };
-    let wanted = Wanted { conformal_factor: true, ..Wanted::default() };
-    let scene = Scene::new(&pendulum, VelocityPoint::new([1.0], [0.0], 0.0), 800.0).wanting(wanted);
-    let outcome = scene.by(Integrator::Gauss { stages: 4 }).steps(Steps::Count(8000)).plan().unwrap().run().unwrap();
-    assert_eq!((outcome.status, outcome.conformal_factor), (Status::Completed, Some(0.0)));
+    assert!((off(AnyIntegrator::Discrete(Method::Midpoint)) - 0.0229).abs() < 1e-3);
+    assert!(off(AnyIntegrator::Discrete(Method::LeftMidpoint)) > 0.4);
 }
 
 #[test]
@@ -157,8 +143,9 @@ fn chaos_outgrows_any_accuracy() {
     let run = |q: f64| {
         let pendulum = DoublePendulum { gamma: 0.0, ..DoublePendulum::default() };
         let start = VelocityPoint::new([q, 2.0], [0.0, 0.0], 0.0);
-        let scene = Scene::new(&pendulum, start, 150.0).by(Integrator::Gauss { stages: 8 });
-        scene.steps(Steps::Count(6000)).plan().unwrap().run().unwrap().q
+        let problem = Problem::new(&pendulum, 0.0, start).unwrap();
+        let run = problem.by(AnyIntegrator::Gauss { stages: 8 }).steps(Steps::Count(6000));
+        run.run(Until::Time(150.0)).unwrap().q
     };
     let apart = (run(2.5) - run(2.5 + 4.0 * f64::EPSILON)).amax();
     assert!(apart > 1e-9, "{apart:e}");

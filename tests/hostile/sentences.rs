@@ -3,13 +3,14 @@
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{
-    Clock, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint,
+    Clock, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, Statement, Structure, Symmetry, VelocityPoint,
     herglotz_field, linear,
 };
 use discrete_herglotz::{
-    Composition, DiscreteLagrangian, Event, EventStatus, Every, FinalOnly, Flow, Gauss, InputError, Integrator,
-    LeftMidpoint, Method, Midpoint, Obstacle, Rectangle, Scene, Solver, SplittingScheme, Status, StepError, Stepper,
-    Steps, Strang, Suspicion, UnknownIntegrator, UnknownMethod, run_with_events,
+    AnyIntegrator, Checkpoint, Composition, DiscreteLagrangian, Event, Events, Facts, Flow, Gauss, Halt, InputError,
+    Integrator, Interrupted, LeftMidpoint, Method, Midpoint, Moment, Obstacle, Problem, Rectangle, Rows, Solver,
+    SplittingScheme, Status, StepError, Stepper, Steps, Stop, Strang, Suspicion, UnknownIntegrator, UnknownMethod,
+    Until, Wants,
 };
 use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow};
 use std::ops::ControlFlow;
@@ -121,32 +122,88 @@ impl DiscreteLagrangian<1> for Length {
     }
 }
 
+/// An integrator with no more than what it must have.
+struct Forgetful;
+
+struct Bare<'a>(Box<dyn Stepper<1> + 'a>);
+
+impl<'a> Integrator<'a, Pendulum, 1> for Forgetful {
+    fn facts(&self) -> Facts {
+        Facts::of_discrete::<1>("forgetful", 2)
+    }
+    fn check(&self, _: &Pendulum) -> Result<(), InputError> {
+        Ok(())
+    }
+    fn stepper(
+        &self,
+        problem: &Problem<'a, Pendulum, 1>,
+        h: f64,
+        wants: Wants,
+    ) -> Result<Box<dyn Stepper<1> + 'a>, InputError> {
+        Ok(Box::new(Bare(Method::Midpoint.stepper(problem, h, wants)?)))
+    }
+}
+
+impl Stepper<1> for Bare<'_> {
+    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        self.0.advance(steps)
+    }
+    fn state(&self) -> PhasePoint<1> {
+        self.0.state()
+    }
+    fn time(&self) -> f64 {
+        self.0.time()
+    }
+    fn sigma(&self) -> f64 {
+        self.0.sigma()
+    }
+    fn evaluations(&self) -> u64 {
+        self.0.evaluations()
+    }
+}
+
 #[test]
 fn input_errors() {
     let (pendulum, start) = (Pendulum::default(), VelocityPoint::new([0.3], [0.5], 0.1));
+    let problem = Problem::new(&pendulum, 0.5, start).unwrap();
+    let in_steps = |steps| problem.steps(steps).plan(Until::Time(5.5)).err().unwrap();
     let kepler = Kepler::<2>::default();
     let circle = PhasePoint::new([1.0, 0.0], [0.0, 1.0], 0.0);
     every!(InputError {
-        InputError::Step { .. } => Midpoint::new(pendulum, -0.25).unwrap_err(), ["-0.25", "positive finite"];
-        InputError::Span { .. } => Scene::new(&pendulum, start, -3.5).plan().err().unwrap(), ["-3.5", "positive and finite"];
+        InputError::Step { .. } => in_steps(Steps::Size(-0.25)), ["-0.25", "finite number and not 0", "positive where the end of the run tells"];
+        InputError::Span { .. } => problem.steps(Steps::Count(1)).plan(Until::Time(0.5)).err().unwrap(), ["is 0;", "finite and not 0", "negative to go back"];
         InputError::Accuracy { .. } => {
-            let scene = Scene::new(&pendulum, start, 5.0).by(Integrator::Gauss { stages: 8 });
-            scene.steps(Steps::Accuracy(1e-17)).plan().err().unwrap()
+            let run = problem.by(AnyIntegrator::Gauss { stages: 8 }).accuracy(1e-17);
+            run.plan(Until::Time(5.5)).err().unwrap()
         }, ["1e-17", "ask for less"];
-        InputError::Tolerance { .. } => {
-            Scene::new(&pendulum, start, 5.0).steps(Steps::Accuracy(-0.5)).plan().err().unwrap()
-        }, ["-0.5", "positive and finite"];
-        InputError::TooMany { .. } => {
-            Scene::new(&pendulum, start, 5.0).steps(Steps::Size(1e-300)).plan().err().unwrap()
-        }, ["the number of steps", "e300", "longer steps"];
-        InputError::Undefined => Scene::new(&Odd::Kicked, VelocityPoint::new([f64::MAX], [0.0], 0.0), 1.0).plan().err().unwrap(), ["not finite at the start", "inside its domain"];
+        InputError::Tolerance { .. } => problem.accuracy(-0.5).plan(Until::Time(5.5)).err().unwrap(), ["-0.5", "positive and finite"];
+        InputError::TooMany { .. } => in_steps(Steps::Size(1e-300)), ["the number of steps", "e300", "longer steps"];
+        InputError::NoSteps => problem.by(AnyIntegrator::Gauss { stages: 8 }).plan(Until::Time(5.5)).err().unwrap(), ["`steps`", "`accuracy`"];
+        InputError::NoIntegrator => problem.accuracy(0.5).steps(Steps::Count(1)).plan(Until::Time(5.5)).err().unwrap(), ["`by`", "`accuracy`"];
+        InputError::AnotherRun => {
+            let path = std::env::temp_dir().join(format!("another_run_{}", std::process::id()));
+            let mut saved = Checkpoint::every(1, &path).unwrap();
+            problem.steps(Steps::Count(1)).observe(&mut saved).run(Until::Time(5.5)).unwrap();
+            let interrupted = Interrupted::read(&path).unwrap();
+            std::fs::remove_file(path).unwrap();
+            problem.steps(Steps::Count(2)).resume(interrupted).run(Until::Time(5.5)).unwrap_err()
+        }, ["not the one that was interrupted", "same problem"];
+        InputError::Unsaved => {
+            let mut saved = Checkpoint::every(1, std::env::temp_dir().join("never_written")).unwrap();
+            problem.by(Forgetful).steps(Steps::Count(1)).observe(&mut saved).run(Until::Time(5.5)).unwrap_err()
+        }, ["cannot be saved", "leave the checkpoint out", "`restore`"];
+        InputError::Times { .. } => {
+            let mut rows = Rows::at([0.5, 7.25]).unwrap();
+            problem.steps(Steps::Count(1)).observe(&mut rows).run(Until::Time(5.5)).unwrap_err()
+        }, ["t = 7.25", "row 1", "outside of the run's span", "in the order of the run"];
+        InputError::Undefined => Problem::new(&Odd::Kicked, 0.0, VelocityPoint::new([f64::MAX], [0.0], 0.0)).err().unwrap(), ["not finite at the start", "inside its domain"];
         InputError::Stages { .. } => Gauss::new(pendulum, 17, 0.1).err().unwrap(), ["17", "from 1 to 16"];
         InputError::Clock { .. } => {
             let gauss = Gauss::new(kepler, 3, 0.1).unwrap();
             gauss.clocked_stepper(Stopped, 0.0, circle, circle.p).err().unwrap()
         }, ["is 0", "positive and finite"];
         InputError::Dimension => Midpoint::new(Nothing, 0.1).err().unwrap(), ["dimension 0", "at least one"];
-        InputError::Count { .. } => Every::new(0, FinalOnly).unwrap_err(), ["stride", "= 0", "at least 1"];
+        InputError::Count { .. } => Rows::<1>::every(0).err().unwrap(), ["the steps between two rows", "= 0", "at least 1"];
         InputError::Geometry(_) => {
             Flow::new(&Midpoint::new(pendulum, 0.1).unwrap(), 0.0, pendulum_at(f64::NAN)).err().unwrap()
         }, ["p[0] = NaN", "finite"];
@@ -157,7 +214,7 @@ fn input_errors() {
         InputError::Unclaimed { .. } => {
             Strang::new(CoupledInZ::default(), 0.1, 0.0, &pendulum_at(0.5)).err().unwrap()
         }, ["separable", "claim it", "another method"];
-        InputError::FalseClaim { .. } => Scene::new(&Liar, start, 1.0).steps(Steps::Count(3)).plan().err().unwrap(), ["quadratic", "is not", "size"];
+        InputError::FalseClaim { .. } => Problem::new(&Liar, 0.0, start).err().unwrap(), ["quadratic", "is not", "size"];
         InputError::Hypothesis { .. } => {
             let rule = |h| Midpoint::new(pendulum, h);
             Composition::new(rule, &SplittingScheme::BLANES_MOAN_6, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()
@@ -199,8 +256,9 @@ impl Lagrangian<1> for Odd {
 fn obstacles() {
     let start = VelocityPoint::new([1.0], [0.0], 1.0);
     let obstacle = |system: &Odd, by: &str, span: f64, wanted: f64| {
-        let scene = Scene::new(system, start, span).by(by.parse().unwrap()).steps(Steps::Accuracy(wanted));
-        match scene.plan().err() {
+        let problem = Problem::new(system, 0.0, start).unwrap();
+        let run = problem.by(by.parse::<AnyIntegrator>().unwrap()).accuracy(wanted);
+        match run.plan(Until::Time(span)).err() {
             Some(InputError::Accuracy { cause, .. }) => cause,
             other => panic!("{other:?}"),
         }
@@ -253,6 +311,16 @@ fn step_errors() {
             let start = PhasePoint::new([0.0], [1.0], 0.0);
             gauss.stepper(0.0, start, [1.0].into()).unwrap().without_newton().advance(3).unwrap_err().cause
         }, ["lanes that differ", "if_less"];
+        StepError::Event { .. } => {
+            let pendulum = Pendulum::default();
+            let problem = Problem::new(&pendulum, 0.0, pendulum_at(0.5)).unwrap();
+            let mut undefined = Events::new([Event::new(|t, _| (0.15 - t).sqrt())]);
+            let outcome = problem.steps(Steps::Size(0.1)).observe(&mut undefined).run(Until::Steps(3));
+            match outcome.unwrap().status {
+                Status::Failed { cause, .. } => cause,
+                other => panic!("{other:?}"),
+            }
+        }, ["the function of an event", "not finite at t = 0.2", "defined along the motion"];
         StepError::NonFinite => {
             let ld = Rectangle::new(Kepler::<2>::default(), 0.1).unwrap();
             let centre = PhasePoint::new([0.0, 0.0], [0.0, 1.0], 0.0);
@@ -263,40 +331,44 @@ fn step_errors() {
 
 #[test]
 fn statuses() {
-    let ld = Midpoint::new(Pendulum::default(), 0.1).unwrap();
-    let mut flow = Flow::new(&ld, 0.0, pendulum_at(0.5)).unwrap();
+    let (pendulum, explosive) = (Pendulum::default(), Explosive);
+    let problem = Problem::new(&pendulum, 0.0, pendulum_at(0.5)).unwrap();
+    let run = || problem.by(AnyIntegrator::Discrete(Method::Midpoint)).steps(Steps::Size(0.1));
+    let blows_up = Problem::new(&explosive, 0.0, PhasePoint::new([0.0], [0.1], 1.0)).unwrap();
     every!(Status {
-        Status::Completed => flow.run(3, &mut FinalOnly).unwrap(), ["completed"];
+        Status::Completed => run().run(Until::Steps(3)).unwrap().status, ["completed"];
         Status::Stopped { .. } => {
-            flow.run(3, &mut |_: &discrete_herglotz::Step<1>| ControlFlow::Break(())).unwrap()
-        }, ["stopped", "after step 4"];
+            let mut fourth = |at: &Moment<'_, 1>| match at.k {
+                4 => ControlFlow::Break(Stop::here("a weary observer")),
+                _ => ControlFlow::Continue(()),
+            };
+            run().observe(&mut fourth).run(Until::Steps(10)).unwrap().status
+        }, ["stopped by a weary observer", "at t = 0.4", "in step 4"];
         Status::FalseClaim { .. } => {
             // A cubic force that is nothing before q = 2, where the motion comes to after the steps that are tried before a run.
-            let start = VelocityPoint::new([0.5], [1.0], 0.0);
-            Scene::new(&Later, start, 10.0).steps(Steps::Count(1000)).plan().unwrap().run().unwrap().status
+            let problem = Problem::new(&Later, 0.0, VelocityPoint::new([0.5], [1.0], 0.0)).unwrap();
+            problem.steps(Steps::Count(1000)).run(Until::Time(10.0)).unwrap().status
         }, ["unreliable: after step ", "not quadratic", "correct its structure"];
         Status::Failed { .. } => {
-            let ld = LeftMidpoint::new(Explosive, 0.01).unwrap();
-            let mut flow = Flow::new(&ld, 0.0, PhasePoint::new([0.0], [0.1], 1.0)).unwrap();
-            flow.run(4000, &mut FinalOnly).unwrap()
-        }, ["failed in step", "without bound"];
+            let run = blows_up.by(AnyIntegrator::Discrete(Method::LeftMidpoint)).steps(Steps::Size(0.01));
+            run.run(Until::Steps(4000)).unwrap().status
+        }, ["failed in step", "at t = ", "without bound"];
     });
-    // It has no sentence of its own.
-    let gauss = Gauss::new(Explosive, 2, 0.1).unwrap();
+    // The ways in which a run with events ends; what was found before is kept.
     let run = |event: Event<'_, 1>, steps| {
-        let mut stepper = gauss.stepper(0.0, PhasePoint::new([0.0], [0.1], 1.0), [0.1].into()).unwrap();
-        run_with_events(&mut stepper, steps, &mut [event]).unwrap().status
+        let mut events = Events::new([event]);
+        let run = blows_up.by(AnyIntegrator::Gauss { stages: 2 }).steps(Steps::Size(0.1)).observe(&mut events);
+        (run.run(Until::Steps(steps)).unwrap().status, events.crossings.len())
     };
-    let _: fn(&EventStatus) = |status| match status {
-        EventStatus::Completed
-        | EventStatus::Terminated { event: _ }
-        | EventStatus::Undefined { event: _, t: _ }
-        | EventStatus::Failed(_) => (),
-    };
-    assert_eq!(run(Event::new(|_, _| 1.0), 2), EventStatus::Completed);
-    assert_eq!(run(Event::new(|t, _| t - 0.15).terminal(), 2), EventStatus::Terminated { event: 0 });
-    assert!(matches!(run(Event::new(|t, _| (0.15 - t).sqrt()), 3), EventStatus::Undefined { event: 0, .. }));
-    assert!(matches!(run(Event::new(|_, _| 1.0), 4000), EventStatus::Failed(_)));
+    assert_eq!(run(Event::new(|_, _| 1.0), 2), (Status::Completed, 0));
+    let (stopped, found) = run(Event::new(|t, _| t - 0.15).terminal(), 2);
+    let there = matches!(stopped, Status::Stopped { step: 2, t, by: "an event" } if (t - 0.15).abs() <= 1e-15);
+    assert!(there && found == 1, "{stopped:?}, {found}");
+    let (undefined, _) = run(Event::new(|t, _| (0.15 - t).sqrt()), 3);
+    assert!(matches!(undefined, Status::Failed { cause: StepError::Event { .. }, .. }), "{undefined:?}");
+    let (failed, found) = run(Event::new(|_, x| x.z - 3.0), 4000);
+    let by_itself = matches!(failed, Status::Failed { cause, .. } if !matches!(cause, StepError::Event { .. }));
+    assert!(by_itself && found > 0, "{failed:?}, {found}");
 }
 
 #[test]
@@ -312,7 +384,7 @@ fn geometry_errors() {
         GeometryError::Undefined { .. } => {
             let ld = Rectangle::new(Explosive, 0.1).unwrap();
             let outside = DiscretePoint::new([0.0], [f64::NAN], 0.0);
-            discrete_herglotz::statements::residual(13, &ld, &[], 0.0, &outside).unwrap_err()
+            discrete_herglotz::statements::residual(Statement::ActionDifferential, &ld, &[], 0.0, &outside).unwrap_err()
         }, ["not defined", "inside its domain"];
     });
     // The remedy is named, not left to the reader.
@@ -335,7 +407,7 @@ fn exact_errors() {
     }
     let oscillator = HarmonicOscillator { gamma: 0.0 };
     every!(ExactError<1> {
-        ExactError::Input(_) => ContactExponential::new(oscillator, -0.5).map_err(ExactError::from).unwrap_err(), ["-0.5", "positive finite"];
+        ExactError::Input(_) => ContactExponential::new(oscillator, -0.5).map_err(ExactError::from).unwrap_err(), ["-0.5", "finite number", "positive"];
         ExactError::OutsideDomain { .. } => {
             herglotz_flow(&Explosive, 0.0, &VelocityPoint::new([0.0], [0.0], 1.0), 2.0).unwrap_err()
         }, ["only until t = ", "smaller h", "another start"];
@@ -358,7 +430,7 @@ fn names_that_are_none() {
     let UnknownMethod { name } = "mid-point".parse::<Method>().unwrap_err();
     let sentence = UnknownMethod { name }.to_string();
     assert!(sentence.contains("\"mid-point\"") && sentence.contains("left_midpoint, midpoint"), "{sentence}");
-    let UnknownIntegrator { name } = "gauss_17".parse::<Integrator>().unwrap_err();
+    let UnknownIntegrator { name } = "gauss_17".parse::<AnyIntegrator>().unwrap_err();
     let sentence = UnknownIntegrator { name }.to_string();
     assert!(sentence.contains("\"gauss_17\"") && sentence.contains("gauss_16"), "{sentence}");
     let sentence = Suspicion { step: 7, misfit: 12.5 }.to_string();

@@ -1,10 +1,10 @@
-//! Scenes that ask for an accuracy: the true error is at most ten times what was asked for, or the scene is refused.
+//! Runs that ask for an accuracy: the true error is at most ten times what was asked for, or the run is refused.
 
 use super::dice::Dice;
 use super::problem::{Problem, integrators};
 use super::truth::{NoTruth, truth};
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
-use discrete_herglotz::{Scene, Status, Steps, Wanted};
+use discrete_herglotz::Status;
 
 /// The most steps that a case may take.
 const STEPS: usize = 200_000;
@@ -15,9 +15,14 @@ pub fn accurate<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checke
     let integrator = dice.pick(&integrators());
     let least: f64 = if integrator.order() <= 2 { 1e-4 } else { 1e-10 };
     let tolerance = dice.scale(least, 1e-2);
-    let wanted = Wanted { action: dice.chance(0.5), ..Wanted::default() };
-    let scene = Scene::new(system, *start, *span).from_time(*t0).by(integrator).steps(Steps::Accuracy(tolerance));
-    let plan = match scene.wanting(wanted).plan() {
+    let action = dice.chance(0.5);
+    let posed = match problem.posed() {
+        Ok(posed) => posed,
+        Err(error) => return Ok(refused(&error)),
+    };
+    let run = posed.by(integrator).accuracy(tolerance);
+    let run = if action { run } else { run.without_action() };
+    let plan = match run.plan(problem.until()) {
         Ok(plan) => plan,
         Err(error) => return Ok(refused(&error)),
     };

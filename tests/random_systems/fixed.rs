@@ -1,11 +1,12 @@
-//! Scenes with fixed steps: by every integrator, judged by the motion itself and by runs with shorter steps.
+//! Runs with fixed steps: by every integrator, judged by the motion itself and by runs with shorter steps.
 
 use super::dice::Dice;
 use super::problem::{Problem, integrators};
+use super::system::RandomSystem;
 use super::truth::{NoTruth, truth};
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
-use contact_geom::{Symmetry, Triple, VelocityPoint, legendre};
-use discrete_herglotz::{DiscreteLagrangian, Outcome, Scene, Solver, Status, Steps, Wanted};
+use contact_geom::{OneParameterGroup, Symmetry, Triple, VelocityPoint, legendre};
+use discrete_herglotz::{DiscreteLagrangian, Outcome, Plan, Row, Rows, Run, Solver, Status, Steps};
 use exact_lagrangian::ExactLagrangian;
 
 /// The error, relative to the size of the motion, below which a run has found its motion.
@@ -21,7 +22,34 @@ const CHAOTIC: f64 = 1e7;
 const STEPS: usize = 200;
 const REFINED: usize = 1 << 12;
 
-/// Draws what is asked of a scene, runs it and judges it.
+/// What is asked of a run beside its final `(q, p)`.
+#[derive(Clone, Debug)]
+struct Asked<const N: usize> {
+    action: bool,
+    conformal_factor: bool,
+    /// The steps between two rows.
+    rows: Option<usize>,
+    /// The momentum of this group in each row.
+    momentum: Option<Symmetry<N>>,
+}
+
+impl<const N: usize> Asked<N> {
+    fn of<'p, 'o>(&self, run: Run<'p, 'o, RandomSystem<N>, N>) -> Run<'p, 'o, RandomSystem<N>, N> {
+        let run = if self.action { run } else { run.without_action() };
+        if self.conformal_factor { run.with_conformal_factor() } else { run }
+    }
+
+    fn rows(&self) -> Option<Rows<'_, N>> {
+        let rows = Rows::every(self.rows?).ok()?;
+        let rows = if self.action { rows } else { rows.without_action() };
+        Some(match &self.momentum {
+            Some(group) => rows.column("J", |_, x| group.momentum(&x.q, &x.p)),
+            None => rows,
+        })
+    }
+}
+
+/// Draws what is asked of a run, runs it and judges it.
 pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let Problem { system, t0, start, span, .. } = problem;
     let integrator = dice.pick(&integrators());
@@ -29,14 +57,17 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let h = span / count as f64;
     let steps = if dice.chance(0.5) { Steps::Count(count) } else { Steps::Size(h) };
     let momentum = if N == 2 && dice.chance(0.2) { Symmetry::rotation(0, 1).ok() } else { None };
-    let wanted = Wanted {
+    let asked = Asked {
         action: dice.chance(0.6),
         conformal_factor: dice.chance(0.3),
         rows: dice.chance(0.3).then(|| 1 + dice.below(20)),
         momentum,
     };
-    let scene = Scene::new(system, *start, *span).from_time(*t0).by(integrator).steps(steps).wanting(wanted.clone());
-    let plan = match scene.plan() {
+    let posed = match problem.posed() {
+        Ok(posed) => posed,
+        Err(error) => return Ok(refused(&error)),
+    };
+    let plan = match asked.of(posed.by(integrator).steps(steps)).plan(problem.until()) {
         Ok(plan) => plan,
         Err(error) => return Ok(refused(&error)),
     };
@@ -44,13 +75,17 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         Ok(stepper) => stepper,
         Err(error) => return Ok(refused(&error)),
     };
-    let outcome = match plan.run() {
+    let mut rows = asked.rows();
+    let run = asked.of(posed.by(integrator).steps(steps));
+    let run = if let Some(rows) = &mut rows { run.observe(rows) } else { run };
+    let outcome = match run.run(problem.until()) {
         Ok(outcome) => outcome,
         Err(error) => return Ok(refused(&error)),
     };
-    finite(&outcome)?;
+    finite(&outcome, rows.iter().flat_map(|rows| &rows.rows))?;
     let Outcome { status, q, p, z, .. } = outcome;
-    if let Status::Failed { cause, step } = status {
+    if let Status::Failed { cause, step, t } = status {
+        ensure(t == outcome.t, Kind::RoutesDiffer, || format!("failed at t = {t}, ended at {}", outcome.t))?;
         ensure(step == outcome.steps, Kind::RoutesDiffer, || format!("step {step} failed after {}", outcome.steps))?;
         return Ok(ended(&cause));
     }
@@ -66,7 +101,7 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let same = halted.is_ok() && bare.q == q && bare.p == p && z.is_none_or(|z| z == bare.z);
     ensure(same, Kind::ObservedDiffers, || {
         let apart = larger_of(&(bare.q - q), &(bare.p - p));
-        format!("{integrator}: {apart:e} between a run with {wanted:?} and one without, {halted:?}")
+        format!("{integrator}: {apart:e} between a run with {asked:?} and one without, {halted:?}")
     })?;
     if outcome.suspicion.is_some() {
         return Ok(Verdict::Marked);
@@ -87,15 +122,14 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         return Ok(Verdict::Right);
     }
     // The order cannot be asked of a step that is too long; that the error falls can.
-    let finer = Wanted { action: wanted.action, ..Wanted::default() };
+    let finer = Asked { conformal_factor: false, ..asked };
     let mut ends = vec![Some((q, p, z))];
     let mut errors = vec![error];
     let mut refined = 2 * count;
     let small_enough = |error: f64, first: f64| error <= 0.7 * first.min(FOUND) || error <= floor;
     while refined <= REFINED && (errors.len() == 1 || !small_enough(errors[errors.len() - 1], error)) {
-        let scene = Scene::new(system, *start, *span).from_time(*t0).by(integrator).steps(Steps::Count(refined));
         // A poor step may go where a good one refuses to.
-        let run = scene.wanting(finer.clone()).plan().and_then(|plan| plan.run()).ok();
+        let run = finer.of(posed.by(integrator).steps(Steps::Count(refined))).run(problem.until()).ok();
         let end = run.filter(|o| o.status == Status::Completed).map(|o| (o.q, o.p, o.z));
         errors.push(end.as_ref().map_or(f64::INFINITY, |(q, p, z)| truth.error(q, p, *z)));
         ends.push(end);
@@ -123,7 +157,7 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     if error <= FOUND {
         return Ok(Verdict::Right);
     }
-    let (step, worst) = worst_step(problem, &scene, truth.size)?;
+    let (step, worst) = worst_step(problem, &plan, truth.size)?;
     ensure(worst <= ORDER_ONE, Kind::UnmarkedStep, || {
         format!(
             "{integrator}, h = {h:.2e}: step {step} of {count} is wrong by {worst:.1e} sizes of the motion; at the end {error:.1e}"
@@ -139,12 +173,11 @@ fn larger_of<const N: usize>(
     contact_geom::largest(a.iter().chain(b).copied())
 }
 
-/// Refuses an outcome with a number that is not finite; a factor may be too small or too large for a number.
-fn finite<const N: usize>(outcome: &Outcome<N>) -> Result<(), Wrong> {
+/// Refuses an outcome with a number that is not finite; a factor may be too small or too large for a number in one step.
+fn finite<'r, const N: usize>(outcome: &Outcome<N>, rows: impl Iterator<Item = &'r Row<N>>) -> Result<(), Wrong> {
     let end = outcome.q.iter().chain(&outcome.p).copied().chain(outcome.z).chain([outcome.t]);
-    let rows =
-        outcome.rows.iter().flat_map(|r| r.q.iter().chain(&r.p).copied().chain(r.z).chain(r.momentum).chain([r.t]));
-    let good = end.chain(rows).all(f64::is_finite) && outcome.conformal_factor.is_none_or(|f| f >= 0.0);
+    let rows = rows.flat_map(|r| r.q.iter().chain(&r.p).copied().chain(r.z).chain(r.columns.clone()).chain([r.t]));
+    let good = end.chain(rows).all(f64::is_finite) && outcome.log_factor.is_none_or(|f| !f.is_nan());
     ensure(good, Kind::NotFinite, || format!("{outcome:?}"))
 }
 
@@ -155,11 +188,10 @@ const LOST: usize = 4;
 /// [wrong](ORDER_ONE): what runs away after it takes the motion long to follow.
 fn worst_step<const N: usize>(
     problem: &Problem<N>,
-    scene: &Scene<'_, super::system::RandomSystem<N>, N>,
+    plan: &Plan<'_, RandomSystem<N>, N>,
     [size_q, size_p, _]: [f64; 3],
 ) -> Result<(usize, f64), Wrong> {
     let none = (0, 0.0);
-    let Ok(plan) = scene.plan() else { return Ok(none) };
     let (Ok(mut stepper), Ok(exact)) =
         (plan.stepper(), ExactLagrangian::<_, N>::new(&problem.system, plan.step_size()))
     else {

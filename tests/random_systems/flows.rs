@@ -6,7 +6,7 @@ use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscreteJet, DiscretePoint, PhasePoint, Triple, larger, largest, legendre};
 use discrete_herglotz::{
-    DiscreteLagrangian, DiscretePath, Flow, Method, Record, Solver, Status, Transition, legendre_minus, legendre_plus,
+    DiscreteLagrangian, DiscretePath, Flow, Method, Solver, Transition, legendre_minus, legendre_plus,
 };
 
 pub fn flow<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
@@ -22,12 +22,8 @@ pub fn flow<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         Ok(flow) => flow,
         Err(error) => return Ok(refused(&error)),
     };
-    let mut record = Record::default();
-    let status = match flow.run(steps, &mut record) {
-        Ok(status) => status,
-        Err(error) => return Ok(refused(&error)),
-    };
-    let rows = &record.rows;
+    let mut rows = vec![(*t0, state)];
+    let taken = (0..steps).try_for_each(|_| flow.step().map(|step| rows.push((step.t, step.to))));
     let finite = rows.iter().all(|(t, x)| t.is_finite() && x.check().is_ok());
     ensure(finite, Kind::NotFinite, || format!("{method}: {:?}", rows.last()))?;
     for pair in rows.windows(2) {
@@ -58,11 +54,7 @@ pub fn flow<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
             ensure(finite, Kind::NotFinite, || format!("{method}: from points {:?}", again.state()))?;
         }
     }
-    match status {
-        Status::Failed { cause, .. } => Ok(ended(&cause)),
-        Status::Completed => Ok(Verdict::Right),
-        other => Err(Wrong { kind: Kind::RoutesDiffer, what: format!("{other}") }),
-    }
+    Ok(taken.map_or_else(|cause| ended(&cause), |()| Verdict::Right))
 }
 
 fn named(wrong: Wrong, name: impl std::fmt::Display) -> Wrong {

@@ -3,9 +3,9 @@
 use super::dice::Dice;
 use super::flows::{is_conformal, step_solves_its_equations};
 use super::problem::Problem;
-use super::verdict::{Checked, Kind, Verdict, ended, ensure, refused};
+use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
 use contact_geom::{PhasePoint, Triple, larger, largest, legendre};
-use discrete_herglotz::{Direction, Event, EventStatus, Gauss, Halt, Stepper, run_with_events};
+use discrete_herglotz::{AnyIntegrator, Event, Events, Gauss, Halt, Start, Status, Stepper, Steps, Until};
 
 pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let Problem { system, t0, start, .. } = problem;
@@ -58,42 +58,7 @@ pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         format!("gauss_{stages} without the action: {all:?} and {without:?}, {end:?} and {:?}", bare.state())
     })?;
 
-    let Ok(mut watched) = stepper() else { return Ok(Verdict::NoReference) };
-    let level = state.q[0] + dice.between(-0.5, 0.5);
-    let direction = dice.pick(&[Direction::Both, Direction::Rising, Direction::Falling]);
-    let event = Event::new(|_, x: &PhasePoint<N>| x.q[0] - level).in_direction(direction);
-    let terminal = dice.chance(0.3);
-    let events = &mut [if terminal { event.terminal() } else { event }];
-    let run = match run_with_events(&mut watched, steps, events) {
-        Ok(run) => run,
-        Err(error) => return Ok(refused(&error)),
-    };
-    let mut before = *t0;
-    for crossing in &run.crossings {
-        let off = (crossing.state.q[0] - level).abs();
-        // The rounding of the curve's sums over up to 16 terms, and what the motion does in the spacing of its fractions.
-        let size = Triple::from(crossing.state).amax() + Triple::from(end).amax() + Triple::from(state).amax() + 1.0;
-        let bound = 1e3 * f64::EPSILON * size;
-        ensure(off <= bound && crossing.t >= before, Kind::Residual, || {
-            format!("gauss_{stages}: a crossing at t = {} is {off:.1e} off, not {bound:.1e}", crossing.t)
-        })?;
-        before = crossing.t;
-    }
-    match run.status {
-        EventStatus::Completed => {
-            let same = all.is_ok() && run.state == end;
-            ensure(same, Kind::ObservedDiffers, || format!("with events {:?}, without {end:?}", run.state))?;
-        }
-        EventStatus::Terminated { .. } => {
-            ensure(terminal && run.state.check().is_ok(), Kind::NotFinite, || format!("{run:?}"))?;
-        }
-        EventStatus::Failed(halt) => {
-            ensure(all == Err(halt), Kind::ObservedDiffers, || format!("{halt:?} with events, {all:?} without"))?;
-        }
-        EventStatus::Undefined { .. } => {
-            ensure(run.state.check().is_ok(), Kind::NotFinite, || format!("{run:?}"))?;
-        }
-    }
+    with_events(problem, (stages, h, steps), dice)?;
     Ok(match all {
         _ if whole.suspicion().is_some() => Verdict::Marked,
         Ok(()) => Verdict::Right,
@@ -101,12 +66,78 @@ pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     })
 }
 
+/// A run with an event where the first coordinate crosses a level: its states are there, its times in order, and the run is the same as
+/// without.
+fn with_events<const N: usize>(
+    problem: &Problem<N>,
+    (stages, h, steps): (usize, f64, usize),
+    dice: &mut Dice,
+) -> Result<(), Wrong> {
+    let Problem { system, t0, start, .. } = problem;
+    let level = start.q[0] + dice.between(-0.5, 0.5);
+    let event = Event::new(|_, x: &PhasePoint<N>| x.q[0] - level);
+    let event = match dice.below(3) {
+        0 => event,
+        1 => event.rising(),
+        _ => event.falling(),
+    };
+    let terminal = dice.chance(0.3);
+    let mut events = Events::new([if terminal { event.terminal() } else { event }]);
+    // A run is refused more than a stepper: it looks at the claims along the whole span.
+    let Ok(posed) = problem.posed() else { return Ok(()) };
+    let by_steps = posed.by(AnyIntegrator::Gauss { stages }).steps(Steps::Size(h)).observe(&mut events);
+    let Ok(plan) = by_steps.plan(Until::Steps(steps)) else { return Ok(()) };
+    // It may differ from h in the last digit.
+    let of_run = plan.step_size();
+    let (Ok(outcome), Ok(gauss)) = (by_steps.run(Until::Steps(steps)), Gauss::new(system, stages, of_run)) else {
+        return ensure(false, Kind::RoutesDiffer, || format!("gauss_{stages}: a plan and no run"));
+    };
+    let at = posed.state();
+    let Ok(mut stepper) = gauss.stepper(*t0, *at, start.v) else {
+        return ensure(false, Kind::RoutesDiffer, || format!("gauss_{stages}: a run and no stepper"));
+    };
+    let without = stepper.advance(steps);
+    let (state, end) = (outcome.state(), stepper.state());
+    let mut before = *t0;
+    for crossing in &events.crossings {
+        let off = (crossing.state.q[0] - level).abs();
+        // The rounding of a step's sums over up to 16 terms, and what the motion does in the spacing of the time.
+        let size = Triple::from(crossing.state).amax() + Triple::from(end).amax() + Triple::from(*at).amax() + 1.0;
+        let from_there = discrete_herglotz::Problem::new(system, crossing.t, Start::Momentum(crossing.state, start.v));
+        let speed = from_there.map_or(f64::INFINITY, |from_there| from_there.start().v[0].abs());
+        let bound = f64::EPSILON * (1e3 * size + 4.0 * crossing.t.abs() * speed);
+        ensure(off <= bound && crossing.t >= before, Kind::Residual, || {
+            format!("gauss_{stages}: a crossing at t = {} is {off:.1e} off, not {bound:.1e}", crossing.t)
+        })?;
+        before = crossing.t;
+    }
+    match outcome.status {
+        Status::Completed => ensure(without.is_ok() && state == end, Kind::ObservedDiffers, || {
+            format!("gauss_{stages}: with events {state:?}, without {end:?}")
+        }),
+        Status::Stopped { t, .. } => {
+            let there = events.crossings.last().map(|c| (c.t, c.state)) == Some((t, state)) && t == outcome.t;
+            ensure(terminal && there, Kind::RoutesDiffer, || format!("gauss_{stages}: {outcome:?}"))
+        }
+        // Of the run itself it is the same failure; before that one there may be a part of a step that cannot be taken.
+        Status::Failed { step, cause, .. } => {
+            let same = without == Err(Halt { taken: step, cause });
+            let before = without.map_or_else(|halt| halt.taken, |()| steps) >= step && step > 0;
+            ensure((same || before) && state.check().is_ok(), Kind::ObservedDiffers, || {
+                format!("gauss_{stages}: {outcome:?} with events, {without:?} without")
+            })
+        }
+        // The plan has taken all steps, and looked.
+        Status::FalseClaim { .. } => ensure(false, Kind::RoutesDiffer, || format!("gauss_{stages}: {outcome:?}")),
+    }
+}
+
 /// The dense output of the last step: at its ends the states, between them finite.
 fn looked_at<const N: usize>(
     stepper: &discrete_herglotz::GaussStepper<'_, &super::system::RandomSystem<N>, N>,
     stages: usize,
     dice: &mut Dice,
-) -> Result<(), super::verdict::Wrong> {
+) -> Result<(), Wrong> {
     let Some(curve) = stepper.dense() else {
         return ensure(false, Kind::RoutesDiffer, || "no dense output after a step".into());
     };

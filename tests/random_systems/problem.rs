@@ -4,11 +4,11 @@ use super::dice::Dice;
 use super::system::RandomSystem;
 use contact_geom::VelocityPoint;
 use contact_geom::nalgebra::SVector;
-use discrete_herglotz::Integrator;
+use discrete_herglotz::{AnyIntegrator, InputError, Until};
 
 /// The integrators that may apply: random systems state no clock.
-pub fn integrators() -> Vec<Integrator> {
-    Integrator::all().into_iter().filter(|integrator| !matches!(integrator, Integrator::Clocked { .. })).collect()
+pub fn integrators() -> Vec<AnyIntegrator> {
+    AnyIntegrator::all().into_iter().filter(|integrator| !matches!(integrator, AnyIntegrator::Clocked { .. })).collect()
 }
 
 /// A system with the time, the place and the span of a motion.
@@ -43,5 +43,15 @@ impl<const N: usize> Problem<N> {
         let z = if dice.chance(0.3) { 0.0 } else { reach * dice.between(-1.0, 1.0) };
         let span = dice.scale(0.05, 20.0);
         Problem { system, t0, start: VelocityPoint { q, v, z }, span, pace: if reach > 1.0 { reach } else { 1.0 } }
+    }
+
+    /// As the library takes it.
+    pub fn posed(&self) -> Result<discrete_herglotz::Problem<'_, RandomSystem<N>, N>, InputError> {
+        discrete_herglotz::Problem::new(&self.system, self.t0, self.start)
+    }
+
+    /// Its end.
+    pub fn until(&self) -> Until {
+        Until::Time(self.t0 + self.span)
     }
 }

@@ -45,7 +45,7 @@ impl<const N: usize> Truth<N> {
         f64::EPSILON * self.condition * (1e3 * (steps as f64).sqrt() + 1e3 * t0.abs())
     }
 
-    /// The error of `(q, p)` relative to its size at the end, as `Steps::Accuracy` promises it.
+    /// The error of `(q, p)` relative to its size at the end, as `Run::accuracy` promises it.
     pub fn error_at_end(&self, q: &SVector<f64, N>, p: &SVector<f64, N>) -> f64 {
         let norm = |q: &SVector<f64, N>, p: &SVector<f64, N>| larger(largest(q), largest(p));
         relative(norm(&(q - self.end.q), &(p - self.end.p)), norm(&self.end.q, &self.end.p))

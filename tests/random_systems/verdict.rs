@@ -70,6 +70,7 @@ pub fn refused(error: &InputError) -> Verdict {
         InputError::Step { .. } => "step",
         InputError::Span { .. } => "span",
         InputError::Accuracy { .. } => "accuracy",
+        InputError::Times { .. } => "times",
         InputError::Stages { .. } => "stages",
         InputError::Clock { .. } => "clock",
         InputError::Dimension => "dimension",
@@ -86,7 +87,7 @@ pub fn refused(error: &InputError) -> Verdict {
     })
 }
 
-/// The name of bad luck, for the tally.
+/// The name of what went wrong along a motion, for the tally.
 pub fn ended(cause: &StepError) -> Verdict {
     Verdict::Ended(match cause {
         StepError::NotConverged { .. } => "not converged",
@@ -95,6 +96,7 @@ pub fn ended(cause: &StepError) -> Verdict {
         StepError::OutsideDomain { .. } => "outside the domain",
         StepError::ConjugatePoint { .. } => "conjugate point",
         StepError::NonFinite => "not finite",
+        StepError::Event { .. } => "event",
         #[allow(unreachable_patterns)] // As above.
         _ => "another",
     })

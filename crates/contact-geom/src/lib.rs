@@ -24,59 +24,28 @@
 //!
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
-mod action;
-mod blocks;
-mod clock;
-mod contact_form;
-mod darboux;
-mod discrete_form;
-mod dual;
+mod dynamics;
 mod error;
-mod fibre_form;
-mod hamiltonian;
-mod herglotz;
-mod lagrangian;
-mod lagrangian_form;
-mod largest;
-pub mod linear;
-mod module;
-#[cfg(feature = "num-dual")]
-mod num_dual;
-mod points;
-mod probe;
-mod pullback;
-mod rounded;
-mod scalar;
-mod smooth;
+mod forms;
+mod number;
+mod statement;
 pub mod statements;
-mod structure;
 pub mod systems;
 
-pub use action::{OneParameterGroup, Symmetry};
-pub use clock::Clock;
-pub use contact_form::{ContactForm, Form, generic};
-pub use darboux::Darboux;
-pub use discrete_form::{DiscreteJet, EtaMinus, EtaPlus, SecondDiscreteJet};
-pub use dual::{Dual, KernelDual};
+pub use dynamics::{
+    Clock, DarbouxBracket, DarbouxField, Defect, Defects, Derivatives, Energy, HerglotzField, Hessian,
+    InfinitesimalConformality, Lagrangian, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient,
+    Regularity, Structure, Symmetry, ValueOnly, check_closed_derivatives, conformal_factor_along, derivative_along,
+    derived_gradient, derived_hessian, dissipation_defect, hamiltonian_vector_field, herglotz_field, herglotz_rates,
+    infinitesimal_conformality, jacobi_bracket, legendre, legendre_jacobian, lie_bracket, lie_derivative, regularity,
+};
 pub use error::GeometryError;
-pub use hamiltonian::{
-    DarbouxBracket, DarbouxField, InfinitesimalConformality, Quotient, conformal_factor_along, derivative_along,
-    dissipation_defect, hamiltonian_vector_field, infinitesimal_conformality, jacobi_bracket, lie_bracket,
-    lie_derivative,
+pub use forms::{
+    Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, EtaMinus, EtaPlus, Form, LagrangianForm,
+    PhasePoint, SecondDiscreteJet, Smooth, SmoothFunction, Triple, VelocityPoint, conformality,
+    conformality_with_jacobian, generic, seed,
 };
-pub use herglotz::{
-    Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, Regularity, herglotz_field, herglotz_rates,
-    legendre, legendre_jacobian, regularity,
-};
-pub use lagrangian::{Hessian, Lagrangian, ValueOnly, derived_gradient, derived_hessian};
-pub use lagrangian_form::LagrangianForm;
-pub use largest::{Larger, Largest, larger, largest};
-pub use module::{Border, Module};
-pub use points::{DiscretePoint, PhasePoint, Triple, VelocityPoint, seed};
-pub use probe::check_closed_derivatives;
-pub use pullback::{Conformality, conformality, conformality_with_jacobian};
-pub use scalar::Scalar;
-pub use smooth::{Smooth, SmoothFunction};
-pub use structure::{Defect, Defects, Structure};
+pub use number::{Border, Dual, KernelDual, Larger, Largest, Module, Scalar, larger, largest, linear};
+pub use statement::Statement;
 
 pub use nalgebra;

@@ -1,46 +1,57 @@
 //! The paper's section 2 as residuals: each statement evaluated at a point of a system, relative to its terms' size.
 //!
-//! The numbers are those of the project's list of statements (NOTATION.md has it). A residual of a true statement is
-//! round-off times the conditions of the matrices involved; a test compares it with a tolerance, this module has none.
+//! A residual of a true statement is round-off times the conditions of the matrices involved; a test compares it with a
+//! tolerance, this module has none.
 
 // In a check `f64::max` and `amax` would lose a NaN.
 #![deny(clippy::disallowed_methods)]
 
 use crate::systems::{FreeParticle, HarmonicOscillator, System};
 use crate::{
-    ContactForm, Darboux, DarbouxBracket, DarbouxField, Dual, Energy, Form, GeometryError, HerglotzField, Lagrangian,
-    LagrangianForm, Larger, Largest, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, PhasePoint, Quotient,
-    Scalar, Smooth, SmoothFunction, Triple, VelocityPoint, conformal_factor_along, conformality, dissipation_defect,
-    generic, hamiltonian_vector_field, herglotz_field, infinitesimal_conformality, jacobi_bracket, legendre,
-    legendre_jacobian, lie_bracket, lie_derivative, regularity,
+    ContactForm, Darboux, DarbouxBracket, DarbouxField, Derivatives, Dual, Energy, Form, GeometryError, HerglotzField,
+    Lagrangian, LagrangianForm, Larger, Largest, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup,
+    PhasePoint, Quotient, Scalar, Smooth, SmoothFunction, Statement, Triple, VelocityPoint, conformal_factor_along,
+    conformality, dissipation_defect, generic, hamiltonian_vector_field, herglotz_field, infinitesimal_conformality,
+    jacobi_bracket, legendre, legendre_jacobian, lie_bracket, lie_derivative, regularity,
 };
 use nalgebra::SVector;
 
 /// The statements of section 2 that [`residual`] evaluates.
-pub const STATEMENTS: [u32; 10] = [1, 2, 3, 4, 6, 7, 8, 9, 11, 12];
+pub const STATEMENTS: [Statement; 10] = [
+    Statement::Volume,
+    Statement::ReebField,
+    Statement::HamiltonianField,
+    Statement::InfinitesimalContactomorphism,
+    Statement::EnergyDecay,
+    Statement::Regularity,
+    Statement::HerglotzField,
+    Statement::LegendreTransformation,
+    Statement::DissipatedQuantities,
+    Statement::Noether,
+];
 
 /// The residual of a statement of section 2 for a system at a time and a point of TQ x R; `None` where the statement's
-/// hypotheses do not apply, as for Noether's theorem without a symmetry, or where the number is not one of [`STATEMENTS`].
+/// hypotheses do not apply, as for Noether's theorem without a symmetry, or where it is not one of [`STATEMENTS`].
 ///
 /// # Errors
 /// Those of the forms at a point where the system is not regular.
 pub fn residual<const N: usize>(
-    statement: u32,
+    statement: Statement,
     system: &impl System<N>,
     t: f64,
     x: &VelocityPoint<N>,
 ) -> Result<Option<f64>, GeometryError> {
     Ok(match statement {
-        1 => Some(volume(system, t, x)?),
-        2 => Some(reeb(system, t, x)?),
-        3 => Some(hamiltonian_field(system, t, x)?),
-        4 => Some(infinitesimal_conformal(system, t, x)?),
-        6 => Some(energy_decay(system, t, x)?),
-        7 => Some(regular_iff_contact(system, t, x)?),
-        8 => Some(second_order_equation(system, t, x)?),
-        9 => Some(legendre_is_contact(system, t, x)?),
-        11 => Some(dissipated_quantities(system, t, x)?),
-        12 => noether(system, t, x)?,
+        Statement::Volume => Some(volume(system, t, x)?),
+        Statement::ReebField => Some(reeb(system, t, x)?),
+        Statement::HamiltonianField => Some(hamiltonian_field(system, t, x)?),
+        Statement::InfinitesimalContactomorphism => Some(infinitesimal_conformal(system, t, x)?),
+        Statement::EnergyDecay => Some(energy_decay(system, t, x)?),
+        Statement::Regularity => Some(regular_iff_contact(system, t, x)?),
+        Statement::HerglotzField => Some(second_order_equation(system, t, x)?),
+        Statement::LegendreTransformation => Some(legendre_is_contact(system, t, x)?),
+        Statement::DissipatedQuantities => Some(dissipated_quantities(system, t, x)?),
+        Statement::Noether => noether(system, t, x)?,
         _ => None,
     })
 }
@@ -92,7 +103,8 @@ fn relative_number(a: f64, b: f64, least: f64) -> f64 {
 /// The contact condition, flat, sharp and Reeb field of one form: closed against generic, and against their definitions.
 fn form_residual<const N: usize>(form: &impl ContactForm<N>, x: &Triple<N>) -> Result<f64, GeometryError> {
     let (eta, d_eta, reeb) = (form.eta(x)?, form.d_eta(x)?, form.reeb(x)?);
-    let contraction = crate::smooth::apply_transposed(&d_eta, &reeb).largest() / (d_eta.largest() * reeb.largest());
+    let contraction =
+        crate::forms::smooth::apply_transposed(&d_eta, &reeb).largest() / (d_eta.largest() * reeb.largest());
     let mut worst = contraction.larger((eta.dot(&reeb) - 1.0).abs() / (eta.largest() * reeb.largest()).larger(1.0));
     worst = worst.larger(relative(reeb, generic::reeb(form, x)?, 0.0));
     worst = worst.larger(relative(form.flat(x, &reeb)?, eta, 0.0));
@@ -299,7 +311,7 @@ fn legendre_is_contact<const N: usize>(
     if let Some(h) = known_hamiltonian(system) {
         let energy = Energy(system).value(t, &velocity);
         worst = worst.larger(relative_number(energy, h.value(t, &phase), 1.0));
-        let pushed = crate::smooth::apply(&jacobian, &herglotz_field(system, t, x)?);
+        let pushed = crate::forms::smooth::apply(&jacobian, &herglotz_field(system, t, x)?);
         worst = worst.larger(relative(pushed, DarbouxField { hamiltonian: &h, t }.at(&phase)?, 1.0));
     }
     Ok(worst)

@@ -6,7 +6,9 @@
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
-use discrete_herglotz::{InputError, Integrator, Outcome, Scene, SplittingScheme, Status, Steps, Wanted};
+use discrete_herglotz::{
+    AnyIntegrator, InputError, Outcome, Problem, Rows, Run, SplittingScheme, Status, Steps, Until,
+};
 use std::hint::black_box;
 use std::io::Write;
 use std::time::Instant;
@@ -36,106 +38,117 @@ struct Line {
 /// Runs of which a median is taken.
 const RUNS: usize = 41;
 
-/// The median time of a scene's run, in microseconds, with its outcome.
-fn timed<L: Lagrangian<N>, const N: usize>(scene: &Scene<'_, L, N>) -> Result<(f64, Outcome<N>), InputError> {
-    let plan = scene.plan()?;
-    let outcome = plan.run()?;
+/// The median time of a motion, in microseconds, with its outcome.
+type Timed<const N: usize> = Result<(f64, Outcome<N>), InputError>;
+
+fn median<const N: usize>(mut times: Vec<f64>, outcome: Outcome<N>) -> Timed<N> {
+    assert_eq!(outcome.status, Status::Completed);
+    times.sort_by(f64::total_cmp);
+    Ok((times[RUNS / 2], outcome))
+}
+
+/// The steps of a run alone.
+fn steps<L: Lagrangian<N>, const N: usize>(run: &Run<'_, '_, L, N>, until: Until) -> Timed<N> {
+    let plan = run.plan(until)?;
     let mut times = Vec::with_capacity(RUNS);
     for _ in 0..RUNS {
         let mut stepper = plan.stepper()?;
         let clock = Instant::now();
-        let recorded = scene_runs_by_itself(scene);
-        if recorded {
-            black_box(plan.run()?);
-        } else {
-            let halted = stepper.advance(plan.count());
-            assert!(halted.is_ok(), "{halted:?}");
-        }
+        let halted = stepper.advance(plan.count());
+        times.push(clock.elapsed().as_secs_f64() * 1e6);
+        assert!(halted.is_ok(), "{halted:?}");
+    }
+    median(times, plan.run()?)
+}
+
+/// A whole run, with what it does between its steps.
+fn whole<const N: usize>(run: impl Fn() -> Result<Outcome<N>, InputError>) -> Timed<N> {
+    let mut times = Vec::with_capacity(RUNS);
+    for _ in 0..RUNS {
+        let clock = Instant::now();
+        black_box(run()?);
         times.push(clock.elapsed().as_secs_f64() * 1e6);
     }
-    times.sort_by(f64::total_cmp);
-    assert_eq!(outcome.status, Status::Completed);
-    Ok((times[RUNS / 2], outcome))
+    median(times, run()?)
 }
 
-/// Whether what is timed is the run of the plan, with its rows and factors, and not the steps alone.
-fn scene_runs_by_itself<L: Lagrangian<N>, const N: usize>(scene: &Scene<'_, L, N>) -> bool {
-    scene.wanted().rows.is_some() || scene.wanted().conformal_factor
-}
-
-/// A line from a scene that does all and one that skips.
-fn line<A: Lagrangian<N>, B: Lagrangian<N>, const N: usize>(
+/// A line from a motion that is computed with all and one that skips.
+fn line<const N: usize>(
     (what, on): (&'static str, &'static str),
-    full: &Scene<'_, A, N>,
-    skipping: &Scene<'_, B, N>,
+    full: Timed<N>,
+    skipping: Timed<N>,
 ) -> Result<Line, InputError> {
-    let ((full, a), (skipped, b)) = (timed(full)?, timed(skipping)?);
+    let ((full, a), (skipped, b)) = (full?, skipping?);
     let size = a.q.amax().max(a.p.amax());
     Ok(Line { what, on, full, skipped, apart: (a.q - b.q).amax().max((a.p - b.p).amax()) / size })
 }
 
 fn lines() -> Result<Vec<Line>, InputError> {
-    let none = Wanted { action: false, ..Wanted::default() };
     let start = VelocityPoint::new([1.0], [1.0], 0.0);
-    let sixteen = Integrator::Gauss { stages: 16 };
-    let eight = Integrator::Gauss { stages: 8 };
-    let nystrom = Integrator::Splitting(SplittingScheme::BLANES_MOAN_6);
+    let late = Until::Time(1000.0);
+    let sixteen = AnyIntegrator::Gauss { stages: 16 };
+    let eight = AnyIntegrator::Gauss { stages: 8 };
+    let nystrom = AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6);
 
     let pendulum = Pendulum { gamma: -0.01 };
-    let swing = |by: Integrator, h: f64, wanted: &Wanted<1>| {
-        Scene::new(&pendulum, start, 1000.0).by(by).steps(Steps::Size(h)).wanting(wanted.clone())
-    };
-    let with_z = Wanted::default();
-    let rows = Wanted { rows: Some(1), ..none.clone() };
+    let swing = Problem::new(&pendulum, 0.0, start)?;
+    let with_z = |by: AnyIntegrator, h: f64| steps(&swing.by(by).steps(Steps::Size(h)), late);
+    let without_z = |by: AnyIntegrator, h: f64| steps(&swing.by(by).steps(Steps::Size(h)).without_action(), late);
     let affine = Structure { separable: false, ..pendulum.structure() };
     let constant_mass = Claiming(pendulum, affine);
     let plain = Claiming(pendulum, Structure { constant_mass: false, ..affine });
+    let general = |lagrangian| {
+        let swing = Problem::new(lagrangian, 0.0, start)?;
+        steps(&swing.by(eight).steps(Steps::Size(1.0)).without_action(), late)
+    };
+    // A plan is run without observers; so the plans of both are timed too.
+    let recorded = || {
+        let mut rows = Rows::every(1)?.without_action();
+        swing.by(nystrom).steps(Steps::Size(0.2)).without_action().observe(&mut rows).run(late)
+    };
+    let unrecorded = || swing.by(nystrom).steps(Steps::Size(0.2)).without_action().run(late);
 
     let oscillator = HarmonicOscillator { gamma: -0.05 };
     let unquadratic = Claiming(oscillator, Structure { quadratic: false, ..oscillator.structure() });
+    let (linear, iterated) = (Problem::new(&oscillator, 0.0, start)?, Problem::new(&unquadratic, 0.0, start)?);
     let kepler = Kepler::<2> { mu: 1.0, gamma: -1e-4 };
-    let orbit = |wanted: Wanted<2>| {
-        Scene::new(&kepler, kepler.initial(), 200.0).by(sixteen).steps(Steps::Size(0.5)).wanting(wanted)
-    };
+    let orbit = Problem::new(&kepler, 0.0, kepler.initial())?;
+    let around = || orbit.by(sixteen).steps(Steps::Size(0.5));
     let square = QuadraticInZ { c: 0.1 };
-    let decay = |conformal_factor: bool| {
-        Scene::new(&square, VelocityPoint::new([1.0], [0.0], 1.0), 100.0)
-            .by(eight)
-            .steps(Steps::Size(2.0))
-            .wanting(Wanted { conformal_factor, ..Wanted::default() })
-    };
+    let decay = Problem::new(&square, 0.0, VelocityPoint::new([1.0], [0.0], 1.0))?;
+    let decaying = || decay.by(eight).steps(Steps::Size(2.0));
+    let with_factor = decaying().with_conformal_factor().plan(Until::Time(100.0))?;
+    let without_factor = decaying().plan(Until::Time(100.0))?;
     let double = DoublePendulum::default();
-    let by = |integrator: Integrator, h: f64| {
-        Scene::new(&double, double.initial(), 20.0).by(integrator).steps(Steps::Size(h))
-    };
-    let general = |l| Scene::new(l, start, 1000.0).by(eight).steps(Steps::Size(1.0)).wanting(none.clone());
+    let chaos = Problem::new(&double, 0.0, double.initial())?;
+    let by = |integrator: AnyIntegrator| steps(&chaos.by(integrator).steps(Steps::Size(0.05)), Until::Time(20.0));
 
     Ok(vec![
-        line(("z", "pendulum, gauss_16"), &swing(sixteen, 2.5, &with_z), &swing(sixteen, 2.5, &none))?,
-        line(("z", "pendulum, blanes_moan_6"), &swing(nystrom, 0.2, &with_z), &swing(nystrom, 0.2, &none))?,
+        line(("z", "pendulum, gauss_16"), with_z(sixteen, 2.5), without_z(sixteen, 2.5))?,
+        line(("z", "pendulum, blanes_moan_6"), with_z(nystrom, 0.2), without_z(nystrom, 0.2))?,
         line(
             ("z", "Kepler, gauss_16"),
-            &orbit(Wanted::default()),
-            &orbit(Wanted { action: false, ..Wanted::default() }),
+            steps(&around(), Until::Time(200.0)),
+            steps(&around().without_action(), Until::Time(200.0)),
         )?,
         line(
             ("iteration (one matrix)", "oscillator, gauss_16"),
-            &Scene::new(&unquadratic, start, 1000.0).by(sixteen).steps(Steps::Size(2.5)).wanting(none.clone()),
-            &Scene::new(&oscillator, start, 1000.0).by(sixteen).steps(Steps::Size(2.5)).wanting(none.clone()),
+            steps(&iterated.by(sixteen).steps(Steps::Size(2.5)).without_action(), late),
+            steps(&linear.by(sixteen).steps(Steps::Size(2.5)).without_action(), late),
         )?,
-        line(("stages of z and rho", "pendulum, gauss_8"), &general(&constant_mass), &swing(eight, 1.0, &none))?,
-        line(
-            ("mass matrix at the stages", "pendulum, gauss_8"),
-            &general(&plain),
-            &Scene::new(&constant_mass, start, 1000.0).by(eight).steps(Steps::Size(1.0)).wanting(none.clone()),
-        )?,
+        line(("stages of z and rho", "pendulum, gauss_8"), general(&constant_mass), without_z(eight, 1.0))?,
+        line(("mass matrix at the stages", "pendulum, gauss_8"), general(&plain), general(&constant_mass))?,
         line(
             ("Newton's method", "double pendulum, midpoint by composition or gauss_3"),
-            &by(Integrator::Composition(discrete_herglotz::Method::Midpoint, SplittingScheme::YOSHIDA_6), 0.05),
-            &by(Integrator::Gauss { stages: 3 }, 0.05),
+            by(AnyIntegrator::Composition(discrete_herglotz::Method::Midpoint, SplittingScheme::YOSHIDA_6)),
+            by(AnyIntegrator::Gauss { stages: 3 }),
         )?,
-        line(("rows", "pendulum, blanes_moan_6"), &swing(nystrom, 0.2, &rows), &swing(nystrom, 0.2, &none))?,
-        line(("conformal factor", "quadratic in z, gauss_8"), &decay(true), &decay(false))?,
+        line(("rows", "pendulum, blanes_moan_6"), whole(recorded), whole(unrecorded))?,
+        line(
+            ("conformal factor", "quadratic in z, gauss_8"),
+            whole(|| with_factor.run()),
+            whole(|| without_factor.run()),
+        )?,
     ])
 }
 

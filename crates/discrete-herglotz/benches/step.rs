@@ -5,7 +5,7 @@ use contact_geom::PhasePoint;
 use contact_geom::nalgebra::{Matrix2, Vector2};
 use contact_geom::systems::{DoublePendulum, Pendulum};
 use criterion::{Criterion, criterion_group, criterion_main};
-use discrete_herglotz::{DiscreteLagrangian, FinalOnly, Flow, LeftMidpoint};
+use discrete_herglotz::{DiscreteLagrangian, Flow, LeftMidpoint, Stepper};
 use std::hint::black_box;
 
 const H: f64 = 0.1;
@@ -14,7 +14,7 @@ const STEPS: usize = 1000;
 /// A run of the library, final state only.
 fn by_library<const N: usize>(ld: &impl DiscreteLagrangian<N>, start: PhasePoint<N>) -> Option<PhasePoint<N>> {
     let mut flow = Flow::new(ld, 0.0, start).ok()?;
-    flow.run(STEPS, &mut FinalOnly).ok()?;
+    flow.advance(STEPS).ok()?;
     Some(*flow.state())
 }
 

@@ -1,4 +1,4 @@
-//! Bad input, and bad luck.
+//! Bad input, and what goes wrong along a motion.
 
 use contact_geom::GeometryError;
 use thiserror::Error;
@@ -6,14 +6,16 @@ use thiserror::Error;
 /// Bad input, found before the first step.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum InputError {
-    /// The step is not a positive finite number.
-    #[error("the step h = {h} must be a positive finite number")]
+    /// The step is 0 or not finite, or negative where something else tells the direction, as the end of a run does.
+    #[error(
+        "the step h = {h} must be a finite number and not 0; and positive where the end of the run tells its direction"
+    )]
     Step {
         /// The step that was passed.
         h: f64,
     },
-    /// The span of a scene is not a positive finite time.
-    #[error("the span of time is {span}; it must be positive and finite")]
+    /// The span of a run is 0 or not finite.
+    #[error("the span of time is {span}; it must be finite and not 0 (negative to go back)")]
     Span {
         /// The span that was passed.
         span: f64,
@@ -45,6 +47,32 @@ pub enum InputError {
         most: f64,
         /// What to do.
         remedy: &'static str,
+    },
+    /// A run has neither steps nor an accuracy for which they are chosen.
+    #[error("the run has no steps; give them by `steps`, or ask for an `accuracy`")]
+    NoSteps,
+    /// A run with given steps names no integrator.
+    #[error("the run has no integrator; name one by `by`, or ask for an `accuracy` for which one is chosen")]
+    NoIntegrator,
+    /// A run is resumed that is not the one which was interrupted.
+    #[error(
+        "the run is not the one that was interrupted; resume it with the same problem, integrator, steps, end and requests"
+    )]
+    AnotherRun,
+    /// A run is to be saved whose stepper does not know how.
+    #[error(
+        "the integrator's stepper cannot be saved; leave the checkpoint out, or give it `Stepper::save` and `restore`"
+    )]
+    Unsaved,
+    /// Times of output are not in order, not finite, or outside of the span of the run.
+    #[error(
+        "the time t = {t} of row {index} is out of order, not finite or outside of the run's span; give times in the order of the run"
+    )]
+    Times {
+        /// The first row with such a time.
+        index: usize,
+        /// The time.
+        t: f64,
     },
     /// The Lagrangian has no finite value or derivative at the start.
     #[error("the Lagrangian or one of its derivatives is not finite at the start; choose a start inside its domain")]
@@ -128,7 +156,7 @@ impl InputError {
     }
 }
 
-/// Why a step could not be taken: bad luck, not bad input.
+/// Why a step could not be taken: for no fault of the input.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum StepError {
     /// Newton's method did not reach round-off.
@@ -175,6 +203,12 @@ pub enum StepError {
     /// A coordinate or a derivative is infinite or not a number.
     #[error("a value is not finite: the motion leaves the domain of the Lagrangian, or grows without bound")]
     NonFinite,
+    /// The function of an event is not finite.
+    #[error("the function of an event is not finite at t = {t}; give one that is defined along the motion")]
+    Event {
+        /// The time.
+        t: f64,
+    },
     /// A formula branches on the value of a number, of which vector lanes have several.
     #[error(
         "the Lagrangian or the clock asks for one value (`re`, `extent`, `==`) of lanes that differ; \
@@ -260,10 +294,14 @@ impl std::fmt::Display for Suspicion {
 pub enum Status {
     /// All steps were taken.
     Completed,
-    /// The observer asked to stop after this step.
+    /// An observer ended the run.
     Stopped {
         /// The number of steps taken.
         step: usize,
+        /// The time, within the last step or at its end.
+        t: f64,
+        /// Which observer.
+        by: &'static str,
     },
     /// A claim of the Lagrangian's structure was found false at a state of the run: all that was computed may be wrong.
     FalseClaim {
@@ -278,6 +316,8 @@ pub enum Status {
     Failed {
         /// The number of the step that failed, counted from 0.
         step: usize,
+        /// The time that was reached.
+        t: f64,
         /// Why.
         cause: StepError,
     },
@@ -287,13 +327,13 @@ impl std::fmt::Display for Status {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Status::Completed => write!(f, "completed"),
-            Status::Stopped { step } => write!(f, "stopped by the observer after step {step}"),
+            Status::Stopped { step, t, by } => write!(f, "stopped by {by} at t = {t}, in step {step}"),
             Status::FalseClaim { step, claim, size } => write!(
                 f,
                 "unreliable: after step {step} the Lagrangian is not {claim}, as it claims (relative size {size:e}); correct \
                  its structure and run again"
             ),
-            Status::Failed { step, cause } => write!(f, "failed in step {step}: {cause}"),
+            Status::Failed { step, t, cause } => write!(f, "failed in step {step} at t = {t}: {cause}"),
         }
     }
 }

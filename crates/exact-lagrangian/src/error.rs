@@ -1,11 +1,11 @@
-//! Bad input and bad luck on the exact side.
+//! Bad input, and what goes wrong along a motion, on the exact side.
 
 use contact_geom::{GeometryError, VelocityPoint};
 use discrete_herglotz::{InputError, StepError};
 use thiserror::Error;
 
-/// Why a motion, or the motion between two points, could not be computed. Bad luck carries what was reached, so that one can
-/// go on from there.
+/// Why a motion, or the motion between two points, could not be computed. What goes wrong along the motion carries what
+/// was reached, so that one can go on from there.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum ExactError<const N: usize> {
     /// The input is not acceptable; nothing was computed.
@@ -79,7 +79,7 @@ impl<const N: usize> From<ExactError<N>> for StepError {
             ExactError::Input(_) => StepError::NonFinite,
             ExactError::OutsideDomain { t, .. } | ExactError::Unfinished { t, .. } => StepError::OutsideDomain { t },
             ExactError::NotConverged { residual, .. } => {
-                StepError::NotConverged { residual, iterations: crate::retraction::ITERATIONS }
+                StepError::NotConverged { residual, iterations: crate::map::ITERATIONS }
             }
             ExactError::ConjugatePoint { smallest, .. } => StepError::ConjugatePoint { smallest },
         }

@@ -42,31 +42,24 @@
 
 #[cfg(test)]
 mod bad_numbers;
-mod composition;
-mod conjugate;
 mod error;
-mod exact_lagrangian;
-mod exponential;
-mod flow;
-mod gauss;
-mod nonholonomic;
-mod panel;
+mod map;
+mod numerics;
 mod principle;
 mod quadratic_exact;
-mod retraction;
-mod spline_curve;
 pub mod statements;
 mod variational_error;
 
-pub use composition::{Composition, compose, through};
-pub use conjugate::ConjugatePoint;
 pub use error::ExactError;
-pub use exact_lagrangian::ExactLagrangian;
-pub use exponential::{ContactExponential, ExponentialDifferential, HerglotzFlow};
-pub use flow::{EVALUATIONS, Motion, herglotz_flow};
-pub use nonholonomic::{Chetaev, ExtendedMotion, ExtendedPoint, NonHolonomic};
-pub use principle::{Curve, CurveAction, MotionCurve, VariedCurve, action, action_derivative};
+pub use map::conjugate::ConjugatePoint;
+pub use map::exact_flow::ExactFlow;
+pub use map::exact_lagrangian::ExactLagrangian;
+pub use map::exponential::{ContactExponential, ExponentialDifferential, HerglotzFlow};
+pub use map::joined_steps::{JoinedSteps, compose, through};
+pub use map::retraction::{Retraction, RetractionRoute};
+pub use numerics::flow::{EVALUATIONS, Motion, herglotz_flow};
+pub use principle::curve::{Curve, CurveAction, MotionCurve, VariedCurve, action, action_derivative};
+pub use principle::nonholonomic::{Chetaev, ExtendedMotion, ExtendedPoint, NonHolonomic};
+pub use principle::spline_curve::SplineCurve;
 pub use quadratic_exact::QuadraticExact;
-pub use retraction::{Retraction, Route};
-pub use spline_curve::SplineCurve;
 pub use variational_error::{ErrorOrders, MeasuredOrder, Order, error_orders};

@@ -4,11 +4,11 @@ mod evolution;
 #[cfg(test)]
 mod tests;
 
-use crate::conjugate::Fold;
-use crate::exponential::singular_values;
+use crate::map::conjugate::Fold;
+use crate::map::exponential::singular_values;
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
-use contact_geom::{DiscretePoint, GeometryError, Lagrangian, Regularity, Scalar, VelocityPoint};
+use contact_geom::{Derivatives, DiscretePoint, GeometryError, Lagrangian, Regularity, Scalar, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, InputError, StepError};
 use evolution::Evolution;
 

@@ -1,9 +1,9 @@
 //! The paper's section 4 as residuals: each statement evaluated on a Lagrangian at a point of TQ x R for a time step, relative
 //! to its terms' size.
 //!
-//! The numbers are those of the project's list of statements (NOTATION.md has it). The derivatives of `L_h^e` that the theorems speak
-//! of are taken by dual numbers through flow and shooting, never by the formulas that the theorems give. All is on the branch of
-//! motions near the one from the given point, so that conjugate points before h do no harm.
+//! The derivatives of `L_h^e` that the theorems speak of are taken by dual numbers through flow and shooting, never by the
+//! formulas that the theorems give. All is on the branch of motions near the one from the given point, so that conjugate points
+//! before h do no harm.
 //!
 //! A residual of a true statement is round-off. It is given in units of the condition of the motion, the largest entry of
 //! `T phi_h` where that is above one (its square for second derivatives): by so much the motion itself magnifies the rounding of
@@ -13,8 +13,8 @@
 // In a check `f64::max` and `amax` would lose a NaN.
 #![deny(clippy::disallowed_methods)]
 
-use crate::exponential::HerglotzFlow;
-use crate::gauss::collocations;
+use crate::map::exponential::HerglotzFlow;
+use crate::numerics::gauss::collocations;
 use crate::{
     ContactExponential, ExactError, ExactLagrangian, MotionCurve, NonHolonomic, VariedCurve, action, action_derivative,
     compose, herglotz_flow, through,
@@ -22,23 +22,35 @@ use crate::{
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::systems::System;
 use contact_geom::{
-    DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, Larger, Largest, PhasePoint, Scalar, SecondDiscreteJet,
-    Smooth, Triple, VelocityPoint, herglotz_rates, larger, legendre, seed,
+    Derivatives, DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, Larger, Largest, PhasePoint, Scalar,
+    SecondDiscreteJet, Smooth, Statement, Triple, VelocityPoint, herglotz_rates, larger, legendre, seed,
 };
 use discrete_herglotz::{
     DiscreteLagrangian, InputError, StepError, derived_jet, derived_second_jet, discrete_flow, legendre_minus_inverse,
 };
 
-/// The statements of section 4 that [`residual`] evaluates, and statement 10 of section 2.
-pub const STATEMENTS: [u32; 11] = [10, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36];
+/// The statements of section 4 that [`residual`] evaluates, and [`Statement::HerglotzPrinciple`] of section 2.
+pub const STATEMENTS: [Statement; 11] = [
+    Statement::HerglotzPrinciple,
+    Statement::ChetaevMultiplier,
+    Statement::ProjectedFlow,
+    Statement::ExponentialMap,
+    Statement::NonHolonomicExponential,
+    Statement::ImageProjection,
+    Statement::ExactRetractions,
+    Statement::LinearEquation,
+    Statement::ExactDerivatives,
+    Statement::ExactLegendreTransforms,
+    Statement::ExactFlow,
+];
 
-/// The residual of a statement for a system at a time and a point of TQ x R, with a time step h; `None` where the number is not
-/// one of [`STATEMENTS`].
+/// The residual of a statement for a system at a time and a point of TQ x R, with a time step h; `None` where the statement is
+/// not one of [`STATEMENTS`].
 ///
 /// # Errors
-/// Those of the motion over h (over 2h for statement 36).
+/// Those of the motion over h (over 2h for [`Statement::ExactFlow`]).
 pub fn residual<S: System<N>, const N: usize>(
-    statement: u32,
+    statement: Statement,
     system: &S,
     t: f64,
     x: &VelocityPoint<N>,
@@ -46,17 +58,17 @@ pub fn residual<S: System<N>, const N: usize>(
 ) -> Result<Option<f64>, ExactError<N>> {
     let at = Place { system, t, x, h, exponential: ContactExponential::new(system, h)? };
     Ok(Some(match statement {
-        10 => at.principle()?,
-        27 => at.multiplier()?,
-        28 => at.projected_flow()?,
-        29 => at.local_diffeomorphism()?,
-        30 => at.two_exponentials()?,
-        31 => at.projection()?,
-        32 => at.retraction()?,
-        33 => at.linear_equation()?,
-        34 => at.derivatives()?,
-        35 => at.legendre_transforms()?,
-        36 => at.regular_and_exact()?,
+        Statement::HerglotzPrinciple => at.principle()?,
+        Statement::ChetaevMultiplier => at.multiplier()?,
+        Statement::ProjectedFlow => at.projected_flow()?,
+        Statement::ExponentialMap => at.local_diffeomorphism()?,
+        Statement::NonHolonomicExponential => at.two_exponentials()?,
+        Statement::ImageProjection => at.projection()?,
+        Statement::ExactRetractions => at.retraction()?,
+        Statement::LinearEquation => at.linear_equation()?,
+        Statement::ExactDerivatives => at.derivatives()?,
+        Statement::ExactLegendreTransforms => at.legendre_transforms()?,
+        Statement::ExactFlow => at.regular_and_exact()?,
         _ => return Ok(None),
     }))
 }

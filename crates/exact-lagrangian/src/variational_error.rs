@@ -1,7 +1,7 @@
 //! Variational error analysis: how well a discrete Lagrangian matches the exact one, and what order its flow has.
 
 use crate::{ExactError, herglotz_flow};
-use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Triple, VelocityPoint, larger};
+use contact_geom::{Derivatives, DiscretePoint, Lagrangian, PhasePoint, Triple, VelocityPoint, larger};
 use discrete_herglotz::{DiscreteLagrangian, InputError, Solver, legendre_minus, legendre_plus};
 
 /// What the errors at all time steps say of an order.
@@ -99,6 +99,9 @@ pub fn error_orders<D: DiscreteLagrangian<N>, const N: usize>(
     x: &VelocityPoint<N>,
     largest: f64,
 ) -> Result<ErrorOrders, ExactError<N>> {
+    if !(largest > 0.0 && largest.is_finite()) {
+        return Err(InputError::Step { h: largest }.into());
+    }
     let p0 = lagrangian.gradient(t, x).y;
     let start = PhasePoint { q: x.q, p: p0, z: x.z };
     let mut rows: [Vec<Row>; 4] = Default::default();

@@ -1,6 +1,7 @@
 //! The table of checked statements: the worst residual for each statement, system, method and time step.
 
 use crate::Failure;
+use contact_geom::Statement;
 use std::collections::BTreeMap;
 use std::error::Error;
 
@@ -15,8 +16,8 @@ pub const TOLERANCE: f64 = 1e-11;
 /// What a residual belongs to. The order is that of the table: by statement, then by name, then by step.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Subject {
-    /// The number of the statement.
-    pub statement: u32,
+    /// The statement.
+    pub statement: Statement,
     /// The system that it was checked on.
     pub system: &'static str,
     /// The discretisation, or a dash for the statements that need none.
@@ -27,12 +28,12 @@ pub struct Subject {
 
 impl Subject {
     /// A statement without discretisation.
-    pub fn continuous(statement: u32, system: &'static str) -> Self {
+    pub fn continuous(statement: Statement, system: &'static str) -> Self {
         Subject { statement, system, method: "-".into(), step: 0 }
     }
 
     /// A statement for a discrete Lagrangian.
-    pub fn discrete(statement: u32, system: &'static str, method: &str, h: f64) -> Self {
+    pub fn discrete(statement: Statement, system: &'static str, method: &str, h: f64) -> Self {
         Subject { statement, system, method: method.into(), step: h.to_bits() }
     }
 
@@ -91,13 +92,13 @@ impl Checks {
     }
 
     /// The worst residual of a statement and where it was met.
-    pub fn worst_of(&self, statement: u32) -> Option<(&Subject, f64)> {
+    pub fn worst_of(&self, statement: Statement) -> Option<(&Subject, f64)> {
         let of = self.iter().filter(|(subject, _)| subject.statement == statement);
         of.reduce(|worst, other| if other.1 > worst.1 { other } else { worst })
     }
 
     /// The number of subjects that a statement was checked on.
-    pub fn count(&self, statement: u32) -> usize {
+    pub fn count(&self, statement: Statement) -> usize {
         self.iter().filter(|(subject, _)| subject.statement == statement).count()
     }
 
@@ -106,7 +107,7 @@ impl Checks {
         self.worst.iter().map(|(subject, (residual, tolerance))| {
             let numbers = [format!("{residual:.3e}"), format!("{tolerance:e}")];
             let [residual, tolerance] = numbers;
-            let statement = subject.statement.to_string();
+            let statement = subject.statement.number().to_string();
             vec![statement, subject.system.into(), subject.method.clone(), subject.step(), residual, tolerance]
         })
     }
@@ -119,66 +120,15 @@ impl Checks {
             .filter(|(_, (residual, tolerance))| residual > tolerance)
             .map(|(subject, (residual, tolerance))| {
                 let Subject { statement, system, method, .. } = subject;
-                let title = title(*statement);
                 let cause = self.errors.get(subject).map_or(String::new(), |error| format!(" ({error})"));
                 let step = subject.step();
-                format!(
-                    "  {statement} ({title}): {system}, {method}, h = {step}: {residual:.1e} > {tolerance:e}{cause}"
-                )
+                format!("  {statement}: {system}, {method}, h = {step}: {residual:.1e} > {tolerance:e}{cause}")
             })
             .collect();
         if failing.is_empty() {
             return Ok(());
         }
         Err(Failure::Statements { count: failing.len(), total: self.worst.len(), list: failing.join("\n") })
-    }
-}
-
-/// A few words for a statement, for tables; NOTATION.md has the statements.
-pub fn title(statement: u32) -> &'static str {
-    match statement {
-        1 => "contact condition",
-        2 => "Reeb field, flat and sharp",
-        3 => "contact Hamiltonian vector field",
-        4 => "L_X eta = -R(f) eta",
-        5 => "conformal factor of a flow",
-        6 => "X_H(H) = -R(H) H",
-        7 => "L regular iff eta_L contact",
-        8 => "Herglotz field is of second order",
-        9 => "FL is a contactomorphism",
-        10 => "Herglotz' principle",
-        11 => "dissipated quantities",
-        12 => "Noether's theorem",
-        13 => "differential of the discrete action",
-        14 => "the same for two steps",
-        15 => "discrete Herglotz principle",
-        16 => "condition on Q x Q x R^2",
-        17 => "F+ and F- regular together",
-        18 => "momentum matching",
-        19 => "existence of the discrete flow",
-        20 => "three expressions of the flow",
-        21 => "eta+ and eta- are contact forms",
-        22 => "eta+ = sigma_d eta-, pullback to eta+",
-        23 => "conformal factors of Phi_d",
-        24 => "conformal factor of the flow on T*Q x R",
-        25 => "invariance of L_d",
-        26 => "discrete Noether theorem",
-        27 => "Chetaev's multiplier",
-        28 => "flow of the non-holonomic system",
-        29 => "exp_h is a local diffeomorphism",
-        30 => "the two exponential maps",
-        31 => "projection of M_d",
-        32 => "exact retractions",
-        33 => "linear equation, action",
-        34 => "D1, D2, Dz of L_h^e",
-        35 => "F(+-)L_h^e = FL o R_h^(e+-)",
-        36 => "F+L_h^e = phi_h o F-L_h^e, motion",
-        37 => "free particle, explicit",
-        38 => "oscillator, explicit",
-        39 => "midpoint rule for any V",
-        40 => "orders of L_d - L_h^e and of the flow",
-        41 => "rules on Q x Q x R^2",
-        _ => "not checked",
     }
 }
 
@@ -197,7 +147,7 @@ mod tests {
 
     fn verdict(residual: Result<Option<f64>, GeometryError>) -> Result<(), Failure> {
         let mut checks = Checks::default();
-        let subject = Subject::discrete(15, "pendulum", "midpoint", 0.1);
+        let subject = Subject::discrete(Statement::DiscreteHerglotzPrinciple, "pendulum", "midpoint", 0.1);
         checks.record(&subject, Ok::<_, GeometryError>(Some(1e-15)));
         checks.record(&subject, residual);
         checks.record(&subject, Ok::<_, GeometryError>(Some(2e-15)));
@@ -216,7 +166,7 @@ mod tests {
     #[test]
     fn each_subject_has_its_own_tolerance() {
         let mut checks = Checks::default();
-        let order = Subject::discrete(40, "pendulum", "midpoint", 0.0);
+        let order = Subject::discrete(Statement::ErrorOrders, "pendulum", "midpoint", 0.0);
         checks.record_within(0.15, &order, Ok::<_, GeometryError>(Some(0.1)));
         assert!(checks.verdict().is_ok());
         checks.record_within(0.15, &order, Ok::<_, GeometryError>(Some(0.2)));

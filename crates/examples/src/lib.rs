@@ -6,8 +6,20 @@ mod checks;
 mod failure;
 mod figure;
 mod output;
+mod tables;
 
-pub use checks::{Checks, Subject, TOLERANCE, fractions, title};
+pub use checks::{Checks, Subject, TOLERANCE, fractions};
 pub use failure::{Failure, finish};
 pub use figure::{Axis, Curve, Line, Panel, draw, draw_row};
 pub use output::{Directory, number, print};
+pub use tables::{integrators, systems};
+
+/// The tasks of the guide, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide.md")]
+pub struct Guide;
+
+/// The program of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+pub struct Readme;

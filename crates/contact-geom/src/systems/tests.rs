@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::linear::solve;
-use crate::{OneParameterGroup, Triple};
+use crate::{Derivatives, OneParameterGroup, Triple};
 use nalgebra::{SMatrix, SVector};
 
 /// Weyl's sequence: multiples of numbers that are independent over the rationals fill the cube evenly.

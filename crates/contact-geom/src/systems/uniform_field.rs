@@ -111,7 +111,7 @@ impl<const D: usize> System<D> for UniformField<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Larger, Largest, OneParameterGroup};
+    use crate::{Derivatives, Larger, Largest, OneParameterGroup};
 
     const GAMMAS: [f64; 9] = [-1e3, -40.0, -2.5, -0.1, -1e-9, 0.0, 1e-15, 0.7, 3.0];
     const EPS: f64 = f64::EPSILON;

@@ -1,9 +1,9 @@
 //! What is found of a Lagrangian at the start of a run.
 
-use crate::step_equations::{inverted, kept_mass_matrix, mass_matrix};
+use crate::rules::step_equations::{inverted, kept_mass_matrix, mass_matrix};
 use crate::{InputError, StepError, last_correction, verified};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint, largest, linear};
+use contact_geom::{Derivatives, GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint, largest, linear};
 
 /// The start of a run.
 pub(super) struct Beginning<const N: usize> {

@@ -1,16 +1,18 @@
 //! Runs of contact Gauss collocation in the time of a clock.
 
-use super::Gauss;
+use super::account::account_by_clock;
 use super::beginning::Beginning;
 use super::compensated::Compensated;
-use super::extension::{Extension, Fictitious, Values};
 use super::general::General;
 use super::look::{Compare, Curve, Look};
 use super::mass::Mass;
-use super::sweeps::Progress;
-use super::table::Table;
-use crate::lanes::forget_branches;
-use crate::{Halt, ITERATION_LIMIT, InputError, StepError, Stepper, Suspicion};
+use super::stage_equations::Products;
+use super::sweeps::Verdict;
+use super::table::StageTable;
+use super::time_transformation::{Extension, Fictitious, Values};
+use crate::gauss::lanes::forget_branches;
+use crate::run::saved::{Saved, load_option, save_option};
+use crate::{Halt, ITERATION_LIMIT, InputError, Item, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Clock, Lagrangian, PhasePoint, Scalar, Structure};
 use pulp::{Arch, Simd, WithSimd};
@@ -47,9 +49,9 @@ impl<L: Lagrangian<N>, const N: usize> Clock<N> for OwnClock<'_, L> {
 /// let start = kepler.initial();
 /// let gauss = Gauss::new(kepler, 6, 0.2)?;
 /// let mut run = gauss.clocked_stepper(kepler.clock(), 0.0, legendre(&kepler, 0.0, &start), start.v)?;
-/// run.advance_to(10.0).map_err(|halt| discrete_herglotz::InputError::FirstStep(halt.cause))?;
+/// run.advance_to(10.0)?;
 /// assert!((run.time() - 10.0).abs() < 1e-14);
-/// # Ok::<(), discrete_herglotz::InputError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct ClockedStepper<'a, L, C, const N: usize> {
     general: Box<General<'a, L, Fictitious<C>, N>>,
@@ -64,14 +66,15 @@ pub struct ClockedStepper<'a, L, C, const N: usize> {
 
 impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C, N> {
     pub(super) fn new(
-        gauss: &'a Gauss<L>,
+        lagrangian: &'a L,
+        products: Products,
         clock: C,
         probed: Option<Structure>,
         t0: f64,
         state: PhasePoint<N>,
         guess: SVector<f64, N>,
     ) -> Result<Self, InputError> {
-        let (lagrangian, h) = (&gauss.lagrangian, gauss.forward.h);
+        let Products { s, h, .. } = products;
         let Beginning { start, structure, inverse, .. } = Beginning::of(lagrangian, probed, t0, &state, guess)?;
         if !structure.autonomous {
             return Err(InputError::Unclaimed { claim: "autonomous" });
@@ -85,7 +88,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
             return Err(InputError::FirstStep(StepError::NonFinite));
         }
         let extension = Extension::new(Fictitious(clock), t0, -energy);
-        let (table, mass) = (Table::new(gauss.stages(), h), Mass::new(&structure, inverse));
+        let (table, mass) = (StageTable::new(s, h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, &state, &start.v));
         Ok(ClockedStepper { general, arch: Arch::new(), h, tau: 0.0, taken: 0, from: None, suspicion: None })
     }
@@ -116,32 +119,36 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         let (general, from) = (&*self.general, self.from.as_ref()?);
         let value = |x: &[Compensated; N]| SVector::from(x.map(|x| x.value));
         let start = PhasePoint { q: value(&from.q), p: value(&from.p), z: from.z.value };
-        let (&Table { s, h, .. }, clock) = (&general.table, &general.extension.pace);
+        let (&StageTable { s, h, .. }, clock) = (&general.table, &general.extension.transformation);
         let mut curve = Curve::new(s, from.t.value, h, &start);
         curve.of_clock(&general.solved_by_clock(), [clock.0.rate(&start.q), general.rate()]);
-        let at = |set| self.arch.dispatch(Compare { lagrangian: general.lagrangian, pace: clock, curve: &curve, set });
+        let at = |set| {
+            self.arch.dispatch(Compare { lagrangian: general.lagrangian, transformation: clock, curve: &curve, set })
+        };
         (0..sets).map(at).reduce(Look::and)
     }
 
     /// Takes the last step again from where it started, so long that it ends at a time, which it has passed.
     fn shorten(&mut self, before: &Values<N>, t_end: f64) -> Result<(), StepError> {
-        let (mut short, mut long, mut h) = (0.0, self.h, self.h);
-        let mut over = self.time() - t_end;
+        // Lengths, whichever way the run goes.
+        let way = self.h.signum();
+        let (mut short, mut long, mut length) = (0.0, self.h.abs(), self.h.abs());
+        let mut over = (self.time() - t_end) * way;
         for _ in 0..ITERATION_LIMIT {
             // Newton's method, where dt/dh is the rate at the end but for the method's error.
-            let newton = h - over / self.general.rate();
-            h = if short < newton && newton < long { newton } else { 0.5 * (short + long) };
+            let newton = length - over / self.general.rate();
+            length = if short < newton && newton < long { newton } else { 0.5 * (short + long) };
             self.general.reset(before);
-            self.general.table = Table::new(self.general.table.s, h);
+            self.general.table = StageTable::new(self.general.table.s, length * way);
             self.sweep(1).map_err(|halt| halt.cause)?;
-            over = self.time() - t_end;
+            over = (self.time() - t_end) * way;
             if self.ends_at(t_end, before.t.value) {
                 // The stages are those of another length than the next step's.
                 let end = self.general.values();
                 self.general.reset(&end);
                 return Ok(());
             }
-            *(if over > 0.0 { &mut long } else { &mut short }) = h;
+            *(if over > 0.0 { &mut long } else { &mut short }) = length;
         }
         Err(StepError::NotConverged { residual: over, iterations: ITERATION_LIMIT })
     }
@@ -161,10 +168,25 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         self.arch.dispatch(Advance { general: &mut **general, suspicion, taken, steps })
     }
 
+    /// From the words of another; no look at its last step.
+    fn read(&mut self, from: &mut &[u64]) -> Option<()> {
+        self.general.load(from)?;
+        let mut h = 0.0;
+        h.load(from)?;
+        if h != self.general.table.h {
+            self.general.table = StageTable::new(self.general.table.s, h);
+        }
+        self.tau.load(from)?;
+        self.taken.load(from)?;
+        self.from = None;
+        self.suspicion = load_option(from, || Suspicion { step: 0, misfit: 0.0 })?;
+        Some(())
+    }
+
     /// Goes back to the full step after one that was made shorter.
     fn lengthen(&mut self) {
         if self.general.table.h != self.h {
-            self.general.table = Table::new(self.general.table.s, self.h);
+            self.general.table = StageTable::new(self.general.table.s, self.h);
         }
     }
 }
@@ -187,7 +209,7 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for Advance<'_, '_,
             // L does not depend on it.
             let t = self.general.extension.t.value;
             let progress = self.general.step::<S>(t);
-            if progress != Progress::Done {
+            if progress != Verdict::Done {
                 return Err(Halt { taken, cause: progress.into() });
             }
             if self.general.misfit > 1.0 && self.suspicion.is_none() {
@@ -216,13 +238,13 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
             return Err(halt(0, StepError::NonFinite));
         }
         let mut taken = 0;
-        while taken < steps && self.time() < t_end {
+        while taken < steps && (t_end - self.time()) * self.h > 0.0 {
             self.lengthen();
             let before = self.general.values();
             self.from = None;
             self.sweep(1).map_err(|refused| halt(taken, refused.cause))?;
             if !self.ends_at(t_end, before.t.value)
-                && self.time() > t_end
+                && (self.time() - t_end) * self.h > 0.0
                 && let Err(cause) = self.shorten(&before, t_end)
             {
                 self.general.reset(&before);
@@ -246,11 +268,28 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
     }
 
     fn sigma(&self) -> f64 {
-        1.0 / (1.0 - self.general.fallen)
+        1.0 / (1.0 - self.general.one_minus_rho)
     }
 
     fn evaluations(&self) -> u64 {
         self.general.evaluations
+    }
+
+    fn account(&self) -> Vec<Item> {
+        account_by_clock(&self.general.lagrangian.structure())
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        self.general.save(&mut words);
+        [self.general.table.h, self.tau].save(&mut words);
+        self.taken.save(&mut words);
+        save_option(self.suspicion.as_ref(), &mut words);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.read(&mut words).is_some() && words.is_empty()
     }
 
     fn suspicion(&self) -> Option<Suspicion> {

@@ -1,5 +1,6 @@
 //! Sums that lose nothing over many steps.
 
+use crate::run::saved::saved;
 use qd::Quad;
 use std::ops::{Add, Mul};
 
@@ -93,3 +94,5 @@ pub(super) fn finite<const N: usize>(dq: &[Twofold; N], dy: &[Twofold; N], dz: T
 pub(super) fn add<const N: usize>(x: &mut [Compensated; N], changes: &[Twofold; N]) {
     x.iter_mut().zip(changes).for_each(|(x, change)| x.add(*change));
 }
+
+saved!([] Compensated { value, rest });

@@ -73,8 +73,8 @@ impl Condensed {
             rho = from_fn(|i| if i < s { rows[i][s] } else { one });
         }
         let sum = |f: &dyn Fn(usize) -> Quad| (0..s).fold(zero, |sum, j| sum + f(j));
-        let fallen = step * rate * sum(&|j| g.b[j] * rho[j]);
-        let end_rho = one - fallen;
+        let one_minus_rho = step * rate * sum(&|j| g.b[j] * rho[j]);
+        let end_rho = one - one_minus_rho;
         // Not `<= 0`: that would let a NaN pass.
         if let Some(rho) = rho[..s].iter().map(|rho| rho.0).find(|rho| !(*rho > 0.0 && rho.is_finite())) {
             return Err(InputError::FirstStep(StepError::StageFactor { rho }));
@@ -88,7 +88,7 @@ impl Condensed {
             inverse_rho: rho.map(|r| if gamma == 0.0 { one } else { one / r }),
             end_u: positions[s].at(MOST),
             end_b: from_fn(|k| positions[s].at(k)),
-            grow: fallen / end_rho,
+            grow: one_minus_rho / end_rho,
             end_v: from_fn(|j| if j < s { step * g.b[j] * rho[j] / end_rho } else { zero }),
         };
         let b = from_fn(|i| from_fn(|k| positions[i].at(k)));
@@ -254,7 +254,7 @@ impl WithSimd for Multiply<'_> {
 type Rows = [[f64; MOST + 2]; MOST];
 
 /// The matrices of [`Condensed::preconditioned`], or what their rounding leaves out.
-#[repr(C)] // See `Separable`: the matrix last.
+#[repr(C)] // See `SeparableStages`: the matrix last.
 pub(super) struct Left {
     pub q: Stages,
     pub u: Stages,
@@ -269,7 +269,7 @@ impl Left {
 }
 
 /// See [`Condensed::preconditioned`].
-#[repr(C)] // See `Separable`: the head last.
+#[repr(C)] // See `SeparableStages`: the head last.
 pub(super) struct Preconditioned {
     pub kappa: f64,
     /// What the rounding of the head leaves out, found by [`refine`](Self::refine).

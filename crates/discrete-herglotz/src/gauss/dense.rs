@@ -5,17 +5,20 @@
 
 use super::coefficients::{Coefficients, MOST};
 use super::condensed::Condensed;
+use crate::run::saved::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, linear};
 use std::array::from_fn;
 
 /// The state at the start of a step as a route holds it: momenta, or velocities in the condensed routes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Start<const N: usize> {
+pub(super) struct StepStart<const N: usize> {
     pub q: [f64; N],
     pub y: [f64; N],
     pub z: f64,
 }
+
+saved!([const N: usize] StepStart<N> { q, y, z });
 
 /// The stages of a solved step: V, `rho L_q`, `rho L_z` and L, with 0 beyond the last stage.
 pub(super) struct Solved<const N: usize> {
@@ -34,7 +37,7 @@ impl<const N: usize> Solved<N> {
         table: &Condensed,
         mass: &SMatrix<f64, N, N>,
         t: f64,
-        start: &Start<N>,
+        start: &StepStart<N>,
         a: &[[f64; MOST]; N],
         wants_z: bool,
     ) -> Self {
@@ -79,8 +82,8 @@ impl<const N: usize> Solved<N> {
 /// where V, L, `rho L_z` and `rho L_q` are the polynomials of degree `s - 1` through the stages.
 ///
 /// At its ends it is the states of the run to round-off, which have order 2s; between them its order is s. So the curve of
-/// a run is continuous, and its velocity jumps from step to step by `O(h^s)`. Where the stepper was told that nobody wants
-/// the action and z decouples, z stays what it was at the start.
+/// a run is continuous, and its velocity jumps from step to step by `O(h^s)`. Where the action is not requested
+/// and z decouples, z stays what it was at the start.
 #[derive(Clone, Copy, Debug)]
 pub struct DenseStep<const N: usize> {
     s: usize,
@@ -127,11 +130,6 @@ impl<const N: usize> DenseStep<N> {
     /// The number of stages.
     pub(crate) fn stages(&self) -> usize {
         self.s
-    }
-
-    /// The time at a fraction of the step.
-    pub(crate) fn time(&self, fraction: f64) -> f64 {
-        self.t + fraction * self.h
     }
 
     /// The state at a fraction of the step.

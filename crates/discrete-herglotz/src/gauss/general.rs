@@ -5,16 +5,16 @@
 
 use super::coefficients::MOST;
 use super::compensated::{Compensated, Twofold, add, finite};
-use super::extension::{Extension, Pace, Values};
 use super::mass::Mass;
 use super::resolution::Tail;
 use super::simplified::{CorrectStages, StageNewton};
 use super::stages::{StageMap, Stages, blocks};
-use super::sweeps::{AGE, Progress, SLOW, Sweeps};
-use super::table::Table;
-use crate::lanes::{Lanes, branched};
+use super::sweeps::{AGE, SLOW, Sweeps, Verdict};
+use super::table::StageTable;
+use super::time_transformation::{Extension, TimeTransformation, Values};
+use crate::gauss::lanes::{Lanes, branched};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
+use contact_geom::{Derivatives, Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
 use pulp::{Arch, Simd};
 use std::array::from_fn;
 
@@ -34,7 +34,7 @@ const MOST_IN_LANES: usize = 8;
 /// A rate that is the same in every step is rounded the same in every step: so `1 - rho`, which is small where the rate is, is
 /// carried instead of rho, and enters by sums of which the rounding depends on the motion.
 ///
-/// The matrix of the sweeps and what it multiplies lie together, as in [`Separable`](super::separable::Separable).
+/// The matrix of the sweeps and what it multiplies lie together, as in [`SeparableStages`](super::separable::SeparableStages).
 #[repr(C)]
 pub(super) struct General<'a, L, P, const N: usize> {
     /// The `m` of the table.
@@ -53,34 +53,34 @@ pub(super) struct General<'a, L, P, const N: usize> {
     pub(super) x: [Stages; N],
     pub lagrangian: &'a L,
     pub extension: Extension<P>,
-    pub table: Table,
+    pub table: StageTable,
     pub mass: Mass<N>,
     pub q: [Compensated; N],
     pub p: [Compensated; N],
     pub z: Compensated,
     /// `1 - rho` at the end of the last step.
-    pub fallen: f64,
-    warm: bool,
+    pub one_minus_rho: f64,
+    pub(super) warm: bool,
     /// Corrects the sweeps where they do not contract by themselves.
     pub newton: Option<Box<StageNewton<N>>>,
     /// The steps that Newton's Jacobian has served.
-    age: u32,
+    pub(super) age: u32,
     pub(super) tail: Tail,
     /// Above one where the last step has not resolved the motion, or its drag.
     pub misfit: f64,
     /// The same while it is not used.
     parked: Option<Box<StageNewton<N>>>,
     /// Whether the stages of the next step are solved: v, l and falling are theirs.
-    solved: bool,
+    pub(super) solved: bool,
     pub evaluations: u64,
 }
 
-impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
+impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a, L, P, N> {
     /// From a state with a velocity that belongs to it, or a guess of it.
     pub fn new(
         lagrangian: &'a L,
         extension: Extension<P>,
-        table: Table,
+        table: StageTable,
         mass: Mass<N>,
         state: &PhasePoint<N>,
         v: &SVector<f64, N>,
@@ -104,7 +104,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             falling: Stages::ZERO,
             z_stages: Stages::ZERO,
             x: [Stages::ZERO; N],
-            fallen: 0.0,
+            one_minus_rho: 0.0,
             warm: false,
             newton: None,
             age: 0,
@@ -169,19 +169,25 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
 
     pub fn values(&self) -> Values<N> {
         let Extension { t, p_t, .. } = self.extension;
-        Values { q: self.q, p: self.p, z: self.z, t, p_t, fallen: self.fallen }
+        Values { q: self.q, p: self.p, z: self.z, t, p_t, one_minus_rho: self.one_minus_rho }
     }
 
     /// Goes on from other values; the velocities of the stages are the guess.
     pub fn reset(&mut self, values: &Values<N>) {
-        Values { q: self.q, p: self.p, z: self.z, t: self.extension.t, p_t: self.extension.p_t, fallen: self.fallen } =
-            *values;
+        Values {
+            q: self.q,
+            p: self.p,
+            z: self.z,
+            t: self.extension.t,
+            p_t: self.extension.p_t,
+            one_minus_rho: self.one_minus_rho,
+        } = *values;
         self.warm = false;
     }
 
     /// The clock's rate at the state.
     pub fn rate(&self) -> f64 {
-        self.extension.pace.rate(&SVector::from(self.q.map(|q| q.value)))
+        self.extension.transformation.rate(&SVector::from(self.q.map(|q| q.value)))
     }
 
     /// The point of TQ x R at a block of stages.
@@ -210,7 +216,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
                     q.d[i] = Lanes::splat(1.0);
                     q
                 });
-                let KernelDual { re: g, d: slope } = self.extension.pace.rate(&q);
+                let KernelDual { re: g, d: slope } = self.extension.transformation.rate(&q);
                 let energy = point.v.dot(&d.y) - re;
                 let extended = energy.mul_add(falling, energy + self.extension.p_t.value);
                 of_clock = from_fn(|i| slope[i] * extended * -weight);
@@ -279,9 +285,9 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
     #[inline(always)]
     fn carry<S: Simd>(&mut self) {
         let s = self.table.s;
-        let renewed = 1.0 / (1.0 - self.fallen);
+        let renewed = 1.0 / (1.0 - self.one_minus_rho);
         let rates = if P::PHYSICAL { None } else { Some(&mut self.extension.g) };
-        let Table { ahead, ahead_weighted, .. } = &self.table;
+        let StageTable { ahead, ahead_weighted, .. } = &self.table;
         for x in self.v.iter_mut().chain(&mut self.l_v).chain(rates) {
             let before = *x;
             ahead.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
@@ -299,7 +305,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
 
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
-    pub fn step<S: Simd>(&mut self, t: f64) -> Progress {
+    pub fn step<S: Simd>(&mut self, t: f64) -> Verdict {
         let solved = std::mem::take(&mut self.solved);
         // Without a step before, from a motion of constant velocity.
         let mut cold = !self.warm || self.newton.is_some();
@@ -318,7 +324,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         self.warm = false;
         self.place::<S>();
         if !self.invert_mass::<S>(t) {
-            return Progress::NonFinite;
+            return Verdict::NonFinite;
         }
         let mut sweeps = Sweeps::until(1.0, 0.25);
         // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
@@ -345,8 +351,8 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             // `f64::max` would hide a NaN.
             let change = if !P::PHYSICAL && (of_clock > change || of_clock.is_nan()) { of_clock } else { change };
             match sweeps.judge(change, 1.0) {
-                Progress::Going => {}
-                Progress::Done => {
+                Verdict::Going => {}
+                Verdict::Done => {
                     let outcome = self.finish::<S>();
                     self.judge::<S>(sweeps.first());
                     self.age = self.age.saturating_add(1);
@@ -355,7 +361,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
                     }
                     return outcome;
                 }
-                Progress::Slow { .. } if self.holds::<S>() => return self.finish::<S>(),
+                Verdict::Slow { .. } if self.holds::<S>() => return self.finish::<S>(),
                 refused => return refused,
             }
         }
@@ -435,26 +441,26 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
 
     /// The end of the step from its stages.
     #[inline(always)]
-    fn finish<S: Simd>(&mut self) -> Progress {
+    fn finish<S: Simd>(&mut self) -> Verdict {
         if !P::PHYSICAL {
             // With the rates of the last evaluation.
             self.stride::<S>();
         }
         let s = self.table.s;
-        let (fallen, dz) = (self.rate.sum::<S>(s), self.l.sum::<S>(s));
+        let (one_minus_rho, dz) = (self.rate.sum::<S>(s), self.l.sum::<S>(s));
         let mut deepest = Lanes::<S>::splat(f64::NEG_INFINITY);
         for r in 0..blocks::<S>(s) {
             deepest = deepest.max(self.falling.block::<S>(r));
         }
         let rho = 1.0 - deepest.largest();
         if rho <= 0.0 {
-            return Progress::StageFactor { rho };
+            return Verdict::StageFactor { rho };
         }
-        if fallen >= 1.0 {
-            return Progress::SigmaVanished { sigma: 1.0 / (1.0 - fallen) };
+        if one_minus_rho >= 1.0 {
+            return Verdict::SigmaVanished { sigma: 1.0 / (1.0 - one_minus_rho) };
         }
         // sigma_d - 1, so that a small rate does not round the whole.
-        let grow = fallen / (1.0 - fallen);
+        let grow = one_minus_rho / (1.0 - one_minus_rho);
         let single = |head| Twofold { head, tail: 0.0 };
         let (mut dq, mut dp) = ([Twofold::default(); N], [Twofold::default(); N]);
         for d in 0..N {
@@ -463,11 +469,11 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             dp[d] = Twofold { head: pushed, tail: grow * (pushed + self.p[d].value) };
         }
         if branched() {
-            return Progress::Branched;
+            return Verdict::Branched;
         }
-        // The largest change over lanes may hide a NaN; one of `fallen` is in `dp`.
+        // The largest change over lanes may hide a NaN; one of `one_minus_rho` is in `dp`.
         if !finite(&dq, &dp, single(dz)) {
-            return Progress::NonFinite;
+            return Verdict::NonFinite;
         }
         if !P::PHYSICAL {
             let mut dt = Stages::ZERO;
@@ -477,7 +483,7 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
             let dt = dt.sum::<S>(s);
             let runs = self.extension.g.0[..s].iter().all(|g| *g > 0.0);
             if !(runs && dt.is_finite()) {
-                return Progress::NonFinite;
+                return Verdict::NonFinite;
             }
             self.extension.t.add(single(dt));
             self.extension.p_t.add(single(grow * self.extension.p_t.value));
@@ -485,8 +491,8 @@ impl<'a, L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'a, L, P, N> {
         add(&mut self.q, &dq);
         add(&mut self.p, &dp);
         self.z.add(single(dz));
-        self.fallen = fallen;
+        self.one_minus_rho = one_minus_rho;
         self.warm = true;
-        Progress::Done
+        Verdict::Done
     }
 }

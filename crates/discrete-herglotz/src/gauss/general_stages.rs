@@ -2,21 +2,21 @@
 
 use super::coefficients::MOST;
 use super::dense::Solved;
-use super::extension::Pace;
 use super::general::General;
 use super::resolution::{FORETOLD, of_sigma};
 use super::stages::{Stages, blocks};
-use crate::lanes::Lanes;
-use crate::step_equations::{inverted, kept_mass_matrix};
+use super::time_transformation::TimeTransformation;
+use crate::gauss::lanes::Lanes;
+use crate::rules::step_equations::{inverted, kept_mass_matrix};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, larger};
 use pulp::Simd;
 use std::array::from_fn;
 
 /// The change of the integrating factor in a step from which on it is compared with the drag's integral.
-const FALLEN: f64 = 0.2;
+const STRONG: f64 = 0.2;
 
-impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'_, L, P, N> {
+impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, P, N> {
     /// Judges how well a step has resolved the motion, from how far its start was off what the step before foretold.
     #[inline(always)]
     pub(super) fn judge<S: Simd>(&mut self, first: f64) {
@@ -28,11 +28,11 @@ impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> General<'_, L, P, N> {
             };
             self.misfit = self.tail.misfit(rates, &self.x, self.table.h);
         }
-        if first > FORETOLD || self.fallen.abs() > FALLEN {
+        if first > FORETOLD || self.one_minus_rho.abs() > STRONG {
             let one = Lanes::<S>::splat(1.0);
             let integral = (0..blocks::<S>(self.table.s))
                 .fold(Lanes::<S>::splat(0.0), |sum, r| sum + self.rate.block::<S>(r) / (one - self.falling.block(r)));
-            self.misfit = larger(self.misfit, of_sigma(1.0 / (1.0 - self.fallen), integral.sum()));
+            self.misfit = larger(self.misfit, of_sigma(1.0 / (1.0 - self.one_minus_rho), integral.sum()));
         }
     }
 

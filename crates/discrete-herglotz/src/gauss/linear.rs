@@ -3,10 +3,11 @@
 use super::coefficients::MOST;
 use super::compensated::{Compensated, Twofold};
 use super::condensed::Condensed;
-use super::dense::Start;
+use super::dense::StepStart;
 use super::double_double::solve_exactly;
+use crate::run::saved::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Hessian, Lagrangian, VelocityPoint};
+use contact_geom::{Derivatives, Hessian, Lagrangian, VelocityPoint};
 use num_traits::{One, Zero};
 use qd::Quad;
 use std::array::from_fn;
@@ -130,7 +131,7 @@ impl<const N: usize> Linear<N> {
     ///
     /// Only a run that leaves the finite numbers is looked at step by step, again from its start.
     #[inline(always)]
-    pub fn advance(&mut self, steps: usize) -> (usize, Start<N>) {
+    pub fn advance(&mut self, steps: usize) -> (usize, StepStart<N>) {
         let start = (self.q, self.v, self.z);
         (1..steps).for_each(|_| self.step());
         let last = self.start();
@@ -151,8 +152,8 @@ impl<const N: usize> Linear<N> {
         }
     }
 
-    fn start(&self) -> Start<N> {
-        Start { q: self.q.map(|q| q.value), y: self.v.map(|v| v.value), z: self.z.value }
+    fn start(&self) -> StepStart<N> {
+        StepStart { q: self.q.map(|q| q.value), y: self.v.map(|v| v.value), z: self.z.value }
     }
 
     fn is_finite(&self) -> bool {
@@ -212,3 +213,5 @@ impl<const N: usize> Linear<N> {
         })
     }
 }
+
+saved!([const N: usize] Linear<N> { q, v, z });

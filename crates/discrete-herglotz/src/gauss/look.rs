@@ -6,11 +6,11 @@
 use super::coefficients::{Coefficients, MOST, lagrange_rows};
 use super::condensed::Condensed;
 use super::dense::Solved;
-use super::extension::Pace;
 use super::stages::{StageMap, Stages, blocks};
-use crate::lanes::Lanes;
+use super::time_transformation::TimeTransformation;
+use crate::gauss::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint, larger, largest};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint, larger, largest};
 use pulp::{Simd, WithSimd};
 use std::array::from_fn;
 use std::sync::OnceLock;
@@ -185,17 +185,17 @@ fn weighted(weights: &[f64; MOST], y: &Stages) -> f64 {
 /// The look, in the lanes of an instruction set.
 pub(super) struct Compare<'a, L, P, const N: usize> {
     pub lagrangian: &'a L,
-    pub pace: &'a P,
+    pub transformation: &'a P,
     pub curve: &'a Curve<N>,
     pub set: usize,
 }
 
-impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> WithSimd for Compare<'_, L, P, N> {
+impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Compare<'_, L, P, N> {
     type Output = Look;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Look {
-        let Compare { lagrangian, pace, curve, set } = self;
+        let Compare { lagrangian, transformation, curve, set } = self;
         let Curve { s, t, h, .. } = *curve;
         let between = Between::of(s, set);
         let zero = Lanes::<S>::splat(0.0);
@@ -207,7 +207,8 @@ impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> WithSimd for Compare<'_, L, P
             }
         };
         let (mut v, mut q, mut f, mut y) = ([Stages::ZERO; N], [Stages::ZERO; N], [Stages::ZERO; N], [Stages::ZERO; N]);
-        let (mut rate, mut fallen, mut l, mut z) = (Stages::ZERO, Stages::ZERO, Stages::ZERO, Stages([curve.z; MOST]));
+        let (mut rate, mut one_minus_rho, mut l, mut z) =
+            (Stages::ZERO, Stages::ZERO, Stages::ZERO, Stages([curve.z; MOST]));
         for d in 0..N {
             value(&curve.v[d], &mut v[d]);
             grown(&curve.v[d], curve.q[d], &mut q[d]);
@@ -215,7 +216,7 @@ impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> WithSimd for Compare<'_, L, P
             grown(&curve.force[d], curve.p[d], &mut y[d]);
         }
         value(&curve.rate, &mut rate);
-        grown(&curve.rate, 0.0, &mut fallen);
+        grown(&curve.rate, 0.0, &mut one_minus_rho);
         value(&curve.l, &mut l);
         if curve.acts {
             grown(&curve.l, curve.z, &mut z);
@@ -231,12 +232,12 @@ impl<L: Lagrangian<N>, P: Pace<N>, const N: usize> WithSimd for Compare<'_, L, P
             // From the clock's time to t.
             let (mut slower, mut long) = (Lanes::<S>::splat(1.0), Lanes::<S>::splat(h));
             if !P::PHYSICAL {
-                let rate = pace.rate(&x.q);
+                let rate = transformation.rate(&x.q);
                 (slower, long) = (rate.recip(), long * rate);
                 x.v *= slower;
             }
             let (value, g) = lagrangian.with_gradient(between.points.block::<S>(r) * h + t, &x);
-            let inverse = (Lanes::<S>::splat(1.0) - fallen.block::<S>(r)).recip();
+            let inverse = (Lanes::<S>::splat(1.0) - one_minus_rho.block::<S>(r)).recip();
             let mut work = zero;
             let drag = (rate.block::<S>(r) * inverse * slower - g.z) * long;
             for d in 0..N {

@@ -4,7 +4,8 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::stages::Stages;
-use crate::lanes::Lanes;
+use crate::gauss::lanes::Lanes;
+use crate::run::saved::Saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Structure, linear};
 use pulp::Simd;
@@ -60,5 +61,20 @@ impl<const N: usize> Mass<N> {
             Mass::Constant(w) => Lanes::splat(w[(i, j)]),
             Mass::Stages(w) => w[i][j].block(r),
         }
+    }
+}
+
+/// A constant one is not saved; that of the stages belongs to the last step.
+impl<const N: usize> Saved for Mass<N> {
+    fn save(&self, to: &mut Vec<u64>) {
+        if let Mass::Stages(rows) = self {
+            rows.iter().for_each(|row| row.save(to));
+        }
+    }
+    fn load(&mut self, from: &mut &[u64]) -> Option<()> {
+        if let Mass::Stages(rows) = self {
+            rows.iter_mut().try_for_each(|row| row.load(from))?;
+        }
+        Some(())
     }
 }

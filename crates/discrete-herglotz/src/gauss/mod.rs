@@ -1,5 +1,6 @@
 //! Contact Gauss collocation.
 
+mod account;
 mod beginning;
 mod clocked;
 pub(crate) mod coefficients;
@@ -8,9 +9,11 @@ mod condensed;
 mod damping;
 mod dense;
 mod double_double;
-mod extension;
 mod general;
+mod general_saved;
 mod general_stages;
+mod integrator;
+pub(crate) mod lanes;
 mod linear;
 mod look;
 mod mass;
@@ -24,11 +27,12 @@ mod stages;
 mod stepper;
 mod sweeps;
 mod table;
+mod time_transformation;
 
 pub(crate) use beginning::velocity;
 pub use clocked::ClockedStepper;
-use clocked::OwnClock;
 pub use dense::DenseStep;
+pub use integrator::{ClockedGauss, GaussCollocation};
 pub(crate) use look::{Look, SETS};
 pub(crate) use stepper::FEW;
 pub use stepper::{GaussRoute, GaussStepper};
@@ -37,7 +41,8 @@ use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use coefficients::MOST;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    Clock, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Structure, Triple, seed,
+    Clock, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Triple,
+    seed,
 };
 use stage_equations::{Given, Products, StageEquations, Workspace};
 
@@ -58,9 +63,9 @@ use stage_equations::{Given, Products, StageEquations, Workspace};
 /// use discrete_herglotz::{Gauss, Stepper};
 /// let gauss = Gauss::new(DoublePendulum::default(), 8, 0.1)?;
 /// let mut run = gauss.stepper(0.0, PhasePoint::new([1.0, 0.5], [0.0, 0.0], 0.0), [0.0, 0.0].into())?;
-/// run.advance(100).map_err(|halt| discrete_herglotz::InputError::FirstStep(halt.cause))?;
+/// run.advance(100)?;
 /// println!("t = {}: {:?}", run.time(), run.state());
-/// # Ok::<(), discrete_herglotz::InputError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Gauss<L> {
@@ -84,7 +89,7 @@ impl<L> Gauss<L> {
         if !(1..=MOST).contains(&stages) {
             return Err(InputError::Stages { found: stages });
         }
-        if !(h > 0.0 && h.is_finite()) {
+        if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
         if N == 0 {
@@ -112,10 +117,10 @@ impl<L> Gauss<L> {
     where
         L: Lagrangian<N>,
     {
-        GaussStepper::new(self, None, t0, state, guess, true)
+        GaussStepper::new(&self.lagrangian, self.forward.clone(), None, t0, state, guess, true)
     }
 
-    /// Like [`stepper`](Self::stepper) for a run of which nobody wants the action: where z decouples it is not computed.
+    /// Like [`stepper`](Self::stepper) for a run whose action is not requested: where z decouples it is not computed.
     ///
     /// # Errors
     /// Those of [`stepper`](Self::stepper).
@@ -128,22 +133,7 @@ impl<L> Gauss<L> {
     where
         L: Lagrangian<N>,
     {
-        GaussStepper::new(self, None, t0, state, guess, false)
-    }
-
-    /// Like [`stepper`](Self::stepper), with or without the action, where the structure has been probed at this start.
-    pub(crate) fn verified_stepper<const N: usize>(
-        &self,
-        structure: Structure,
-        t0: f64,
-        state: PhasePoint<N>,
-        guess: SVector<f64, N>,
-        wants_z: bool,
-    ) -> Result<GaussStepper<'_, L, N>, InputError>
-    where
-        L: Lagrangian<N>,
-    {
-        GaussStepper::new(self, Some(structure), t0, state, guess, wants_z)
+        GaussStepper::new(&self.lagrangian, self.forward.clone(), None, t0, state, guess, false)
     }
 
     /// A stepper of variable steps from a state at a time, for autonomous Lagrangians: the method's step is one of the time tau
@@ -163,22 +153,7 @@ impl<L> Gauss<L> {
         L: Lagrangian<N>,
         C: Clock<N>,
     {
-        ClockedStepper::new(self, clock, None, t0, state, guess)
-    }
-
-    /// Like [`clocked_stepper`](Self::clocked_stepper) by the Lagrangian's own clock, where the structure has been probed at this
-    /// start.
-    pub(crate) fn own_clock_stepper<const N: usize>(
-        &self,
-        structure: Structure,
-        t0: f64,
-        state: PhasePoint<N>,
-        guess: SVector<f64, N>,
-    ) -> Result<ClockedStepper<'_, L, OwnClock<'_, L>, N>, InputError>
-    where
-        L: Lagrangian<N>,
-    {
-        ClockedStepper::new(self, OwnClock(&self.lagrangian), Some(structure), t0, state, guess)
+        ClockedStepper::new(&self.lagrangian, self.forward.clone(), clock, None, t0, state, guess)
     }
 
     /// The stage equations of a step forward or backward in time.

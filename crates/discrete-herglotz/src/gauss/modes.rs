@@ -2,7 +2,7 @@
 
 use super::coefficients::{Coefficients, MOST, legendre};
 use super::stages::{StageMap, Stages};
-use crate::lanes::Lanes;
+use crate::gauss::lanes::Lanes;
 use contact_geom::nalgebra::{Complex, DMatrix};
 use num_traits::{One, Zero};
 use pulp::Simd;

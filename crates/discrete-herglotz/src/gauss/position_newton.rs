@@ -3,10 +3,10 @@
 use super::condensed::Condensed;
 use super::damping::{Damping, ITERATIONS, Verdict, chances};
 use crate::StepError;
-use crate::solver::DenseLu;
-use crate::step_equations::BLOCK;
+use crate::rules::step_equations::BLOCK;
+use crate::solve::solver::DenseLu;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{KernelDual, Lagrangian, VelocityPoint, largest};
+use contact_geom::{Derivatives, KernelDual, Lagrangian, VelocityPoint, largest};
 
 /// Solves `Q = q0 + u v0 + B a`, `a_i = M^-1 L_q(t_i, Q_i)`, for the positions Q of the stages: `s N` unknowns, of which a correction is
 /// `(1 - B a')^-1` times the residual. Made once for a run, so that no step allocates.

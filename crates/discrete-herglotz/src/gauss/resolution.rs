@@ -2,7 +2,7 @@
 
 use super::coefficients::Coefficients;
 use super::stages::{Stages, blocks};
-use crate::lanes::Lanes;
+use crate::gauss::lanes::Lanes;
 use contact_geom::larger;
 use pulp::Simd;
 

@@ -9,11 +9,12 @@ use super::position_newton::{At, PositionNewton, curvature};
 use super::resolution::{FORETOLD, Tail};
 use super::simplified::SlopeNewton;
 use super::stages::{Stages, blocks};
-use super::sweeps::{AGE, Progress, SLOW, Sweeps};
+use super::sweeps::{AGE, SLOW, Sweeps, Verdict};
 use crate::StepError;
-use crate::lanes::{Lanes, branched};
+use crate::gauss::lanes::{Lanes, branched};
+use crate::run::saved::{Saved, load_option, save_option, saved};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, VelocityPoint, largest};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, largest};
 use pulp::{Arch, Simd};
 
 /// The steps after which a matrix is expected to last.
@@ -31,7 +32,7 @@ const TAILS: usize = 7;
 /// The matrix of the sweeps and what it multiplies lie together, within 4096 bytes in few dimensions: a processor takes a load for
 /// one of what was just stored where the last twelve bits of their addresses agree, and waits.
 #[repr(C)]
-pub(super) struct Separable<'a, L, const N: usize> {
+pub(super) struct SeparableStages<'a, L, const N: usize> {
     pub lagrangian: &'a L,
     pub table: Condensed,
     pub left: Preconditioned,
@@ -71,7 +72,7 @@ pub(super) struct Separable<'a, L, const N: usize> {
     pub evaluations: u64,
 }
 
-impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
+impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
     pub fn new(
         lagrangian: &'a L,
         table: Condensed,
@@ -81,7 +82,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
         wants_z: bool,
     ) -> Self {
         let tail = Tail::new(table.s);
-        Separable {
+        SeparableStages {
             lagrangian,
             table,
             left,
@@ -207,7 +208,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
 
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
-    pub fn step<S: Simd>(&mut self, t: f64) -> Progress {
+    pub fn step<S: Simd>(&mut self, t: f64) -> Verdict {
         if self.warm && self.newton.is_none() && self.taken >= self.review {
             self.review *= 2;
             self.look_again();
@@ -268,23 +269,23 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             self.evaluations += s as u64;
             let (mut change, size) = (change.largest(), size.largest());
             if solved {
-                break Progress::Done;
+                break Verdict::Done;
             }
             if self.newton.is_some() {
                 (change, sweeps.still) = self.correct();
             }
             match sweeps.judge(change, size) {
-                Progress::Going if tails && change > NEAR * size => (due, self.far) = (true, true),
-                Progress::Going => (again, due) = (again || due, false),
+                Verdict::Going if tails && change > NEAR * size => (due, self.far) = (true, true),
+                Verdict::Going => (again, due) = (again || due, false),
                 done => break done,
             }
         };
-        if let (Progress::Done, Some(_)) = (outcome, &self.newton) {
+        if let (Verdict::Done, Some(_)) = (outcome, &self.newton) {
             // Stiff forces magnify the round-off of the positions, and the correction takes it back.
             self.a = self.rest;
         }
-        let outcome = if outcome == Progress::Done { self.finish::<S>(t) } else { outcome };
-        self.warm = outcome == Progress::Done;
+        let outcome = if outcome == Verdict::Done { self.finish::<S>(t) } else { outcome };
+        self.warm = outcome == Verdict::Done;
         if !self.warm {
             // What an iteration leaves that does not contract is worse than nothing.
             self.rest = [Stages::ZERO; N];
@@ -298,10 +299,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             if sweeps.count() > SLOW && self.age > AGE {
                 self.renew(t);
             }
-            return Progress::Done;
+            return Verdict::Done;
         }
         self.taken += 1;
-        Progress::Done
+        Verdict::Done
     }
 
     /// Looks at the slope of the force, and refines matrices that last.
@@ -353,7 +354,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
 
     /// The end of the step from its accelerations.
     #[inline(always)]
-    fn finish<S: Simd>(&mut self, t: f64) -> Progress {
+    fn finish<S: Simd>(&mut self, t: f64) -> Verdict {
         let (table, s) = (&self.table, self.table.s);
         let (mut dq, mut dv, mut dz) = ([Twofold::default(); N], [Twofold::default(); N], Twofold::default());
         if self.wants_z {
@@ -365,16 +366,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             dv[d] = table.end_v.sum::<S>(&self.a[d], s) + table.grow.times(v);
         }
         if branched() {
-            return Progress::Branched;
+            return Verdict::Branched;
         }
         // The largest change over lanes may hide a NaN.
         if !finite(&dq, &dv, dz) {
-            return Progress::NonFinite;
+            return Verdict::NonFinite;
         }
         add(&mut self.q, &dq);
         add(&mut self.v, &dv);
         self.z.add(dz);
-        Progress::Done
+        Verdict::Done
     }
 
     /// `L - gamma z` at the stages.
@@ -421,5 +422,30 @@ impl<'a, L: Lagrangian<N>, const N: usize> Separable<'a, L, N> {
             }
             self.left = left;
         }
+    }
+}
+
+saved!([L, const N: usize] SeparableStages<'_, L, N> {
+    rest, x, a, base, q, v, z, far, warm, solved, age, misfit, taken, review, evaluations,
+} and save_solution, load_solution);
+
+impl<L, const N: usize> SeparableStages<'_, L, N> {
+    /// The matrix by its slope and whether it has a tail, and Newton's Jacobian.
+    fn save_solution(&self, to: &mut Vec<u64>) {
+        self.left.kappa.save(to);
+        self.left.tail.is_some().save(to);
+        save_option(self.newton.as_deref(), to);
+    }
+
+    fn load_solution(&mut self, from: &mut &[u64]) -> Option<()> {
+        let (mut kappa, mut refined) = (0.0, false);
+        kappa.load(from)?;
+        refined.load(from)?;
+        self.left = self.table.preconditioned(kappa)?;
+        if refined {
+            self.left.refine(&self.table);
+        }
+        self.newton = load_option(from, || SlopeNewton::new(&self.table))?.map(Box::new);
+        Some(())
     }
 }

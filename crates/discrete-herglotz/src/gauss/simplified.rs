@@ -9,8 +9,9 @@
 use super::condensed::Condensed;
 use super::modes::Modes;
 use super::stages::{Stages, blocks};
-use super::table::Table;
-use crate::lanes::Lanes;
+use super::table::StageTable;
+use crate::gauss::lanes::Lanes;
+use crate::run::saved::saved;
 use contact_geom::nalgebra::{Complex, DMatrix, SMatrix, SVector};
 use contact_geom::{Hessian, Scalar, Triple, larger};
 use pulp::{Arch, Simd, WithSimd};
@@ -165,7 +166,7 @@ impl<const N: usize> Block<N> {
 }
 
 impl<const N: usize> StageNewton<N> {
-    pub fn new(table: &Table) -> Self {
+    pub fn new(table: &StageTable) -> Self {
         let modes = Modes::of(table.s);
         StageNewton { modes, h: table.h, blocks: Vec::with_capacity(modes.iter().count()) }
     }
@@ -203,7 +204,7 @@ impl<const N: usize> StageNewton<N> {
 /// once for all Lagrangians.
 pub(super) struct CorrectStages<'a, const N: usize> {
     pub newton: &'a StageNewton<N>,
-    pub table: &'a Table,
+    pub table: &'a StageTable,
     pub start: ([f64; N], [f64; N], f64),
     pub l_v: &'a [Stages; N],
     /// With the weights `h b`.
@@ -298,3 +299,7 @@ fn invert<const N: usize>(m: &mut Matrix<N>) -> bool {
     m.copy_from_slice(inverse.as_slice());
     m.iter().all(|e| e.is_finite())
 }
+
+saved!([const N: usize] SlopeNewton<N> { inverses, a });
+saved!([const N: usize] StageNewton<N> { blocks });
+saved!([const N: usize] Block<N> { inverse, z, z_v, rho, rho_v, rho_z, of_z, of_rho });

@@ -4,11 +4,11 @@
 
 use super::coefficients::{Coefficients, MOST};
 use super::damping::{Damping, ITERATIONS, Verdict, chances};
-use crate::solver::DenseLu;
-use crate::step_equations::BLOCK;
+use crate::rules::step_equations::BLOCK;
+use crate::solve::solver::DenseLu;
 use crate::{ITERATION_LIMIT, StepError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::{Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, seed};
+use contact_geom::{Derivatives, Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, seed};
 use std::array::from_fn;
 
 /// The products of the coefficients with a step, which may be negative.
@@ -46,14 +46,14 @@ pub(super) enum Given<const N: usize, T> {
 
 /// The unknowns: velocity, action and integrating factor of each stage, and the momentum at the start.
 #[derive(Clone)]
-pub(super) struct Unknowns<const N: usize, T> {
+pub(super) struct StageUnknowns<const N: usize, T> {
     pub v: Vec<SVector<T, N>>,
     pub z: Vec<T>,
     pub rho: Vec<T>,
     pub p0: SVector<T, N>,
 }
 
-impl<const N: usize> Unknowns<N, f64> {
+impl<const N: usize> StageUnknowns<N, f64> {
     /// A motion of constant velocity.
     fn make_uniform(&mut self, v: &SVector<f64, N>, p0: &SVector<f64, N>, z0: f64) {
         self.v.fill(*v);
@@ -77,8 +77,8 @@ impl<const N: usize> Unknowns<N, f64> {
     }
 
     /// The same over another scalar, without differentials.
-    pub fn lifted<T: Scalar>(&self) -> Unknowns<N, T> {
-        Unknowns {
+    pub fn lifted<T: Scalar>(&self) -> StageUnknowns<N, T> {
+        StageUnknowns {
             v: self.v.iter().map(|v| v.map(T::from)).collect(),
             z: self.z.iter().map(|z| T::from(*z)).collect(),
             rho: self.rho.iter().map(|r| T::from(*r)).collect(),
@@ -101,11 +101,11 @@ pub(super) struct End<const N: usize, T> {
 /// What Newton's method works in; made once for a run, so that no step allocates.
 pub(super) struct Workspace<const N: usize> {
     /// The guess, then the solution.
-    pub x: Unknowns<N, f64>,
+    pub x: StageUnknowns<N, f64>,
     /// L and its gradient at the stages of the solution.
     pub l: Vec<Dual<f64, Triple<N>>>,
     /// The last iterate, from which the solution is tried.
-    from: Unknowns<N, f64>,
+    from: StageUnknowns<N, f64>,
     jacobian: DMatrix<f64>,
     /// The factors of the Jacobian that an iteration uses: of its own iterate, or of one before.
     lu: DenseLu,
@@ -128,13 +128,13 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     }
 
     /// `q0 + hA V` at a stage.
-    pub fn position<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>, i: usize) -> SVector<T, N> {
+    pub fn position<T: Scalar>(&self, given: &Given<N, T>, x: &StageUnknowns<N, T>, i: usize) -> SVector<T, N> {
         let (Given::Start(PhasePoint { q: q0, .. }) | Given::Ends { q0, .. }) = given;
         x.v.iter().zip(&self.products.a[i]).fold(*q0, |sum, (v, a)| sum + v.map(|e| e * *a))
     }
 
     /// L and its gradient at the stages.
-    fn stages<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>, l: &mut Vec<Dual<T, Triple<N, T>>>) {
+    fn stages<T: Scalar>(&self, given: &Given<N, T>, x: &StageUnknowns<N, T>, l: &mut Vec<Dual<T, Triple<N, T>>>) {
         l.clear();
         l.extend((0..self.products.s).map(|i| {
             let y = VelocityPoint { q: self.position(given, x, i), v: x.v[i], z: x.z[i] };
@@ -151,7 +151,8 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     /// The workspace for steps of this kind.
     pub fn workspace(&self, given: &Given<N, f64>) -> Workspace<N> {
         let (s, n) = (self.products.s, self.unknowns(given));
-        let x = Unknowns { v: vec![SVector::zeros(); s], z: vec![0.0; s], rho: vec![1.0; s], p0: SVector::zeros() };
+        let x =
+            StageUnknowns { v: vec![SVector::zeros(); s], z: vec![0.0; s], rho: vec![1.0; s], p0: SVector::zeros() };
         let numbers = DVector::zeros(n);
         Workspace {
             from: x.clone(),
@@ -169,7 +170,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     pub fn residual<T: Scalar>(
         &self,
         given: &Given<N, T>,
-        x: &Unknowns<N, T>,
+        x: &StageUnknowns<N, T>,
         l: &[Dual<T, Triple<N, T>>],
         out: &mut DVector<T>,
     ) {
@@ -206,7 +207,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     pub fn jacobian(
         &self,
         given: &Given<N, f64>,
-        x: &Unknowns<N, f64>,
+        x: &StageUnknowns<N, f64>,
         l: &[Dual<f64, Triple<N>>],
         out: &mut DMatrix<f64>,
     ) {
@@ -271,7 +272,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     }
 
     /// Adds a part of a correction to the unknowns.
-    fn add<T: Scalar>(&self, x: &mut Unknowns<N, T>, change: &DVector<T>, part: f64) {
+    fn add<T: Scalar>(&self, x: &mut StageUnknowns<N, T>, change: &DVector<T>, part: f64) {
         let s = self.products.s;
         for i in 0..s {
             for d in 0..N {
@@ -286,7 +287,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     }
 
     /// The size of a correction: the largest, each in units of the largest of its kind.
-    fn size<T: Scalar>(&self, x: &Unknowns<N, T>, change: &DVector<T>) -> f64 {
+    fn size<T: Scalar>(&self, x: &StageUnknowns<N, T>, change: &DVector<T>) -> f64 {
         let s = self.products.s;
         let mut worst = 0.0f64;
         let mut see = |change: f64, size: f64| {
@@ -369,7 +370,12 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     }
 
     /// The end of the step whose stages are solved, from L and its gradient there.
-    pub fn end<T: Scalar>(&self, given: &Given<N, T>, x: &Unknowns<N, T>, l: &[Dual<T, Triple<N, T>>]) -> End<N, T> {
+    pub fn end<T: Scalar>(
+        &self,
+        given: &Given<N, T>,
+        x: &StageUnknowns<N, T>,
+        l: &[Dual<T, Triple<N, T>>],
+    ) -> End<N, T> {
         let Products { b, .. } = self.products;
         let (q0, p0) = match given {
             Given::Start(state) => (state.q, state.p),

@@ -2,7 +2,8 @@
 
 use super::coefficients::MOST;
 use super::compensated::Twofold;
-use crate::lanes::Lanes;
+use crate::gauss::lanes::Lanes;
+use crate::run::saved::Saved;
 use pulp::Simd;
 use qd::Quad;
 use std::array::from_fn;
@@ -120,5 +121,14 @@ impl StageMap {
             }
             y.set(r, even + odd);
         }
+    }
+}
+
+impl Saved for Stages {
+    fn save(&self, to: &mut Vec<u64>) {
+        self.0.save(to);
+    }
+    fn load(&mut self, from: &mut &[u64]) -> Option<()> {
+        self.0.load(from)
     }
 }

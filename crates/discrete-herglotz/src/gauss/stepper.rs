@@ -1,26 +1,27 @@
 //! Runs of contact Gauss collocation.
 
 mod marks;
+mod words;
 
-use super::Gauss;
+use super::account::account;
 use super::beginning::{Beginning, velocity};
 use super::condensed::Condensed;
-use super::dense::{DenseStep, Solved, Start};
-use super::extension::{Extension, Physical};
+use super::dense::{DenseStep, Solved, StepStart};
 use super::general::General;
 use super::linear::Linear;
 use super::mass::Mass;
 use super::resolution;
-use super::separable::Separable;
+use super::separable::SeparableStages;
 use super::stage_equations::{Given, Products, StageEquations, Workspace};
-use super::sweeps::Progress;
-use super::table::Table;
-use crate::lanes::forget_branches;
-use crate::step_equations::is_identity;
-use crate::watch::Watch;
-use crate::{Doubt, Halt, InputError, StepError, Stepper, Suspicion};
+use super::sweeps::Verdict;
+use super::table::StageTable;
+use super::time_transformation::{Extension, Physical};
+use crate::gauss::lanes::forget_branches;
+use crate::rules::step_equations::is_identity;
+use crate::run::watch::Watch;
+use crate::{Doubt, Halt, InputError, Item, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 pub(crate) use marks::FEW;
 use marks::Sequence;
 use pulp::{Arch, Simd, WithSimd};
@@ -46,7 +47,7 @@ const MOST_LINEAR: usize = 32;
 enum Route<'a, L, const N: usize> {
     /// In a box of its own: its matrices are larger than all that others hold.
     Linear(Box<Linear<N>>, Condensed),
-    Condensed(Separable<'a, L, N>),
+    Condensed(SeparableStages<'a, L, N>),
     General(General<'a, L, Physical, N>),
 }
 
@@ -67,14 +68,14 @@ enum Solution {
 /// method, in the positions of the stages alone where mass and rate are constant. A step of which no correction helps is given up.
 pub struct GaussStepper<'a, L, const N: usize> {
     lagrangian: &'a L,
-    products: &'a Products,
+    products: Products,
     route: Box<Route<'a, L, N>>,
     mass: Option<Box<SMatrix<f64, N, N>>>,
     arch: Arch,
     t0: f64,
     k: usize,
     /// The state at the start of the last step.
-    from: Start<N>,
+    from: StepStart<N>,
     /// Whether the stages of the last step are in the route's workspace.
     solved: bool,
     newton: bool,
@@ -94,14 +95,15 @@ pub struct GaussStepper<'a, L, const N: usize> {
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     pub(super) fn new(
-        gauss: &'a Gauss<L>,
+        lagrangian: &'a L,
+        products: Products,
         probed: Option<Structure>,
         t0: f64,
         state: PhasePoint<N>,
         guess: SVector<f64, N>,
         wants_z: bool,
     ) -> Result<Self, InputError> {
-        let (lagrangian, s, h) = (&gauss.lagrangian, gauss.stages(), gauss.forward.h);
+        let Products { s, h, .. } = products;
         let Beginning { start, structure, w, inverse } = Beginning::of(lagrangian, probed, t0, &state, guess)?;
         let condensed = structure.separable && structure.has_constant_rate();
         let (mut mass, mut of_sigma) = (None, 0.0);
@@ -121,18 +123,18 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
                 None => {
                     let left = table.preconditioned(0.0).ok_or(InputError::Step { h })?;
                     let inverse = (!unit).then_some(inverse);
-                    Route::Condensed(Separable::new(lagrangian, table, left, inverse, &start, wants_z))
+                    Route::Condensed(SeparableStages::new(lagrangian, table, left, inverse, &start, wants_z))
                 }
             }
         } else {
             let mass = Mass::new(&structure, inverse);
             let physical = Extension::new(Physical, t0, 0.0);
-            Route::General(General::new(lagrangian, physical, Table::new(s, h), mass, &state, &start.v))
+            Route::General(General::new(lagrangian, physical, StageTable::new(s, h), mass, &state, &start.v))
         };
-        let from = Start { q: [0.0; N], y: [0.0; N], z: 0.0 };
+        let from = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
         Ok(GaussStepper {
             lagrangian,
-            products: &gauss.forward,
+            products,
             route: Box::new(route),
             mass,
             arch: Arch::new(),
@@ -147,7 +149,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             workspace: None,
             newton_steps: 0,
             of_sigma,
-            sequence: (s <= FEW).then(|| Sequence::new(Start { q: state.q.into(), ..from })),
+            sequence: (s <= FEW).then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
             watch: Watch::new(&state.q, &start.v, h),
         })
     }
@@ -181,9 +183,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         self.newton_steps
     }
 
-    /// The last step as a curve; `None` before the first, and after a step that could not be taken. It costs nothing where it
-    /// is not asked for.
-    pub fn dense(&self) -> Option<DenseStep<N>> {
+    /// The last step as a curve.
+    fn curve(&self) -> Option<DenseStep<N>> {
         let (s, h) = (self.products.s, self.products.h);
         let t = self.t0 + self.k.checked_sub(1)? as f64 * h;
         let condensed = |table: &Condensed, a, wants_z| {
@@ -206,17 +207,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
 
     /// The state as the route holds it.
     #[inline(always)]
-    fn values(&self) -> Start<N> {
+    fn values(&self) -> StepStart<N> {
         let (q, y, z) = match &*self.route {
             Route::Linear(run, _) => (&run.q, &run.v, run.z),
             Route::Condensed(run) => (&run.q, &run.v, run.z),
             Route::General(run) => (&run.q, &run.p, run.z),
         };
-        Start { q: q.map(|q| q.value), y: y.map(|y| y.value), z: z.value }
+        StepStart { q: q.map(|q| q.value), y: y.map(|y| y.value), z: z.value }
     }
 
     /// With momenta for the velocities of the condensed routes.
-    fn phase(&self, x: &Start<N>) -> PhasePoint<N> {
+    fn phase(&self, x: &StepStart<N>) -> PhasePoint<N> {
         let y = SVector::from(x.y);
         PhasePoint { q: SVector::from(x.q), p: self.mass.as_ref().map_or(y, |mass| **mass * y), z: x.z }
     }
@@ -234,7 +235,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         match &mut *self.route {
             Route::Condensed(run) => run.reserve(),
             _ if self.workspace.is_none() => {
-                let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t: self.time() };
+                let equations =
+                    StageEquations { lagrangian: self.lagrangian, products: &self.products, t: self.time() };
                 self.workspace = Some(Box::new(equations.workspace(&Given::Start(self.state()))));
             }
             _ => {}
@@ -290,7 +292,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             Route::Condensed(run) => return run.solve(t),
             Route::General(run) => run,
         };
-        let equations = StageEquations { lagrangian: self.lagrangian, products: self.products, t };
+        let equations = StageEquations { lagrangian: self.lagrangian, products: &self.products, t };
         let given = Given::Start(from);
         let v = match velocity(self.lagrangian, t, &from, SVector::zeros()) {
             Ok(v) => v,
@@ -357,7 +359,7 @@ struct Advance<'b, 'a, L, const N: usize> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
-    type Output = Result<(), (usize, Progress)>;
+    type Output = Result<(), (usize, Verdict)>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
@@ -368,7 +370,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
             let (taken, from) = linear.advance(steps);
             run.k += taken;
             run.from = from;
-            return if taken == steps { Ok(()) } else { Err((taken, Progress::NonFinite)) };
+            return if taken == steps { Ok(()) } else { Err((taken, Verdict::NonFinite)) };
         }
         for taken in 0..steps {
             // Dense output is of the last step.
@@ -377,11 +379,11 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
             }
             let t = t0 + run.k as f64 * h;
             let progress = match &mut *run.route {
-                Route::Linear(..) => Progress::Done,
+                Route::Linear(..) => Verdict::Done,
                 Route::Condensed(condensed) => condensed.step::<S>(t),
                 Route::General(general) => general.step::<S>(t),
             };
-            if progress != Progress::Done {
+            if progress != Verdict::Done {
                 return Err((taken, progress));
             }
             let misfit = match &*run.route {
@@ -448,7 +450,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             _ if self.k == 0 => 1.0,
             Route::Linear(_, table) => 1.0 + table.grow.head,
             Route::Condensed(run) => 1.0 + run.table.grow.head,
-            Route::General(run) => 1.0 / (1.0 - run.fallen),
+            Route::General(run) => 1.0 / (1.0 - run.one_minus_rho),
         }
     }
 
@@ -458,6 +460,27 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             Route::Condensed(run) => run.evaluations,
             Route::General(run) => run.evaluations,
         }
+    }
+
+    fn has_constant_rate(&self) -> bool {
+        !matches!(&*self.route, Route::General(_))
+    }
+
+    fn account(&self) -> Vec<Item> {
+        account(self.route(), &self.lagrangian.structure())
+    }
+
+    /// The collocation polynomial. It costs nothing where it is not asked for.
+    fn dense(&self) -> Option<DenseStep<N>> {
+        self.curve()
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        Some(self.words())
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.read(&mut words).is_some() && words.is_empty()
     }
 
     /// What was seen along the steps; else what a look at the last step alone shows, between its nodes: a run that wants more asks

@@ -4,7 +4,7 @@ use crate::StepError;
 
 /// What is to be done after a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Progress {
+pub(super) enum Verdict {
     /// Another sweep.
     Going,
     /// The stages are solved to round-off.
@@ -21,13 +21,13 @@ pub(super) enum Progress {
     SigmaVanished { sigma: f64 },
 }
 
-impl From<Progress> for StepError {
-    fn from(refused: Progress) -> Self {
+impl From<Verdict> for StepError {
+    fn from(refused: Verdict) -> Self {
         match refused {
-            Progress::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
-            Progress::StageFactor { rho } => StepError::StageFactor { rho },
-            Progress::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
-            Progress::Branched => StepError::Branched,
+            Verdict::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
+            Verdict::StageFactor { rho } => StepError::StageFactor { rho },
+            Verdict::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
+            Verdict::Branched => StepError::Branched,
             _ => StepError::NonFinite,
         }
     }
@@ -84,14 +84,14 @@ impl Sweeps {
 
     /// Judges a sweep by its largest change and the largest term.
     #[inline(always)]
-    pub fn judge(&mut self, change: f64, size: f64) -> Progress {
+    pub fn judge(&mut self, change: f64, size: f64) -> Verdict {
         self.count += 1;
         let round_off = 0.5 * f64::EPSILON * size;
         if change <= self.enough * round_off || self.last && change <= 256.0 * round_off {
-            return Progress::Done;
+            return Verdict::Done;
         }
         if !(change + size).is_finite() {
-            return Progress::NonFinite;
+            return Verdict::NonFinite;
         }
         if self.count == 1 {
             self.first = (change, size);
@@ -101,21 +101,21 @@ impl Sweeps {
             let expected = f64::max(ratio, if self.count > 2 { self.ratio } else { 0.1 });
             let next = change * expected;
             if next <= self.left * round_off {
-                return Progress::Done;
+                return Verdict::Done;
             }
             self.last = next * expected <= self.left * round_off;
             if ratio >= 1.0 {
                 if change <= 256.0 * round_off || self.still {
-                    return Progress::Done;
+                    return Verdict::Done;
                 }
                 self.risen += 1;
             }
             if self.risen > 3 || self.count > LIMIT {
-                return Progress::Slow { change: change / size, sweeps: self.count };
+                return Verdict::Slow { change: change / size, sweeps: self.count };
             }
             self.ratio = ratio;
         }
         self.before = change;
-        Progress::Going
+        Verdict::Going
     }
 }

@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 /// the energy drift. But the method is symplectic with any weights where `m_ij + m_ji = 1`, and this numbers of 53 digits
 /// can satisfy exactly: stages take `M (h b f)`, the end the sum of the same `h b f`. See Antonana, Makazaga and Murua,
 /// "Reducing and monitoring round-off error propagation for symplectic implicit Runge-Kutta schemes", Numer. Algorithms 76 (2017).
-pub(super) struct Table {
+pub(super) struct StageTable {
     pub s: usize,
     pub h: f64,
     /// `M`.
@@ -62,7 +62,7 @@ impl Maps {
     }
 }
 
-impl Table {
+impl StageTable {
     pub fn new(s: usize, h: f64) -> Self {
         let (g, step) = (Coefficients::of(s), Quad::from(h));
         let mut weights = from_fn(|j| if j < s { (step * g.b[j]).0 } else { 0.0 });
@@ -73,6 +73,14 @@ impl Table {
             weights[s - 1] = weights[0];
         }
         let Maps { m, ahead, ahead_weighted } = Maps::of(s);
-        Table { s, h, m, weights: Stages(weights), times: padded(&g.c.map(|c| step * c), s), ahead, ahead_weighted }
+        StageTable {
+            s,
+            h,
+            m,
+            weights: Stages(weights),
+            times: padded(&g.c.map(|c| step * c), s),
+            ahead,
+            ahead_weighted,
+        }
     }
 }

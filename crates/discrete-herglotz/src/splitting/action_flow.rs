@@ -3,7 +3,7 @@
 use super::separable::{FALSE_CLAIM, without_symmetry};
 use crate::InputError;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
 /// The flow of `z' = f(z)`, `p' = f'(z) p`: the third part of a splitting where L is not affine in z.
 ///

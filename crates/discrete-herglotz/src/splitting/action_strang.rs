@@ -1,8 +1,8 @@
 //! The Strang splitting of a drag that is not linear, as a discrete Lagrangian.
 
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
-use super::separable::Separable;
-use crate::watch::misfit;
+use super::separable::SeparableForm;
+use crate::run::watch::misfit;
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
@@ -15,7 +15,7 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 /// Symmetric and explicit; `sigma_d` is the product of the two factors `phi'`.
 #[derive(Clone, Debug)]
 pub struct ActionStrang<L, F: ActionFlow, const N: usize> {
-    form: Separable<L, N>,
+    form: SeparableForm<L, N>,
     h: f64,
     forth: F::Map,
     back: F::Map,
@@ -29,7 +29,7 @@ impl<L: Lagrangian<N>, const N: usize> ActionStrang<L, Riccati, N> {
     /// # Errors
     /// Those of [`ActionSplitting::new`](crate::ActionSplitting::new), but for the last.
     pub fn new(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
-        let form = Separable::read(lagrangian, h, t, state)?;
+        let form = SeparableForm::read(lagrangian, h, t, state)?;
         let flow = Riccati::of(&form.lagrangian, t, state)?;
         Self::of(form, &flow, h, t, state)
     }
@@ -41,10 +41,10 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionStrang<L, F, N> {
     /// # Errors
     /// Those of [`ActionSplitting::with_flow`](crate::ActionSplitting::with_flow), but for the last.
     pub fn with_flow(lagrangian: L, flow: &F, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
-        Self::of(Separable::read(lagrangian, h, t, state)?, flow, h, t, state)
+        Self::of(SeparableForm::read(lagrangian, h, t, state)?, flow, h, t, state)
     }
 
-    fn of(form: Separable<L, N>, flow: &F, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
+    fn of(form: SeparableForm<L, N>, flow: &F, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
         form.check_steady_drag(t, state)?;
         check_flow(flow, &form.lagrangian, t, state)?;
         let (forth, back) = (flow.over(0.5 * h), flow.over(-0.5 * h));

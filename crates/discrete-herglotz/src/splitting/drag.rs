@@ -1,10 +1,10 @@
 //! A linear drag, and the flow of the kinetic part with it.
 
-use super::separable::Separable;
+use super::separable::SeparableForm;
 use crate::InputError;
 use crate::gauss::coefficients::Coefficients;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Dual, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, VelocityPoint};
 
 /// The nodes of the quadrature along a drift: its error is that of order 12, far below that of any scheme here.
 const NODES: usize = 6;
@@ -21,7 +21,7 @@ pub(super) enum Drag<const N: usize> {
 impl<const N: usize> Drag<N> {
     /// That of a separable Lagrangian.
     pub(super) fn of<L: Lagrangian<N>>(
-        form: &Separable<L, N>,
+        form: &SeparableForm<L, N>,
         t: f64,
         state: &PhasePoint<N>,
     ) -> Result<Self, InputError> {

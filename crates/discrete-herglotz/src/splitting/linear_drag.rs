@@ -1,9 +1,11 @@
 //! Splittings where the drag is linear.
 
 use super::drag::{Drag, Drift};
-use super::motion::{Motion, Progress, Reached};
-use super::separable::Separable;
-use crate::{Doubt, Halt, InputError, SplittingScheme, Stepper, Suspicion};
+use super::motion::{Advance, Motion, Reached};
+use super::separable::SeparableForm;
+use crate::run::DECOUPLED;
+use crate::run::saved::Saved;
+use crate::{Doubt, Halt, InputError, Item, SplittingScheme, Stepper, Suspicion};
 use contact_geom::{Lagrangian, PhasePoint};
 
 /// A splitting at work on `L = v.Mv/2 - V(t, q) + gamma(t) z`.
@@ -33,10 +35,10 @@ use contact_geom::{Lagrangian, PhasePoint};
 /// ```
 #[derive(Clone, Debug)]
 pub struct Splitting<'a, L, const N: usize> {
-    form: Separable<&'a L, N>,
+    form: SeparableForm<&'a L, N>,
     drag: Drag<N>,
-    table: Table,
-    progress: Progress<N>,
+    table: SubstepTable,
+    progress: Advance<N>,
     action: bool,
     compensated: bool,
     watched: bool,
@@ -44,7 +46,7 @@ pub struct Splitting<'a, L, const N: usize> {
 
 /// The stages of a step, in the lengths of this step and this drag.
 #[derive(Clone, Debug)]
-struct Table {
+struct SubstepTable {
     /// Those of the first step.
     first: Vec<Stage>,
     /// Those of a later one: its first kick, or its first drift, is one with the last of the step before.
@@ -68,7 +70,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
     /// A splitting from the state `(q, p, z)` at time `t0`, with the action.
     ///
     /// # Errors
-    /// [`InputError::Step`] unless h is positive and finite; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
+    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
     /// is not separable and affine in z; [`InputError::Geometry`] where the state is not finite or M singular;
     /// [`InputError::FirstStep`] where V is not defined at the start.
     pub fn new(
@@ -78,11 +80,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         t0: f64,
         state: PhasePoint<N>,
     ) -> Result<Self, InputError> {
-        let form = Separable::read(lagrangian, h, t0, &state)?;
+        let form = SeparableForm::read(lagrangian, h, t0, &state)?;
         let drag = Drag::of(&form, t0, &state)?;
         let kick = form.first_kick(t0, &state.q, 0.0)?;
-        let table = Table::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
-        let progress = Progress::new(h, t0, scheme.stages(), state, kick);
+        let table = SubstepTable::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
+        let progress = Advance::new(h, t0, scheme.stages(), state, kick);
         Ok(Splitting { form, drag, table, progress, action: true, compensated: false, watched: false })
     }
 
@@ -104,7 +106,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
     }
 }
 
-impl Table {
+impl SubstepTable {
     /// Of a drag that depends on time the drifts are those from `t0`; each step makes its own.
     fn new(scheme: &SplittingScheme, h: f64, drift: impl Fn(f64) -> Drift) -> Self {
         let (drifts, kicks) = scheme.coefficients();
@@ -122,7 +124,7 @@ impl Table {
         let (last_kick, last_drift) = (kicks[stages], drifts.get(stages).copied().unwrap_or(0.0));
         let mut joined = first.clone();
         joined[0] = stage(last_kick + kicks[0], last_drift + drifts[0], first[0].time);
-        Table { first, joined, closing: stage(last_kick, last_drift, h) }
+        SubstepTable { first, joined, closing: stage(last_kick, last_drift, h) }
     }
 }
 
@@ -147,13 +149,31 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     }
 
     fn sigma(&self) -> f64 {
-        let Progress { taken, t0, h, .. } = self.progress;
+        let Advance { taken, t0, h, .. } = self.progress;
         let Some(before) = taken.checked_sub(1) else { return 1.0 };
         Maps { form: &self.form, drag: &self.drag, table: &self.table }.sigma(t0 + before as f64 * h, h)
     }
 
     fn evaluations(&self) -> u64 {
         self.progress.evaluations()
+    }
+
+    fn has_constant_rate(&self) -> bool {
+        matches!(self.drag, Drag::Constant(_))
+    }
+
+    fn account(&self) -> Vec<Item> {
+        super::account(Item::skipped("action z", DECOUPLED))
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        Saved::save(&self.progress, &mut words);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.progress.load(&mut words).is_some() && words.is_empty()
     }
 
     fn suspicion(&self) -> Option<Suspicion> {
@@ -167,15 +187,15 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
 
 /// What a step consists of.
 struct Maps<'s, 'a, L, const N: usize> {
-    form: &'s Separable<&'a L, N>,
+    form: &'s SeparableForm<&'a L, N>,
     drag: &'s Drag<N>,
-    table: &'s Table,
+    table: &'s SubstepTable,
 }
 
 impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
     fn advance<const ACTION: bool, const COMPENSATED: bool>(
         &self,
-        progress: &mut Progress<N>,
+        progress: &mut Advance<N>,
         steps: usize,
         watched: bool,
     ) -> Result<(), Halt> {
@@ -199,7 +219,7 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
     #[inline(never)]
     fn run<const ACTION: bool, const COMPENSATED: bool, const TIMED: bool, const WATCHED: bool>(
         &self,
-        from: &Progress<N>,
+        from: &Advance<N>,
         steps: usize,
     ) -> Reached<N> {
         let Maps { form, table, .. } = self;

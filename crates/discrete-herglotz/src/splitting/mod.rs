@@ -3,6 +3,7 @@
 mod action_flow;
 mod action_strang;
 mod drag;
+mod integrator;
 mod linear_drag;
 mod motion;
 mod nonlinear_drag;
@@ -20,3 +21,15 @@ pub use linear_drag::Splitting;
 pub use nonlinear_drag::ActionSplitting;
 pub use scheme::SplittingScheme;
 pub use strang::Strang;
+
+use crate::Item;
+
+/// What the steps of splittings compute, with what is said of the action.
+fn account(action: Item) -> Vec<Item> {
+    vec![
+        Item::skipped("Newton's method", "each step is explicit: forces only"),
+        Item::skipped("Jacobian", "no equation is solved"),
+        Item::skipped("shared kicks", "the last force of a step is the first of the next"),
+        action,
+    ]
+}

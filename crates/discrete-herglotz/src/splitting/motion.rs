@@ -1,6 +1,7 @@
 //! What every splitting moves: sums that may carry their rounding, a state of them, and a run in chunks.
 
-use crate::watch::{Watch, sharper, turning};
+use crate::run::saved::saved;
+use crate::run::watch::{Watch, sharper, turning};
 use crate::{Doubt, Halt, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{PhasePoint, Triple, larger};
@@ -115,7 +116,7 @@ const CHUNK: usize = 256;
 
 /// How far a run has come.
 #[derive(Clone, Debug)]
-pub(super) struct Progress<const N: usize> {
+pub(super) struct Advance<const N: usize> {
     pub(super) h: f64,
     pub(super) t0: f64,
     pub(super) taken: usize,
@@ -127,10 +128,10 @@ pub(super) struct Progress<const N: usize> {
     pub(super) watch: Watch<N>,
 }
 
-impl<const N: usize> Progress<N> {
+impl<const N: usize> Advance<N> {
     pub(super) fn new(h: f64, t0: f64, forces: usize, state: PhasePoint<N>, kick: (f64, SVector<f64, N>)) -> Self {
         let watch = Watch::new(&state.q, &SVector::zeros(), h);
-        Progress { h, t0, taken: 0, forces, motion: Motion::new(state, kick), state, watch }
+        Advance { h, t0, taken: 0, forces, motion: Motion::new(state, kick), state, watch }
     }
 
     /// The time after so many steps more.
@@ -183,3 +184,7 @@ impl<const N: usize> Progress<N> {
         Ok(())
     }
 }
+
+saved!([const N: usize] Sum<N> { value, carry });
+saved!([const N: usize] Motion<N> { q, p, z, force, value, change, sigma });
+saved!([const N: usize] Advance<N> { taken, motion, state, watch });

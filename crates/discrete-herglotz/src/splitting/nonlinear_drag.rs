@@ -1,9 +1,10 @@
 //! Splittings where the drag is not linear in the action.
 
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
-use super::motion::{Motion, Progress, Reached};
-use super::separable::Separable;
-use crate::{Doubt, Halt, InputError, SplittingScheme, Stepper, Suspicion};
+use super::motion::{Advance, Motion, Reached};
+use super::separable::SeparableForm;
+use crate::run::saved::Saved;
+use crate::{Doubt, Halt, InputError, Item, SplittingScheme, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
 
@@ -15,16 +16,16 @@ use contact_geom::{Lagrangian, PhasePoint};
 /// the momentum. One force a substep; the C of two substeps is one.
 #[derive(Clone, Debug)]
 pub struct ActionSplitting<'a, L, F: ActionFlow, const N: usize> {
-    form: Separable<&'a L, N>,
-    table: Table<F::Map>,
-    progress: Progress<N>,
+    form: SeparableForm<&'a L, N>,
+    table: DragTable<F::Map>,
+    progress: Advance<N>,
     compensated: bool,
     doubting: bool,
 }
 
 /// The substeps of a step.
 #[derive(Clone, Debug)]
-struct Table<C> {
+struct DragTable<C> {
     stages: Vec<Stage<C>>,
     /// The map that ends a step.
     closing: C,
@@ -54,7 +55,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> ActionSplitting<'a, L, Riccati, N> {
         t0: f64,
         state: PhasePoint<N>,
     ) -> Result<Self, InputError> {
-        let flow = Riccati::of(&Separable::read(lagrangian, h, t0, &state)?.lagrangian, t0, &state)?;
+        let flow = Riccati::of(&SeparableForm::read(lagrangian, h, t0, &state)?.lagrangian, t0, &state)?;
         Self::with_flow(lagrangian, &flow, scheme, h, t0, state)
     }
 }
@@ -63,7 +64,7 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
     /// A splitting from the state `(q, p, z)` at time `t0`, with the flow of f.
     ///
     /// # Errors
-    /// [`InputError::Step`] unless h is positive and finite; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
+    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Unclaimed`] and [`InputError::FalseClaim`] where L
     /// is not separable; [`InputError::Hypothesis`] where `L_z` depends on time or is not `f'`, where the maps are not the
     /// flow of f, and for a Runge-Kutta-Nyström scheme; [`InputError::Geometry`] where the state is not finite or M singular;
     /// [`InputError::FirstStep`] where V is not defined at the start.
@@ -75,7 +76,7 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
         t0: f64,
         state: PhasePoint<N>,
     ) -> Result<Self, InputError> {
-        let form = Separable::read(lagrangian, h, t0, &state)?;
+        let form = SeparableForm::read(lagrangian, h, t0, &state)?;
         form.check_steady_drag(t0, &state)?;
         let Some(substeps) = scheme.substeps() else {
             return Err(InputError::Hypothesis {
@@ -92,9 +93,9 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
             Stage { action, half: 0.5 * g * h, length: g * h, time: time * h }
         });
         let stages = stages.collect();
-        let table = Table { stages, closing: flow.over(0.5 * before * h), rest: (state.z, flow.rate(state.z)) };
+        let table = DragTable { stages, closing: flow.over(0.5 * before * h), rest: (state.z, flow.rate(state.z)) };
         let (value, force) = form.first_kick(t0, &state.q, state.z)?;
-        let progress = Progress::new(h, t0, scheme.stages(), state, (value - table.rest.1, force));
+        let progress = Advance::new(h, t0, scheme.stages(), state, (value - table.rest.1, force));
         Ok(ActionSplitting { form, table, progress, compensated: false, doubting: false })
     }
 
@@ -136,6 +137,20 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
         self.progress.evaluations()
     }
 
+    fn account(&self) -> Vec<Item> {
+        super::account(Item::computed("action z", "it drives the motion"))
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        Saved::save(&self.progress, &mut words);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.progress.load(&mut words).is_some() && words.is_empty()
+    }
+
     fn suspicion(&self) -> Option<Suspicion> {
         self.progress.watch.first
     }
@@ -148,9 +163,9 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
 /// The motion after some steps more, and its state.
 #[inline(never)]
 fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool, const DOUBTING: bool>(
-    form: &Separable<&L, N>,
-    table: &Table<C>,
-    from: &Progress<N>,
+    form: &SeparableForm<&L, N>,
+    table: &DragTable<C>,
+    from: &Advance<N>,
     steps: usize,
 ) -> Reached<N> {
     let (mut m, mut seen, (z, constant)) = (from.motion, from.seen(), table.rest);

@@ -29,9 +29,11 @@ enum Coefficients {
     Nystrom { kick_first: bool, drifts: &'static [f64], kicks: &'static [f64] },
 }
 
-const KAHAN_LI: &str = "Kahan and Li, Math. Comp. 66 (1997) 1089-1099";
-const SOFRONIOU_SPALETTA: &str = "Sofroniou and Spaletta, Optim. Methods Softw. 20 (2005) 597-613";
-const BLANES_MOAN: &str = "Blanes and Moan, J. Comput. Appl. Math. 142 (2002) 313-330, table 3";
+const KAHAN_LI: &str = "Kahan and Li, Math. Comp. 66 (1997) 1089-1099, doi:10.1090/S0025-5718-97-00873-9";
+const SOFRONIOU_SPALETTA: &str =
+    "Sofroniou and Spaletta, Optim. Methods Softw. 20 (2005) 597-613, doi:10.1080/10556780500140664";
+const BLANES_MOAN: &str =
+    "Blanes and Moan, J. Comput. Appl. Math. 142 (2002) 313-330, table 3, doi:10.1016/S0377-0427(01)00492-7";
 
 impl SplittingScheme {
     /// The Strang splitting, of order 2: Strang, SIAM J. Numer. Anal. 5 (1968) 506-517.
@@ -39,7 +41,7 @@ impl SplittingScheme {
         name: "strang",
         order: 2,
         stages: 1,
-        source: "Strang, SIAM J. Numer. Anal. 5 (1968) 506-517",
+        source: "Strang, SIAM J. Numer. Anal. 5 (1968) 506-517, doi:10.1137/0705041",
         coefficients: Composition(&[1.0]),
     };
 
@@ -48,7 +50,7 @@ impl SplittingScheme {
         name: "yoshida_4",
         order: 4,
         stages: 3,
-        source: "Yoshida, Phys. Lett. A 150 (1990) 262-268",
+        source: "Yoshida, Phys. Lett. A 150 (1990) 262-268, doi:10.1016/0375-9601(90)90092-3",
         coefficients: Composition(&[1.351_207_191_959_657_8, -1.702_414_383_919_315_3]),
     };
 
@@ -57,7 +59,7 @@ impl SplittingScheme {
         name: "suzuki_4",
         order: 4,
         stages: 5,
-        source: "Suzuki, Phys. Lett. A 146 (1990) 319-323",
+        source: "Suzuki, Phys. Lett. A 146 (1990) 319-323, doi:10.1016/0375-9601(90)90962-N",
         coefficients: Composition(&[0.414_490_771_794_375_74, 0.414_490_771_794_375_74, -0.657_963_087_177_502_9]),
     };
 
@@ -66,7 +68,7 @@ impl SplittingScheme {
         name: "mclachlan_4",
         order: 4,
         stages: 5,
-        source: "McLachlan, SIAM J. Sci. Comput. 16 (1995) 151-168",
+        source: "McLachlan, SIAM J. Sci. Comput. 16 (1995) 151-168, doi:10.1137/0916010",
         coefficients: Composition(&[0.28, 0.625_466_428_467_670_045_01, -0.810_932_856_935_340_09]),
     };
 
@@ -75,7 +77,7 @@ impl SplittingScheme {
         name: "yoshida_6",
         order: 6,
         stages: 7,
-        source: "Yoshida, Phys. Lett. A 150 (1990) 262-268, solution A",
+        source: "Yoshida, Phys. Lett. A 150 (1990) 262-268, solution A, doi:10.1016/0375-9601(90)90092-3",
         coefficients: Composition(&[
             0.784_513_610_477_557_263_82,
             0.235_573_213_359_358_133_68,

@@ -1,30 +1,30 @@
 //! Lagrangians `v.Mv/2 - V(t, q) + f(z)`, as splittings read them.
 
-use crate::step_equations::{inverted, is_identity, kept_mass_matrix};
-use crate::verified::PROBE;
+use crate::rules::step_equations::{inverted, is_identity, kept_mass_matrix};
+use crate::run::verified::PROBE;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Defect, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use contact_geom::{Defect, Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
 /// What is left of a false claim's derivative by the rounding of a true one, with some margin.
 pub(super) const FALSE_CLAIM: f64 = 1e-9;
 
 /// A separable Lagrangian with its mass matrix, read once.
 #[derive(Clone, Debug)]
-pub(crate) struct Separable<L, const N: usize> {
+pub(crate) struct SeparableForm<L, const N: usize> {
     pub(crate) lagrangian: L,
     mass: Box<SMatrix<f64, N, N>>,
     /// `None` for the identity: a product with it would cost a third of a step of the oscillator.
     inverse: Option<Box<SMatrix<f64, N, N>>>,
 }
 
-impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
+impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
     /// Reads M, and verifies what the Lagrangian claims, at a state and beside it.
     pub(crate) fn read(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
-        if !(h > 0.0 && h.is_finite()) {
+        if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
         crate::run::check_time(t)?;
@@ -46,7 +46,7 @@ impl<L: Lagrangian<N>, const N: usize> Separable<L, N> {
         } else {
             Some(inverted(&mass).map_err(|e| e.of("the mass matrix L_vv", "take a regular Lagrangian"))?)
         };
-        Ok(Separable { lagrangian, mass, inverse })
+        Ok(SeparableForm { lagrangian, mass, inverse })
     }
 
     /// Verifies, at some times, that `L_z` does not depend on time.

@@ -1,8 +1,8 @@
 //! The Strang splitting as a discrete Lagrangian.
 
 use super::drag::{Drag, Drift};
-use super::separable::Separable;
-use crate::watch::misfit;
+use super::separable::SeparableForm;
+use crate::run::watch::misfit;
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
@@ -19,17 +19,17 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::Pendulum};
-/// use discrete_herglotz::{FinalOnly, Flow, Strang};
+/// use discrete_herglotz::{Flow, Stepper, Strang};
 /// let pendulum = Pendulum { gamma: -0.1 };
 /// let start = PhasePoint::new([1.0], [1.0], 0.0);
 /// let ld = Strang::new(&pendulum, 0.1, 0.0, &start)?;
 /// let mut flow = Flow::new(&ld, 0.0, start)?;
-/// flow.run(100, &mut FinalOnly)?;
-/// # Ok::<(), discrete_herglotz::InputError>(())
+/// flow.advance(100)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Strang<L, const N: usize> {
-    form: Separable<L, N>,
+    form: SeparableForm<L, N>,
     h: f64,
     drag: Drag<N>,
     /// Where the drag is constant, its drifts over h and -h.
@@ -42,7 +42,7 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
     /// # Errors
     /// Those of [`Splitting::new`](crate::Splitting::new), but for the last.
     pub fn new(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
-        let form = Separable::read(lagrangian, h, t, state)?;
+        let form = SeparableForm::read(lagrangian, h, t, state)?;
         let drag = Drag::of(&form, t, state)?;
         let drift = |s| drag.drift(&form.lagrangian, t, s);
         let steady = matches!(drag, Drag::Constant(_)).then(|| (drift(h), drift(-h)));
@@ -98,6 +98,14 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
     #[inline(always)]
     fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
         misfit(velocities, &to.q, self.h, 0.0)
+    }
+
+    fn is_explicit(&self) -> bool {
+        true
+    }
+
+    fn constant_rate(&self) -> bool {
+        self.steady.is_some()
     }
 
     /// Explicit; the guess and the solver are not needed.

@@ -445,7 +445,7 @@ fn what_does_not_fit_is_refused() {
     let nonlinear = Structure { z_affine: false, ..affine() };
     let in_time = ActionSplitting::new(&Rate(nonlinear), scheme, 0.1, 0.0, start).err();
     assert!(matches!(in_time, Some(InputError::Hypothesis { .. })));
-    assert_eq!(linear(&Rate(affine()), -0.1), Some(InputError::Step { h: -0.1 }));
+    assert_eq!(linear(&Rate(affine()), 0.0), Some(InputError::Step { h: 0.0 }));
     assert_eq!(linear(&Rate(Structure::default()), 0.1), Some(InputError::Unclaimed { claim: "separable" }));
     let lie = Structure { autonomous: true, ..affine() };
     assert!(matches!(linear(&Rate(lie), 0.1), Some(InputError::FalseClaim { claim: "autonomous", .. })));

@@ -3,7 +3,7 @@
 use super::*;
 use crate::herglotz_flow;
 use contact_geom::systems::{Chain, ChargedParticle, Ends, FreeParticle, HarmonicOscillator, Pendulum, UniformField};
-use contact_geom::{GeometryError, Larger, Largest, Structure};
+use contact_geom::{Derivatives, GeometryError, Larger, Largest, Structure};
 
 const GAMMAS: [f64; 12] = [-40.0, -2.5, -2.0 - 1e-12, -2.0, -2.0 + 1e-12, -1.999, -1e-9, 0.0, 1e-15, 0.3, 2.0, 2.5];
 const STEPS: [f64; 5] = [1e-8, 1e-5, 1e-3, 0.1, 0.8];

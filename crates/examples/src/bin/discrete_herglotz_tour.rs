@@ -1,4 +1,4 @@
-//! A tour of the flow: a Lagrangian of one's own, run, observed and plotted.
+//! A tour of runs: a Lagrangian of one's own, run, observed and plotted.
 //!
 //! ```text
 //! cargo run --release --bin discrete_herglotz_tour [-- --out DIR]
@@ -8,7 +8,9 @@ use clap::Parser;
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, finish, number, print};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Symmetry};
-use discrete_herglotz::{Every, Flow, Midpoint, MomentumDecay, MomentumRow, Record, Status, Step};
+use discrete_herglotz::{
+    AnyIntegrator, Method, Moment, MomentumDecay, MomentumRow, Problem, Row, Rows, Status, Steps, Until,
+};
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -44,43 +46,48 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = Directory::create(&arguments.out)?;
     let (h, steps) = RUN;
-    let ld = Midpoint::new::<2>(Star, h)?;
-    let mut flow = Flow::new(&ld, 0.0, PhasePoint::new([1.0, 0.0], [0.0, 0.7], 0.0))?;
+    let problem = Problem::new(&Star, 0.0, PhasePoint::new([1.0, 0.0], [0.0, 0.7], 0.0))?;
 
     // What the run is observed by: every fifth state, a momentum with its prediction, the smallest conformal factor, a bar.
-    let bar = ProgressBar::new(steps as u64);
-    let progress = Every::new(100, |step: &Step<2>| {
-        bar.set_position(step.k as u64);
-        ControlFlow::Continue(())
-    })?;
+    let mut states = Rows::every(5)?;
+    let mut momentum = MomentumDecay::new(Symmetry::rotation(0, 1)?);
     let mut smallest = f64::INFINITY;
-    let factor = |step: &Step<2>| {
-        smallest = smallest.min(step.sigma);
+    let mut factor = |at: &Moment<'_, 2>| {
+        smallest = smallest.min(at.sigma);
         ControlFlow::Continue(())
     };
-    let states = Every::new(5, Record::default())?;
-    let momentum = MomentumDecay::new(Symmetry::rotation(0, 1)?);
-    let mut observers = ((states, momentum), (factor, progress));
-    let status = flow.run(steps, &mut observers)?;
-    let ((states, momentum), _) = observers;
+    let bar = ProgressBar::new(steps as u64);
+    let mut progress = |at: &Moment<'_, 2>| {
+        if at.k.is_multiple_of(100) {
+            bar.set_position(at.k as u64);
+        }
+        ControlFlow::Continue(())
+    };
+    let end = problem
+        .by(AnyIntegrator::Discrete(Method::Midpoint))
+        .steps(Steps::Size(h))
+        .observe(&mut states)
+        .observe(&mut momentum)
+        .observe(&mut factor)
+        .observe(&mut progress)
+        .run(Until::Steps(steps))?;
     bar.finish_and_clear();
 
-    let (rows, momentum) = (states.into_inner().rows, momentum.rows);
+    let (rows, momentum, status) = (states.rows, momentum.rows, end.status);
     write(&out, &rows, &momentum)?;
     let defect = momentum.iter().map(MomentumRow::defect).fold(0.0, f64::max);
-    let end = flow.state();
     print(&format!(
         "{steps} steps of h = {h}: {status}\n\
          state at t = {:.2}: q = ({:.6}, {:.6}), p = ({:.6}, {:.6}), z = {:.6}\n\
          smallest conformal factor of a step: {smallest:.9}\n\
          angular momentum: from {:.6} to {:.6}; at most {defect:.1e} (relative) from the product of the factors\n\
          table and figure are in {}\n",
-        flow.time(),
+        end.t,
         end.q[0],
         end.q[1],
         end.p[0],
         end.p[1],
-        end.z,
+        end.state().z,
         momentum.first().map_or(f64::NAN, |row| row.momentum),
         momentum.last().map_or(f64::NAN, |row| row.momentum),
         out.path().display()
@@ -92,8 +99,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// The orbit as a table, and as a figure beside the angular momentum.
-fn write(out: &Directory, rows: &[(f64, PhasePoint<2>)], momentum: &[MomentumRow]) -> Result<(), Failure> {
-    let entries = rows.iter().map(|(t, x)| [*t, x.q[0], x.q[1], x.p[0], x.p[1], x.z].map(number));
+fn write(out: &Directory, rows: &[Row<2>], momentum: &[MomentumRow]) -> Result<(), Failure> {
+    let entries = rows.iter().map(|x| [x.t, x.q[0], x.q[1], x.p[0], x.p[1]].into_iter().chain(x.z).map(number));
     out.table("star.csv", &["t", "q1", "q2", "p1", "p2", "z"], entries)?;
     let orbit = Panel {
         x_label: "position q1 (dimensionless)".into(),
@@ -101,7 +108,7 @@ fn write(out: &Directory, rows: &[(f64, PhasePoint<2>)], momentum: &[MomentumRow
         x: Axis::Linear(-1.5, 1.5, 0.5),
         y: Axis::Linear(-1.0, 1.0, 0.5),
         legend: (0.0, 1.0),
-        curves: vec![Curve::unnamed(Line::Solid, rows.iter().map(|(_, x)| (x.q[0], x.q[1])))],
+        curves: vec![Curve::unnamed(Line::Solid, rows.iter().map(|x| (x.q[0], x.q[1])))],
         marks: Vec::new(),
     };
     let decay = Panel {

@@ -1,10 +1,11 @@
 //! What the steps of a run say of themselves: whether they resolve the motion.
 
 use super::{GaussStepper, Route};
-use crate::gauss::dense::Start;
-use crate::gauss::extension::Physical;
+use crate::gauss::dense::StepStart;
 use crate::gauss::look::{Compare, Curve, Look, SETS};
-use crate::watch::{misfit, sharper};
+use crate::gauss::time_transformation::Physical;
+use crate::run::saved::saved;
+use crate::run::watch::{misfit, sharper};
 use crate::{Doubt, Suspicion};
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::SVector;
@@ -18,15 +19,17 @@ const UNRESOLVED: f64 = 0.1;
 pub(super) struct Sequence<const N: usize> {
     pub velocities: [SVector<f64, N>; 4],
     pub q: SVector<f64, N>,
-    pub ends: [Start<N>; 2],
+    pub ends: [StepStart<N>; 2],
 }
 
 impl<const N: usize> Sequence<N> {
     /// Before the first step.
-    pub fn new(start: Start<N>) -> Box<Self> {
+    pub fn new(start: StepStart<N>) -> Box<Self> {
         Box::new(Sequence { velocities: [SVector::zeros(); 4], q: SVector::from(start.q), ends: [start; 2] })
     }
 }
+
+saved!([const N: usize] Sequence<N> { velocities, q, ends });
 
 /// The stages up to which the nodes of a step do not tell whether it resolves the motion.
 pub(crate) const FEW: usize = 2;
@@ -35,7 +38,9 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step.
     pub(crate) fn look(&self, sets: usize) -> Option<Look> {
         let curve = self.arch.dispatch(Stages { run: self })?;
-        let at = |set| self.arch.dispatch(Compare { lagrangian: self.lagrangian, pace: &Physical, curve: &curve, set });
+        let at = |set| {
+            self.arch.dispatch(Compare { lagrangian: self.lagrangian, transformation: &Physical, curve: &curve, set })
+        };
         (0..sets).map(at).reduce(Look::and)
     }
 

@@ -1,6 +1,7 @@
 //! Lagrangians that choose by a value, in every instruction set that this processor has.
 
 use super::*;
+use crate::Gauss;
 use crate::{DiscreteLagrangian, Solver, Transition};
 use contact_geom::{Scalar, Structure};
 

@@ -2,7 +2,7 @@
 
 use contact_examples::{Axis, Checks, Curve, Directory, Failure, Line, Panel, Subject, draw_row, fractions};
 use contact_geom::systems::{CoupledInZ, System, SystemVisitor, visit_catalogue};
-use contact_geom::{VelocityPoint, legendre};
+use contact_geom::{Statement, VelocityPoint, legendre};
 use discrete_herglotz::Method;
 use exact_lagrangian::{ErrorOrders, ExactError, MeasuredOrder, Order, error_orders};
 
@@ -64,7 +64,7 @@ impl SystemVisitor for Walk<'_> {
     fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
         for method in Method::applicable(&system.structure()) {
             let (system_name, method_name) = (system.name(), method.name());
-            let subject = Subject::discrete(40, system_name, method_name, 0.0);
+            let subject = Subject::discrete(Statement::ErrorOrders, system_name, method_name, 0.0);
             match measure(system, method) {
                 Err(error) => self.checks.record_within(BAND, &subject, Err::<Option<f64>, _>(error)),
                 Ok(orders) => {

@@ -1,6 +1,6 @@
 //! The statements of section 4 on every system, over six decades of the time step.
 
-use contact_examples::{Checks, Directory, Failure, Subject, fractions, number, title};
+use contact_examples::{Checks, Directory, Failure, Subject, fractions, number};
 use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
 use exact_lagrangian::{ContactExponential, ExactError, statements};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -98,7 +98,7 @@ pub fn tables(checks: &Checks) -> String {
     );
     text += &header("statement");
     for statement in statements::STATEMENTS {
-        text += &row(&format!("{statement:>2}  {}", title(statement)), &|s| s.statement == statement);
+        text += &row(&format!("{:>2}  {}", statement.number(), statement.title()), &|s| s.statement == statement);
     }
     text += "\nThe same for each system: worst over the statements\n\n";
     text += &header("system");

@@ -4,7 +4,7 @@ use contact_examples::{Checks, Subject, fractions};
 use contact_geom::statements::{ActionSquared, ClosedFlow, conformal_flow};
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, Lienard, VanDerPol};
 use contact_geom::{
-    ContactForm, Darboux, DarbouxField, GeometryError, Smooth, SmoothFunction, Triple, dissipation_defect,
+    ContactForm, Darboux, DarbouxField, GeometryError, Smooth, SmoothFunction, Statement, Triple, dissipation_defect,
     hamiltonian_vector_field, infinitesimal_conformality,
 };
 
@@ -27,7 +27,7 @@ pub fn closed_flows(checks: &mut Checks) {
 fn closed_flow(flow: &impl ClosedFlow, checks: &mut Checks) {
     for (i, t) in (0..SAMPLES).flat_map(|i| [0.3, 2.0].map(|t| (i, t))) {
         let residual = conformal_flow(flow, t, &phase_point(i), &gauss_legendre(t));
-        for statement in [5, 11] {
+        for statement in [Statement::ConformalFactor, Statement::DissipatedQuantities] {
             checks.record(&Subject::continuous(statement, flow.name()), residual.map(Some));
         }
     }
@@ -68,9 +68,9 @@ fn hamiltonian(name: &'static str, h: &impl SmoothFunction<1>, checks: &mut Chec
     for i in 0..SAMPLES {
         let x = phase_point(i);
         for (statement, residual) in [
-            (3, field_in_darboux_coordinates(h, &x)),
-            (4, conformal_at_the_rate_of_the_reeb_field(h, &x)),
-            (6, dissipation_defect(&Darboux, h, h, 0.0, &x)),
+            (Statement::HamiltonianField, field_in_darboux_coordinates(h, &x)),
+            (Statement::InfinitesimalContactomorphism, conformal_at_the_rate_of_the_reeb_field(h, &x)),
+            (Statement::EnergyDecay, dissipation_defect(&Darboux, h, h, 0.0, &x)),
         ] {
             checks.record(&Subject::continuous(statement, name), residual.map(Some));
         }

@@ -4,7 +4,7 @@ use crate::statements::STEPS;
 use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::System;
-use contact_geom::{DiscretePoint, GeometryError, VelocityPoint, legendre};
+use contact_geom::{DiscretePoint, GeometryError, Statement, VelocityPoint, legendre};
 use discrete_herglotz::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
 use discrete_herglotz::statements::{STATEMENTS, residual};
 use discrete_herglotz::{DiscreteLagrangian, DiscretePath, InputError, Method, Quadrature, Rule, derived_jet};
@@ -64,11 +64,11 @@ fn with_rule<R: Rule, const N: usize, S: System<N>>(system: &S, h: f64, checks: 
     let subject = |statement| Subject::discrete(statement, system.name(), R::NAME, h);
     let ld = match Quadrature::<_, R>::new(system, h) {
         Ok(ld) => ld,
-        Err(error) => return checks.record(&subject(16), Err(error)),
+        Err(error) => return checks.record(&subject(Statement::VermeerenBravettiSeri), Err(error)),
     };
     for (t, x) in points(system, h) {
-        checks.record(&subject(16), equivalent_conditions(&ld, t, &x).map(Some));
-        checks.record(&subject(41), momenta_from_both_spaces(&ld, t, &x).map(Some));
+        checks.record(&subject(Statement::VermeerenBravettiSeri), equivalent_conditions(&ld, t, &x).map(Some));
+        checks.record(&subject(Statement::ExtendedRules), momenta_from_both_spaces(&ld, t, &x).map(Some));
     }
 }
 

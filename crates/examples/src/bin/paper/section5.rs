@@ -8,7 +8,7 @@ use crate::statements::STEPS;
 use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Duffing, FreeParticle, HarmonicOscillator, Kepler, Pendulum, System};
-use contact_geom::{DiscretePoint, GeometryError, PhasePoint, VelocityPoint, legendre};
+use contact_geom::{DiscretePoint, GeometryError, PhasePoint, Statement, VelocityPoint, legendre};
 use discrete_herglotz::{
     DiscreteLagrangian, HamiltonianFlow, InputError, LeftMidpoint, Rectangle, derived_jet, discrete_flow,
     hamiltonian_flow, sigma_d,
@@ -29,12 +29,22 @@ pub fn check(checks: &mut Checks) {
         let points = straight_step(&x, h);
         let closed = ClosedExact::corrected(gamma, h);
         for (statement, system, method, residual) in [
-            (37, free.name(), "rectangle", free_particle_step(&free, h, t, &points)),
-            (37, free.name(), "closed_exact", exact(&closed, &free, gamma, t, &points)),
-            (37, free.name(), "quadratic_exact", linear(QuadraticExact::new(&free, h), &free, gamma, t, &points)),
-            (38, spring.name(), "left_midpoint", oscillator_step(&spring, h, t, &points)),
-            (38, spring.name(), "closed_motion", Ok(oscillator_motion(&spring, h, x.v[0]))),
-            (38, spring.name(), "quadratic_exact", linear(QuadraticExact::new(&spring, h), &spring, gamma, t, &points)),
+            (Statement::FreeParticle, free.name(), "rectangle", free_particle_step(&free, h, t, &points)),
+            (Statement::FreeParticle, free.name(), "closed_exact", exact(&closed, &free, gamma, t, &points)),
+            (
+                Statement::FreeParticle,
+                free.name(),
+                "quadratic_exact",
+                linear(QuadraticExact::new(&free, h), &free, gamma, t, &points),
+            ),
+            (Statement::HarmonicOscillator, spring.name(), "left_midpoint", oscillator_step(&spring, h, t, &points)),
+            (Statement::HarmonicOscillator, spring.name(), "closed_motion", Ok(oscillator_motion(&spring, h, x.v[0]))),
+            (
+                Statement::HarmonicOscillator,
+                spring.name(),
+                "quadratic_exact",
+                linear(QuadraticExact::new(&spring, h), &spring, gamma, t, &points),
+            ),
         ] {
             checks.record(&Subject::discrete(statement, system, method, h), residual.map(Some));
         }
@@ -168,7 +178,7 @@ fn midpoint<const N: usize>(
     };
     for (h, i) in STEPS.iter().flat_map(|h| (0..SAMPLES).map(move |i| (*h, i))) {
         let (t, x) = system.sample(&fractions(i, 2 * N + 2));
-        let subject = Subject::discrete(39, system.name(), "left_midpoint", h);
+        let subject = Subject::discrete(Statement::MidpointRule, system.name(), "left_midpoint", h);
         checks.record(&subject, residual(h, t, &straight_step(&x, h)).map(Some));
     }
 }

@@ -4,7 +4,7 @@ use crate::explicit::Explicit;
 use contact_examples::Failure;
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, System};
 use contact_geom::{DiscretePoint, Energy, GeometryError, PhasePoint, SmoothFunction, Triple, VelocityPoint};
-use discrete_herglotz::{DiscreteLagrangian, Flow, Record, Status, legendre_minus};
+use discrete_herglotz::{DiscreteLagrangian, Flow, legendre_minus};
 
 /// The rate of the conformal factor in both examples, in inverse units of time.
 pub const GAMMA: f64 = -0.05;
@@ -116,11 +116,12 @@ pub fn rows<E: Example>(system: &E, ld: &impl DiscreteLagrangian<1>, count: usiz
 
 /// The positions of the first `count` states of the library's flow in `(q, p, z)`, from the same start.
 pub fn positions_by_flow(ld: &impl DiscreteLagrangian<1>, count: usize) -> Result<Vec<f64>, Failure> {
-    let mut record = Record::default();
-    match Flow::from_points(ld, 0.0, start())?.run(count.saturating_sub(1), &mut record)? {
-        Status::Completed => Ok(record.rows.iter().map(|(_, x)| x.q[0]).collect()),
-        status => Err(Failure::Run { what: "the series", status }),
+    let mut flow = Flow::from_points(ld, 0.0, start())?;
+    let mut positions = vec![flow.state().q[0]];
+    for _ in 1..count {
+        positions.push(flow.step()?.to.q[0]);
     }
+    Ok(positions)
 }
 
 /// The logarithm of the Hamiltonian at a state; NaN where the system has none in closed form, or it is not positive.

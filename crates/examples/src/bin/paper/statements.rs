@@ -1,4 +1,4 @@
-//! The paper's statements by their numbers in the project's list, and the walk over the catalogue that checks them.
+//! The walk over the catalogue that checks the paper's statements.
 
 use crate::{section2, section3, section5};
 use contact_examples::{Checks, Subject, fractions};

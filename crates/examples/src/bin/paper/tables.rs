@@ -2,10 +2,8 @@
 
 use crate::published::{Fixture, PublishedRow, solved_recurrence};
 use crate::series::{Row, distance};
-use contact_examples::{Checks, title};
-
-/// The theorems of section 3.
-const THEOREMS: std::ops::RangeInclusive<u32> = 13..=26;
+use contact_examples::Checks;
+use contact_geom::Statement;
 
 /// One curve of the paper's figures.
 struct Curve {
@@ -117,11 +115,11 @@ pub fn theorems(checks: &Checks) -> String {
         "\nThe theorems of section 3: worst residual over the catalogue, relative to the size of its terms\n\n",
     );
     text += &format!("  {:>2}  {:<42} {:>6} {:>9}  {}\n", "no", "statement", "checks", "residual", "worst at");
-    for statement in THEOREMS {
+    for statement in Statement::ALL.into_iter().filter(|s| s.section().starts_with('3')) {
         if let Some((subject, residual)) = checks.worst_of(statement) {
             let place = format!("{}, {}, h = {}", subject.system, subject.method, subject.step());
-            let (title, count) = (title(statement), checks.count(statement));
-            text += &format!("  {statement:>2}  {title:<42} {count:>6} {residual:>9.1e}  {place}\n");
+            let (number, title, count) = (statement.number(), statement.title(), checks.count(statement));
+            text += &format!("  {number:>2}  {title:<42} {count:>6} {residual:>9.1e}  {place}\n");
         }
     }
     text

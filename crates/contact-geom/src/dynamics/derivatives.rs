@@ -1,0 +1,185 @@
+//! The derivatives of Lagrangians.
+
+use crate::dynamics::blocks::{self, BLOCK};
+use crate::{Dual, KernelDual, Lagrangian, Module, Scalar, Triple, VelocityPoint, seed};
+use nalgebra::{SMatrix, SVector};
+use num_traits::One;
+
+/// The derivatives of a Lagrangian: those in closed form where it has them, the others by automatic differentiation. Every Lagrangian has
+/// these methods, and none has others in their place.
+///
+/// ```
+/// use contact_geom::{Derivatives, VelocityPoint, systems::Pendulum};
+/// let x = VelocityPoint::new([1.0], [2.0], 0.0);
+/// assert_eq!(Pendulum { gamma: -0.1 }.gradient(0.0, &x).y[0], 2.0); // L_v
+/// ```
+pub trait Derivatives<const N: usize>: Lagrangian<N> {
+    /// The value and the differential along given directions: the coordinates of `x` carry the directions as duals.
+    /// It uses
+    /// [`closed_gradient`](Lagrangian::closed_gradient) where there is one.
+    fn along<T: Scalar, D: Module<T>>(&self, t: T, x: &VelocityPoint<N, Dual<T, D>>) -> Dual<T, D>;
+
+    /// The value with the partial derivatives `(L_q, L_v, L_z)`, for kernels.
+    fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, Triple<N, T>);
+
+    /// The value with the partial derivatives `L_q` alone, for kernels: what a force needs.
+    fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>);
+
+    /// The matrix `W = L_vv` alone, for kernels.
+    fn mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SMatrix<T, N, N>;
+
+    /// The partial derivatives `(L_q, L_v, L_z)`.
+    fn gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Triple<N, T>;
+
+    /// The second partial derivatives in `(q, v, z)`.
+    fn hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Hessian<N, T>;
+}
+
+impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
+    #[inline(always)]
+    fn along<T: Scalar, D: Module<T>>(&self, t: T, x: &VelocityPoint<N, Dual<T, D>>) -> Dual<T, D> {
+        let base = VelocityPoint { q: x.q.map(|a| a.re), v: x.v.map(|a| a.re), z: x.z.re };
+        match self.closed_gradient(t, &base) {
+            None => self.value(Dual::constant(t), &x.q, &x.v, x.z),
+            Some(g) => {
+                let mut d = x.z.d.each(|a| a * g.z);
+                for i in 0..N {
+                    d = d.join(x.q[i].d, |sum, a| sum + a * g.x[i]).join(x.v[i].d, |sum, a| sum + a * g.y[i]);
+                }
+                Dual { re: self.value(t, &base.q, &base.v, base.z), d }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, Triple<N, T>) {
+        if let Some(gradient) = self.closed_gradient(t, x) {
+            return (self.value(t, &x.q, &x.v, x.z), gradient);
+        }
+        if const { N > BLOCK } {
+            return blocks::with_gradient(self, t, x);
+        }
+        let mut q = still::<T, Triple<N, T>, N>(&x.q);
+        let mut v = still::<T, Triple<N, T>, N>(&x.v);
+        let mut z = KernelDual::<T, Triple<N, T>>::constant(x.z);
+        for i in 0..N {
+            q[i].d.x[i] = T::one();
+            v[i].d.y[i] = T::one();
+        }
+        z.d.z = T::one();
+        let l = self.value(KernelDual::constant(t), &q, &v, z);
+        (l.re, l.d)
+    }
+
+    #[inline(always)]
+    fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>) {
+        if let Some(gradient) = self.closed_gradient(t, x) {
+            return (self.value(t, &x.q, &x.v, x.z), gradient.x);
+        }
+        if const { N > BLOCK } {
+            return blocks::with_force(self, t, x);
+        }
+        let mut q = still::<T, SVector<T, N>, N>(&x.q);
+        for i in 0..N {
+            q[i].d[i] = T::one();
+        }
+        let l = self.value(KernelDual::constant(t), &q, &still(&x.v), KernelDual::constant(x.z));
+        (l.re, l.d)
+    }
+
+    #[inline(always)]
+    fn mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SMatrix<T, N, N> {
+        if let Some(hessian) = self.closed_hessian(t, x) {
+            return hessian.vv;
+        }
+        if const { N > BLOCK } {
+            return blocks::mass_matrix(self, t, x);
+        }
+        let mut y = VelocityPoint {
+            q: still::<T, SVector<T, N>, N>(&x.q),
+            v: still::<T, SVector<T, N>, N>(&x.v),
+            z: KernelDual::<T, SVector<T, N>>::constant(x.z),
+        };
+        for i in 0..N {
+            y.v[i].d[i] = T::one();
+        }
+        let time = KernelDual::constant(t);
+        if let Some(gradient) = self.closed_gradient(time, &y) {
+            return SMatrix::from_fn(|i, j| gradient.y[i].d[j]);
+        }
+        let mut v = still::<_, SVector<KernelDual<T, SVector<T, N>>, N>, N>(&y.v);
+        for i in 0..N {
+            v[i].d[i] = KernelDual::one();
+        }
+        let l = self.value(KernelDual::constant(time), &still(&y.q), &v, KernelDual::constant(y.z));
+        SMatrix::from_fn(|i, j| l.d[i].d[j])
+    }
+
+    #[inline]
+    fn gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Triple<N, T> {
+        self.closed_gradient(t, x).unwrap_or_else(|| derived_gradient(self, t, x))
+    }
+
+    #[inline]
+    fn hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Hessian<N, T> {
+        self.closed_hessian(t, x).unwrap_or_else(|| derived_hessian(self, t, x))
+    }
+}
+
+/// Coordinates that no direction moves.
+#[inline(always)]
+fn still<T: Scalar, D: Module<T>, const N: usize>(x: &SVector<T, N>) -> SVector<KernelDual<T, D>, N> {
+    SVector::from_array_storage(nalgebra::ArrayStorage([std::array::from_fn(|i| KernelDual::constant(x[i]))]))
+}
+
+/// The second partial derivatives of a Lagrangian in `(q, v, z)`; `W = vv` in the paper's notation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hessian<const N: usize, T = f64> {
+    /// `d2L / dq_i dq_j`.
+    pub qq: SMatrix<T, N, N>,
+    /// `d2L / dq_i dv_j`.
+    pub qv: SMatrix<T, N, N>,
+    /// `W_ij = d2L / dv_i dv_j`.
+    pub vv: SMatrix<T, N, N>,
+    /// `d2L / dq_i dz`.
+    pub qz: SVector<T, N>,
+    /// `d2L / dv_i dz`.
+    pub vz: SVector<T, N>,
+    /// `d2L / dz2`.
+    pub zz: T,
+}
+
+/// The gradient by automatic differentiation, whatever the implementor overrides.
+#[inline]
+pub fn derived_gradient<T: Scalar, const N: usize>(
+    lagrangian: &(impl Lagrangian<N> + ?Sized),
+    t: T,
+    x: &VelocityPoint<N, T>,
+) -> Triple<N, T> {
+    if const { N > BLOCK } {
+        return blocks::with_gradient(lagrangian, t, x).1;
+    }
+    let s = seed(&Triple::from(*x));
+    lagrangian.value(Dual::constant(t), &s.x, &s.y, s.z).d
+}
+
+/// The second derivatives by automatic differentiation of the gradient, itself derived or in closed form.
+#[inline]
+pub fn derived_hessian<T: Scalar, const N: usize>(
+    lagrangian: &(impl Lagrangian<N> + ?Sized),
+    t: T,
+    x: &VelocityPoint<N, T>,
+) -> Hessian<N, T> {
+    if const { N > BLOCK } {
+        return blocks::hessian(lagrangian, t, x);
+    }
+    let g = lagrangian.gradient(Dual::constant(t), &seed(&Triple::from(*x)).into());
+    Hessian {
+        qq: SMatrix::from_fn(|i, j| g.x[i].d.x[j]),
+        qv: SMatrix::from_fn(|i, j| g.x[i].d.y[j]),
+        vv: SMatrix::from_fn(|i, j| g.y[i].d.y[j]),
+        qz: SVector::from_fn(|i, _| g.x[i].d.z),
+        vz: SVector::from_fn(|i, _| g.y[i].d.z),
+        zz: g.z.d.z,
+    }
+}

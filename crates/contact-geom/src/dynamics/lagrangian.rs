@@ -1,0 +1,103 @@
+//! Lagrangians L(t, q, v, z).
+
+use crate::{Hessian, Scalar, Structure, Triple, VelocityPoint};
+use nalgebra::SVector;
+
+/// A Lagrangian of Herglotz' variational principle, `L : R x TQ x R -> R`, written once as a generic function.
+///
+/// The motion makes the end value of the action critical, where `zdot = L(t, q, qdot, z)`. In the field's signs a
+/// dissipative term is `gamma z` with `gamma < 0`. Every derivative is `value` on duals; a user who has a closed form
+/// overrides [`closed_gradient`](Self::closed_gradient), which vector fields, forms and steps then differentiate once less,
+/// or [`closed_hessian`](Self::closed_hessian), which W, forms and second jets then use. [`check_closed_derivatives`](crate::check_closed_derivatives)
+/// compares such a form with the derived one.
+///
+/// Mark `value`, and the functions that it calls, `#[inline(always)]`: integrators evaluate them at several stages in one
+/// vector register, and what the compiler does not merge into their kernels is ten times slower.
+///
+/// ```
+/// use contact_geom::{nalgebra::SVector, Derivatives, Lagrangian, Scalar, VelocityPoint};
+/// struct Damped;
+/// impl Lagrangian<1> for Damped {
+///     #[inline(always)]
+///     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+///         v[0] * v[0] * 0.5 - q[0] * q[0] * 0.5 - z * 0.1
+///     }
+/// }
+/// let x = VelocityPoint::new([1.0], [2.0], 0.0);
+/// assert_eq!(Damped.gradient(0.0, &x).y[0], 2.0); // L_v
+/// ```
+pub trait Lagrangian<const N: usize> {
+    /// Whether this Lagrangian states a clock, that is, whether [`clock_rate`](Self::clock_rate) is overridden: it is asked for
+    /// and compiled only then.
+    const HAS_CLOCK: bool = false;
+
+    /// The value `L(t, q, v, z)`.
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T;
+
+    /// The partial derivatives `(L_q, L_v, L_z)` in closed form, if the implementor has one that is worth it.
+    fn closed_gradient<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+        None
+    }
+
+    /// The second partial derivatives in closed form, if the implementor has one that is worth it.
+    fn closed_hessian<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
+        None
+    }
+
+    /// What is known of this Lagrangian's form; see [`Structure`]. The default claims nothing.
+    fn structure(&self) -> Structure {
+        Structure::default()
+    }
+
+    /// The rate `g(q) = dt/dtau` of the [`Clock`](crate::Clock) by whose time tau the steps of this motion are best equal, for
+    /// autonomous Lagrangians: it should fall as the motion gets faster, and be positive. With [`HAS_CLOCK`](Self::HAS_CLOCK); the
+    /// default is the time itself.
+    #[inline(always)]
+    fn clock_rate<T: Scalar>(&self, _q: &SVector<T, N>) -> T {
+        T::one()
+    }
+}
+
+/// A Lagrangian without its closed derivatives: all are found by automatic differentiation, to see what they cost or gain.
+#[derive(Clone, Copy, Debug)]
+pub struct ValueOnly<L>(pub L);
+
+impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<L> {
+    const HAS_CLOCK: bool = L::HAS_CLOCK;
+
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        self.0.value(t, q, v, z)
+    }
+    fn structure(&self) -> Structure {
+        self.0.structure()
+    }
+    #[inline(always)]
+    fn clock_rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
+        self.0.clock_rate(q)
+    }
+}
+
+impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
+    const HAS_CLOCK: bool = L::HAS_CLOCK;
+
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        (**self).value(t, q, v, z)
+    }
+    #[inline(always)]
+    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+        (**self).closed_gradient(t, x)
+    }
+    #[inline(always)]
+    fn closed_hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
+        (**self).closed_hessian(t, x)
+    }
+    fn structure(&self) -> Structure {
+        (**self).structure()
+    }
+    #[inline(always)]
+    fn clock_rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
+        (**self).clock_rate(q)
+    }
+}

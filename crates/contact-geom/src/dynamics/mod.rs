@@ -1,0 +1,27 @@
+//! Lagrangians and what they claim of themselves, Herglotz and contact Hamiltonian vector fields, symmetries, clocks.
+
+mod action;
+pub(crate) mod blocks;
+mod clock;
+mod derivatives;
+mod hamiltonian;
+mod herglotz;
+mod lagrangian;
+pub(crate) mod probe;
+mod structure;
+
+pub use action::{OneParameterGroup, Symmetry};
+pub use clock::Clock;
+pub use derivatives::{Derivatives, Hessian, derived_gradient, derived_hessian};
+pub use hamiltonian::{
+    DarbouxBracket, DarbouxField, InfinitesimalConformality, Quotient, conformal_factor_along, derivative_along,
+    dissipation_defect, hamiltonian_vector_field, infinitesimal_conformality, jacobi_bracket, lie_bracket,
+    lie_derivative,
+};
+pub use herglotz::{
+    Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, Regularity, herglotz_field, herglotz_rates,
+    legendre, legendre_jacobian, regularity,
+};
+pub use lagrangian::{Lagrangian, ValueOnly};
+pub use probe::check_closed_derivatives;
+pub use structure::{Defect, Defects, Structure};

@@ -1,0 +1,18 @@
+//! Points and contact forms of T\*Q x R, TQ x R and Q x Q x R, smooth maps between them, and their pullbacks.
+
+mod contact_form;
+pub(crate) mod darboux;
+mod discrete_form;
+pub(crate) mod fibre_form;
+mod lagrangian_form;
+pub(crate) mod points;
+mod pullback;
+pub(crate) mod smooth;
+
+pub use contact_form::{ContactForm, Form, generic};
+pub use darboux::Darboux;
+pub use discrete_form::{DiscreteJet, EtaMinus, EtaPlus, SecondDiscreteJet};
+pub use lagrangian_form::LagrangianForm;
+pub use points::{DiscretePoint, PhasePoint, Triple, VelocityPoint, seed};
+pub use pullback::{Conformality, conformality, conformality_with_jacobian};
+pub use smooth::{Smooth, SmoothFunction};

@@ -1,0 +1,117 @@
+//! Contact Gauss collocation as an integrator.
+
+use super::clocked::OwnClock;
+use super::stage_equations::Products;
+use super::{ClockedStepper, GaussStepper, MOST};
+use crate::{Facts, InputError, Integrator, Problem, Stepper, Wants};
+use contact_geom::Lagrangian;
+
+/// Contact [`Gauss`](crate::Gauss) collocation with 1 to 16 stages, of order twice their number, for every regular Lagrangian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GaussCollocation {
+    /// The number of stages.
+    pub stages: usize,
+}
+
+/// The same with steps that are equal in the time of the clock which an autonomous Lagrangian states: short where its motion is fast, and the
+/// last one shorter, so that it ends where the span does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ClockedGauss {
+    /// The number of stages.
+    pub stages: usize,
+}
+
+/// Of either.
+fn facts(stages: usize, by_clock: bool) -> Facts {
+    Facts {
+        name: format!("{}gauss_{stages}", if by_clock { "clocked_" } else { "" }).into(),
+        order: 2 * stages as u32,
+        symmetric: true,
+        explicit: false,
+        exact_rate: false,
+        by_clock,
+        collocation: Some(stages),
+        substeps: false,
+        price: 1,
+        source: "Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3, doi:10.1007/3-540-30666-8"
+            .into(),
+    }
+}
+
+fn check_stages(stages: usize) -> Result<(), InputError> {
+    if (1..=MOST).contains(&stages) { Ok(()) } else { Err(InputError::Stages { found: stages }) }
+}
+
+fn products(stages: usize, h: f64) -> Result<Products, InputError> {
+    check_stages(stages)?;
+    if h != 0.0 && h.is_finite() { Ok(Products::new(stages, h)) } else { Err(InputError::Step { h }) }
+}
+
+impl GaussCollocation {
+    /// A stepper by the cheapest route that the Lagrangian's structure allows.
+    pub(crate) fn run<'a, L: Lagrangian<N>, const N: usize>(
+        self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        Wants { action, watched }: Wants,
+    ) -> Result<GaussStepper<'a, L, N>, InputError> {
+        let Problem { lagrangian, t0, start, state, structure } = *problem;
+        let products = products(self.stages, h)?;
+        let run = GaussStepper::new(lagrangian, products, Some(structure), t0, state, start.v, action)?;
+        Ok(if watched { run.doubting() } else { run })
+    }
+}
+
+impl ClockedGauss {
+    /// A stepper by the Lagrangian's own clock.
+    pub(crate) fn run<'a, L: Lagrangian<N>, const N: usize>(
+        self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+    ) -> Result<ClockedStepper<'a, L, OwnClock<'a, L>, N>, InputError> {
+        let Problem { lagrangian, t0, start, state, structure } = *problem;
+        let (products, clock) = (products(self.stages, h)?, OwnClock(lagrangian));
+        ClockedStepper::new(lagrangian, products, clock, Some(structure), t0, state, start.v)
+    }
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussCollocation {
+    fn facts(&self) -> Facts {
+        facts(self.stages, false)
+    }
+
+    fn check(&self, _lagrangian: &L) -> Result<(), InputError> {
+        check_stages(self.stages)
+    }
+
+    fn stepper(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        wants: Wants,
+    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+        Ok(Box::new(self.run(problem, h, wants)?))
+    }
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for ClockedGauss {
+    fn facts(&self) -> Facts {
+        facts(self.stages, true)
+    }
+
+    fn check(&self, lagrangian: &L) -> Result<(), InputError> {
+        check_stages(self.stages)?;
+        if const { !L::HAS_CLOCK } {
+            return Err(InputError::Hypothesis {
+                hypothesis: "a Lagrangian that states a clock (`HAS_CLOCK`, `clock_rate`)",
+            });
+        }
+        if lagrangian.structure().autonomous { Ok(()) } else { Err(InputError::Unclaimed { claim: "autonomous" }) }
+    }
+
+    fn stepper(&self, problem: &Problem<'a, L, N>, h: f64, _: Wants) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+        Integrator::<'a, L, N>::check(self, problem.lagrangian)?;
+        // Compiled only where there is a clock; the check has refused the rest.
+        if const { L::HAS_CLOCK } { Ok(Box::new(self.run(problem, h)?)) } else { Err(InputError::NoIntegrator) }
+    }
+}

@@ -1,0 +1,253 @@
+//! Symmetric compositions of discrete flows.
+
+use crate::rules::flow::account_of;
+use crate::run::saved::{Saved, saved};
+use crate::run::watch::{Watch, sharper, turning};
+use crate::{
+    DiscreteLagrangian, Doubt, Halt, InputError, Item, Solver, SplittingScheme, StepError, Stepper, Suspicion,
+    Transition,
+};
+use contact_geom::PhasePoint;
+use contact_geom::nalgebra::SVector;
+
+/// A symmetric discrete Lagrangian of order 2, at work in a composition of higher order: `F_(g_s h) ... F_(g_1 h)`.
+///
+/// The substeps `g_i` of a [`SplittingScheme`] sum to 1 and cancel the errors of order 3 and more, so that a user's own rule
+/// is raised to any order of the table; Yoshida, Phys. Lett. A 150 (1990). Some substeps are negative: for a symmetric rule
+/// the step with `-h` is the inverse of that with `h`, which is its [`backward`](DiscreteLagrangian::backward).
+///
+/// The hypotheses are the order 2 and the symmetry `F_(-h) = F_h^(-1)`; nothing here can see whether a rule has them, and
+/// one that has not keeps its own order. Each substep is conformally contact, and `sigma_d` of the step their product.
+///
+/// ```
+/// use contact_geom::{PhasePoint, systems::DoublePendulum};
+/// use discrete_herglotz::{Composition, Midpoint, SplittingScheme, Stepper};
+/// let system = DoublePendulum::default();
+/// let rule = |h| Midpoint::new(&system, h);
+/// let start = PhasePoint::new([1.0, 0.5], [0.0, 0.0], 0.0);
+/// let mut motion = Composition::new(rule, &SplittingScheme::KAHAN_LI_8, 0.1, 0.0, start)?;
+/// assert!(motion.advance(100).is_ok());
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+pub struct Composition<D, const N: usize> {
+    rules: Vec<D>,
+    substeps: Vec<Substep>,
+    h: f64,
+    t0: f64,
+    taken: usize,
+    state: PhasePoint<N>,
+    velocity: SVector<f64, N>,
+    sigma: f64,
+    evaluations: u64,
+    solver: Solver<N>,
+    /// The difference quotient of the last two mean velocities, and its last change over a substep.
+    acceleration: SVector<f64, N>,
+    change: SVector<f64, N>,
+    /// The state before the last step.
+    before: PhasePoint<N>,
+    watch: Watch<N>,
+}
+
+/// One substep: its rule by index, and the earlier of its two times after the step's start.
+#[derive(Clone, Copy, Debug)]
+struct Substep {
+    rule: usize,
+    start: f64,
+    back: bool,
+    /// Its length, with the sign of what the middle of two mean velocities moves by.
+    length: f64,
+    /// The time from the middle of the substep before to the middle of this one.
+    apart: f64,
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
+    /// A composition of the rules that `rule` makes for each length of a substep, from the state `(q, p, z)` at `t0`.
+    ///
+    /// # Errors
+    /// [`InputError::Step`] unless h is finite and not 0; [`InputError::Hypothesis`] for a scheme that is no composition;
+    /// [`InputError::Geometry`] where the time or the state is not finite, or the Lagrangian singular; [`InputError::Sigma`] and
+    /// [`InputError::FirstStep`] where the first substep cannot be taken; those of `rule`.
+    pub fn new(
+        mut rule: impl FnMut(f64) -> Result<D, InputError>,
+        scheme: &SplittingScheme,
+        h: f64,
+        t0: f64,
+        state: PhasePoint<N>,
+    ) -> Result<Self, InputError> {
+        if !(h != 0.0 && h.is_finite()) {
+            return Err(InputError::Step { h });
+        }
+        crate::run::check_time(t0)?;
+        state.check()?;
+        let Some(lengths) = scheme.substeps() else {
+            return Err(InputError::Hypothesis {
+                hypothesis: "a composition of symmetric steps, no Nyström splitting",
+            });
+        };
+        let (mut rules, mut substeps, mut time) = (Vec::new(), Vec::new(), 0.0);
+        // Symmetric: the last two middles are as far apart as the first two.
+        let mut last_apart = match lengths[..] {
+            [first, second, ..] => 0.5 * (first + second) * h,
+            _ => h,
+        };
+        for (i, &g) in lengths.iter().enumerate() {
+            // The second half of the substeps mirrors the first, and shares its rules.
+            let index = i.min(lengths.len() - 1 - i);
+            if index == i {
+                rules.push(rule(g.abs() * h)?);
+            }
+            let before = if i == 0 { lengths[lengths.len() - 1] } else { lengths[i - 1] };
+            let start = f64::min(time, time + g) * h;
+            let apart = 0.5 * (before + g) * h;
+            // Forward or back, as the middle of the last two mean velocities moves.
+            let length = (g * h).abs().copysign(apart + last_apart);
+            last_apart = apart;
+            substeps.push(Substep { rule: index, start, back: g < 0.0, length, apart });
+            time += g;
+        }
+        let mut composition = Composition {
+            rules,
+            substeps,
+            h,
+            t0,
+            taken: 0,
+            state,
+            velocity: SVector::zeros(),
+            sigma: 1.0,
+            evaluations: 0,
+            solver: Solver::default(),
+            acceleration: SVector::zeros(),
+            change: SVector::zeros(),
+            before: state,
+            watch: Watch::new(&state.q, &SVector::zeros(), h),
+        };
+        if let Some(first) = composition.substeps.first().copied() {
+            let guess = SVector::zeros();
+            let taken = composition.substep(&first, &state, &guess);
+            let velocity = taken.map_or(guess, |step| step.velocity);
+            composition.rules[first.rule].check_start(t0, &state, &velocity)?;
+            taken.map_err(InputError::first_step)?;
+        }
+        Ok(composition)
+    }
+
+    /// One substep of the step that is at work.
+    fn substep(
+        &mut self,
+        substep: &Substep,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+    ) -> Result<Transition<N>, StepError> {
+        let (rule, at) = (&self.rules[substep.rule], self.time() + substep.start);
+        if substep.back {
+            rule.backward(at, from, guess, &mut self.solver)
+        } else {
+            rule.forward(at, from, guess, &mut self.solver)
+        }
+    }
+
+    /// One step; the state changes only if each substep can be taken.
+    fn step(&mut self) -> Result<(), StepError> {
+        let (mut state, mut velocity, mut sigma) = (self.state, self.velocity, 1.0);
+        let mut sharpest = self.watch.sharpest;
+        for i in 0..self.substeps.len() {
+            let substep = self.substeps[i];
+            let next = self.substep(&substep, &state, &velocity)?;
+            sigma *= if substep.back { 1.0 / next.sigma } else { next.sigma };
+            self.watch(&substep, &velocity, &next, &mut sharpest);
+            // Newton's method evaluates once for each iteration, and once where it ends.
+            self.evaluations += u64::from(next.iterations) + 1;
+            (state, velocity) = (next.end, next.velocity);
+        }
+        if sharpest > self.watch.sharpest
+            && let Some(step) = self.taken.checked_sub(1)
+        {
+            // What turns the first mean velocity may lie in the step before.
+            let t = self.t0 + step as f64 * self.h;
+            self.watch.doubt(sharpest, Doubt { step, steps: 2, t, from: self.before, to: state });
+        }
+        self.before = self.state;
+        (self.state, self.velocity, self.sigma) = (state, velocity, sigma);
+        self.taken += 1;
+        Ok(())
+    }
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
+    /// Looks whether a substep resolves the motion: by its rule's factor, and by the second differences of the mean velocities
+    /// along a time as long as the substep. The first step has nothing before it to compare with.
+    #[inline(always)]
+    fn watch(&mut self, substep: &Substep, before: &SVector<f64, N>, next: &Transition<N>, sharpest: &mut f64) {
+        let now = &next.velocity;
+        let acceleration = (now - before) / substep.apart;
+        let last = std::mem::replace(&mut self.acceleration, acceleration);
+        let change = (acceleration - last) * substep.length;
+        let last = std::mem::replace(&mut self.change, change);
+        if self.taken > 0 {
+            let found = if change.dot(&last) < 0.0 {
+                turning([&last, &change], [before, now, now], &next.end.q, substep.length, self.watch.floor)
+            } else {
+                None
+            };
+            if let Some(misfit) = found {
+                self.watch.note(self.taken, misfit);
+            }
+            if let Some(sharpness) = sharper([&change, now, &next.end.q], substep.length, self.watch.floor, *sharpest) {
+                *sharpest = sharpness;
+            }
+        }
+        if let Some(misfit) = self.rules[substep.rule].misfit([now; 4], &next.end, next.sigma) {
+            self.watch.note(self.taken, misfit);
+        }
+    }
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> {
+    fn has_constant_rate(&self) -> bool {
+        self.rules.iter().all(|rule| rule.constant_rate())
+    }
+
+    fn account(&self) -> Vec<Item> {
+        account_of(self.rules.iter().all(|rule| rule.is_explicit()), "substep")
+    }
+
+    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        (0..steps).try_for_each(|taken| self.step().map_err(|cause| Halt { taken, cause }))
+    }
+
+    fn state(&self) -> PhasePoint<N> {
+        self.state
+    }
+
+    fn time(&self) -> f64 {
+        self.t0 + self.taken as f64 * self.h
+    }
+
+    fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        Saved::save(self, &mut words);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.load(&mut words).is_some() && words.is_empty()
+    }
+
+    fn suspicion(&self) -> Option<Suspicion> {
+        self.watch.first
+    }
+
+    fn doubt(&mut self) -> Option<Doubt<N>> {
+        self.watch.doubt.take()
+    }
+}
+
+saved!([D, const N: usize] Composition<D, N> { taken, state, velocity, sigma, evaluations, acceleration, change, before, watch });

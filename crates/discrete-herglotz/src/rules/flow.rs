@@ -1,0 +1,255 @@
+//! The discrete Hamiltonian flow at work on a motion.
+
+use crate::run::saved::{Saved, saved};
+use crate::run::watch::{Watch, at_rest, sharper};
+use crate::run::{check_time, start_of};
+use crate::{DiscreteLagrangian, Doubt, Halt, InputError, Item, Solver, StepError, Stepper, Suspicion, Transition};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{DiscretePoint, PhasePoint};
+
+/// One step of a [`Flow`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlowStep<const N: usize> {
+    /// The number of steps taken, this one included: the state `to` is that of index `k`.
+    pub k: usize,
+    /// The time at the step's end, `t0 + k h`.
+    pub t: f64,
+    /// The state before.
+    pub from: PhasePoint<N>,
+    /// The state after.
+    pub to: PhasePoint<N>,
+    /// The mean velocity `(q_k - q_{k-1}) / h`, to full precision.
+    pub velocity: SVector<f64, N>,
+    /// `sigma_d` of the step: the factor by which it contracts the contact form, and every momentum of a symmetry.
+    pub sigma: f64,
+    /// Newton iterations taken.
+    pub iterations: u32,
+}
+
+/// A discrete Hamiltonian flow with its current state: what a run of a rule advances.
+///
+/// The state is `(q, p, z)`; there is a second door for those who start, as the paper does, from `(q0, q1, z0)`.
+///
+/// ```
+/// use contact_geom::{PhasePoint, systems::Pendulum};
+/// use discrete_herglotz::{Flow, Midpoint, Stepper};
+/// let ld = Midpoint::new(Pendulum { gamma: -0.1 }, 0.1)?;
+/// let mut flow = Flow::new(&ld, 0.0, PhasePoint::new([1.0], [1.0], 0.0))?;
+/// flow.advance(100)?;
+/// println!("q(10) = {}", flow.state().q[0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Flow<D, const N: usize> {
+    ld: D,
+    t0: f64,
+    k: usize,
+    state: PhasePoint<N>,
+    /// The mean velocities of the last steps, the latest first: the start of Newton's method is extrapolated from them.
+    velocities: [SVector<f64, N>; 3],
+    solver: Solver<N>,
+    /// `sigma_d` of the last step.
+    sigma: f64,
+    evaluations: u64,
+    /// The state before the last step.
+    before: PhasePoint<N>,
+    watch: Watch<N>,
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
+    /// A flow of a discrete Lagrangian, or of a reference to one, from the state `(q, p, z)` at time `t0`.
+    ///
+    /// # Errors
+    /// [`InputError`] where the state is not finite, `sigma_d <= 0`, the discrete Lagrangian is not regular there, or the
+    /// first step cannot be solved.
+    pub fn new(ld: D, t0: f64, state: PhasePoint<N>) -> Result<Self, InputError> {
+        Self::with_guess(ld, t0, state, SVector::zeros())
+    }
+
+    /// Like [`new`](Self::new), with a guess of the velocity from which the first step is solved; needed where several
+    /// velocities have the same momentum.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn with_guess(ld: D, t0: f64, state: PhasePoint<N>, guess: SVector<f64, N>) -> Result<Self, InputError> {
+        check_time(t0)?;
+        state.check()?;
+        let mut solver = Solver::default();
+        let first = ld.forward(t0, &state, &guess, &mut solver);
+        // A singular Lagrangian is the reason of what goes wrong, where something does.
+        ld.check_start(t0, &state, &first.map_or(guess, |step| step.velocity))?;
+        let first = first.map_err(InputError::first_step)?;
+        let (velocities, watch) = ([first.velocity; 3], Watch::new(&state.q, &first.velocity, ld.step_size()));
+        Ok(Flow { ld, t0, k: 0, state, velocities, solver, sigma: 1.0, evaluations: 0, before: state, watch })
+    }
+
+    /// A flow from the two positions `q0, q1` and the action `z0`: its state at `t0` is `F-L_d (q0, q1, z0)`.
+    ///
+    /// # Errors
+    /// [`InputError`] where a coordinate is not finite, `sigma_d <= 0`, or the discrete Lagrangian is not regular at the
+    /// point; [`InputError::EqualPoints`] where that is because `q0 = q1`.
+    pub fn from_points(ld: D, t0: f64, x: DiscretePoint<N>) -> Result<Self, InputError> {
+        check_time(t0)?;
+        let state = start_of(&ld, t0, &x)?;
+        let velocity = (x.q1 - x.q0) / ld.step_size();
+        Self::with_guess(ld, t0, state, velocity)
+    }
+
+    /// The first step so far that cannot have resolved the motion, where one was seen: as fewer than six steps in a period of
+    /// the velocity, or a conformal factor beyond three.
+    pub fn suspicion(&self) -> Option<Suspicion> {
+        self.watch.first
+    }
+
+    /// The current state `(q, p, z)`.
+    pub fn state(&self) -> &PhasePoint<N> {
+        &self.state
+    }
+
+    /// The current time `t0 + k h`.
+    pub fn time(&self) -> f64 {
+        self.t0 + self.k as f64 * self.ld.step_size()
+    }
+
+    /// Takes one step.
+    ///
+    /// # Errors
+    /// A [`StepError`]; the state is then the one before.
+    #[inline(always)]
+    pub fn step(&mut self) -> Result<FlowStep<N>, StepError> {
+        let t = self.time();
+        let [latest, before, earlier] = self.velocities;
+        let next = self.ld.forward(t, &self.state, &(latest * 2.0 - before), &mut self.solver)?;
+        self.k += 1;
+        let step = FlowStep {
+            k: self.k,
+            t: self.time(),
+            from: self.state,
+            to: next.end,
+            velocity: next.velocity,
+            sigma: next.sigma,
+            iterations: next.iterations,
+        };
+        let velocities = [&earlier, &before, &latest, &next.velocity];
+        if let Some(misfit) = self.ld.misfit(velocities, &next.end, next.sigma) {
+            self.suspect(misfit, velocities, &next);
+        }
+        // The first velocity has none before it.
+        let (turn, h) = (next.velocity - latest * 2.0 + before, self.ld.step_size());
+        if let Some(sharpness) = sharper([&turn, &latest, &next.end.q], h, self.watch.floor, self.watch.sharpest)
+            && let Some(step) = self.k.checked_sub(2).filter(|step| *step > 0)
+        {
+            // What turns mean velocities lies in this step or the last.
+            let doubt = Doubt { step, steps: 2, t: self.t0 + step as f64 * h, from: self.before, to: next.end };
+            self.watch.doubt(sharpness, doubt);
+        }
+        // Before the first step velocities changed as they do in the second, for all that is known.
+        self.velocities = match self.k {
+            1 => [next.velocity; 3],
+            2 => [next.velocity, latest, latest * 2.0 - next.velocity],
+            _ => [next.velocity, latest, before],
+        };
+        self.before = self.state;
+        self.state = next.end;
+        self.sigma = next.sigma;
+        // A second jet an iteration, and the jet that makes the next momentum.
+        self.evaluations += u64::from(next.iterations) + 1;
+        Ok(step)
+    }
+
+    /// Notes the misfit of a step. What is at rest turns by its rounding, and has a misfit by its factor alone.
+    #[cold]
+    #[inline(never)]
+    fn suspect(&mut self, misfit: f64, velocities: [&SVector<f64, N>; 4], next: &Transition<N>) {
+        let still = at_rest(velocities, self.ld.step_size(), self.watch.floor);
+        let of_factor = || self.ld.misfit([&SVector::zeros(); 4], &next.end, next.sigma);
+        if let Some(misfit) = if still { of_factor() } else { Some(misfit) } {
+            self.watch.note(self.k - 1, misfit);
+        }
+    }
+
+    /// Takes one step back by the inverse flow `F-L_d o (F+L_d)^-1`.
+    ///
+    /// # Errors
+    /// A [`StepError`]; the state is then unchanged.
+    pub fn step_back(&mut self) -> Result<(), StepError> {
+        let t = self.time() - self.ld.step_size();
+        let back = self.ld.backward(t, &self.state, &self.velocities[0], &mut self.solver)?;
+        self.state = back.end;
+        self.velocities = [back.velocity; 3];
+        match self.k.checked_sub(1) {
+            Some(k) => self.k = k,
+            None => self.t0 = t,
+        }
+        Ok(())
+    }
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
+    fn has_constant_rate(&self) -> bool {
+        self.ld.constant_rate()
+    }
+
+    fn account(&self) -> Vec<Item> {
+        account_of(self.ld.is_explicit(), "step")
+    }
+
+    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        for taken in 0..steps {
+            self.step().map_err(|cause| Halt { taken, cause })?;
+        }
+        Ok(())
+    }
+
+    fn state(&self) -> PhasePoint<N> {
+        self.state
+    }
+
+    fn time(&self) -> f64 {
+        Flow::time(self)
+    }
+
+    fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        Saved::save(self, &mut words);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.load(&mut words).is_some() && words.is_empty()
+    }
+
+    fn suspicion(&self) -> Option<Suspicion> {
+        self.watch.first
+    }
+
+    fn doubt(&mut self) -> Option<Doubt<N>> {
+        self.watch.doubt.take()
+    }
+}
+
+/// What the steps or substeps of discrete Lagrangians compute.
+pub(crate) fn account_of(explicit: bool, what: &str) -> Vec<Item> {
+    let solved = if explicit {
+        [
+            Item::skipped("Newton's method", "each step is explicit: forces only"),
+            Item::skipped("Jacobian", "no equation is solved"),
+        ]
+    } else {
+        [
+            Item::computed("Newton's method", format!("each {what} is implicit in q1")),
+            Item::computed("Jacobian", "second derivatives of L at each iterate"),
+        ]
+    };
+    let action = Item::computed("action z", "the flow of a discrete Lagrangian carries it");
+    solved.into_iter().chain([action]).collect()
+}
+
+saved!([D, const N: usize] Flow<D, N> { t0, k, state, velocities, sigma, evaluations, before, watch });

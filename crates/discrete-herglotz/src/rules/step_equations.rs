@@ -1,0 +1,176 @@
+//! The step equations of a quadrature rule: L along just the directions that a Newton step needs.
+
+use crate::Node;
+use crate::solve::unknowns::Unknowns;
+use contact_geom::linear::{self, SingularMatrix};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Border, Derivatives, Dual, Lagrangian, VelocityPoint};
+
+/// The largest dimension whose directions are carried at once; larger ones go in blocks, so that the numbers stay small
+/// enough for the stack and for registers.
+pub(crate) const BLOCK: usize = 8;
+
+/// The sums over the nodes that the step equations consist of.
+pub(crate) struct Sums<const N: usize> {
+    /// `sum w L`.
+    pub value: f64,
+    /// `p0 + sum w dL[l_i]`.
+    pub residual: SVector<f64, N>,
+    /// `sum w d2L[l_i, r_j]` for the velocity directions.
+    pub right: SMatrix<f64, N, N>,
+    /// The same for the direction of the end action.
+    pub right_z: SVector<f64, N>,
+    /// `sum w dL[r_j]`.
+    pub slope: Border<N>,
+}
+
+/// One node with the point at which L is taken there.
+pub(crate) struct Frame<'a, const N: usize> {
+    pub node: Node,
+    pub h: f64,
+    pub p: &'a SVector<f64, N>,
+    pub t: f64,
+    pub at: &'a VelocityPoint<N>,
+}
+
+impl<const N: usize> Frame<'_, N> {
+    /// Adds the part of the sums with left directions from `left` on and right directions from `right` on.
+    #[inline(always)]
+    pub fn accumulate<U: Unknowns, const A: usize>(
+        &self,
+        lagrangian: &impl Lagrangian<N>,
+        left: usize,
+        right: usize,
+        sums: &mut Sums<N>,
+    ) {
+        let Node { weight, place, action } = self.node;
+        let h = self.h;
+        type Left<U, const A: usize> = Dual<Dual<f64, U>, SVector<Dual<f64, U>, A>>;
+        let constant = |re: f64| -> Left<U, A> { Dual::constant(Dual::constant(re)) };
+        let mut x = VelocityPoint { q: self.at.q.map(constant), v: self.at.v.map(constant), z: constant(self.at.z) };
+        for j in right..N.min(right + U::LEN) {
+            x.q[j].re.d = U::unit(j - right, h * place);
+            x.v[j].re.d = U::unit(j - right, 1.0);
+        }
+        if (right..right + U::LEN).contains(&N) {
+            x.z.re.d = U::unit(N - right, action);
+        }
+        for i in left..N.min(left + A) {
+            x.q[i].d[i - left] = Dual::constant(h * (1.0 - place));
+            x.v[i].d[i - left] = Dual::constant(-1.0);
+            x.z.d[i - left] = Dual::constant(h * (1.0 - action) * self.p[i]);
+        }
+        let l = lagrangian.along(Dual::constant(self.t), &x);
+        if left == 0 && right == 0 {
+            sums.value += weight * l.re.re;
+        }
+        for i in left..N.min(left + A) {
+            let row = l.d[i - left];
+            if right == 0 {
+                sums.residual[i] += weight * row.re;
+            }
+            for j in right..N.min(right + U::LEN) {
+                sums.right[(i, j)] += weight * row.d.get(j - right);
+            }
+            if (right..right + U::LEN).contains(&N) {
+                sums.right_z[i] += weight * row.d.get(N - right);
+            }
+        }
+        if left == 0 {
+            for j in right..N.min(right + U::LEN) {
+                sums.slope.x[j] += weight * l.re.d.get(j - right);
+            }
+            if (right..right + U::LEN).contains(&N) {
+                sums.slope.z += weight * l.re.d.get(N - right);
+            }
+        }
+    }
+
+    /// All blocks of a large system; never inlined, so that small systems do not pay for its stack.
+    #[inline(never)]
+    pub fn by_blocks(&self, lagrangian: &impl Lagrangian<N>, unknowns: usize, sums: &mut Sums<N>) {
+        for left in (0..N).step_by(BLOCK) {
+            for right in (0..unknowns).step_by(BLOCK) {
+                self.accumulate::<SVector<f64, BLOCK>, BLOCK>(lagrangian, left, right, sums);
+            }
+        }
+    }
+}
+
+/// `L`, `L_q` and `L_z`: what the end of a step needs of a node.
+#[inline(always)]
+pub(crate) fn rates_at<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    at: &VelocityPoint<N>,
+) -> (f64, SVector<f64, N>, f64) {
+    if const { N > BLOCK } {
+        return rates_by_blocks(lagrangian, t, at);
+    }
+    let constant = |re: f64| -> Dual<f64, Border<N>> { Dual::constant(re) };
+    let mut x = VelocityPoint { q: at.q.map(constant), v: at.v.map(constant), z: constant(at.z) };
+    for i in 0..N {
+        x.q[i].d.x[i] = 1.0;
+    }
+    x.z.d.z = 1.0;
+    let l = lagrangian.along(t, &x);
+    (l.re, l.d.x, l.d.z)
+}
+
+/// [`rates_at`] for a large system.
+#[inline(never)]
+fn rates_by_blocks<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    at: &VelocityPoint<N>,
+) -> (f64, SVector<f64, N>, f64) {
+    let constant = |re: f64| -> Dual<f64, Border<BLOCK>> { Dual::constant(re) };
+    let (mut value, mut force, mut rate) = (0.0, SVector::zeros(), 0.0);
+    for start in (0..N).step_by(BLOCK) {
+        let mut x = VelocityPoint { q: at.q.map(constant), v: at.v.map(constant), z: constant(at.z) };
+        for i in start..N.min(start + BLOCK) {
+            x.q[i].d.x[i - start] = 1.0;
+        }
+        x.z.d.z = 1.0;
+        let l = lagrangian.along(t, &x);
+        for i in start..N.min(start + BLOCK) {
+            force[i] = l.d.x[i - start];
+        }
+        (value, rate) = (l.re, l.d.z);
+    }
+    (value, force, rate)
+}
+
+/// W alone where there are many coordinates; else with the other second derivatives, which are compiled in any case.
+pub(crate) fn mass_matrix<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+) -> SMatrix<f64, N, N> {
+    if const { N > BLOCK } { lagrangian.mass_matrix(t, x) } else { lagrangian.hessian(t, x).vv }
+}
+
+/// Whether a matrix is the identity; without one to compare with, for the sake of the stack.
+pub(crate) fn is_identity<const N: usize>(m: &SMatrix<f64, N, N>) -> bool {
+    (0..N).all(|j| (0..N).all(|i| m[(i, j)] == f64::from(u8::from(i == j))))
+}
+
+/// W on the heap, for what is kept.
+#[inline(never)]
+pub(crate) fn kept_mass_matrix<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+) -> Box<SMatrix<f64, N, N>> {
+    Box::new(mass_matrix(lagrangian, t, x))
+}
+
+/// The inverse, column by column, on the heap.
+#[inline(never)]
+pub(crate) fn inverted<const N: usize>(m: &SMatrix<f64, N, N>) -> Result<Box<SMatrix<f64, N, N>>, SingularMatrix> {
+    let mut inverse = SMatrix::<f64, N, N>::identity();
+    for mut column in inverse.column_iter_mut() {
+        linear::solve(&mut m.clone_owned(), &mut column)?;
+    }
+    Ok(Box::new(inverse))
+}

@@ -1,0 +1,414 @@
+//! The integrator and the number of steps for a wanted error.
+
+use super::pilot::{BUDGET, Ending, Marks, Pilots, Track};
+use super::{MOST_STEPS, Problem, Shared, Task};
+use crate::{ClockedGauss, GaussCollocation, InputError, Obstacle};
+use contact_geom::{Derivatives, Lagrangian, larger};
+use std::sync::Arc;
+
+/// The searches that may follow each other: each makes the steps shorter, or ends.
+const ATTEMPTS: usize = 64;
+
+/// The refinements, of so many steps, after which a step that still cannot be taken, or is not resolved, at the same time never will
+/// be, and those after which something narrow that is still between the nodes is left to the comparison of runs.
+const HALTS: usize = 8;
+const LONG: usize = 512;
+const NARROWS: usize = 10;
+
+/// The stages of the reference for other methods.
+const REFERENCE: usize = 12;
+
+/// The stages from which a Gauss method is its own reference.
+const OWN: usize = 6;
+
+/// The stages by a clock, for every error: what its clock makes smooth could be followed by longer steps of more stages, were it not for
+/// the iteration.
+const BY_CLOCK: usize = 8;
+
+/// What is chosen for a run.
+pub(super) struct Choice<'p, L, const N: usize> {
+    pub integrator: Shared<'p, L, N>,
+    pub count: usize,
+    /// The length of a step; by a clock, in its time.
+    pub h: f64,
+    /// The error that the pilot runs found, or predict; `None` where the steps are given.
+    pub error: Option<f64>,
+}
+
+impl<L, const N: usize> Clone for Choice<'_, L, N> {
+    fn clone(&self) -> Self {
+        Choice { integrator: self.integrator.clone(), ..*self }
+    }
+}
+
+/// A motion that runs with k and 2k steps agree on.
+struct Converged<const N: usize> {
+    k: usize,
+    /// The error of the run with k steps, and what is predicted of that with 2k.
+    errors: [f64; 2],
+    /// The largest misfit between the nodes of the run with k steps.
+    misfit: f64,
+    truth: Track<N>,
+    marks: Marks,
+    /// Whether something narrow was met on the way.
+    narrow: bool,
+}
+
+/// The stages of Gauss collocation for an error, where no integrator is named: few steps of many stages cost their tables, many steps of
+/// few stages their number.
+fn stages_for(wanted: f64) -> usize {
+    if wanted < 1e-10 { 12 } else { 8 }
+}
+
+/// Chooses the steps, and the integrator where the run names none, so that the error of (q, p), relative to their size, is at most
+/// `wanted` at ten times along the motion.
+///
+/// By the clock that the motion states, where steps that are equal in its time are much fewer: the first run with equal steps sees
+/// that, and ends there.
+///
+/// A reference is found first: contact Gauss collocation with k and 2k steps. They must agree; and between the nodes their curves must
+/// solve Herglotz' equations up to a misfit that falls from the one to the other as it does where the motion is smooth. The search ends
+/// a run at the first step that does not resolve the motion, so that runs that are far too coarse cost nothing. The error of the
+/// integrator's own runs is then their distance from the reference.
+pub(super) fn choose<'p, L: Lagrangian<N>, const N: usize>(
+    task: &Task<'p, L, N>,
+    wanted: f64,
+) -> Result<Choice<'p, L, N>, InputError> {
+    if !(wanted > 0.0 && wanted.is_finite()) {
+        return Err(InputError::Tolerance { wanted });
+    }
+    choose_with(&mut Pilots { task, left: BUDGET, wanted, watches_clock: false })
+}
+
+/// The same with a budget.
+pub(super) fn choose_with<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, 'p, L, N>,
+) -> Result<Choice<'p, L, N>, InputError> {
+    let wanted = pilots.wanted;
+    let Some(integrator) = pilots.task.integrator.clone() else {
+        let stages = stages_for(wanted);
+        let equal: Shared<'p, L, N> = Arc::new(GaussCollocation { stages });
+        pilots.watches_clock = const { L::HAS_CLOCK } && pilots.task.problem.structure.autonomous;
+        if let Some(choice) = by_equal_steps(pilots, &equal, stages)? {
+            return Ok(choice);
+        }
+        pilots.watches_clock = false;
+        // Where the clock leads nowhere equal steps may.
+        let clocked: Shared<'p, L, N> = Arc::new(ClockedGauss { stages: BY_CLOCK });
+        return by_clock(pilots, &clocked, BY_CLOCK)
+            .or_else(|refused| by_equal_steps(pilots, &equal, stages)?.ok_or(refused));
+    };
+    let facts = integrator.facts();
+    match facts.collocation {
+        Some(stages) if stages >= OWN && facts.by_clock => by_clock(pilots, &integrator, stages),
+        Some(stages) if stages >= OWN => by_equal_steps(pilots, &integrator, stages)?.ok_or(InputError::NoSteps),
+        _ => {
+            let at = if facts.by_clock { Compared::Times } else { Compared::Tenths };
+            let found = reference(pilots, REFERENCE, wanted / 8.0, at)?;
+            by_reference(pilots, &integrator, &found)
+        }
+    }
+}
+
+/// Where pilot runs are compared.
+#[derive(Clone, Copy)]
+enum Compared {
+    /// At the ends of steps next to tenths of the span.
+    Steps,
+    /// At tenths of the span, which divide the numbers of steps.
+    Tenths,
+    /// At tenths of the span; the runs are by the motion's clock.
+    Times,
+}
+
+/// Gauss collocation that is its own reference, with equal steps; `None` where a clock takes much fewer, and these were watched.
+fn by_equal_steps<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, 'p, L, N>,
+    integrator: &Shared<'p, L, N>,
+    stages: usize,
+) -> Result<Option<Choice<'p, L, N>>, InputError> {
+    let wanted = pilots.wanted;
+    let Some(found) = converge(pilots, stages, wanted, Compared::Steps)? else { return Ok(None) };
+    // Where W or the drag changes along the motion a longer step may leave their domain, as no misfit foretells.
+    let structure = &pilots.task.problem.structure;
+    let longer = structure.separable && structure.has_constant_rate();
+    let (count, error) = fewest(stages, wanted, &found, longer);
+    Ok(Some(chosen(pilots, integrator, count, error, &found)))
+}
+
+/// The same with steps that are equal in the time of the motion's clock.
+fn by_clock<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, 'p, L, N>,
+    integrator: &Shared<'p, L, N>,
+    stages: usize,
+) -> Result<Choice<'p, L, N>, InputError> {
+    let wanted = pilots.wanted;
+    let found = reference(pilots, stages, wanted, Compared::Times)?;
+    let (count, error) = fewest(stages, wanted, &found, false);
+    Ok(chosen(pilots, integrator, count, error, &found))
+}
+
+/// The runs that agree where no clock is watched.
+fn reference<L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, '_, L, N>,
+    stages: usize,
+    goal: f64,
+    compared: Compared,
+) -> Result<Converged<N>, InputError> {
+    let refused = InputError::Accuracy { wanted: pilots.wanted, reached: f64::INFINITY, cause: Obstacle::Budget };
+    converge(pilots, stages, goal, compared)?.ok_or(refused)
+}
+
+/// The choice of steps of which so many fill the span; by a clock they are counted anew, in its time.
+fn chosen<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &Pilots<'_, 'p, L, N>,
+    integrator: &Shared<'p, L, N>,
+    count: usize,
+    error: f64,
+    found: &Converged<N>,
+) -> Choice<'p, L, N> {
+    let (h, integrator, error) = (pilots.step(count, &found.marks), integrator.clone(), Some(error));
+    if let Marks::Times = found.marks {
+        // The last step is about half of the others, so that no rounding adds one.
+        let count = (found.truth.tau / h + 0.5).ceil().max(1.0);
+        return Choice { integrator, count: count as usize, h: found.truth.tau / (count - 0.5), error };
+    }
+    Choice { integrator, count, h, error }
+}
+
+/// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.
+fn first_guess<L: Lagrangian<N>, const N: usize>(task: &Task<'_, L, N>, stages: usize, goal: f64) -> usize {
+    let Task { problem: Problem { lagrangian, start, t0, .. }, span, .. } = task;
+    let h = lagrangian.hessian(*t0, start);
+    let frequency = h.vv.try_inverse().map_or(0.0, |inverse| (inverse * h.qq).norm()).sqrt();
+    // The error of a step of x radians is about x^(2s+1) s!^4 / (2s)!^3.
+    let s = stages as f64;
+    let logarithm = |n: usize| (1..=n).map(|i| (i as f64).ln()).sum::<f64>();
+    let constant = 4.0 * logarithm(stages) - 3.0 * logarithm(2 * stages);
+    let radians = ((goal.ln() - constant) / (2.0 * s + 1.0)).exp();
+    let count = span.abs() * frequency / (0.5 * radians).min(s / 3.0);
+    // What is stiff at its start need not be resolved, and what is free there may be anything later.
+    if count.is_finite() { (count.ceil() as usize).clamp(1, 1 << 20) } else { 1 }
+}
+
+/// Finds the runs that agree; `None` where one has ended since a clock would take much fewer steps.
+fn converge<L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, '_, L, N>,
+    stages: usize,
+    goal: f64,
+    compared: Compared,
+) -> Result<Option<Converged<N>>, InputError> {
+    let refuse = |wanted, reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
+    let (wanted, t0, span) = (pilots.wanted, pilots.task.problem.t0, pilots.task.span);
+    let s = stages as f64;
+    let marks_of = |k: usize| match compared {
+        Compared::Steps => Marks::of(k),
+        Compared::Tenths => Marks::equal(k),
+        Compared::Times => Marks::Times,
+    };
+    let mut k = first_guess(pilots.task, stages, goal);
+    let mut marks = marks_of(k);
+    let (mut best, mut strikes, mut narrows, mut halts) = (f64::INFINITY, 0, 0, (0, 0.0));
+    let mut cause = Obstacle::Unresolved { t: t0 };
+    // The finer of the last two runs, and their distance.
+    let (mut known, mut before): (Option<Track<N>>, f64) = (None, f64::NAN);
+    let mut guessed = false;
+    'search: for _ in 0..ATTEMPTS {
+        if 2.0 * k as f64 > MOST_STEPS {
+            break;
+        }
+        if known.is_none() {
+            marks = marks_of(k);
+            k = marks.whole(k as f64);
+        }
+        let left = pilots.left;
+        let mut tracks = Vec::with_capacity(2);
+        for (multiple, closely) in [(1, false), (2, true)] {
+            if let Some(track) = known.take() {
+                tracks.push(track);
+                continue;
+            }
+            let ending = pilots.gauss(stages, multiple * k, &marks, closely, narrows < NARROWS)?;
+            let stopped = match ending {
+                Ending::Followed(track) => {
+                    // The error is about the square of the misfit: what is far too large need not be halved again and again.
+                    let more = (track.misfit.powi(2) / goal).powf(0.5 / s) / 1.4;
+                    if multiple == 1 && !guessed && more > 1.2 {
+                        guessed = true;
+                        k = (k as f64 * more.min(4.0)).ceil() as usize;
+                        continue 'search;
+                    }
+                    tracks.push(track);
+                    continue;
+                }
+                Ending::Uneven => return Ok(None),
+                Ending::Exhausted => {
+                    return refuse(wanted, best, if best.is_finite() { Obstacle::Budget } else { cause });
+                }
+                Ending::Narrow { part } => {
+                    narrows += 1;
+                    (part, Obstacle::Unresolved { t: t0 + part * span })
+                }
+                Ending::Unresolved { part } => (part, Obstacle::Unresolved { t: t0 + part * span }),
+                Ending::Halted { part, cause: halt } => (part, Obstacle::Halted { t: t0 + part * span, cause: halt }),
+            };
+            let (part, obstacle) = stopped;
+            // What is narrow may need many halvings, what is singular has no end of them.
+            let same = (part - halts.1).abs() <= 0.01 && k > LONG;
+            (halts, cause) = ((if same { halts.0 + 1 } else { 1 }, part), obstacle);
+            if halts.0 == HALTS {
+                break 'search;
+            }
+            k *= 2;
+            continue 'search;
+        }
+        let [coarse, fine] = tracks.as_slice() else { break };
+        // Runs that agree in all digits may still be off by half of the last one.
+        let error = larger(coarse.distance(fine), 0.5 * f64::EPSILON);
+        // A misfit of a smooth motion falls with the order s. What jumps has one that does not; what is rounded has none to speak of.
+        let falls = fine.misfit <= larger(coarse.misfit / 8.0, larger(0.01 * wanted, 1e-11));
+        let order = (coarse.misfit / fine.misfit).log2().clamp(0.0, s);
+        let order = if order.is_nan() { s } else { order };
+        // What is left of the error in the finer run: it is of the order 2s, where the misfit is of the order s.
+        let beyond = error / 2.0f64.powf(1.5 * order);
+        let distances = coarse.distances(fine);
+        // Round-off does not fall; it grows like the distances of the runs.
+        let growth = distances.last().copied().unwrap_or(0.0) / distances.first().copied().unwrap_or(0.0);
+        let rounded = 2e-15 * larger(growth, 1.0) * (k as f64).sqrt();
+        let agreed = error <= 0.25 * goal || (error <= 1e-2 && beyond <= 0.1 * goal && rounded <= 0.1 * goal);
+        if falls && agreed {
+            return Ok(Some(Converged {
+                k,
+                errors: [error, beyond],
+                misfit: coarse.misfit,
+                truth: fine.clone(),
+                marks,
+                narrow: narrows > 0,
+            }));
+        }
+        strikes = if error < 0.5 * best { 0 } else { strikes + 1 };
+        cause = if !falls {
+            Obstacle::Order { order }
+        } else if before.is_nan() {
+            // The first two runs show no order, and are the last if others would cost too much.
+            Obstacle::Budget
+        } else if fine.has_underflown() {
+            Obstacle::RoundOff
+        } else {
+            obstacle(&distances, (before / error).log2(), wanted, t0, span)
+        };
+        (best, before) = (if error < best { error } else { best }, error);
+        // Not begun, if it cannot end.
+        if strikes == 3 || 2 * (left - pilots.left) > pilots.left {
+            break;
+        }
+        known = Some(fine.clone());
+        k *= 2;
+    }
+    refuse(wanted, best, cause)
+}
+
+/// What keeps runs from agreeing, by their distances along the motion and the order that they show.
+fn obstacle(distances: &[f64], order: f64, wanted: f64, t0: f64, span: f64) -> Obstacle {
+    let (first, last) = (distances.first().copied().unwrap_or(0.0), distances.last().copied().unwrap_or(0.0));
+    // The order that is left where runs differ by nothing but what they have rounded.
+    let noise = order < 2.0;
+    if noise && last > 1e-8 && last > 1e4 * first {
+        let kept = distances.iter().take_while(|d| **d <= wanted).count();
+        return Obstacle::Chaos { t: t0 + span * kept as f64 / distances.len() as f64 };
+    }
+    // Where only roundings are left they may show any order.
+    if noise && last < 1e-9 || last <= 64.0 * f64::EPSILON { Obstacle::RoundOff } else { Obstacle::Order { order } }
+}
+
+/// The fewest steps of a Gauss method that the converged runs allow, with the error that they predict.
+fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, longer: bool) -> (usize, f64) {
+    let Converged { k, errors: [error, beyond], misfit, narrow, .. } = *found;
+    let order = 2.0 * stages as f64;
+    // Ten times as exactly as wanted between the runs and beyond them, as errors of neighbouring steps may differ so much.
+    let (target, predicted) = (0.2 * wanted, 0.02 * wanted);
+    let change = (larger(error, 1e-14) / predicted).powf(1.0 / order);
+    let steps = (k as f64 * change).ceil();
+    if narrow {
+        return if error <= target { (k, error) } else { (2 * k, beyond) };
+    }
+    if error <= target {
+        // Coarser than what was followed only where the misfit says that steps still resolve the motion.
+        let fewer = steps.max((0.6 * k as f64).ceil());
+        let coarser = misfit * (k as f64 / fewer).powf(stages as f64);
+        return if longer && fewer < k as f64 && coarser <= 1e-2 { (fewer as usize, predicted) } else { (k, error) };
+    }
+    if steps < 2.0 * k as f64 { (steps as usize, larger(predicted, beyond)) } else { (2 * k, beyond) }
+}
+
+/// The steps of any integrator, whose runs are compared with the reference.
+fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, 'p, L, N>,
+    integrator: &Shared<'p, L, N>,
+    found: &Converged<N>,
+) -> Result<Choice<'p, L, N>, InputError> {
+    let wanted = pilots.wanted;
+    let (order, marks) = (f64::from(integrator.facts().order), &found.marks);
+    let whole = |count: f64| marks.whole(count);
+    let refuse = |reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
+    let mut count = whole((found.k * REFERENCE) as f64 / order.min(4.0));
+    let (mut best, mut strikes) = (f64::INFINITY, 0);
+    let (mut cause, mut before) = (Obstacle::Budget, None);
+    // The fewest steps that were seen to be enough, with their error.
+    let mut enough: Option<(usize, f64)> = None;
+    for _ in 0..ATTEMPTS {
+        if count as f64 > MOST_STEPS {
+            break;
+        }
+        let factor = match pilots.own(integrator, count, marks)? {
+            Ending::Followed(track) => {
+                let error = track.distance(&found.truth);
+                if error <= 0.7 * wanted {
+                    enough = Some((count, error));
+                    // Down, where an order says that much fewer steps will do.
+                    let fewer = whole(count as f64 * (error / (0.5 * wanted)).powf(1.0 / order).max(1.0 / 16.0));
+                    if error > 0.2 * wanted || fewer as f64 > 0.8 * count as f64 || strikes > 0 {
+                        break;
+                    }
+                    count = fewer;
+                    continue;
+                }
+                if enough.is_some() {
+                    break;
+                }
+                strikes = if error < 0.7 * best { 0 } else { strikes + 1 };
+                // The reference is sure, so it is no chaos that keeps a run from it.
+                if let Some((n, other)) = before.replace((count, error)) {
+                    let shown = f64::ln(other / error) / f64::ln(count as f64 / n as f64);
+                    let round_off = error < 1e-9 && shown < 0.5 * order;
+                    cause = if round_off { Obstacle::RoundOff } else { Obstacle::Order { order: shown } };
+                }
+                best = best.min(error);
+                if strikes == 4 {
+                    break;
+                }
+                if error.is_finite() {
+                    (1.05 * (error / (0.5 * wanted)).powf(1.0 / order)).clamp(1.2, 32.0)
+                } else {
+                    2.0
+                }
+            }
+            Ending::Halted { part, cause: halt } => {
+                if enough.is_some() {
+                    break;
+                }
+                cause = Obstacle::Halted { t: pilots.task.problem.t0 + part * pilots.task.span, cause: halt };
+                2.0
+            }
+            _ => {
+                cause = Obstacle::Budget;
+                break;
+            }
+        };
+        count = whole(count as f64 * factor);
+    }
+    match enough {
+        Some((count, error)) => Ok(chosen(pilots, integrator, count, error, found)),
+        None => refuse(best, cause),
+    }
+}

@@ -1,0 +1,159 @@
+//! The table of integrators.
+
+use super::{Facts, Integrator, Problem, Wants};
+use crate::{ClockedGauss, Composed, Gauss, GaussCollocation, InputError, Method, SplittingScheme, Stepper};
+use contact_geom::Lagrangian;
+use std::fmt::{Display, Formatter};
+use std::str::FromStr;
+use thiserror::Error;
+
+/// Any of the integrators of this crate by name, chosen at run time. A program that has this type compiles them all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AnyIntegrator {
+    /// The flow of a discrete Lagrangian, each step by Newton's method.
+    Discrete(Method),
+    /// [`GaussCollocation`].
+    Gauss {
+        /// The number of stages.
+        stages: usize,
+    },
+    /// [`ClockedGauss`].
+    Clocked {
+        /// The number of stages.
+        stages: usize,
+    },
+    /// A splitting with exact rate, for `v.Mv/2 - V(t, q) + f(z)`.
+    Splitting(SplittingScheme),
+    /// A symmetric composition of a symmetric rule of order 2.
+    Composition(Method, SplittingScheme),
+}
+
+/// The same expression for each integrator.
+macro_rules! each {
+    ($any:expr, $integrator:ident => $result:expr) => {
+        match $any {
+            AnyIntegrator::Discrete($integrator) => $result,
+            AnyIntegrator::Gauss { stages } => {
+                let $integrator = GaussCollocation { stages };
+                $result
+            }
+            AnyIntegrator::Clocked { stages } => {
+                let $integrator = ClockedGauss { stages };
+                $result
+            }
+            AnyIntegrator::Splitting($integrator) => $result,
+            AnyIntegrator::Composition(rule, scheme) => {
+                let $integrator = Composed::new(rule, scheme);
+                $result
+            }
+        }
+    };
+}
+
+impl AnyIntegrator {
+    /// Every integrator by one name: quadrature rules, Gauss methods, splittings, the compositions of the symmetric midpoint rule, and
+    /// Gauss methods by a clock.
+    pub fn all() -> Vec<AnyIntegrator> {
+        let discrete = Method::RULES.iter().copied().map(AnyIntegrator::Discrete);
+        let gauss = (1..=Gauss::<()>::STAGES).map(|stages| AnyIntegrator::Gauss { stages });
+        let splittings = SplittingScheme::ALL.into_iter().map(AnyIntegrator::Splitting);
+        let compositions = SplittingScheme::ALL.into_iter().filter(|s| !s.is_nystrom() && s.order() > 2);
+        let compositions = compositions.map(|scheme| AnyIntegrator::Composition(Method::Midpoint, scheme));
+        let clocked = (1..=Gauss::<()>::STAGES).map(|stages| AnyIntegrator::Clocked { stages });
+        discrete.chain(gauss).chain(splittings).chain(compositions).chain(clocked).collect()
+    }
+
+    /// The order of the flow; by a clock, in steps of its time.
+    pub fn order(self) -> u32 {
+        match self {
+            AnyIntegrator::Discrete(method) => method.order(),
+            AnyIntegrator::Gauss { stages } | AnyIntegrator::Clocked { stages } => 2 * stages as u32,
+            AnyIntegrator::Splitting(scheme) | AnyIntegrator::Composition(_, scheme) => scheme.order(),
+        }
+    }
+
+    /// Whether a Lagrangian meets the hypotheses of the method.
+    ///
+    /// # Errors
+    /// Those of [`Integrator::check`].
+    pub fn check<const N: usize, L: Lagrangian<N>>(self, lagrangian: &L) -> Result<(), InputError> {
+        each!(self, integrator => Integrator::<'_, L, N>::check(&integrator, lagrangian))
+    }
+}
+
+impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyIntegrator {
+    fn facts(&self) -> Facts {
+        let facts = each!(*self, integrator => Integrator::<'a, L, N>::facts(&integrator));
+        Facts { name: self.to_string().into(), ..facts }
+    }
+
+    fn check(&self, lagrangian: &L) -> Result<(), InputError> {
+        AnyIntegrator::check(*self, lagrangian)
+    }
+
+    fn stepper(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        wants: Wants,
+    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+        each!(*self, integrator => integrator.stepper(problem, h, wants))
+    }
+}
+
+/// The name in tables: `midpoint`, `gauss_8`, `clocked_gauss_8`, `kahan_li_8`, `midpoint_by_kahan_li_8`.
+impl Display for AnyIntegrator {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        match self {
+            // As a splitting it has a stepper of its own.
+            AnyIntegrator::Discrete(Method::Strang) => f.pad("discrete_strang"),
+            AnyIntegrator::Discrete(method) => f.pad(method.name()),
+            AnyIntegrator::Gauss { stages } => f.pad(&format!("gauss_{stages}")),
+            AnyIntegrator::Clocked { stages } => f.pad(&format!("clocked_gauss_{stages}")),
+            AnyIntegrator::Splitting(scheme) => f.pad(scheme.name()),
+            AnyIntegrator::Composition(method, scheme) => f.pad(&format!("{method}_by_{}", scheme.name())),
+        }
+    }
+}
+
+/// From the name.
+impl FromStr for AnyIntegrator {
+    type Err = UnknownIntegrator;
+
+    fn from_str(name: &str) -> Result<Self, UnknownIntegrator> {
+        let all = Self::all().into_iter().chain([AnyIntegrator::Discrete(Method::Strang)]);
+        let named = all.into_iter().find(|integrator| integrator.to_string() == name);
+        // Of compositions those of the other rules too.
+        let composed = || {
+            let (rule, scheme) = name.split_once("_by_")?;
+            let scheme = SplittingScheme::ALL.into_iter().find(|known| known.name() == scheme)?;
+            Some(AnyIntegrator::Composition(rule.parse().ok()?, scheme))
+        };
+        named.or_else(composed).ok_or_else(|| UnknownIntegrator { name: name.into() })
+    }
+}
+
+/// As its name.
+#[cfg(feature = "serde")]
+impl serde::Serialize for AnyIntegrator {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// From the name.
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for AnyIntegrator {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = <String as serde::Deserialize>::deserialize(deserializer)?;
+        name.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+/// No integrator has this name.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("there is no integrator {name:?}; there are {}", AnyIntegrator::all().iter().map(|i| i.to_string()).collect::<Vec<_>>().join(", "))]
+pub struct UnknownIntegrator {
+    /// The name that was asked for.
+    pub name: String,
+}

@@ -1,0 +1,75 @@
+//! What a plan computes and skips, in words.
+
+use super::Plan;
+use contact_geom::Lagrangian;
+use std::borrow::Cow;
+use std::fmt::{Display, Formatter};
+
+/// One line of a plan: something that could be computed, whether it is, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Item {
+    /// What it is about.
+    pub what: &'static str,
+    /// Whether it is computed.
+    pub computed: bool,
+    /// Why, or how.
+    pub why: Cow<'static, str>,
+}
+
+impl Item {
+    /// Something that is computed, and why or how.
+    pub fn computed(what: &'static str, why: impl Into<Cow<'static, str>>) -> Self {
+        Item { what, computed: true, why: why.into() }
+    }
+
+    /// Something that is not computed, and why.
+    pub fn skipped(what: &'static str, why: impl Into<Cow<'static, str>>) -> Self {
+        Item { what, computed: false, why: why.into() }
+    }
+}
+
+/// Why the action is left out.
+pub(crate) const DECOUPLED: &str = "L = L0 + gamma z: it does not act back, and is not requested";
+
+impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
+    /// What is computed, and what is not: by the steps, and beside them.
+    pub fn items(&self) -> Vec<Item> {
+        let mut items = self.account.clone();
+        if self.needs.action {
+            items.retain(|item| item.what != "action z");
+            items.push(Item::computed("action z", "requested"));
+        }
+        let what = "conformal factor";
+        items.push(match (self.needs.conformal_factor, self.constant_rate) {
+            (false, true) => Item::skipped(what, "sigma_d is the same in every step, and the product is not requested"),
+            (true, true) => Item::computed(what, "requested; sigma_d is the same in every step: a power at the end"),
+            (true, false) => Item::computed(what, "requested, and different in every step: a product along the run"),
+            (false, false) => {
+                Item::skipped(what, "the product is not requested; each step checks that its own is positive")
+            }
+        });
+        let (what, autonomous) = ("time at the stages", self.problem.structure.autonomous);
+        items.push(Item {
+            what,
+            computed: !autonomous,
+            why: if autonomous { "L does not depend on it" } else { "L depends on it" }.into(),
+        });
+        items
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> Display for Plan<'_, L, N> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let Plan { problem, count, h, facts, t_end, .. } = self;
+        let (t0, items) = (problem.t0, self.items());
+        let of = if facts.by_clock { " of the clock's time" } else { "" };
+        writeln!(f, "{count} steps of {h}{of} by {}, t = {t0} .. {t_end}", facts.name)?;
+        for (title, computed) in [("computed", true), ("skipped", false)] {
+            writeln!(f, "{title}:")?;
+            for item in items.iter().filter(|item| item.computed == computed) {
+                writeln!(f, "  {}: {}", item.what, item.why)?;
+            }
+        }
+        Ok(())
+    }
+}

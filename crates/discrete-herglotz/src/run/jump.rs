@@ -1,0 +1,74 @@
+//! Steps in doubt: whether what turned the velocity is narrower than they are.
+
+use super::{Plan, Problem};
+use crate::gauss::velocity;
+use crate::run::watch::{rounding, size};
+use crate::{Doubt, Suspicion};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, VelocityPoint, herglotz_rates, larger, largest};
+
+/// The parts of the steps in doubt at whose ends the acceleration is taken.
+const PARTS: usize = 32;
+
+/// What a jump of the acceleration gains in a step, in units of the velocity, from which on the step does not resolve it: a tenth, which
+/// is what a step may be wrong by that has all of it on the wrong side of the jump.
+const JUMP: f64 = 0.1;
+
+impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
+    /// What becomes of a doubt: a mark, where shorter steps differ or the acceleration jumps.
+    pub(super) fn settled(&self, doubt: &Doubt<N>) -> Option<Suspicion> {
+        let halves = self.against_halves(doubt).unwrap_or(0.0);
+        // Long steps of many stages are no cubic curves; and they see what jumps between their nodes.
+        let jump = if self.many_stages() { None } else { self.jump(doubt) };
+        let misfit = larger(halves, jump.unwrap_or(0.0));
+        // A NaN is a misfit too.
+        if misfit <= 1.0 { None } else { Some(Suspicion { step: doubt.step + doubt.steps - 1, misfit }) }
+    }
+
+    /// The misfit of the largest second difference of the acceleration along the cubic curve through both ends: a jump has it however
+    /// close the points are, and what is smooth falls with their square. `None` where no velocity is known.
+    fn jump(&self, Doubt { step, steps, t, from, to }: &Doubt<N>) -> Option<f64> {
+        let Problem { lagrangian, start: first, .. } = *self.problem;
+        let span = *steps as f64 * self.h;
+        let start = VelocityPoint { q: from.q, v: velocity(lagrangian, *t, from, first.v).ok()?, z: from.z };
+        let end = VelocityPoint { q: to.q, v: velocity(lagrangian, t + span, to, start.v).ok()?, z: to.z };
+        // Substeps back and forth meet what lies beside the steps; but nothing is beside the run.
+        let aside = if self.facts.substeps { 0.5 * self.h } else { 0.0 };
+        // However strong.
+        let exact_drag = self.facts.exact_rate;
+        let before = if *step > 0 { aside } else { 0.0 };
+        let after = if step + steps < self.count { aside } else { 0.0 };
+        let (mut accelerations, mut speed) = ([SVector::<f64, N>::zeros(); PARTS + 1], 0.0);
+        for (i, acceleration) in accelerations.iter_mut().enumerate() {
+            let at = (before + span + after) * (i as f64 / PARTS as f64) - before;
+            let x = between(&start, &end, span, at);
+            speed = larger(speed, size(&x.v));
+            // Where the curve leaves the domain of L this is not finite: the steps are none of the motion's.
+            let (rates, drag) = herglotz_rates(lagrangian, t + at, &x).ok()?;
+            *acceleration = if exact_drag { rates.y - x.v * drag } else { rates.y };
+        }
+        let jump = largest(accelerations.windows(3).map(|a| size(&(a[2] - a[1] * 2.0 + a[0]))));
+        let rounded = jump * self.h * self.h <= rounding(&first.q, &first.v, self.h);
+        Some(if rounded { 0.0 } else { jump * self.h.abs() / (JUMP * speed) })
+    }
+}
+
+/// The cubic curve through two points with their velocities, at some time after the first; straight on beside them.
+fn between<const N: usize>(start: &VelocityPoint<N>, end: &VelocityPoint<N>, span: f64, at: f64) -> VelocityPoint<N> {
+    // In units of the span, which is negative where the run goes back.
+    let u = at / span;
+    if u <= 0.0 {
+        return VelocityPoint { q: start.q + start.v * at, ..*start };
+    }
+    if u >= 1.0 {
+        return VelocityPoint { q: end.q + end.v * (at - span), ..*end };
+    }
+    let left = 1.0 - u;
+    let q = start.q * (left * left * (1.0 + 2.0 * u))
+        + end.q * (u * u * (1.0 + 2.0 * left))
+        + (start.v * left - end.v * u) * (span * u * left);
+    let v = (end.q - start.q) * (6.0 * u * left / span)
+        + start.v * (left * (1.0 - 3.0 * u))
+        + end.v * (u * (3.0 * u - 2.0));
+    VelocityPoint { q, v, z: start.z * left + end.z * u }
+}

@@ -1,0 +1,346 @@
+//! Runs: one way from a problem and an integrator to a motion.
+
+mod accuracy;
+mod any_integrator;
+mod checkpoint;
+#[cfg(feature = "csv")]
+mod csv_rows;
+mod events;
+mod explain;
+mod halved;
+mod integrator;
+mod jump;
+mod momentum;
+mod observer;
+mod outcome;
+mod pilot;
+mod plan;
+mod problem;
+mod progress;
+mod quotient;
+mod rows;
+pub(crate) mod saved;
+mod stepper;
+#[cfg(test)]
+mod tests;
+pub(crate) mod verified;
+pub(crate) mod watch;
+
+pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
+pub use checkpoint::{Checkpoint, CheckpointError, Interrupted};
+#[cfg(feature = "csv")]
+pub use csv_rows::CsvRows;
+pub use events::{Crossing, Event, Events};
+pub(crate) use explain::DECOUPLED;
+pub use explain::Item;
+pub use integrator::{Facts, Integrator, Wants};
+pub use momentum::{MomentumDecay, MomentumRow};
+pub use observer::{Course, LastStep, Moment, Needs, Observer, Stop};
+pub use outcome::Outcome;
+pub use plan::Plan;
+pub use problem::{Problem, Start};
+pub(crate) use problem::{check_time, start_of};
+pub use progress::Progress;
+pub use quotient::Quotient;
+pub use rows::{Row, Rows};
+pub use stepper::{Halt, Stepper};
+pub use verified::verified;
+pub use watch::Doubt;
+
+use crate::{InputError, StepError};
+use accuracy::Choice;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, PhasePoint};
+use std::sync::Arc;
+use verified::verified_over;
+
+/// The time steps of a run. They go back in time where the run does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Steps {
+    /// Steps of this length, made a little shorter so that a whole number of them fills the span; of an integrator by a clock, steps
+    /// of this length in the clock's time, the last one shorter.
+    Size(f64),
+    /// This many steps; not by a clock, which counts them itself.
+    Count(usize),
+}
+
+/// Where a run ends, if no observer ends it before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Until {
+    /// At this time, before or after that of the start.
+    Time(f64),
+    /// After this time, negative to go back.
+    After(f64),
+    /// After so many steps of the [size](Steps::Size) that is given; a negative size goes back.
+    Steps(usize),
+}
+
+/// An integrator for as long as the Lagrangian lives.
+type Shared<'p, L, const N: usize> = Arc<dyn Integrator<'p, L, N> + 'p>;
+
+/// How a step is chosen for an accuracy: in a program that asks for none it is not compiled.
+type Choose<'p, L, const N: usize> = fn(&Task<'p, L, N>, f64) -> Result<Choice<'p, L, N>, InputError>;
+
+/// How long the steps of a run are to be.
+enum Length<'p, L, const N: usize> {
+    Given(Steps),
+    /// So many steps of this length exactly.
+    Exactly(usize, f64),
+    For(f64, Choose<'p, L, N>),
+}
+
+impl<L, const N: usize> Clone for Length<'_, L, N> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<L, const N: usize> Copy for Length<'_, L, N> {}
+
+/// What is asked of a run, without its observers.
+struct Task<'p, L, const N: usize> {
+    problem: &'p Problem<'p, L, N>,
+    t_end: f64,
+    span: f64,
+    integrator: Option<Shared<'p, L, N>>,
+    needs: Needs,
+}
+
+/// A [`Problem`] with an integrator, steps and observers.
+///
+/// From these and the declared structure of the Lagrangian (probed: a false claim is an error) a [`Plan`] takes the cheapest route, and
+/// says in words what will be computed and what not.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use discrete_herglotz::{GaussCollocation, Problem, Until};
+///
+/// let pendulum = Pendulum { gamma: -0.01 };
+/// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.0], 0.0))?;
+/// let run = problem.by(GaussCollocation { stages: 16 }).accuracy(1e-9).without_action();
+/// println!("{}", run.plan(Until::Time(1000.0))?);
+/// let outcome = run.run(Until::Time(1000.0))?;
+/// println!("{}: q = {} after {} steps", outcome.status, outcome.q[0], outcome.steps);
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+pub struct Run<'p, 'o, L, const N: usize> {
+    problem: &'p Problem<'p, L, N>,
+    integrator: Option<Shared<'p, L, N>>,
+    length: Option<Length<'p, L, N>>,
+    needs: Needs,
+    observers: Vec<Box<dyn Observer<N> + 'o>>,
+    from: Option<Interrupted>,
+}
+
+impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
+    fn of(problem: &'p Problem<'p, L, N>) -> Self {
+        let needs = Needs { action: true, conformal_factor: false };
+        Run { problem, integrator: None, length: None, needs, observers: Vec::new(), from: None }
+    }
+
+    /// The same by this integrator.
+    pub fn by(self, integrator: impl Integrator<'p, L, N> + 'p) -> Self {
+        Run { integrator: Some(Arc::new(integrator)), ..self }
+    }
+
+    /// The same by steps of a given length or number.
+    pub fn steps(self, steps: Steps) -> Self {
+        Run { length: Some(Length::Given(steps)), ..self }
+    }
+
+    /// The same by steps of one length for the whole run, of time or of the time of the Lagrangian's clock, chosen by pilot runs so that the
+    /// error of (q, p), relative to its size at the time or at the end, is at most this at every tenth of the span. The pilot runs cost
+    /// a small multiple of the run; what is narrower than the distance of their nodes, about the step divided by four times the stages, may
+    /// go unseen.
+    ///
+    /// Where no integrator is named, it is contact Gauss collocation: with stages for the wanted accuracy, and by the clock that the
+    /// Lagrangian states where that takes much fewer steps.
+    pub fn accuracy(self, wanted: f64) -> Self {
+        Run { length: Some(Length::For(wanted, accuracy::choose)), ..self }
+    }
+
+    /// The same under the eyes of one more observer, which sees what those before it have seen.
+    pub fn observe(mut self, observer: &'o mut impl Observer<N>) -> Self {
+        self.observers.push(Box::new(observer::Borrowed(observer)));
+        self
+    }
+
+    /// Without the action in the outcome: where z does not act back on the motion, and no observer asks for it, it is not computed.
+    pub fn without_action(self) -> Self {
+        Run { needs: Needs { action: false, ..self.needs }, ..self }
+    }
+
+    /// With the conformal factor of the motion in the outcome.
+    pub fn with_conformal_factor(self) -> Self {
+        Run { needs: Needs { conformal_factor: true, ..self.needs }, ..self }
+    }
+
+    /// Goes on with the run where it was interrupted, to the last bit: problem, integrator, steps, end and requests must be the same. The
+    /// observers see what follows, its start included.
+    pub fn resume(self, interrupted: Interrupted) -> Self {
+        Run { from: Some(interrupted), ..self }
+    }
+
+    /// Checks everything, chooses the step and the route.
+    ///
+    /// # Errors
+    /// [`InputError`]: a span or step that is 0 or not finite, no steps or no integrator, a false or a missing claim of structure, an
+    /// integrator whose hypothesis the Lagrangian does not meet, an accuracy that it does not reach.
+    pub fn plan(&self, until: Until) -> Result<Plan<'p, L, N>, InputError> {
+        let needs = self.observers.iter().fold(self.needs, |needs, observer| needs.and(observer.needs()));
+        let problem = self.problem;
+        let (t0, Some(length)) = (problem.t0, self.length) else { return Err(InputError::NoSteps) };
+        let (t_end, span, length) = match (until, length) {
+            (Until::Time(t), _) => (t, t - t0, length),
+            (Until::After(span), _) => (t0 + span, span, length),
+            (Until::Steps(0), _) => return Err(NO_STEP),
+            (Until::Steps(_), Length::Given(Steps::Size(h))) if !(h != 0.0 && h.is_finite()) => {
+                return Err(InputError::Step { h });
+            }
+            (Until::Steps(count), Length::Given(Steps::Size(h))) => {
+                let span = count as f64 * h;
+                (t0 + span, span, Length::Exactly(count, h))
+            }
+            (Until::Steps(_), _) => {
+                return Err(InputError::Hypothesis {
+                    hypothesis: "steps of a given size, to be ended after a number of them",
+                });
+            }
+        };
+        Task { problem, t_end, span, integrator: self.integrator.clone(), needs }.plan(length)
+    }
+
+    /// Runs it.
+    ///
+    /// # Errors
+    /// Those of [`plan`](Self::plan), and of observers that cannot observe such a run. What goes wrong in mid-run is the outcome's status.
+    pub fn run(mut self, until: Until) -> Result<Outcome<N>, InputError> {
+        self.plan(until)?.observed_by(&mut self.observers, self.from.as_ref())
+    }
+}
+
+impl<'p, L: Lagrangian<N>, const N: usize> Task<'p, L, N> {
+    fn plan(&self, length: Length<'p, L, N>) -> Result<Plan<'p, L, N>, InputError> {
+        let Task { problem, span, .. } = *self;
+        if !(span != 0.0 && span.is_finite()) {
+            return Err(InputError::Span { span });
+        }
+        if let Some(integrator) = &self.integrator {
+            integrator.check(problem.lagrangian)?;
+            let facts = integrator.facts();
+            if facts.by_clock {
+                self.clock_rate()?;
+            }
+            // A step for an accuracy is a root of that order.
+            if facts.order == 0 {
+                return Err(InputError::Hypothesis { hypothesis: "an order of at least one" });
+            }
+        }
+        // Pilot runs look at the equations of motion along the whole span.
+        let times = if let Length::For(..) = length { 4 } else { 16 };
+        verified_over(problem.lagrangian, problem.t0, span, &problem.start, times)?;
+        let choice = match length {
+            Length::For(wanted, choose) => choose(self, wanted)?,
+            Length::Given(steps) => self.given(steps)?,
+            Length::Exactly(count, h) => Choice { h, ..self.given(Steps::Count(count))? },
+        };
+        check_count(choice.count as f64)?;
+        let plan = Plan::new(self, &choice)?;
+        // Pilot runs have looked already.
+        if plan.error().is_none() {
+            plan.probe_first_steps()?;
+        }
+        Ok(plan)
+    }
+
+    /// Given steps of a named integrator.
+    fn given(&self, steps: Steps) -> Result<Choice<'p, L, N>, InputError> {
+        let Some(integrator) = self.integrator.clone() else { return Err(InputError::NoIntegrator) };
+        let rate = if integrator.facts().by_clock { Some(self.clock_rate()?) } else { None };
+        let span = self.span;
+        let of = |count: usize, integrator| Choice { integrator, count, h: span / count as f64, error: None };
+        match (steps, rate) {
+            (Steps::Count(0), _) => Err(NO_STEP),
+            (Steps::Count(_), Some(_)) => Err(InputError::Hypothesis { hypothesis: SIZED }),
+            (Steps::Count(count), None) => Ok(of(count, integrator)),
+            (Steps::Size(h), _) if !(h > 0.0 && h.is_finite()) => Err(InputError::Step { h }),
+            // A step that fits the span up to rounding is not made shorter.
+            (Steps::Size(h), _) => {
+                let count = (span.abs() / (h * rate.unwrap_or(1.0)) * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0);
+                check_count(count)?;
+                let choice = of(count as usize, integrator);
+                Ok(if rate.is_some() { Choice { h: h.copysign(span), ..choice } } else { choice })
+            }
+        }
+    }
+
+    /// The rate of the Lagrangian's clock at the start.
+    fn clock_rate(&self) -> Result<f64, InputError> {
+        let rate = self.problem.lagrangian.clock_rate(&self.problem.start.q);
+        if rate > 0.0 && rate.is_finite() { Ok(rate) } else { Err(InputError::Clock { rate }) }
+    }
+
+    /// The same for the final (q, p) alone.
+    fn bare(&self) -> Self {
+        Task { needs: Needs::default(), integrator: self.integrator.clone(), ..*self }
+    }
+}
+
+/// A motion as observers ask it for what its states do not hold.
+pub(crate) trait Motion<const N: usize> {
+    /// The velocity at a state.
+    fn velocity(&self, t: f64, state: &PhasePoint<N>) -> Result<SVector<f64, N>, StepError>;
+
+    /// The energy there.
+    fn energy(&self, t: f64, state: &PhasePoint<N>) -> Result<f64, StepError>;
+
+    /// The rates `(qdot, pdot, zdot)` there.
+    fn rates(&self, t: f64, state: &PhasePoint<N>) -> Result<PhasePoint<N>, StepError>;
+
+    /// What tells the run from others.
+    fn fingerprint(&self) -> u64;
+
+    /// The state at a time of the step that starts at a time and a state, and `sigma_d` from there to it.
+    fn inside(&self, from: &(f64, PhasePoint<N>), t: f64) -> Result<(PhasePoint<N>, f64), StepError>;
+}
+
+/// A whole run from t = 0 by given steps, for tests.
+#[cfg(test)]
+pub(crate) fn run_of<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    start: contact_geom::VelocityPoint<N>,
+    span: f64,
+    integrator: AnyIntegrator,
+    steps: Steps,
+) -> Result<Outcome<N>, InputError> {
+    Problem::new(lagrangian, 0.0, start)?.by(integrator).steps(steps).run(Until::Time(span))
+}
+
+/// The same by an integrator and steps for an accuracy.
+#[cfg(test)]
+pub(crate) fn run_to<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    start: contact_geom::VelocityPoint<N>,
+    span: f64,
+    wanted: f64,
+) -> Result<Outcome<N>, InputError> {
+    Problem::new(lagrangian, 0.0, start)?.accuracy(wanted).run(Until::Time(span))
+}
+
+/// Runs have steps.
+const NO_STEP: InputError = InputError::Count { what: "the number of steps", least: 1, found: 0 };
+
+/// What an integrator by a clock needs.
+const SIZED: &str =
+    "steps of a given size in the time of its clock, or for a wanted accuracy, since it counts them itself";
+
+/// The largest number of steps: `t0 + k h` then still tells times a thousandth of a step apart.
+const MOST_STEPS: f64 = (1u64 << 42) as f64;
+
+fn check_count(count: f64) -> Result<(), InputError> {
+    if count <= MOST_STEPS {
+        return Ok(());
+    }
+    let remedy = "take longer steps, or a shorter span";
+    Err(InputError::TooMany { what: "the number of steps", found: count, most: MOST_STEPS, remedy })
+}

@@ -1,0 +1,323 @@
+//! What looks at a run while it goes on.
+
+use super::{Interrupted, Motion};
+use crate::gauss::DenseStep;
+use crate::{InputError, StepError, Stepper, Suspicion};
+use contact_geom::PhasePoint;
+use contact_geom::nalgebra::SVector;
+use std::ops::ControlFlow;
+
+/// What an observer asks of a run beside times, positions and momenta. What no observer asks for, and the outcome does not want either, is
+/// not computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Needs {
+    /// The action z.
+    pub action: bool,
+    /// The conformal factor of the motion, the product of the `sigma_d`.
+    pub conformal_factor: bool,
+}
+
+impl Needs {
+    /// What either asks for.
+    pub fn and(self, other: Self) -> Self {
+        Needs { action: self.action || other.action, conformal_factor: self.conformal_factor || other.conformal_factor }
+    }
+}
+
+/// What a run will be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Course {
+    /// The time of its start.
+    pub t0: f64,
+    /// The time of its end; before that of the start where the run goes back.
+    pub t_end: f64,
+    /// The length of its steps, where all are equal; negative where the run goes back.
+    pub h: Option<f64>,
+    /// The number of its steps, where that is known before: of a clock it shows at the end.
+    pub count: Option<usize>,
+    /// Whether its stepper can be [saved](Stepper::save).
+    pub can_be_saved: bool,
+}
+
+impl Course {
+    /// Of an observer that has not been told its own.
+    pub(super) const NONE: Course = Course { t0: 0.0, t_end: 0.0, h: None, count: None, can_be_saved: false };
+}
+
+/// What a run does with its states: it is shown the start, at least the steps that it asks for, and the last one.
+///
+/// Closures of [`Moment`] observe every step; pairs, triples and vectors of observers observe one after the other.
+pub trait Observer<const N: usize> {
+    /// What it asks of the run. By default the action.
+    fn needs(&self) -> Needs {
+        Needs { action: true, conformal_factor: false }
+    }
+
+    /// Is told what the run will be, before work starts.
+    ///
+    /// # Errors
+    /// An [`InputError`] where it cannot observe such a run.
+    fn prepare(&mut self, _course: &Course) -> Result<(), InputError> {
+        Ok(())
+    }
+
+    /// The number of the step, counted from 1, at whose end it looks next after so many: those before it may be taken at once. By
+    /// default the next one; `usize::MAX` for the last of the run alone.
+    fn next(&self, taken: usize) -> usize {
+        taken + 1
+    }
+
+    /// Sees the start, with no step before it.
+    fn start(&mut self, _at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        ControlFlow::Continue(())
+    }
+
+    /// Sees the end of a step that it has asked for, or another observer, or of the last one; `Break` ends the run.
+    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>>;
+}
+
+/// The end of a run by one of its observers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop<const N: usize> {
+    /// Who ends it, for the status.
+    pub by: &'static str,
+    /// What went wrong, where that is why.
+    pub cause: Option<StepError>,
+    /// Where the run is to end, if not at the end of the step that the observer saw: a time in that step, and the state there.
+    pub at: Option<(f64, PhasePoint<N>)>,
+}
+
+impl<const N: usize> Stop<N> {
+    /// By this observer, at the end of the step that it saw.
+    pub fn here(by: &'static str) -> Self {
+        Stop { by, cause: None, at: None }
+    }
+
+    /// Since something that it needs cannot be computed.
+    pub fn failed(cause: StepError) -> Self {
+        Stop { by: "", cause: Some(cause), at: None }
+    }
+}
+
+/// The end of a step, or the start of a run.
+pub struct Moment<'r, const N: usize> {
+    /// The number of steps taken.
+    pub k: usize,
+    /// The time.
+    pub t: f64,
+    /// The state `(q, p, z)`; the action is the start's where no one has asked for it.
+    pub state: PhasePoint<N>,
+    /// `sigma_d` of the last step, the factor by which it contracts the contact form and every momentum of a symmetry; 1 at the start.
+    pub sigma: f64,
+    /// The logarithm of the conformal factor of the motion since the start, where someone has asked for it.
+    pub log_factor: Option<f64>,
+    /// Whether the run ends here.
+    pub last: bool,
+    pub(super) suspicion: Option<Suspicion>,
+    pub(super) before: Option<(f64, PhasePoint<N>)>,
+    pub(super) motion: &'r dyn Motion<N>,
+    pub(super) stepper: &'r dyn Stepper<N>,
+}
+
+impl<'r, const N: usize> Moment<'r, N> {
+    /// The velocity, the inverse of the Legendre transformation at the state.
+    ///
+    /// # Errors
+    /// A [`StepError`] where no velocity belongs to the momentum.
+    pub fn velocity(&self) -> Result<SVector<f64, N>, StepError> {
+        self.motion.velocity(self.t, &self.state)
+    }
+
+    /// The run as it would go on from here; `None` where its stepper cannot be saved.
+    pub(super) fn interrupted(&self) -> Option<Interrupted> {
+        let (fingerprint, words) = (self.motion.fingerprint(), self.stepper.save()?);
+        let (taken, suspicion) = (self.k, self.suspicion);
+        Some(Interrupted { fingerprint, taken, log_factor: self.log_factor.unwrap_or(0.0), suspicion, words })
+    }
+
+    /// The moment at a time of the last step: see [`LastStep::at`].
+    pub(super) fn inside(&self, t: f64) -> Result<Self, StepError> {
+        let (state, sigma) = self.last_step().ok_or(StepError::NonFinite)?.reach(t)?;
+        let log_factor = self.log_factor.map(|of_end| of_end - self.sigma.ln() + sigma.ln());
+        Ok(Moment { t, state, sigma, log_factor, before: None, ..*self })
+    }
+
+    /// The energy `E_L = v.p - L`.
+    ///
+    /// # Errors
+    /// Those of [`velocity`](Self::velocity).
+    pub fn energy(&self) -> Result<f64, StepError> {
+        self.motion.energy(self.t, &self.state)
+    }
+
+    /// The step that ends here; `None` at the start, and where several steps were taken at once.
+    pub fn last_step(&self) -> Option<LastStep<'r, N>> {
+        let from = self.before?;
+        let curve = self.stepper.dense();
+        Some(LastStep { from, to: (self.t, self.state), motion: self.motion, curve, rates: None })
+    }
+}
+
+/// A step, with the motion between its ends.
+pub struct LastStep<'r, const N: usize> {
+    from: (f64, PhasePoint<N>),
+    to: (f64, PhasePoint<N>),
+    motion: &'r dyn Motion<N>,
+    curve: Option<DenseStep<N>>,
+    rates: Option<[PhasePoint<N>; 2]>,
+}
+
+impl<const N: usize> LastStep<'_, N> {
+    /// The times of the step's start and end.
+    pub fn span(&self) -> (f64, f64) {
+        (self.from.0, self.to.0)
+    }
+
+    /// The times and states of both ends.
+    pub fn ends(&self) -> ((f64, PhasePoint<N>), (f64, PhasePoint<N>)) {
+        (self.from, self.to)
+    }
+
+    /// The time at a fraction of the step.
+    pub(super) fn time(&self, fraction: f64) -> f64 {
+        if fraction == 1.0 { self.to.0 } else { self.from.0 + fraction * (self.to.0 - self.from.0) }
+    }
+
+    /// The state at a time between the ends: by a step of the same integrator that ends there. So it is as exact as the ends are, and its
+    /// map is as conformally contact.
+    ///
+    /// # Errors
+    /// Those of a step.
+    pub fn at(&self, t: f64) -> Result<PhasePoint<N>, StepError> {
+        if t == self.to.0 { Ok(self.to.1) } else { self.reach(t).map(|(state, _)| state) }
+    }
+
+    /// The same by a step of its own, with its `sigma_d`.
+    fn reach(&self, t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
+        if t == self.from.0 { Ok((self.from.1, 1.0)) } else { self.motion.inside(&self.from, t) }
+    }
+
+    /// The parts in which a search along the step looks at it.
+    pub(super) fn parts(&self) -> usize {
+        self.curve.as_ref().map_or(4, |curve| curve.stages() + 2)
+    }
+
+    /// About the state at a fraction of the step, at no cost of a step: by the collocation polynomial where there is one, else by the
+    /// cubic polynomial through both ends with their rates.
+    pub(super) fn about(&mut self, fraction: f64) -> Result<PhasePoint<N>, StepError> {
+        if let Some(curve) = &self.curve {
+            return Ok(curve.at_fraction(fraction));
+        }
+        let ((t0, a), (t1, b)) = (self.from, self.to);
+        let [ra, rb] = match self.rates {
+            Some(rates) => rates,
+            None => {
+                let rates = [self.motion.rates(t0, &a)?, self.motion.rates(t1, &b)?];
+                *self.rates.insert(rates)
+            }
+        };
+        let (u, left, h) = (fraction, 1.0 - fraction, t1 - t0);
+        let weights =
+            [left * left * (1.0 + 2.0 * u), u * u * (1.0 + 2.0 * left), h * u * left * left, -h * u * u * left];
+        let of = |a: &SVector<f64, N>, b: &SVector<f64, N>, ra: &SVector<f64, N>, rb: &SVector<f64, N>| {
+            a * weights[0] + b * weights[1] + ra * weights[2] + rb * weights[3]
+        };
+        Ok(PhasePoint {
+            q: of(&a.q, &b.q, &ra.q, &rb.q),
+            p: of(&a.p, &b.p, &ra.p, &rb.p),
+            z: a.z * weights[0] + b.z * weights[1] + ra.z * weights[2] + rb.z * weights[3],
+        })
+    }
+}
+
+impl<const N: usize, F: FnMut(&Moment<'_, N>) -> ControlFlow<Stop<N>>> Observer<N> for F {
+    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        self(at)
+    }
+}
+
+/// Several observers as one.
+macro_rules! one_after_the_other {
+    ($($name:ident $field:tt),+) => {
+        impl<const N: usize, $($name: Observer<N>),+> Observer<N> for ($($name,)+) {
+            fn needs(&self) -> Needs {
+                Needs::default()$(.and(self.$field.needs()))+
+            }
+            fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+                $(self.$field.prepare(course)?;)+
+                Ok(())
+            }
+            fn next(&self, taken: usize) -> usize {
+                usize::MAX$(.min(self.$field.next(taken)))+
+            }
+            fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+                $(self.$field.start(at)?;)+
+                ControlFlow::Continue(())
+            }
+            fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+                $(self.$field.step(at)?;)+
+                ControlFlow::Continue(())
+            }
+        }
+    };
+}
+
+one_after_the_other!(A 0, B 1);
+one_after_the_other!(A 0, B 1, C 2);
+
+impl<const N: usize, O: Observer<N>> Observer<N> for Vec<O> {
+    fn needs(&self) -> Needs {
+        self.iter().fold(Needs::default(), |needs, observer| needs.and(observer.needs()))
+    }
+    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+        self.iter_mut().try_for_each(|observer| observer.prepare(course))
+    }
+    fn next(&self, taken: usize) -> usize {
+        self.iter().map(|observer| observer.next(taken)).min().unwrap_or(usize::MAX)
+    }
+    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        self.iter_mut().try_for_each(|observer| observer.start(at))
+    }
+    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        self.iter_mut().try_for_each(|observer| observer.step(at))
+    }
+}
+
+/// An observer that someone else keeps.
+pub(super) struct Borrowed<'o, O>(pub &'o mut O);
+
+impl<const N: usize, O: Observer<N>> Observer<N> for Borrowed<'_, O> {
+    fn needs(&self) -> Needs {
+        self.0.needs()
+    }
+    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+        self.0.prepare(course)
+    }
+    fn next(&self, taken: usize) -> usize {
+        self.0.next(taken)
+    }
+    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        self.0.start(at)
+    }
+    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        self.0.step(at)
+    }
+}
+
+impl<const N: usize> Observer<N> for Box<dyn Observer<N> + '_> {
+    fn needs(&self) -> Needs {
+        (**self).needs()
+    }
+    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+        (**self).prepare(course)
+    }
+    fn next(&self, taken: usize) -> usize {
+        (**self).next(taken)
+    }
+    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        (**self).start(at)
+    }
+    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        (**self).step(at)
+    }
+}

@@ -1,0 +1,367 @@
+//! Pilot runs: a motion followed with some number of steps, seen at a few common times, and looked at between its steps.
+
+use super::accuracy::Choice;
+use super::{Plan, Problem, Shared, Task, Wants};
+use crate::gauss::{Look, SETS};
+use crate::run::verified::refuted;
+use crate::{ClockedGauss, GaussCollocation, GaussRoute, Halt, InputError, StepError, Stepper};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Defect, Lagrangian, larger};
+
+/// What all pilot runs of a plan may cost together, in evaluations of L at one stage: some seconds.
+pub(super) const BUDGET: u64 = 1 << 26;
+
+/// The misfit between the nodes beyond which a step does not resolve the motion: its momenta would be off by a twentieth.
+const RESOLVED: f64 = 0.05;
+
+/// The misfit in units of the largest momentum that is round-off: some hundred units for the sums that forces are made of.
+const AT_REST: f64 = 1e-13;
+
+/// The same of the values of L, whose polynomials follow twice the frequencies.
+const RESOLVED_VALUE: f64 = 0.2;
+
+/// Products of two numbers that are smaller have lost digits.
+const UNDERFLOWN: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+
+/// How many times the expected misfit is more than a smooth motion has: something narrow lies between the nodes.
+const NARROW: f64 = 30.0;
+
+/// The points of a span at which a run is looked at, at least: what is wider than the distance of two is seen.
+const POINTS: usize = 2000;
+
+/// The steps between two looks at budget and progress.
+const CHUNK: usize = 1024;
+
+/// The parts of a span at whose ends runs are compared.
+const PARTS: usize = 10;
+
+/// How many times fewer steps a clock must take at the least, for its steps to be tried: each costs about so many of equal steps of the
+/// same error. Of Kepler's orbits those do of which the eccentricity is above one half.
+const PROFIT: f64 = 3.5;
+
+/// The times of a span at which runs are compared.
+#[derive(Clone, Debug)]
+pub(super) enum Marks {
+    /// Ends of steps of a run with `base` steps, which divides the steps of all others.
+    Steps { base: usize, at: Vec<usize> },
+    /// The ends of the tenths of a span, on which steps by a clock are made to end.
+    Times,
+}
+
+impl Marks {
+    /// The ends of the tenths of a span, each moved to the end of the step in which it lies; of all steps where they are fewer.
+    pub fn of(base: usize) -> Self {
+        let parts = base.min(PARTS);
+        Marks::Steps { base, at: (1..=parts).map(|i| (i * base).div_ceil(parts)).collect() }
+    }
+
+    /// Equal parts of a span, as many as tenths and as steps.
+    pub fn equal(steps: usize) -> Self {
+        Marks::of(steps.min(PARTS))
+    }
+
+    /// The fewest steps from a number on that they divide.
+    pub fn whole(&self, steps: f64) -> usize {
+        let base = if let Marks::Steps { base, .. } = self { *base } else { 1 };
+        (steps / base as f64).ceil().max(1.0) as usize * base
+    }
+
+    /// The number of steps and the time, whichever a run with so many steps over a span reaches first, at the i-th mark.
+    fn stop(&self, i: usize, count: usize, t0: f64, span: f64) -> Option<(usize, f64)> {
+        match self {
+            Marks::Steps { base, at } => at.get(i).map(|mark| (mark * (count / base), f64::INFINITY.copysign(span))),
+            Marks::Times => (i < PARTS).then(|| (usize::MAX, t0 + span * ((i + 1) as f64 / PARTS as f64))),
+        }
+    }
+}
+
+/// A motion at some marks: (q, p).
+#[derive(Clone, Debug)]
+pub(super) struct Track<const N: usize> {
+    states: Vec<[SVector<f64, N>; 2]>,
+    /// The largest misfit that was seen between the nodes of its steps.
+    pub misfit: f64,
+    /// The span in the time of its clock.
+    pub tau: f64,
+}
+
+/// A 2-norm that neither overflows nor underflows.
+fn norm<const N: usize>(x: &[SVector<f64, N>; 2]) -> f64 {
+    let size = contact_geom::largest(x.iter().flat_map(|x| x.iter().copied()));
+    if !(size > 0.0 && size.is_finite()) {
+        return size;
+    }
+    size * x.iter().map(|x| (x / size).norm_squared()).sum::<f64>().sqrt()
+}
+
+impl<const N: usize> Track<N> {
+    /// The distances of the states of two tracks at the same marks, relative to the size of the second's at that time, or at the end
+    /// where that is larger. Not a number where a state is not.
+    pub fn distances(&self, of: &Self) -> Vec<f64> {
+        let last = of.states.last().map_or(0.0, norm);
+        let relative = |(a, b): (&[SVector<f64, N>; 2], &[SVector<f64, N>; 2])| {
+            let (apart, size) = (norm(&[a[0] - b[0], a[1] - b[1]]), larger(norm(b), last));
+            if apart == 0.0 { 0.0 } else { apart / size }
+        };
+        self.states.iter().zip(&of.states).map(relative).collect()
+    }
+
+    /// Whether the motion ends with numbers that have lost digits since they are too small.
+    pub fn has_underflown(&self) -> bool {
+        self.states.last().is_some_and(|last| norm(last) < f64::MIN_POSITIVE)
+    }
+
+    /// The largest of the [`distances`](Self::distances).
+    pub fn distance(&self, of: &Self) -> f64 {
+        contact_geom::largest(self.distances(of))
+    }
+}
+
+/// How a pilot run has ended.
+#[derive(Clone, Debug)]
+pub(super) enum Ending<const N: usize> {
+    /// At the end of the span.
+    Followed(Track<N>),
+    /// At a step that does not resolve the motion, after this part of the span.
+    Unresolved { part: f64 },
+    /// The same, where the misfit is that of something narrow.
+    Narrow { part: f64 },
+    /// Where steps by the motion's own clock are seen to be much fewer.
+    Uneven,
+    /// At a step that could not be taken.
+    Halted { part: f64, cause: StepError },
+    /// No evaluations are left.
+    Exhausted,
+}
+
+/// What the looks at a run have seen.
+#[derive(Default)]
+struct Seen {
+    before: Option<Look>,
+    /// The largest momentum, and the largest of what misfits of values change, on the way.
+    size: f64,
+    kinetic: f64,
+    /// The largest misfit, in units of these: of a motion that comes to rest only round-off is left.
+    misfit: f64,
+}
+
+impl Seen {
+    /// Takes in a look at the next step, and says whether the step resolves the motion.
+    fn resolves(&mut self, look: &Look) -> bool {
+        let jump = self.before.replace(*look).map_or(0.0, |before| before.jump_to(look));
+        (self.size, self.kinetic) = (larger(self.size, look.size), larger(self.kinetic, look.kinetic));
+        let of_value = larger(look.of_value, jump);
+        // What does not move crosses nothing, and values of L that have underflowed tell nothing.
+        let told = of_value != 0.0 && (self.kinetic >= UNDERFLOWN || self.kinetic.is_nan());
+        let of_value = if told { of_value / self.kinetic } else { 0.0 };
+        let of_run = look.misfit * if self.size > 0.0 { look.size / self.size } else { 1.0 };
+        self.misfit = larger(self.misfit, larger(of_run, of_value));
+        // A NaN resolves nothing.
+        (look.misfit <= RESOLVED || of_run <= AT_REST) && of_value <= RESOLVED_VALUE
+    }
+}
+
+/// What a clock would make of the equal steps of a run so far.
+#[derive(Default)]
+struct Uneven {
+    steps: f64,
+    /// The sum of the reciprocal rates, which is the span of the clock's time in units of the step, and the largest of them.
+    sum: f64,
+    largest: f64,
+}
+
+impl Uneven {
+    /// Takes in the rate at the end of the next step, and says how many times fewer steps of the clock, all as short as the shortest of
+    /// these in its own time, lead as far.
+    fn profit(&mut self, rate: f64) -> f64 {
+        let speed = 1.0 / rate;
+        (self.steps, self.sum) = (self.steps + 1.0, self.sum + speed);
+        self.largest = larger(self.largest, speed);
+        self.largest * self.steps / self.sum
+    }
+}
+
+/// Pilot runs of a task, with what is left of their budget.
+pub(super) struct Pilots<'t, 'p, L, const N: usize> {
+    pub task: &'t Task<'p, L, N>,
+    pub left: u64,
+    /// The error that is wanted.
+    pub wanted: f64,
+    /// Whether runs with equal steps end where a clock would take much fewer.
+    pub watches_clock: bool,
+}
+
+impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
+    /// Follows the motion by contact Gauss collocation, with a look between the nodes of each step: closely, at so many points of the
+    /// span that nothing is narrower, or at a few of each step; and for what is narrow beside the steps or not.
+    pub fn gauss(
+        &mut self,
+        stages: usize,
+        count: usize,
+        marks: &Marks,
+        closely: bool,
+        narrow: bool,
+    ) -> Result<Ending<N>, InputError> {
+        let (problem, h) = (self.task.problem, self.step(count, marks));
+        let points = if closely { POINTS.div_ceil(stages * count).min(SETS) } else { 1 };
+        let course = PilotCourse { count, marks, points, narrow, price: Price::of::<N>(stages) };
+        if const { L::HAS_CLOCK } && matches!(marks, Marks::Times) {
+            let mut stepper = match (ClockedGauss { stages }).run(problem, h) {
+                Ok(stepper) => stepper,
+                Err(error) => return halted_at_the_start(error),
+            };
+            let ending = self.watch(&mut stepper, &course, 1, |run, sets| (run.look(sets), 0))?;
+            return Ok(ending.with_tau(stepper.tau()));
+        }
+        let mut stepper = match (GaussCollocation { stages }).run(problem, h, Wants::default()) {
+            Ok(stepper) => stepper,
+            Err(error) => return halted_at_the_start(error),
+        };
+        // Of a linear motion nothing is to be seen between the nodes that the order does not show.
+        let linear = stepper.route() == GaussRoute::Linear;
+        let (stride, points) = if linear { (CHUNK, 0) } else { (1, course.points) };
+        let course = PilotCourse { points, ..course };
+        self.watch(&mut stepper, &course, stride, |run, sets| (run.look(sets), run.newton_steps()))
+    }
+
+    /// The length of steps of which so many fill the span; by a clock, if its rate stayed what it is at the start.
+    pub fn step(&self, count: usize, marks: &Marks) -> f64 {
+        let Problem { lagrangian, start, .. } = self.task.problem;
+        let h = self.task.span / count as f64;
+        if let Marks::Times = marks { h / lagrangian.clock_rate(&start.q) } else { h }
+    }
+
+    /// Follows the motion with looks, by `look` at so many sets of points, which also counts the steps of Newton's method.
+    fn watch<R: Stepper<N>>(
+        &mut self,
+        run: &mut R,
+        course: &PilotCourse<'_>,
+        stride: usize,
+        look: impl Fn(&R, usize) -> (Option<Look>, u64),
+    ) -> Result<Ending<N>, InputError> {
+        let PilotCourse { count, marks, points, narrow, price } = course;
+        let Problem { lagrangian, start, .. } = *self.task.problem;
+        let floor = larger(0.1 * self.wanted, 1e-11);
+        let watches_clock = self.watches_clock;
+        let (mut looks, mut seen, mut uneven) = (0, Seen::default(), Uneven::default());
+        let ending = self.follow(run, *count, marks, stride, |run, part| {
+            let (look, newton_steps) = look(run, *points);
+            let spent = |looks: u64| run.evaluations() + newton_steps * price.newton + looks * price.look;
+            if const { L::HAS_CLOCK } && watches_clock && uneven.profit(lagrangian.clock_rate(&run.state().q)) > PROFIT
+            {
+                return (Some(Ending::Uneven), spent(looks));
+            }
+            let ending = look.and_then(|look| {
+                looks += *points as u64 + 1;
+                if !seen.resolves(&look) {
+                    return Some(Ending::Unresolved { part });
+                }
+                (*narrow && look.misfit > NARROW * look.expected + floor).then_some(Ending::Narrow { part })
+            });
+            (ending, spent(looks))
+        });
+        // What is met nowhere else may be what a claim denies.
+        if let Ending::Narrow { .. } | Ending::Unresolved { .. } = ending
+            && let Some(Defect { claim, size }) = refuted(lagrangian, run.time(), &run.state(), &start.v)
+        {
+            return Err(InputError::FalseClaim { claim, size });
+        }
+        Ok(match ending {
+            Ending::Followed(track) => Ending::Followed(Track { misfit: seen.misfit, ..track }),
+            other => other,
+        })
+    }
+
+    /// Follows the motion by the integrator of the task.
+    pub fn own(&mut self, integrator: &Shared<'p, L, N>, count: usize, marks: &Marks) -> Result<Ending<N>, InputError> {
+        let choice = Choice { integrator: integrator.clone(), count, h: self.step(count, marks), error: None };
+        let stepper = Plan::new(&self.task.bare(), &choice).and_then(|plan| plan.stepper());
+        let mut stepper = match stepper {
+            Ok(stepper) => stepper,
+            Err(error) => return halted_at_the_start(error),
+        };
+        let price = integrator.facts().price;
+        let look = |run: &(dyn Stepper<N> + '_), _: f64| (None, run.evaluations().saturating_mul(price));
+        Ok(self.follow(&mut *stepper, count, marks, CHUNK, look))
+    }
+
+    /// Takes `count` steps, at most `stride` at a time; `look` sees the run in between with the part that is done, may end it, and says
+    /// what it has cost. The cost is taken off the budget.
+    fn follow<R: Stepper<N> + ?Sized>(
+        &mut self,
+        run: &mut R,
+        count: usize,
+        marks: &Marks,
+        stride: usize,
+        mut look: impl FnMut(&R, f64) -> (Option<Ending<N>>, u64),
+    ) -> Ending<N> {
+        let &Task { problem: &Problem { t0, .. }, span, .. } = self.task;
+        let (mut states, mut taken, mut spent) = (Vec::with_capacity(PARTS), 0, 0);
+        let mut ending = None;
+        while ending.is_none()
+            && let Some((steps, time)) = marks.stop(states.len(), count, t0, span)
+        {
+            let (done, cause) = match run.advance_until(stride.min(steps - taken), time) {
+                Ok(done) => (done, None),
+                Err(Halt { taken, cause }) => (taken, Some(cause)),
+            };
+            taken += done;
+            let part = (run.time() - t0) / span;
+            let seen;
+            (seen, spent) = look(run, part);
+            ending = cause.map(|cause| Ending::Halted { part, cause }).or(seen);
+            if taken == steps || (run.time() - time) * span >= 0.0 {
+                let x = run.state();
+                states.push([x.q, x.p]);
+            }
+            if spent > self.left {
+                ending = Some(Ending::Exhausted);
+            }
+        }
+        self.left = self.left.saturating_sub(spent);
+        ending.unwrap_or(Ending::Followed(Track { states, misfit: 0.0, tau: span }))
+    }
+}
+
+/// What a run that is watched is asked for.
+struct PilotCourse<'m> {
+    count: usize,
+    marks: &'m Marks,
+    /// The sets of points of a look.
+    points: usize,
+    /// Whether it ends at what is narrow beside the steps.
+    narrow: bool,
+    price: Price,
+}
+
+impl<const N: usize> Ending<N> {
+    /// With the span in the time of a clock.
+    fn with_tau(self, tau: f64) -> Self {
+        if let Ending::Followed(track) = self { Ending::Followed(Track { tau, ..track }) } else { self }
+    }
+}
+
+/// What parts of a run cost, in evaluations of L at one stage.
+struct Price {
+    /// A step that Newton's method solves: a few solutions of the dense equations of all stages, with second derivatives at each.
+    newton: u64,
+    /// A look at as many points as there are stages, maps included.
+    look: u64,
+}
+
+impl Price {
+    fn of<const N: usize>(stages: usize) -> Self {
+        let (unknowns, stages) = ((stages * (N + 2)) as u64, stages as u64);
+        // An evaluation takes as long as about 32 products; second derivatives are not in lanes.
+        Price { newton: 4 * (unknowns.pow(3) / 96 + 8 * stages * (2 * N as u64 + 1)), look: 2 * stages }
+    }
+}
+
+/// A first step that cannot be taken calls for shorter steps; bad input ends the search.
+fn halted_at_the_start<const N: usize>(error: InputError) -> Result<Ending<N>, InputError> {
+    match error {
+        InputError::Sigma { sigma } => Ok(Ending::Halted { part: 0.0, cause: StepError::SigmaVanished { sigma } }),
+        InputError::FirstStep(cause) => Ok(Ending::Halted { part: 0.0, cause }),
+        bad => Err(bad),
+    }
+}

@@ -1,0 +1,324 @@
+//! The plan of a run: the route, and the one loop of all runs.
+
+use super::accuracy::Choice;
+use super::checkpoint::digest;
+use super::{
+    Course, Facts, Interrupted, Item, Moment, Motion, Needs, Observer, Outcome, Problem, Shared, Stop, Task, Wants,
+};
+use crate::gauss::{FEW, velocity};
+use crate::run::verified::refuted;
+use crate::{Doubt, InputError, Status, StepError, Stepper, Suspicion};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Defect, Derivatives, Lagrangian, PhasePoint, VelocityPoint};
+
+/// The steps that are tried, and probed, before a run.
+const FIRST_STEPS: usize = 64;
+
+/// The steps between two probes of the claims in long runs: so many that a probe costs less than one in a hundred.
+const PROBES: usize = 1 << 14;
+
+/// The step after which the claims are probed next: every power of two, and the multiples of [`PROBES`].
+fn next_probe(taken: usize) -> usize {
+    (taken + 1).checked_next_power_of_two().unwrap_or(usize::MAX).min((taken / PROBES + 1) * PROBES)
+}
+
+/// The next step, counted from 0, that is compared with two halves: each that ends at a power of two, and the last.
+fn halved_step(taken: usize, count: usize) -> usize {
+    (taken + 1).checked_next_power_of_two().unwrap_or(count).min(count) - 1
+}
+
+/// The earlier of two.
+fn first(a: Option<Suspicion>, b: Option<Suspicion>) -> Option<Suspicion> {
+    a.into_iter().chain(b).min_by_key(|s| s.step)
+}
+
+/// A run after its checks, with step and route chosen; made by [`Run::plan`](super::Run::plan). Printed, it says what will be computed and
+/// what is skipped.
+pub struct Plan<'p, L, const N: usize> {
+    pub(super) problem: &'p Problem<'p, L, N>,
+    pub(super) t_end: f64,
+    /// Negative where the run goes back.
+    pub(super) h: f64,
+    pub(super) count: usize,
+    error: Option<f64>,
+    integrator: Shared<'p, L, N>,
+    pub(super) facts: Facts,
+    pub(super) needs: Needs,
+    /// What its steps compute and skip, as the stepper says.
+    pub(super) account: Vec<Item>,
+    /// Whether `sigma_d` is the same in all steps.
+    pub(super) constant_rate: bool,
+}
+
+impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
+    /// Finds the route of a task.
+    pub(super) fn new(task: &Task<'p, L, N>, choice: &Choice<'p, L, N>) -> Result<Self, InputError> {
+        let Task { problem, t_end, needs, .. } = *task;
+        let Choice { integrator, count, h, error } = choice.clone();
+        let stepper = integrator.stepper(problem, h, Wants::default())?;
+        Ok(Plan {
+            problem,
+            t_end,
+            h,
+            count,
+            error,
+            facts: integrator.facts(),
+            needs,
+            account: stepper.account(),
+            constant_rate: stepper.has_constant_rate(),
+            integrator,
+        })
+    }
+
+    /// The time step, negative where the run goes back; by a clock, in its time.
+    pub fn step_size(&self) -> f64 {
+        self.h
+    }
+
+    /// The number of steps; by a clock with steps of a given size, as many as its rate at the start lets expect.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// What is known of the integrator, where none was named the one that was chosen.
+    pub fn integrator(&self) -> &Facts {
+        &self.facts
+    }
+
+    /// The error of (q, p) that the pilot runs found, or predict; `None` where no accuracy was asked for.
+    pub fn error(&self) -> Option<f64> {
+        self.error
+    }
+
+    /// A stepper at the start, to be driven by hand: by a clock with [`Stepper::advance_until`], which ends where the span
+    /// does. A splitting's does not watch whether its steps resolve the motion:
+    /// that costs up to a third of its time, and is for runs whose steps were not found by pilot runs.
+    ///
+    /// # Errors
+    /// Those of the method's start.
+    pub fn stepper(&self) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
+        self.make_stepper(self.problem, self.h, false)
+    }
+
+    /// A stepper at a start, by steps of h.
+    pub(super) fn make_stepper(
+        &self,
+        problem: &Problem<'p, L, N>,
+        h: f64,
+        watched: bool,
+    ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
+        self.integrator.stepper(problem, h, Wants { action: self.needs.action, watched })
+    }
+
+    /// Whether steps look at themselves between the nodes of their many stages.
+    pub(super) fn many_stages(&self) -> bool {
+        self.facts.collocation.is_some_and(|stages| stages > FEW)
+    }
+
+    /// Whether a time is the end of the span, or beyond it.
+    fn is_over(&self, t: f64) -> bool {
+        if self.h < 0.0 { t <= self.t_end } else { t >= self.t_end }
+    }
+
+    /// Runs it with no observer but those of the plan's own outcome.
+    ///
+    /// # Errors
+    /// Those of [`stepper`](Self::stepper). What goes wrong in mid-run is the outcome's status.
+    pub fn run(&self) -> Result<Outcome<N>, InputError> {
+        self.observed_by(&mut Vec::new(), None)
+    }
+
+    /// Runs it under the eyes of observers.
+    pub(super) fn observed_by(
+        &self,
+        observers: &mut Vec<Box<dyn Observer<N> + '_>>,
+        from: Option<&Interrupted>,
+    ) -> Result<Outcome<N>, InputError> {
+        let by_clock = self.facts.by_clock;
+        let h = (!by_clock).then_some(self.h);
+        let count = (!by_clock || self.error.is_some()).then_some(self.count);
+        let mut stepper = self.make_stepper(self.problem, self.h, self.error.is_none())?;
+        let can_be_saved = stepper.save().is_some();
+        observers.prepare(&Course { t0: self.problem.t0, t_end: self.t_end, h, count, can_be_saved })?;
+        // The logarithm of the product of the sigma_d; in single steps only where they differ.
+        let (mut log_factor, single) = (0.0, self.needs.conformal_factor && !self.constant_rate);
+        let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
+        if let Some(from) = from {
+            if from.fingerprint != self.fingerprint() || !stepper.restore(&from.words) {
+                return Err(InputError::AnotherRun);
+            }
+            (taken, log_factor, suspicion) = (from.taken, from.log_factor, from.suspicion);
+        }
+        // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes, and are compared
+        // with halves in doubt alone.
+        let doubts = self.error.is_none() && !by_clock;
+        let halves = doubts && !self.many_stages();
+        let most = if by_clock { usize::MAX } else { self.count };
+        let ended = |taken: usize, t: f64| taken == most || by_clock && self.is_over(t);
+        // A run may be resumed at its end.
+        let mut over = ended(taken, stepper.time());
+        let start = self.moment(&*stepper, None, (log_factor, suspicion), (taken, over));
+        let mut stop = observers.start(&start).break_value();
+        while !over && stop.is_none() {
+            // One mark is enough.
+            let halved = if halves && suspicion.is_none() { halved_step(taken, most) } else { usize::MAX };
+            let next_seen = observers.next(taken).max(taken + 1);
+            let next_look = if taken == halved { taken + 1 } else { halved };
+            // The step that is seen is taken by itself, so that observers can look into it.
+            let next_seen_alone = if next_seen > taken + 1 { next_seen - 1 } else { next_seen };
+            let next = next_seen_alone.min(next_probe(taken)).min(next_look).min(most);
+            let chunk = if single { 1 } else { next - taken };
+            let before = (taken == halved || next_seen == taken + 1).then(|| (stepper.time(), stepper.state()));
+            let (done, cause) = match stepper.advance_until(chunk, self.t_end) {
+                Ok(done) => (done, None),
+                Err(halt) => (halt.taken, Some(halt.cause)),
+            };
+            if taken == halved
+                && let (Some((t, from)), None) = (before, cause)
+            {
+                let step = Doubt { step: taken, steps: 1, t, from, to: stepper.state() };
+                suspicion = first(suspicion, self.settled(&step));
+            }
+            taken += done;
+            if self.constant_rate {
+                log_factor = taken as f64 * stepper.sigma().ln();
+            } else if single {
+                log_factor += done as f64 * stepper.sigma().ln();
+            }
+            if let Some(cause) = cause {
+                status = Status::Failed { step: taken, t: stepper.time(), cause };
+                break;
+            }
+            over = ended(taken, stepper.time());
+            let probed = over || taken == next_probe(taken - 1);
+            // Before the step is seen, so that it is not forgotten by who saves the run there.
+            if probed {
+                if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
+                    status = Status::FalseClaim { step: taken, claim, size };
+                    break;
+                }
+                let doubt = stepper.doubt().filter(|_| doubts && suspicion.is_none());
+                suspicion = first(suspicion, doubt.and_then(|doubt| self.settled(&doubt)));
+                suspicion = first(suspicion, stepper.suspicion());
+            }
+            if taken >= next_seen || over {
+                let before = if done == 1 { before } else { None };
+                let end = self.moment(&*stepper, before, (log_factor, suspicion), (taken, over));
+                stop = observers.step(&end).break_value();
+                // It ends within the step.
+                if let Some(Stop { at: Some((t, _)), .. }) = stop
+                    && let Ok(Moment { log_factor: Some(there), .. }) = end.inside(t)
+                {
+                    log_factor = there;
+                }
+            }
+        }
+        let (mut t, mut state) = (stepper.time(), stepper.state());
+        if let Some(Stop { by, cause, at }) = stop {
+            (t, state) = at.unwrap_or((t, state));
+            status = match cause {
+                Some(cause) => Status::Failed { step: taken, t, cause },
+                None => Status::Stopped { step: taken, t, by },
+            };
+        }
+        let Needs { action, conformal_factor } = self.needs;
+        Ok(Outcome {
+            status,
+            suspicion: first(suspicion, stepper.suspicion()),
+            steps: taken,
+            t,
+            q: state.q,
+            p: state.p,
+            v: self.velocity(t, &state).ok(),
+            z: action.then_some(state.z),
+            log_factor: conformal_factor.then_some(log_factor),
+            evaluations: stepper.evaluations(),
+            z_or_start: state.z,
+        })
+    }
+
+    /// What observers see after some steps.
+    fn moment<'r>(
+        &'r self,
+        stepper: &'r dyn Stepper<N>,
+        before: Option<(f64, PhasePoint<N>)>,
+        (log_factor, suspicion): (f64, Option<Suspicion>),
+        (k, last): (usize, bool),
+    ) -> Moment<'r, N> {
+        let log_factor = self.needs.conformal_factor.then_some(log_factor);
+        let (t, state, sigma) = (stepper.time(), stepper.state(), stepper.sigma());
+        Moment { k, t, state, sigma, log_factor, last, suspicion, before, motion: self, stepper }
+    }
+
+    /// The first claim that is false at the state of a stepper.
+    fn refuted(&self, stepper: &dyn Stepper<N>) -> Option<Defect> {
+        refuted(self.problem.lagrangian, stepper.time(), &stepper.state(), &self.problem.start.v)
+    }
+
+    /// Probes the claims along the first steps.
+    ///
+    /// # Errors
+    /// [`InputError::FalseClaim`] with the first claim that does not hold.
+    pub(super) fn probe_first_steps(&self) -> Result<(), InputError> {
+        let mut stepper = self.stepper()?;
+        let mut taken = 0;
+        while taken < self.count.min(FIRST_STEPS) {
+            let steps = next_probe(taken).min(self.count) - taken;
+            match stepper.advance_until(steps, self.t_end) {
+                Ok(done) if done > 0 => taken += done,
+                _ => break,
+            }
+            if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
+                return Err(InputError::FalseClaim { claim, size });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
+    fn velocity(&self, t: f64, state: &PhasePoint<N>) -> Result<SVector<f64, N>, StepError> {
+        velocity(self.problem.lagrangian, t, state, self.problem.start.v).map_err(step_error)
+    }
+
+    fn energy(&self, t: f64, state: &PhasePoint<N>) -> Result<f64, StepError> {
+        let v = self.velocity(t, state)?;
+        let energy = v.dot(&state.p) - self.problem.lagrangian.value(t, &state.q, &v, state.z);
+        if energy.is_finite() { Ok(energy) } else { Err(StepError::NonFinite) }
+    }
+
+    fn rates(&self, t: f64, state: &PhasePoint<N>) -> Result<PhasePoint<N>, StepError> {
+        let v = self.velocity(t, state)?;
+        let (value, g) = self.problem.lagrangian.with_gradient(t, &VelocityPoint { q: state.q, v, z: state.z });
+        Ok(PhasePoint { q: v, p: g.x + state.p * g.z, z: value })
+    }
+
+    /// Of the start, of L there, of the steps, and of what is computed.
+    fn fingerprint(&self) -> u64 {
+        let Problem { lagrangian, t0, start, state, .. } = self.problem;
+        let (value, slope) = lagrangian.with_gradient(*t0, start);
+        let numbers = [*t0, self.t_end, self.h, start.z, value, slope.z];
+        let vectors = [&start.q, &start.v, &state.p, &slope.x, &slope.y];
+        let numbers = numbers.iter().chain(vectors.into_iter().flat_map(|x| x.iter())).map(|x| x.to_bits());
+        let name = self.facts.name.bytes().map(u64::from);
+        let Needs { action, conformal_factor } = self.needs;
+        let counts = [N as u64, self.count as u64, action.into(), conformal_factor.into()];
+        digest(&numbers.chain(name).chain(counts).collect::<Vec<u64>>())
+    }
+
+    fn inside(&self, (t0, from): &(f64, PhasePoint<N>), t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
+        let v = self.velocity(*t0, from)?;
+        let mut run = self.part((*t0, from), &v, t - t0).map_err(step_error)?;
+        run.advance_until(1, t).map_err(|halt| halt.cause)?;
+        Ok((run.state(), run.sigma()))
+    }
+}
+
+/// Of what goes wrong along a motion.
+pub(super) fn step_error(error: InputError) -> StepError {
+    match error {
+        InputError::FirstStep(cause) => cause,
+        InputError::Sigma { sigma } => StepError::SigmaVanished { sigma },
+        _ => StepError::NonFinite,
+    }
+}

@@ -1,0 +1,86 @@
+//! A method at work on one motion.
+
+use crate::{DenseStep, Doubt, Item, StepError, Suspicion};
+use contact_geom::PhasePoint;
+use thiserror::Error;
+
+/// A method at work on one motion: its state, its workspace, and what it carries from one step to the next (guesses,
+/// compensations, a kick that two steps share).
+///
+/// This is what a run advances. A [`DiscreteLagrangian`](crate::DiscreteLagrangian) is a function, and a
+/// [`Flow`](crate::Flow) a stepper on it; methods that gain by more than a guess of the velocity have a stepper of their own.
+pub trait Stepper<const N: usize> {
+    /// Takes `steps` steps with nothing observed between them.
+    ///
+    /// # Errors
+    /// [`Halt`] where a step cannot be taken: the state is then that before it.
+    fn advance(&mut self, steps: usize) -> Result<(), Halt>;
+
+    /// Takes `steps` steps, or fewer where a method whose steps vary with a clock reaches the time `t_end` before; returns how many.
+    /// Steps of one length end where they end.
+    ///
+    /// # Errors
+    /// As [`advance`](Self::advance).
+    fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, Halt> {
+        let _ = t_end;
+        self.advance(steps).map(|()| steps)
+    }
+
+    /// The state `(q, p, z)`. Where the stepper was told that the action is not requested, `z` stays what it was at the start.
+    fn state(&self) -> PhasePoint<N>;
+
+    /// The time of the state.
+    fn time(&self) -> f64;
+
+    /// `sigma_d` of the last step; 1 before the first.
+    fn sigma(&self) -> f64;
+
+    /// The evaluations of forces, or of gradients of L, since the start: one a point of R x TQ x R.
+    fn evaluations(&self) -> u64;
+
+    /// The last step as a curve, for a method that has one of its own; `None` before the first, and after a step that could not be taken.
+    fn dense(&self) -> Option<DenseStep<N>> {
+        None
+    }
+
+    /// Whether `sigma_d` is the same in all steps, as it is known before the first.
+    fn has_constant_rate(&self) -> bool {
+        false
+    }
+
+    /// What its steps compute and what they skip, the action among it: as it is where that is not requested.
+    fn account(&self) -> Vec<Item> {
+        Vec::new()
+    }
+
+    /// Everything of it that changes from step to step, as words, so that it can go on from them to the last bit; `None` where it does not
+    /// know how.
+    fn save(&self) -> Option<Vec<u64>> {
+        None
+    }
+
+    /// Goes on from the [saved](Self::save) words of a stepper of the same problem, integrator and step; `false` where they are none.
+    fn restore(&mut self, _words: &[u64]) -> bool {
+        false
+    }
+
+    /// The first step so far that cannot have resolved the motion, where one was seen.
+    fn suspicion(&self) -> Option<Suspicion> {
+        None
+    }
+
+    /// The last steps since the last call that are in doubt: they may not have resolved the motion.
+    fn doubt(&mut self) -> Option<Doubt<N>> {
+        None
+    }
+}
+
+/// Steps that ended before the last of them.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error("halted after {taken} steps: {cause}")]
+pub struct Halt {
+    /// The steps taken before.
+    pub taken: usize,
+    /// Why the next could not be taken.
+    pub cause: StepError,
+}

@@ -1,0 +1,294 @@
+//! Steps that do not resolve their motion are seen; those that do raise no suspicion.
+
+use crate::{
+    ActionSplitting, Composition, DiscreteLagrangian, Flow, InputError, Midpoint, Splitting, SplittingScheme, Stepper,
+    Strang, Trapezoidal,
+};
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::{DoublePendulum, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
+use contact_geom::{GeometryError, Lagrangian, PhasePoint, Scalar, Structure, legendre};
+
+type Outcome = Result<(), InputError>;
+
+/// Whether a run says, by its status or by its mark, that it cannot be trusted.
+fn says_so<const N: usize>(mut motion: impl Stepper<N>, steps: usize) -> bool {
+    motion.advance(steps).is_err() || motion.suspicion().is_some()
+}
+
+/// `z' = v^2/2 + z^2` leaves the real line before t = 1; so does every velocity with it.
+struct Pole;
+
+impl Lagrangian<1> for Pole {
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 + z * z
+    }
+    fn structure(&self) -> Structure {
+        Structure { autonomous: true, separable: true, constant_mass: true, ..Structure::default() }
+    }
+}
+
+#[test]
+fn no_run_passes_a_pole() -> Outcome {
+    let start = PhasePoint::new([0.0], [0.3], 1.0);
+    for steps in [4, 7, 20, 33, 100, 1000] {
+        let h = 2.0 / steps as f64;
+        let (midpoint, trapezoidal) = (Midpoint::new(&Pole, h)?, Trapezoidal::new(&Pole, h)?);
+        // A start whose first step fails is refused.
+        assert!(Flow::new(&midpoint, 0.0, start).map_or(true, |flow| says_so(flow, steps)), "midpoint, {steps}");
+        assert!(Flow::new(&trapezoidal, 0.0, start).map_or(true, |flow| says_so(flow, steps)), "trapezoidal, {steps}");
+        let scheme = &SplittingScheme::YOSHIDA_4;
+        let composition = Composition::new(|h| Trapezoidal::new(&Pole, h), scheme, h, 0.0, start);
+        assert!(composition.map_or(true, |motion| says_so(motion, steps)), "composition, {steps}");
+        assert!(says_so(ActionSplitting::new(&Pole, scheme, h, 0.0, start)?, steps), "splitting, {steps}");
+    }
+    Ok(())
+}
+
+/// Falls into Kepler's centre, and passes it at 1e-3 and less, with steps between 1/200 and 1/5 of the time of the fall.
+#[test]
+fn no_run_passes_a_centre_of_force() -> Outcome {
+    let (mut missed, mut all) = (Vec::new(), 0);
+    for gamma in [0.0, -0.05] {
+        let kepler = Kepler::<2> { mu: 1.0, gamma };
+        for aside in [0.0, 0.01, 0.04] {
+            let start = PhasePoint::new([1.0, 0.0], [0.0, aside], 0.0);
+            for k in 0..40 {
+                let h = 0.2 * 40f64.powf(-k as f64 / 40.0);
+                let steps = (3.0 / h) as usize;
+                for scheme in &SplittingScheme::ALL {
+                    let motion = Splitting::new(&kepler, scheme, h * scheme.stages() as f64, 0.0, start)?.watched();
+                    all += 1;
+                    if !says_so(motion, 1 + steps / scheme.stages()) {
+                        missed.push((scheme.name(), gamma, aside, h));
+                    }
+                }
+                let (midpoint, strang) = (Midpoint::new(&kepler, h)?, Strang::new(&kepler, h, 0.0, &start)?);
+                all += 2;
+                if !says_so(Flow::new(&midpoint, 0.0, start)?, steps) {
+                    missed.push(("midpoint", gamma, aside, h));
+                }
+                if !says_so(Flow::new(&strang, 0.0, start)?, steps) {
+                    missed.push(("strang as a flow", gamma, aside, h));
+                }
+            }
+        }
+    }
+    println!("{} missed of {all}: {missed:?}", missed.len());
+    // Long schemes with steps of nearly the whole fall may have no two substeps near the centre: 298 runs are not marked.
+    let short = ["strang", "strang as a flow", "midpoint", "blanes_moan_4", "blanes_moan_6"];
+    assert!(!missed.iter().any(|(name, ..)| short.contains(name)), "{missed:?}");
+    assert!(12 * missed.len() <= all, "{} of {all}", missed.len());
+    Ok(())
+}
+
+/// Duffing's oscillator with steps just below those with which it blows up: every run that ends is marked.
+#[test]
+fn the_edge_of_stability_is_marked() -> Outcome {
+    let hard = Duffing { alpha: 1.0, beta: 1.0, force: 0.3, omega: 1.2, gamma: -0.001 };
+    let start = PhasePoint::new([1.5], [0.0], 0.0);
+    for k in 0..10 {
+        // The frequency at this amplitude is about 1.6.
+        let h = 0.75 + 0.05 * f64::from(k);
+        assert!(says_so(Splitting::new(&hard, &SplittingScheme::STRANG, h, 0.0, start)?.watched(), 2000), "{h}");
+        let strang = Strang::new(&hard, h, 0.0, &start)?;
+        assert!(says_so(Flow::new(&strang, 0.0, start)?, 2000), "as a flow {h}");
+    }
+    Ok(())
+}
+
+/// Runs a motion to its end, without a mark.
+fn assert_unsuspicious<const N: usize>(name: &str, mut motion: impl Stepper<N>, steps: usize) {
+    assert_eq!(motion.advance(steps), Ok(()), "{name}");
+    assert_eq!(motion.suspicion(), None, "{name}, until t = {}", motion.time());
+}
+
+/// Every splitting, and the rules, on a motion that they resolve: stages of the length h.
+fn assert_resolved<L: Lagrangian<N>, const N: usize>(l: &L, h: f64, t0: f64, start: PhasePoint<N>, t: f64) -> Outcome {
+    let steps = (t / h) as usize;
+    for scheme in &SplittingScheme::ALL {
+        let stages = scheme.stages();
+        let h = h * stages as f64;
+        assert_unsuspicious(scheme.name(), Splitting::new(l, scheme, h, t0, start)?.watched(), steps / stages);
+    }
+    assert_rules_resolve(l, h, t0, start, steps)
+}
+
+fn assert_rules_resolve<L: Lagrangian<N>, const N: usize>(
+    l: &L,
+    h: f64,
+    t0: f64,
+    start: PhasePoint<N>,
+    steps: usize,
+) -> Outcome {
+    let (midpoint, trapezoidal) = (Midpoint::new(l, h)?, Trapezoidal::new(l, h)?);
+    assert_unsuspicious("midpoint", Flow::new(&midpoint, t0, start)?, steps);
+    assert_unsuspicious("trapezoidal", Flow::new(&trapezoidal, t0, start)?, steps);
+    for scheme in [SplittingScheme::YOSHIDA_4, SplittingScheme::SUZUKI_UMENO_8] {
+        let stages = scheme.stages();
+        let rule = |h| Midpoint::new(l, h);
+        let motion = Composition::new(rule, &scheme, h * stages as f64, t0, start)?;
+        assert_unsuspicious(scheme.name(), motion, steps / stages);
+    }
+    Ok(())
+}
+
+/// A pulse of force that begins at nothing, on a particle at rest.
+struct Pulse;
+
+impl Lagrangian<1> for Pulse {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        let s = t - 5.0;
+        v[0] * v[0] * 0.5 - q[0] * q[0] * 0.5 + (-(s * s) * 4.0).exp() * q[0] - z * 0.1
+    }
+    fn structure(&self) -> Structure {
+        Structure { separable: true, z_affine: true, constant_rate: true, constant_mass: true, ..Structure::default() }
+    }
+}
+
+#[test]
+fn what_is_resolved_raises_no_suspicion() -> Outcome {
+    let start = PhasePoint::new([1.0], [1.0], 0.2);
+    assert_resolved(&Pendulum { gamma: -0.05 }, 0.05, 0.0, start, 100.0)?;
+    assert_resolved(&Pendulum { gamma: -0.05 }, 0.05, 0.0, PhasePoint::new([3.0], [0.0], 0.0), 100.0)?;
+    // Down to rest, at a place that is not zero, with velocities of rounding alone.
+    assert_resolved(&Duffing::default(), 0.02, 0.0, start, 500.0)?;
+    assert_resolved(&Duffing::forced(), 0.01, 0.0, start, 500.0)?;
+    // Through subnormals to zero.
+    assert_resolved(&HarmonicOscillator { gamma: -2.0 }, 0.01, 0.0, start, 1000.0)?;
+    // At rest, before a force and after.
+    // A known false alarm: the long substeps of a composition of midpoint steps see such a beginning as a turn.
+    let rest = PhasePoint::new([0.0], [0.0], 0.0);
+    for scheme in &SplittingScheme::ALL {
+        let motion = Splitting::new(&Pulse, scheme, 0.01 * scheme.stages() as f64, 0.0, rest)?.watched();
+        assert_unsuspicious(scheme.name(), motion, 10_000 / scheme.stages());
+    }
+    let midpoint = Midpoint::new(&Pulse, 0.01)?;
+    assert_unsuspicious("midpoint", Flow::new(&midpoint, 0.0, rest)?, 10_000);
+    // Fast in the units of time, and slow.
+    for scale in [1e-6, 1e6] {
+        let kepler = Kepler::<2> { mu: scale * scale, gamma: -1e-3 * scale };
+        let fast = PhasePoint::new([1.5, 0.0], [0.0, scale * (1.0f64 / 3.0).sqrt()], 0.0);
+        assert_resolved(&kepler, 0.01 / scale, 0.0, fast, 100.0 / scale)?;
+    }
+    // Pericentre at 0.1, where the frequency is 44.
+    let kepler = Kepler::<2> { mu: 1.0, gamma: 0.0 };
+    assert_resolved(&kepler, 0.001, 0.0, PhasePoint::new([1.9, 0.0], [0.0, (0.1f64 / 1.9).sqrt()], 0.0), 50.0)?;
+    // Mass matrices and actions that act back.
+    let (double, square) = (DoublePendulum::default(), QuadraticInZ { c: 0.3 });
+    assert_rules_resolve(&double, 0.02, 0.0, legendre(&double, 0.0, &double.initial()), 5000)?;
+    assert_rules_resolve(&square, 0.05, 0.0, start, 2000)?;
+    for scheme in SplittingScheme::ALL.iter().filter(|s| !s.is_nystrom()) {
+        let motion = ActionSplitting::new(&square, scheme, 0.02 * scheme.stages() as f64, 0.0, start)?;
+        assert_unsuspicious(scheme.name(), motion, 2000 / scheme.stages());
+    }
+    Ok(())
+}
+
+/// The mark names the step, is the same however the steps are taken, and stays.
+#[test]
+fn the_mark_is_that_of_its_step() -> Outcome {
+    let (kepler, start) = (Kepler::<2> { mu: 1.0, gamma: 0.0 }, PhasePoint::new([1.0, 0.0], [0.0, 0.0], 0.0));
+    let mut motion = Splitting::new(&kepler, &SplittingScheme::STRANG, 0.05, 0.0, start)?.watched();
+    let mut at_once = Splitting::new(&kepler, &SplittingScheme::STRANG, 0.05, 0.0, start)?.watched();
+    let seen = (0..200).find(|_| motion.advance(1).is_ok() && motion.suspicion().is_some());
+    assert_eq!(at_once.advance(200), Ok(()));
+    let mark = at_once.suspicion();
+    assert_eq!((seen, motion.suspicion()), (mark.map(|mark| mark.step), mark));
+    // The fall takes 1.11.
+    assert!(mark.is_some_and(|mark| (18..26).contains(&mark.step) && mark.misfit > 1.0), "{mark:?}");
+    Ok(())
+}
+
+/// A singular W is refused by name, however its equations can be solved; one that is only in poor units is not, and neither is
+/// one of a large condition: its step is right to what the condition allows.
+#[test]
+fn a_singular_mass_matrix_is_refused() -> Outcome {
+    struct Linear;
+    impl Lagrangian<1> for Linear {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+            v[0] * q[0] - q[0] * q[0] * 0.5 - z * 0.1
+        }
+    }
+    fn singular<T>(result: Result<T, InputError>) -> bool {
+        matches!(result, Err(InputError::Geometry(GeometryError::Singular { .. })))
+    }
+    let start = PhasePoint::new([1.0], [1.0], 0.0);
+    let (midpoint, trapezoidal) = (Midpoint::new(&Linear, 0.1)?, Trapezoidal::new(&Linear, 0.1)?);
+    assert!(singular(Flow::new(&midpoint, 0.0, start)) && singular(Flow::new(&trapezoidal, 0.0, start)));
+    let points = contact_geom::DiscretePoint::new([1.0], [1.1], 0.0);
+    assert!(Flow::from_points(&midpoint, 0.0, points).is_err());
+    let rule = |h| Midpoint::new(&Linear, h);
+    assert!(singular(Composition::new(rule, &SplittingScheme::YOSHIDA_4, 0.1, 0.0, start)));
+
+    /// Two coordinates whose kinetic energy depends on their difference as `1/condition`.
+    struct Stretched(f64);
+    impl Lagrangian<2> for Stretched {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+            let (a, b) = (v[0] + v[1], v[0] - v[1]);
+            (a * a + b * b / self.0) * 0.5 - (q[0] + q[1]) * 0.3 - z * 0.1
+        }
+    }
+    for condition in [1.0, 1e4, 1e8, 1e10, 1e12, 1e14] {
+        let system = Stretched(condition);
+        let v = SVector::from([0.7, -0.2]);
+        let start = legendre(&system, 0.0, &contact_geom::VelocityPoint { q: SVector::from([0.3, 0.4]), v, z: 0.1 });
+        let ld = Midpoint::new(&system, 0.1)?;
+        let mut flow = Flow::new(&ld, 0.0, start)?;
+        assert_eq!(Stepper::advance(&mut flow, 10), Ok(()), "{condition:e}");
+        // The sum falls as a particle does, whatever the difference: its momentum has the condition one.
+        let reference = Stretched(1.0);
+        let start = legendre(&reference, 0.0, &contact_geom::VelocityPoint { q: SVector::from([0.3, 0.4]), v, z: 0.1 });
+        let ld = Midpoint::new(&reference, 0.1)?;
+        let mut expected = Flow::new(&ld, 0.0, start)?;
+        assert_eq!(Stepper::advance(&mut expected, 10), Ok(()));
+        let sum = |flow: &Flow<_, 2>| flow.state().q.sum();
+        // Each of ten steps solves a system of this condition.
+        let off = (sum(&flow) - sum(&expected)).abs();
+        assert!(off <= 100.0 * condition * f64::EPSILON, "{condition:e}: {off:e}");
+    }
+    // Beyond 1/eps it is singular, whatever a pivot says.
+    let ld = Midpoint::new(&Stretched(1e17), 0.1)?;
+    assert!(singular(Flow::new(&ld, 0.0, PhasePoint::new([0.3, 0.4], [0.5, 0.5], 0.1))));
+
+    /// Masses in the ratio 1e20.
+    struct Units;
+    impl Lagrangian<2> for Units {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+            v[0] * v[0] * 1e10 + v[1] * v[1] * 1e-10 - q[0] * 1e10 - q[1] * 1e-10 - z * 0.1
+        }
+    }
+    let ld = Midpoint::new(&Units, 0.1)?;
+    assert_eq!(DiscreteLagrangian::<2>::step_size(&ld), 0.1);
+    assert!(Flow::new(&ld, 0.0, PhasePoint::new([0.0, 0.0], [1e10, 1e-10], 0.0)).is_ok());
+    Ok(())
+}
+
+/// A time or a state that is not finite is named, by every door.
+#[test]
+fn what_is_not_finite_is_refused() -> Outcome {
+    fn named<T>(result: Result<T, InputError>, name: &str) -> bool {
+        matches!(result, Err(InputError::Geometry(GeometryError::NonFinite { what, .. })) if what == name)
+    }
+    let (pendulum, square) = (Pendulum::default(), QuadraticInZ::default());
+    let scheme = &SplittingScheme::YOSHIDA_4;
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let cases = [
+            ("t0", bad, PhasePoint::new([1.0], [1.0], 0.0)),
+            ("q", 0.0, PhasePoint::new([bad], [1.0], 0.0)),
+            ("p", 0.0, PhasePoint::new([1.0], [bad], 0.0)),
+            ("z", 0.0, PhasePoint::new([1.0], [1.0], bad)),
+        ];
+        for (name, t0, start) in cases {
+            let ld = Midpoint::new(&pendulum, 0.1)?;
+            assert!(named(Flow::new(&ld, t0, start), name), "{name}");
+            assert!(named(Splitting::new(&pendulum, scheme, 0.1, t0, start), name), "{name}");
+            assert!(named(Strang::new(&pendulum, 0.1, t0, &start), name), "{name}");
+            assert!(named(ActionSplitting::new(&square, scheme, 0.1, t0, start), name), "{name}");
+            assert!(named(Composition::new(|h| Midpoint::new(&pendulum, h), scheme, 0.1, t0, start), name), "{name}");
+            for method in crate::Method::ALL {
+                assert!(named(method.discretise(&pendulum, 0.1, t0, &start), name), "{method} {name}");
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,59 @@
+//! Splitting schemes as integrators.
+
+use super::{ActionSplitting, Splitting, SplittingScheme};
+use crate::run::watch::size;
+use crate::{Facts, InputError, Integrator, Problem, Stepper, Wants};
+use contact_geom::Lagrangian;
+use std::borrow::Cow;
+
+/// For `v.Mv/2 - V(t, q) + f(z)`; a Runge-Kutta-Nyström scheme for `f(z) = gamma z`.
+impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingScheme {
+    fn facts(&self) -> Facts {
+        Facts {
+            name: Cow::Borrowed(self.name()),
+            order: self.order(),
+            symmetric: true,
+            explicit: true,
+            exact_rate: true,
+            by_clock: false,
+            collocation: None,
+            substeps: true,
+            price: 4,
+            source: Cow::Borrowed(self.source()),
+        }
+    }
+
+    fn check(&self, lagrangian: &L) -> Result<(), InputError> {
+        let structure = lagrangian.structure();
+        if !structure.separable {
+            return Err(InputError::Unclaimed { claim: "separable" });
+        }
+        // The third flow, that of f(z), leaves the hypothesis of Runge-Kutta-Nyström methods.
+        if self.is_nystrom() && !structure.is_affine_in_z() {
+            return Err(InputError::Unclaimed { claim: "z_affine" });
+        }
+        Ok(())
+    }
+
+    fn stepper(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        Wants { action, watched }: Wants,
+    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+        let Problem { lagrangian, t0, start, state, structure } = *problem;
+        // Steps that move by so little of the position that half of the digits are lost in each change so little from step to step that they
+        // are rounded in the same way, and the error piles up.
+        let moved = h.abs() * size(&start.v);
+        let little = moved > 0.0 && moved < f64::EPSILON.sqrt() * size(&start.q);
+        if !structure.is_affine_in_z() {
+            let splitting = ActionSplitting::new(lagrangian, self, h, t0, state)?;
+            let splitting = if watched { splitting.doubting() } else { splitting };
+            return Ok(Box::new(if little { splitting.compensated() } else { splitting }));
+        }
+        let splitting = Splitting::new(lagrangian, self, h, t0, state)?;
+        let splitting = if watched { splitting.watched() } else { splitting };
+        let splitting = if little { splitting.compensated() } else { splitting };
+        Ok(Box::new(if action { splitting } else { splitting.without_action() }))
+    }
+}

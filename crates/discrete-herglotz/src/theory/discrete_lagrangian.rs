@@ -1,0 +1,319 @@
+//! Discrete Lagrangians on Q x Q x R.
+
+use crate::rules::step_equations::BLOCK;
+use crate::solve::newton::{Linearised, NewtonStart, newton};
+use crate::{InputError, Solver, StepError};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed};
+
+/// A discrete Lagrangian `L_d : Q x Q x R -> R` with the action's recursion `z1 = z0 + L_d(q0, q1, z0)`; paper, section 3.
+///
+/// Only the value is asked for, as a generic function; derivatives come by automatic differentiation and steps by Newton's
+/// method on them. The discretisations of this crate override both by cheaper routes to the same numbers. For a
+/// time-dependent Lagrangian, `t` is the time `t_k` at the start of the step.
+pub trait DiscreteLagrangian<const N: usize> {
+    /// The time step h; negative where steps go back in time.
+    fn step_size(&self) -> f64;
+
+    /// The value `L_d(q0, q1, z0)`.
+    ///
+    /// # Errors
+    /// A [`StepError`] where it is not defined, or where an implicit definition cannot be solved.
+    fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError>;
+
+    /// What must hold at the start of a run beside the regularity of `L_d`: that of the Lagrangian behind it, where there is one.
+    ///
+    /// # Errors
+    /// An [`InputError`] that names what does not hold.
+    fn check_start(&self, _t: f64, _from: &PhasePoint<N>, _velocity: &SVector<f64, N>) -> Result<(), InputError> {
+        Ok(())
+    }
+
+    /// How far a step is from one that resolves its motion, in units of the largest misfit that such a step can have; `None` where
+    /// it is below one, and where nothing is known, as by default: a discrete Lagrangian may be exact for long steps.
+    /// `velocities` are the mean velocities of the last four steps, the latest last, `to` and `sigma` the latest one's end.
+    #[inline(always)]
+    fn misfit(&self, _velocities: [&SVector<f64, N>; 4], _to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
+        None
+    }
+
+    /// Whether its steps solve no equation. By default they do.
+    fn is_explicit(&self) -> bool {
+        false
+    }
+
+    /// Whether `sigma_d` is the same at all points. By default it is not known to be.
+    fn constant_rate(&self) -> bool {
+        false
+    }
+
+    /// Value and first derivatives `D1 L_d, D2 L_d, Dz L_d`.
+    ///
+    /// # Errors
+    /// Those of [`value`](Self::value).
+    fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
+        derived_jet(self, t, x)
+    }
+
+    /// Value, first and second derivatives.
+    ///
+    /// # Errors
+    /// Those of [`value`](Self::value).
+    fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
+        derived_second_jet(self, t, x)
+    }
+
+    /// The step `(q0, p0, z0) -> (q1, p1, z1)` of the discrete Hamiltonian flow `F+L_d o (F-L_d)^-1`.
+    ///
+    /// Solves `D1 L_d + sigma_d p0 = 0` for `q1`, starting from `q0 + h u` with the guess `u` of the mean velocity.
+    ///
+    /// # Errors
+    /// A [`StepError`]: no convergence, a singular matrix, `sigma_d <= 0`, a non-finite value.
+    fn forward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        let h = self.step_size();
+        let point = |u: &SVector<f64, N>| DiscretePoint { q0: from.q, q1: from.q + u * h, z0: from.z };
+        let start =
+            NewtonStart { u: *guess, z: 0.0, resolution: from.q.amax() / h.abs(), impulse: from.p.amax() * h.abs() };
+        let root = newton(start, solver, |u, _| {
+            let jet = self.second_jet(t, &point(u))?;
+            Ok(Linearised {
+                residual: jet.first.d1 + from.p * jet.first.sigma(),
+                jacobian: (jet.d12 + from.p * jet.d2z.transpose()) * h,
+                size: jet.first.d1.amax() + from.p.amax() * (1.0 + jet.first.dz.abs()),
+                z_change: 0.0,
+                z_slope: SVector::zeros(),
+            })
+        })?;
+        let x = point(&root.u);
+        let jet = self.jet(t, &x)?;
+        let end = PhasePoint { q: x.q1, p: jet.d2, z: from.z + jet.value };
+        Transition { end, velocity: root.u, sigma: jet.sigma(), iterations: root.iterations }.checked()
+    }
+
+    /// The step `(q1, p1, z1) -> (q0, p0, z0)` of the inverse flow; `t` is the time at `(q0, p0, z0)`.
+    ///
+    /// Solves `D2 L_d = p1`, `z0 + L_d = z1` for `(q0, z0)`, starting from `q1 - h u`.
+    ///
+    /// # Errors
+    /// Like those of [`forward`](Self::forward).
+    fn backward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        let h = self.step_size();
+        let point = |u: &SVector<f64, N>, z0: f64| DiscretePoint { q0: from.q - u * h, q1: from.q, z0 };
+        let start =
+            NewtonStart { u: *guess, z: from.z, resolution: from.q.amax() / h.abs(), impulse: from.p.amax() * h.abs() };
+        let root = newton(start, solver, |u, z0| {
+            let jet = self.second_jet(t, &point(u, z0))?;
+            let defect = z0 + jet.first.value - from.z;
+            // z0 moves by -(defect + D1 . dq0) / sigma, and dq0 = -h du.
+            let (z_change, z_slope) = (-defect / jet.first.sigma(), jet.first.d1 * (h / jet.first.sigma()));
+            Ok(Linearised {
+                residual: jet.first.d2 - from.p + jet.d2z * z_change,
+                jacobian: jet.d12.transpose() * -h + jet.d2z * z_slope.transpose(),
+                size: jet.first.d2.amax() + from.p.amax() + jet.d2z.amax() * (z0.abs() + jet.first.value.abs()),
+                z_change,
+                z_slope,
+            })
+        })?;
+        let x = point(&root.u, root.z);
+        let jet = self.jet(t, &x)?;
+        let sigma = jet.sigma();
+        let end = PhasePoint { q: x.q0, p: -jet.d1 / sigma, z: root.z };
+        Transition { end, velocity: root.u, sigma, iterations: root.iterations }.checked()
+    }
+}
+
+impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
+    fn step_size(&self) -> f64 {
+        (**self).step_size()
+    }
+    fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
+        (**self).value(t, x)
+    }
+    fn check_start(&self, t: f64, from: &PhasePoint<N>, velocity: &SVector<f64, N>) -> Result<(), InputError> {
+        (**self).check_start(t, from, velocity)
+    }
+    #[inline(always)]
+    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
+        (**self).misfit(velocities, to, sigma)
+    }
+    fn is_explicit(&self) -> bool {
+        (**self).is_explicit()
+    }
+    fn constant_rate(&self) -> bool {
+        (**self).constant_rate()
+    }
+    fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
+        (**self).jet(t, x)
+    }
+    fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
+        (**self).second_jet(t, x)
+    }
+    #[inline(always)]
+    fn forward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        (**self).forward(t, from, guess, solver)
+    }
+    #[inline]
+    fn backward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        (**self).backward(t, from, guess, solver)
+    }
+}
+
+/// One step of a discrete Hamiltonian flow, forward or backward.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transition<const N: usize> {
+    /// The state that the step leads to.
+    pub end: PhasePoint<N>,
+    /// The mean velocity `(q1 - q0) / h`, kept apart because the difference of the positions loses its digits.
+    pub velocity: SVector<f64, N>,
+    /// `sigma_d = 1 + Dz L_d` at the step's point of Q x Q x R.
+    pub sigma: f64,
+    /// Newton iterations taken.
+    pub iterations: u32,
+}
+
+impl<const N: usize> Transition<N> {
+    /// Refuses a step that is not finite or not conformally contact.
+    ///
+    /// # Errors
+    /// [`StepError::NonFinite`], [`StepError::SigmaVanished`].
+    #[inline(always)]
+    pub fn checked(self) -> Result<Self, StepError> {
+        if !(Triple::from(self.end).is_finite() && self.sigma.is_finite()) {
+            return Err(StepError::NonFinite);
+        }
+        if self.sigma <= 0.0 {
+            return Err(StepError::SigmaVanished { sigma: self.sigma });
+        }
+        Ok(self)
+    }
+}
+
+/// The first jet by automatic differentiation of the value.
+///
+/// # Errors
+/// Those of the value.
+pub fn derived_jet<const N: usize>(
+    ld: &(impl DiscreteLagrangian<N> + ?Sized),
+    t: f64,
+    x: &DiscretePoint<N>,
+) -> Result<DiscreteJet<N>, StepError> {
+    if const { N > BLOCK } {
+        let (mut value, mut d) = (0.0, Triple { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 });
+        for start in blocks::<N>() {
+            let l = ld.value(t, &lifted(x, start))?;
+            value = l.re;
+            for (k, slope) in l.d.iter().enumerate() {
+                match start + k {
+                    i if i < N => d.x[i] = *slope,
+                    i if i < 2 * N => d.y[i - N] = *slope,
+                    i if i == 2 * N => d.z = *slope,
+                    _ => {}
+                }
+            }
+        }
+        return Ok(DiscreteJet::new(value, d.x, d.y, d.z));
+    }
+    let l = ld.value(t, &seed(&Triple::from(*x)).into())?;
+    Ok(DiscreteJet::new(l.re, l.d.x, l.d.y, l.d.z))
+}
+
+/// The second jet by automatic differentiation of the value.
+///
+/// # Errors
+/// Those of the value.
+pub fn derived_second_jet<const N: usize>(
+    ld: &(impl DiscreteLagrangian<N> + ?Sized),
+    t: f64,
+    x: &DiscretePoint<N>,
+) -> Result<SecondDiscreteJet<N>, StepError> {
+    if const { N > BLOCK } {
+        return second_jet_by_blocks(ld, t, x);
+    }
+    let l: Dual<Dual<f64, Triple<N>>, _> = ld.value(t, &seed(&seed(&Triple::from(*x))).into())?;
+    Ok(SecondDiscreteJet {
+        first: DiscreteJet::new(l.re.re, l.re.d.x, l.re.d.y, l.re.d.z),
+        d11: SMatrix::from_fn(|i, j| l.d.x[i].d.x[j]),
+        d12: SMatrix::from_fn(|i, j| l.d.x[i].d.y[j]),
+        d22: SMatrix::from_fn(|i, j| l.d.y[i].d.y[j]),
+        d1z: SVector::from_fn(|i, _| l.d.x[i].d.z),
+        d2z: SVector::from_fn(|i, _| l.d.y[i].d.z),
+        dzz: l.d.z.d.z,
+    })
+}
+
+/// The starts of the blocks of the `2N + 1` coordinates.
+fn blocks<const N: usize>() -> impl Iterator<Item = usize> {
+    (0..=2 * N).step_by(BLOCK)
+}
+
+/// The point with the coordinates from `start` on as directions, in the order `q0, q1, z0`: one block of [`seed`].
+fn lifted<T: Scalar, const N: usize>(
+    x: &DiscretePoint<N, T>,
+    start: usize,
+) -> DiscretePoint<N, Dual<T, SVector<T, BLOCK>>> {
+    let one = |i: usize, re: T| {
+        let mut number = Dual::<T, SVector<T, BLOCK>>::constant(re);
+        if (start..start + BLOCK).contains(&i) {
+            number.d[i - start] = T::one();
+        }
+        number
+    };
+    DiscretePoint {
+        q0: SVector::from_fn(|i, _| one(i, x.q0[i])),
+        q1: SVector::from_fn(|i, _| one(N + i, x.q1[i])),
+        z0: one(2 * N, x.z0),
+    }
+}
+
+/// [`derived_second_jet`] of many coordinates: by blocks of directions, for the sake of the stack.
+fn second_jet_by_blocks<const N: usize>(
+    ld: &(impl DiscreteLagrangian<N> + ?Sized),
+    t: f64,
+    x: &DiscretePoint<N>,
+) -> Result<SecondDiscreteJet<N>, StepError> {
+    let (matrix, vector) = (SMatrix::zeros(), SVector::zeros());
+    let first = derived_jet(ld, t, x)?;
+    let mut jet =
+        SecondDiscreteJet { first, d11: matrix, d12: matrix, d22: matrix, d1z: vector, d2z: vector, dzz: 0.0 };
+    for (a, b) in blocks::<N>().flat_map(|a| blocks::<N>().filter(move |b| *b >= a).map(move |b| (a, b))) {
+        let second = ld.value(t, &lifted(&lifted(x, a), b))?.d;
+        for (k, m) in (0..BLOCK).flat_map(|k| (0..BLOCK).map(move |m| (k, m))) {
+            let (i, j) = ((a + m).min(b + k), (a + m).max(b + k));
+            let entry = second[k].d[m];
+            match (i / N, j / N) {
+                _ if j > 2 * N => {}
+                (0, 0) => (jet.d11[(i, j)], jet.d11[(j, i)]) = (entry, entry),
+                (0, 1) => jet.d12[(i, j - N)] = entry,
+                (1, 1) => (jet.d22[(i - N, j - N)], jet.d22[(j - N, i - N)]) = (entry, entry),
+                (0, _) => jet.d1z[i] = entry,
+                (1, _) => jet.d2z[i - N] = entry,
+                _ => jet.dzz = entry,
+            }
+        }
+    }
+    Ok(jet)
+}

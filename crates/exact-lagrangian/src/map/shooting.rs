@@ -1,0 +1,292 @@
+//! The motion between two points in numbers: collocation with both positions given, shooting by Newton's method, continuation.
+
+use super::conjugate::Fold;
+use super::exact_lagrangian::seeded;
+use super::exponential::singular_values;
+use crate::numerics::flow::{ACCURACY, Herglotz, Work, integrate};
+use crate::numerics::panel::{End, Floor, Problem, Rates, State, collocate};
+use crate::{ContactExponential, ExactError, Motion, Retraction, RetractionRoute};
+use contact_geom::linear::solve;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{DiscretePoint, Dual, Lagrangian, VelocityPoint, larger};
+use discrete_herglotz::last_correction;
+
+/// The Newton iterations that a retraction may take.
+pub(crate) const ITERATIONS: u32 = 50;
+
+/// The accuracy of the first Newton iterations: of what is only a guess for the last.
+const ROUGH: f64 = 1e-6;
+
+/// The sine of a [`Fold`] below which the end points count as conjugate.
+const CONJUGATE: f64 = 64.0 * f64::EPSILON;
+
+/// The same where the slope is known to [`ROUGH`] accuracy only.
+const NEARLY: f64 = 1e-4;
+
+/// Whether a matrix reverses orientation.
+pub(super) fn reverses<const N: usize>(mut m: SMatrix<f64, N, N>) -> bool {
+    solve(&mut m, &mut SVector::<f64, N>::zeros()).is_ok_and(|determinant| determinant < 0.0)
+}
+
+/// The motion with its derivatives in the initial velocity.
+type Shot<const N: usize> = Motion<N, Dual<f64, SVector<f64, N>>>;
+
+/// The derivative `dq1/dv0` of a shot.
+fn slope<const N: usize>(shot: &Shot<N>) -> SMatrix<f64, N, N> {
+    SMatrix::from_fn(|i, j| shot.displacement[i].d[j])
+}
+
+/// What a shot makes of variations of its initial velocity.
+fn fold<const N: usize>(shot: &Shot<N>, time: f64) -> Fold {
+    Fold::of(&slope(shot), &SMatrix::from_fn(|i, j| shot.end.v[i].d[j]), time)
+}
+
+/// How far from singular the slope is that has this inverse, in units of what the motion makes of velocities: like the sine of its
+/// [`Fold`], without allocation and exactly that for `N = 1`.
+fn regularity<const N: usize>(shot: &Shot<N>, inverse: &SMatrix<f64, N, N>, time: f64) -> f64 {
+    let entries = |i: usize, j: usize| larger(shot.displacement[i].d[j].abs(), (shot.end.v[i].d[j] * time).abs());
+    let size = (0..N * N).fold(0.0, |size, k| larger(size, entries(k / N, k % N)));
+    smallest(inverse) / size
+}
+
+/// A motion through both points, and the inverse of `dq1/dv0` there.
+pub(super) struct Found<const N: usize> {
+    pub retraction: Retraction<N>,
+    pub inverse: SMatrix<f64, N, N>,
+    /// [How far from singular](regularity) the slope is.
+    regularity: f64,
+}
+
+/// The smallest singular value of a matrix with this inverse, up to a factor of at most `sqrt N`.
+pub(super) fn smallest<const N: usize>(inverse: &SMatrix<f64, N, N>) -> f64 {
+    1.0 / inverse.norm()
+}
+
+impl<L> ContactExponential<L> {
+    /// The motion by collocation on one panel with both positions given, from a guess of the initial velocity and of the
+    /// inverse of `dq1/dv0`; if the iteration contracts and the error is below round-off. With it the factor of contraction.
+    pub(super) fn by_collocation<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+        v0: &mut SVector<f64, N>,
+        inverse: &SMatrix<f64, N, N>,
+        patience: f64,
+    ) -> Result<Option<(Retraction<N>, f64)>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let rates = Herglotz(&self.lagrangian);
+        let from = State { q: x.q0, v: *v0, z: x.z0, b: 0.0 };
+        let start = rates.at(t, &from)?;
+        let end = End { displacement: &(x.q1 - x.q0), inverse, patience };
+        let (floor, mut evaluations) = (Floor::default(), 1);
+        let problem =
+            Problem { t, h: self.h, from: &from, end: Some(end), accuracy: ACCURACY, floor, part: 1.0, narrow: None };
+        Ok(match collocate(&rates, &problem, start, v0, &mut evaluations) {
+            Ok(panel) if panel.error <= ACCURACY => Some((
+                Retraction {
+                    start: VelocityPoint { q: x.q0, v: panel.v0, z: x.z0 },
+                    end: VelocityPoint { q: x.q1, v: panel.v0 + panel.change.a, z: x.z0 + panel.change.z },
+                    action: panel.change.z,
+                    b: panel.change.b,
+                    // The iteration contracts before the first conjugate point only.
+                    conjugate: None,
+                    route: RetractionRoute::Collocation,
+                    evaluations,
+                },
+                panel.contraction,
+            )),
+            _ => None,
+        })
+    }
+
+    /// A retraction with the time by which its motion has met a conjugate point.
+    pub(super) fn marked<const N: usize>(&self, t: f64, found: Retraction<N>) -> Result<Retraction<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        const PARTS: u32 = 32;
+        let (part, mut at, mut work) = (self.h / f64::from(PARTS), seeded(&found.start), Work::default());
+        for k in 0..PARTS {
+            at = self.shot(t + f64::from(k) * part, &at, part, ROUGH, &mut work)?.end;
+            if reverses(SMatrix::<f64, N, N>::from_fn(|i, j| at.q[i].d[j])) {
+                return Ok(Retraction { conjugate: Some(f64::from(k + 1) * part), ..found });
+            }
+        }
+        Ok(Retraction { conjugate: None, ..found })
+    }
+
+    /// The motion with its derivatives in the initial velocity, to an accuracy.
+    fn shot<const N: usize>(
+        &self,
+        t: f64,
+        start: &VelocityPoint<N, Dual<f64, SVector<f64, N>>>,
+        h: f64,
+        accuracy: f64,
+        work: &mut Work,
+    ) -> Result<Shot<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let from = State { q: start.q, v: start.v, z: start.z, b: Dual::constant(0.0) };
+        integrate(&Herglotz(&self.lagrangian), t, &from, h, accuracy, work)
+    }
+
+    /// The inverse of `dq1/dv0` along the motion from a start, to the accuracy of a guess; none where it is nearly singular, or the
+    /// motion not defined.
+    pub(super) fn slope_inverse<const N: usize>(
+        &self,
+        t: f64,
+        start: &VelocityPoint<N>,
+        work: &mut Work,
+    ) -> Option<SMatrix<f64, N, N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let shot = self.shot(t, &seeded(start), self.h, ROUGH, work).ok()?;
+        slope(&shot).try_inverse().filter(|inverse| regularity(&shot, inverse, self.h) > NEARLY)
+    }
+
+    /// Newton's method on `exp_h`: to some digits first; the rest by collocation with the slope found, or else to the end.
+    pub(super) fn by_newton<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+        guess: &SVector<f64, N>,
+        work: &mut Work,
+    ) -> Result<Retraction<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let rough = self.shoot(t, x, guess, (self.h, ROUGH), work)?;
+        let near = rough.retraction.start.v;
+        let regular = rough.regularity > NEARLY;
+        if regular && let Some((found, _)) = self.by_collocation(t, x, &mut { near }, &rough.inverse, 1.0)? {
+            // Still the motion that Newton's method has found, not another one.
+            if (found.start.v - near).amax() <= ROUGH.sqrt() * near.amax() {
+                return Ok(Retraction { route: RetractionRoute::Newton, ..found });
+            }
+        }
+        Ok(self.shoot(t, x, &near, (self.h, ACCURACY), work)?.retraction)
+    }
+
+    /// Newton's method on `exp_h` with the slope `dq1/dv0` of the variational equation. A change that takes the motion out of
+    /// its domain, or farther from the second point, is halved.
+    pub(super) fn shoot<const N: usize>(
+        &self,
+        t: f64,
+        x: &DiscretePoint<N>,
+        guess: &SVector<f64, N>,
+        (h, accuracy): (f64, f64),
+        work: &mut Work,
+    ) -> Result<Found<N>, ExactError<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let displacement = x.q1 - x.q0;
+        let (mut v, mut change) = (*guess, SVector::<f64, N>::zeros());
+        let (mut before, mut nearest) = (f64::INFINITY, f64::INFINITY);
+        let mut last = None;
+        for _ in 0..ITERATIONS {
+            let start = VelocityPoint { q: x.q0, v, z: x.z0 };
+            let shot = match self.shot(t, &seeded(&start), h, accuracy, work) {
+                Ok(shot) => shot,
+                Err(error) if last.is_none() || work.is_done() => return Err(error),
+                Err(_) => {
+                    change *= 0.5;
+                    v -= change;
+                    continue;
+                }
+            };
+            let missed = shot.displacement.map(|d| d.re) - displacement;
+            let slope = slope(&shot);
+            let residual = missed.amax();
+            if residual > 2.0 * nearest && change.amax() > f64::EPSILON * v.amax() {
+                change *= 0.5;
+                v -= change;
+                continue;
+            }
+            nearest = nearest.min(residual);
+            last = Some((start, residual, slope, shot));
+            change = -missed;
+            let (mut matrix, size) = (slope, v.amax());
+            if solve(&mut matrix, &mut change).is_err() {
+                break;
+            }
+            let now = change.amax();
+            // The next change is about now^3 / before^2 or, at round-off, what moves no position.
+            let predicted = last_correction(now, before, 2.0 * accuracy * size.max(now));
+            let resolution = 2.0 * accuracy * (x.q0.amax().max(x.q1.amax()) / h.abs()).max(size);
+            let stagnant = now >= 0.5 * before && now <= 64.0 * resolution;
+            if residual == 0.0 || (before.is_finite() && (predicted || stagnant)) {
+                let Some(inverse) = slope.try_inverse() else { break };
+                let regularity = regularity(&shot, &inverse, h);
+                if regularity.is_nan() || regularity <= CONJUGATE {
+                    break;
+                }
+                return Ok(Found { retraction: moved(x, &start, &shot, &change), inverse, regularity });
+            }
+            v += change;
+            before = now;
+        }
+        let Some((start, residual, slope, shot)) = last else {
+            return Err(ExactError::NotConverged {
+                last: VelocityPoint { q: x.q0, v: *guess, z: x.z0 },
+                residual: f64::INFINITY,
+                smallest: 0.0,
+            });
+        };
+        let (smallest, fold) = (singular_values(&slope).smallest, fold(&shot, h));
+        // Newton's method is slow, and its limit ill determined, where the slope nearly vanishes.
+        Err(if fold.sine <= f64::EPSILON.sqrt() && !fold.decayed {
+            ExactError::ConjugatePoint { last: start, residual, smallest }
+        } else {
+            ExactError::NotConverged { last: start, residual, smallest }
+        })
+    }
+
+    /// Continuation: the motions in the times `s h` to the points `q0 + s (q1 - q0)`, for s from small to 1, each the guess for
+    /// the next.
+    pub(super) fn lead<const N: usize>(&self, t: f64, x: &DiscretePoint<N>, work: &mut Work) -> Option<Found<N>>
+    where
+        L: Lagrangian<N>,
+    {
+        let (mut s, mut step) = (0.0, 0.125);
+        let mut v = (x.q1 - x.q0) / self.h;
+        while step > 1e-3 && !work.is_done() {
+            let next = f64::min(s + step, 1.0);
+            let target = DiscretePoint { q1: x.q0 + (x.q1 - x.q0) * next, ..*x };
+            let accuracy = if next < 1.0 { ROUGH } else { ACCURACY };
+            match self.shoot(t, &target, &v, (next * self.h, accuracy), work) {
+                Ok(found) if next == 1.0 => return Some(found),
+                Ok(found) => {
+                    v = found.retraction.start.v;
+                    s = next;
+                    step *= 1.5;
+                }
+                Err(_) => step *= 0.5,
+            }
+        }
+        None
+    }
+}
+
+/// The motion after the last small change of its initial velocity, to first order in it: no further pass is needed.
+fn moved<const N: usize>(
+    x: &DiscretePoint<N>,
+    start: &VelocityPoint<N>,
+    shot: &Shot<N>,
+    change: &SVector<f64, N>,
+) -> Retraction<N> {
+    let along = |c: &Dual<f64, SVector<f64, N>>| c.re + c.d.dot(change);
+    Retraction {
+        start: VelocityPoint { v: start.v + change, ..*start },
+        end: VelocityPoint { q: x.q1, v: SVector::from_fn(|i, _| along(&shot.end.v[i])), z: along(&shot.end.z) },
+        action: along(&shot.action),
+        b: along(&shot.b),
+        conjugate: None,
+        route: RetractionRoute::Newton,
+        evaluations: shot.evaluations,
+    }
+}

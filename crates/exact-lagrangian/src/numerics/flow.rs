@@ -1,0 +1,334 @@
+//! The flow of the Herglotz vector field, to round-off.
+
+#[cfg(test)]
+mod tests;
+
+use crate::ExactError;
+use crate::numerics::panel::{Floor, Panel, Problem, Rate, Rates, Refused, SMALLEST, Size, State, collocate};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{GeometryError, Lagrangian, Scalar, Triple, VelocityPoint, herglotz_rates, larger};
+
+/// The evaluations of the vector field that a motion, or the search for one between two points, may take, about a second's: over
+/// duals of n entries each counts n times.
+pub const EVALUATIONS: u64 = 4_000_000;
+
+/// The relative error that a panel's end values may have by their estimate: half a unit of round-off.
+pub(crate) const ACCURACY: f64 = 0.5 * f64::EPSILON;
+
+/// Herglotz' equations `q'' = a`, `z' = L`, `b' = L_z`.
+pub(crate) struct Herglotz<'a, L>(pub &'a L);
+
+impl<L: Lagrangian<N>, const N: usize> Rates<N> for Herglotz<'_, L> {
+    #[inline]
+    fn at<T: Scalar>(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError> {
+        let point = VelocityPoint { q: x.q, v: x.v, z: x.z };
+        let (field, b) = herglotz_rates(self.0, T::from(t), &point)?;
+        Ok(Rate { a: field.y, z: field.z, b })
+    }
+}
+
+/// A motion: where it ends, and what has grown along it. Over duals, with the derivatives of all of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion<const N: usize, T = f64> {
+    /// The end `phi_t(q0, v0, z0)`.
+    pub end: VelocityPoint<N, T>,
+    /// The displacement `q1 - q0`, to round-off of itself even where it is small beside the positions.
+    pub displacement: SVector<T, N>,
+    /// The action `z1 - z0 = int L dt`, likewise.
+    pub action: T,
+    /// `b = int L_z dt`, the logarithm of the conformal factor; paper, section 4.2.
+    pub b: T,
+    /// The panels that it took.
+    pub panels: u32,
+    /// The evaluations of the vector field that it took, refused panels and the looks between the nodes included.
+    pub evaluations: u64,
+}
+
+impl<const N: usize, T: Scalar> Motion<N, T> {
+    /// The conformal factor `sigma = e^b` of the flow: `phi_t* eta_L = sigma eta_L`.
+    pub fn sigma(&self) -> T {
+        self.b.exp()
+    }
+}
+
+/// The motion `phi_t` of the Herglotz vector field `xi_L` from a start at time `t0` over a duration, negative to go back;
+/// paper, section 4.1. To round-off, for any regular L and over any [`Scalar`]: on duals it gives the first (and further)
+/// variational equations' solution.
+///
+/// Collocation at 4 to 24 Gauss points (order 8 to 48) on panels that are as long as the estimated error and the convergence of
+/// the iteration allow; the changes of all panels are added with compensation. The error stays within some units of round-off
+/// times the condition of the motion.
+///
+/// What is narrow may hide between the nodes. Each panel is compared with the equations at both ends and at 5 to 25 and more other
+/// places, in all at 160 and more of a motion that changes its position or its velocity by as much as they are. A force of
+/// Gauss' shape `exp(-(s/w)^2)` in position or time, which is felt over `8 w`, is found if w is above a hundredth of the part between
+/// two places: w = 1e-3 of the span as a rule. What is narrower still may not be seen; take shorter durations where it is known to
+/// be. A force that is small beside another and faster than the nodes is found by what it does in the mean. A jump of a force or of
+/// the drag is found by the panel's ends, and passed in a panel so short that it changes nothing but the last digit.
+///
+/// Of numbers below the smallest normal one the last digit is the smallest number of all.
+///
+/// # Errors
+/// [`ExactError::Input`] for a non-finite argument or a W that is singular at the start; [`ExactError::OutsideDomain`] where the
+/// motion is not defined up to the end, with the state reached; [`ExactError::Unfinished`] after [`EVALUATIONS`].
+pub fn herglotz_flow<T: Scalar, const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t0: f64,
+    start: &VelocityPoint<N, T>,
+    duration: f64,
+) -> Result<Motion<N, T>, ExactError<N>> {
+    let from = State { q: start.q, v: start.v, z: start.z, b: T::zero() };
+    integrate(&Herglotz(lagrangian), t0, &from, duration, ACCURACY, &mut Work::default())
+}
+
+/// A sum whose rounding errors are carried along, after Kahan.
+#[derive(Clone, Copy)]
+struct Sum<T> {
+    value: T,
+    lost: T,
+}
+
+impl<T: Scalar> Sum<T> {
+    fn from(value: T) -> Self {
+        Sum { value, lost: T::zero() }
+    }
+
+    #[inline]
+    fn add(&mut self, term: T) {
+        let corrected = term - self.lost;
+        let next = self.value + corrected;
+        self.lost = (next - self.value) - corrected;
+        self.value = next;
+    }
+}
+
+/// The sums along a motion. The state is summed up from the start's, so that what decays keeps its digits; the displacement
+/// and the action from 0, so that what is small beside the state keeps its own.
+struct Sums<const N: usize, T> {
+    q: [Sum<T>; N],
+    v: [Sum<T>; N],
+    z: Sum<T>,
+    b: Sum<T>,
+    displacement: [Sum<T>; N],
+    action: Sum<T>,
+}
+
+impl<const N: usize, T: Scalar> Sums<N, T> {
+    fn new(from: &State<N, T>) -> Self {
+        Sums {
+            q: std::array::from_fn(|i| Sum::from(from.q[i])),
+            v: std::array::from_fn(|i| Sum::from(from.v[i])),
+            z: Sum::from(from.z),
+            b: Sum::from(from.b),
+            displacement: [Sum::from(T::zero()); N],
+            action: Sum::from(T::zero()),
+        }
+    }
+
+    fn add(&mut self, panel: &Panel<N, T>) {
+        for i in 0..N {
+            self.q[i].add(panel.displacement[i]);
+            self.v[i].add(panel.change.a[i]);
+            self.displacement[i].add(panel.displacement[i]);
+        }
+        self.z.add(panel.change.z);
+        self.b.add(panel.change.b);
+        self.action.add(panel.change.z);
+    }
+
+    fn state(&self) -> State<N, T> {
+        State {
+            q: SVector::from_fn(|i, _| self.q[i].value),
+            v: SVector::from_fn(|i, _| self.v[i].value),
+            z: self.z.value,
+            b: self.b.value,
+        }
+    }
+}
+
+/// The work that is left of [`EVALUATIONS`].
+pub(crate) struct Work(u64);
+
+impl Default for Work {
+    fn default() -> Self {
+        Work(EVALUATIONS)
+    }
+}
+
+impl Work {
+    /// Whether it is done.
+    pub fn is_done(&self) -> bool {
+        self.0 == 0
+    }
+
+    fn take<T>(&mut self, evaluations: u64) {
+        self.0 = self.0.saturating_sub(evaluations * (size_of::<T>() / size_of::<f64>()) as u64);
+    }
+}
+
+/// The factor by which a panel of order `2 nodes` should be made longer.
+fn stretch<const N: usize, T>(panel: &Panel<N, T>, accuracy: f64) -> f64 {
+    0.9 * (accuracy / larger(panel.error, 1e-300)).powf(0.5 / panel.nodes as f64)
+}
+
+/// The same state but for the last digit of each coordinate, up and down in turn.
+fn with_last_digits_changed<const N: usize, T: Scalar>(x: &State<N, T>) -> State<N, T> {
+    let [up, down] = [1.0 + f64::EPSILON, 1.0 - f64::EPSILON];
+    // Of numbers below the smallest normal one the last digit is the smallest of all.
+    let changed = |x: T, factor: f64| x * factor + if x.pivot_size() < f64::MIN_POSITIVE { SMALLEST } else { 0.0 };
+    let of = |x: &SVector<T, N>, even, odd| SVector::from_fn(|i, _| changed(x[i], if i % 2 == 0 { even } else { odd }));
+    State { q: of(&x.q, up, down), v: of(&x.v, down, up), z: changed(x.z, up), b: x.b }
+}
+
+/// Refusals after which the way to the end of the panel refused is halved, and after which the panels are
+/// [narrow](Problem::narrow); and where it is given up, farther than from any length to a rounding of it.
+const HALVING: u32 = 8;
+const NARROW: u32 = 14;
+const CLOSED: u32 = 250;
+
+/// Refuses what is not finite.
+fn finite<T: Scalar>(what: &'static str, entries: &[T]) -> Result<(), GeometryError> {
+    match entries.iter().position(|e| !e.extent().is_finite()) {
+        Some(index) => Err(GeometryError::NonFinite { what, index, value: entries[index].re() }),
+        None => Ok(()),
+    }
+}
+
+/// Integrates equations of motion over a duration by panels. In the result `b` is that of the last state, grown from
+/// `from.b`.
+pub(crate) fn integrate<T: Scalar, const N: usize>(
+    rates: &impl Rates<N>,
+    t0: f64,
+    from: &State<N, T>,
+    duration: f64,
+    accuracy: f64,
+    work: &mut Work,
+) -> Result<Motion<N, T>, ExactError<N>> {
+    finite("t0", &[t0])?;
+    finite("the duration", &[duration])?;
+    finite("t0 + the duration", &[t0 + duration])?;
+    finite("q", from.q.as_slice())?;
+    finite("v", from.v.as_slice())?;
+    finite("z", &[from.z])?;
+    let mut sums = Sums::new(from);
+    let (mut done, mut panels, mut evaluations) = (Sum::from(0.0), 0, 1);
+    let mut start = rates.at(t0, from)?;
+    // The longest panel that seems possible, and the collocation for it.
+    let mut longest = duration.abs();
+    // Refusals since a panel has come past the nearest end that was refused, and how far that is.
+    let (mut refusals, mut wall) = (0, f64::INFINITY);
+    // The length of the first of these; and how far it is to a place at which a panel has missed something, which no other may pass.
+    let (mut usual, mut suspect) = (longest, f64::INFINITY);
+    // The longest panel until here.
+    let mut scale: f64 = 0.0;
+    // What rounding makes of the rates, and the largest velocity and action until here.
+    let (mut floor, mut units) = (Floor::default(), [Size::default(); 3]);
+    // What the rounding of the time makes of them: far from t = 0 it is all that is known of a force in time.
+    let mut of_time = Floor::default();
+    let mut cause = None;
+    let mut at = *from;
+    let mut ended = duration == 0.0;
+    while !ended {
+        let t = t0 + done.value;
+        let rest = (duration - done.value) + done.lost;
+        longest = longest.min(suspect);
+        let ends = rest.abs() <= longest;
+        let h = if ends {
+            rest
+        } else if refusals == 0 && longest < suspect {
+            rest / (rest.abs() / longest).ceil()
+        } else {
+            longest.copysign(rest)
+        };
+        let reached = || Triple {
+            x: SVector::<f64, N>::from_fn(|i, _| at.q[i].re()),
+            y: SVector::from_fn(|i, _| at.v[i].re()),
+            z: at.z.re(),
+        };
+        // A singularity is closer than round-off.
+        let closed = refusals < HALVING && h.abs() <= 4.0 * f64::EPSILON * duration.abs() && !ends;
+        if closed || refusals > CLOSED || h == 0.0 {
+            return Err(ExactError::OutsideDomain { t, reached: reached().into(), cause });
+        }
+        if work.is_done() {
+            return Err(ExactError::Unfinished { t, reached: reached().into() });
+        }
+        units = [units[0].or(Size::of(&at.v)), units[1].or(Size::of([&at.z])), Size([1.0, f64::INFINITY])];
+        let narrow = (refusals >= NARROW).then_some(units);
+        // At rest velocities are known to the rounding of the positions in the time of a panel.
+        let time = if panels == 0 { duration.abs() } else { scale };
+        let at_rest = [units[0].or(Size::of(&at.q).times(1.0 / time)), units[1], units[2]];
+        let part = h / duration;
+        let problem =
+            Problem { t, h, from: &at, end: None, accuracy, floor: floor.below(&at_rest, h).or(of_time), part, narrow };
+        let mut counted = 0;
+        let outcome = collocate(rates, &problem, start, &mut { at.v }, &mut counted);
+        match outcome {
+            Ok(panel) if panel.error <= accuracy => {
+                panels += 1;
+                scale = larger(scale, h.abs());
+                sums.add(&panel);
+                at = sums.state();
+                done.add(h);
+                ended = ends;
+                start = panel.last;
+                // Beyond some twenty sweeps two panels of half the length are cheaper.
+                let slow = if panel.sweeps > 20 { 0.7 } else { f64::INFINITY };
+                longest = h.abs() * stretch(&panel, accuracy).min(slow).clamp(0.5, 3.0);
+                suspect = if h.abs() >= 0.999 * suspect { f64::INFINITY } else { suspect - h.abs() };
+                wall -= h.abs();
+                if wall <= 0.0 {
+                    if refusals >= NARROW {
+                        longest = usual;
+                    }
+                    (refusals, wall) = (0, f64::INFINITY);
+                } else if refusals >= HALVING {
+                    refusals += 1;
+                    longest = longest.min(2.0 * wall);
+                }
+            }
+            refused => {
+                if refusals == 0 {
+                    usual = h.abs();
+                }
+                if refusals == 0 || refusals >= HALVING {
+                    // What rounding makes of the rates here, which no panel can resolve.
+                    counted += 3;
+                    let later = t + 2.0 * f64::EPSILON * t.abs();
+                    of_time = match (rates.at(t, &at), rates.at(later, &at)) {
+                        (Ok(now), Ok(later)) => Floor::between(&now, &later),
+                        _ => of_time,
+                    };
+                    floor = rates.at(t, &with_last_digits_changed(&at)).map_or(floor, |r| Floor::between(&r, &start));
+                }
+                refusals += 1;
+                longest = match refused {
+                    Ok(panel) => h.abs() * stretch(&panel, accuracy).clamp(0.1, 0.9),
+                    Err(Refused::Hidden(c)) if c > 0.0 && c < 1.0 => {
+                        suspect = h.abs() * c;
+                        suspect
+                    }
+                    Err(Refused::Undefined(error)) => {
+                        cause = Some(error);
+                        h.abs() * 0.4
+                    }
+                    Err(_) => h.abs() * 0.4,
+                };
+                wall = wall.min(h.abs());
+                if refusals >= HALVING {
+                    longest = longest.min(0.5 * wall);
+                }
+            }
+        }
+        evaluations += counted;
+        work.take::<T>(counted);
+    }
+    Ok(Motion {
+        end: VelocityPoint { q: at.q, v: at.v, z: at.z },
+        displacement: SVector::from_fn(|i, _| sums.displacement[i].value),
+        action: sums.action.value,
+        b: at.b,
+        panels,
+        evaluations,
+    })
+}

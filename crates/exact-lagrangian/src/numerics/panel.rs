@@ -1,0 +1,476 @@
+//! One panel of a motion: collocation at Gauss points, solved by iteration to round-off.
+
+use crate::numerics::gauss::{Gauss, MOST, PROBES, Probe, collocations};
+use contact_geom::larger;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{GeometryError, Scalar};
+
+/// The state of a motion `q'' = a`, with two more quantities that grow along it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct State<const N: usize, T = f64> {
+    pub q: SVector<T, N>,
+    pub v: SVector<T, N>,
+    /// The action.
+    pub z: T,
+    /// For Herglotz' equations `b = int L_z`.
+    pub b: T,
+}
+
+/// The rates of `v`, `z` and `b` at a state.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rate<const N: usize, T = f64> {
+    pub a: SVector<T, N>,
+    pub z: T,
+    pub b: T,
+}
+
+impl<const N: usize, T: Scalar> Rate<N, T> {
+    pub fn zero() -> Self {
+        Rate { a: SVector::from_element(T::zero()), z: T::zero(), b: T::zero() }
+    }
+
+    /// The sum of the nodes' rates with these weights.
+    #[inline(always)]
+    fn sum(nodes: &[Self], weights: &[f64; MOST]) -> Self {
+        let mut sum = Self::zero();
+        for (rate, w) in nodes.iter().zip(weights) {
+            for i in 0..N {
+                sum.a[i] += rate.a[i] * *w;
+            }
+            sum.z += rate.z * *w;
+            sum.b += rate.b * *w;
+        }
+        sum
+    }
+}
+
+/// The equations of a motion: what Herglotz' equations, Chetaev's, and the action along a given curve have in common.
+pub(crate) trait Rates<const N: usize> {
+    /// The rates at a time and a state.
+    ///
+    /// # Errors
+    /// A [`GeometryError`] where they are not defined.
+    fn at<T: Scalar>(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError>;
+}
+
+/// A panel that has been solved: the velocity at its start, what changes along it, and how exactly.
+pub(crate) struct Panel<const N: usize, T> {
+    pub v0: SVector<T, N>,
+    pub displacement: SVector<T, N>,
+    pub change: Rate<N, T>,
+    /// The rates at the end, with which the next panel starts.
+    pub last: Rate<N, T>,
+    /// The estimated relative error of the end values.
+    pub error: f64,
+    /// The largest factor by which a sweep after the second reduced the changes.
+    pub contraction: f64,
+    /// The number of nodes.
+    pub nodes: usize,
+    /// The sweeps that were made with the last number of nodes.
+    pub sweeps: u32,
+}
+
+/// The position at a panel's end, where it is given instead of the velocity at the start.
+pub(crate) struct End<'a, const N: usize, T> {
+    pub displacement: &'a SVector<T, N>,
+    /// The inverse of `dq1/dv0`, or what is known of it: `1/h` is that of a free motion, and good enough in a short time.
+    pub inverse: &'a SMatrix<f64, N, N>,
+    /// The factor of contraction above which the iteration is given up, for want of a better inverse.
+    pub patience: f64,
+}
+
+/// Why a panel could not be solved; a shorter one may be.
+pub(crate) enum Refused {
+    /// The iteration does not contract.
+    Slow,
+    /// A value is not finite.
+    NonFinite,
+    /// The rates are not defined at a node.
+    Undefined(GeometryError),
+    /// The nodes miss something: at this part of the panel the rates are not those of the polynomial.
+    Hidden(f64),
+}
+
+/// The smallest positive number, by which all below [`f64::MIN_POSITIVE`] are rounded.
+pub(crate) const SMALLEST: f64 = f64::MIN_POSITIVE * f64::EPSILON;
+
+/// The sweeps after which an iteration counts as not contracting.
+const SWEEPS: u32 = 40;
+
+/// The largest size, of the values alone and of the values with their differentials: over duals both must converge, and
+/// neither may hide behind the other.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Size(pub [f64; 2]);
+
+impl Size {
+    #[inline(always)]
+    fn see<T: Scalar>(&mut self, x: T) {
+        // Comparisons rather than `f64::max`: an extent is no NaN, and of a plain number it is the modulus.
+        let (extent, plain) = (x.extent(), size_of::<T>() == size_of::<f64>());
+        let modulus = if plain { extent } else { x.pivot_size() };
+        if modulus > self.0[0] {
+            self.0[0] = modulus;
+        }
+        if extent > self.0[1] {
+            self.0[1] = extent;
+        }
+    }
+
+    #[inline]
+    pub fn of<'a, T: Scalar>(entries: impl IntoIterator<Item = &'a T>) -> Self {
+        let mut size = Size::default();
+        entries.into_iter().for_each(|e| size.see(*e));
+        size
+    }
+
+    /// The larger of the two quotients; infinite where a size is, and 0 where it is not above a floor, as it is for 0/0.
+    #[inline]
+    fn over(self, scale: Size, floor: Size) -> f64 {
+        let quotient = |i: usize| match self.0[i] {
+            size if size <= floor.0[i] => 0.0,
+            size if size.is_finite() => size / scale.0[i],
+            _ => f64::INFINITY,
+        };
+        larger(quotient(0), quotient(1))
+    }
+
+    /// The same multiple of both.
+    #[inline]
+    pub fn times(self, factor: f64) -> Size {
+        Size(self.0.map(|s| s * factor))
+    }
+
+    /// The larger of each.
+    #[inline]
+    pub fn or(self, other: Size) -> Size {
+        Size([larger(self.0[0], other.0[0]), larger(self.0[1], other.0[1])])
+    }
+}
+
+/// Sizes of rates that are nothing, of a, z and b: what rounding alone makes of them, and what lets none of the changes along a
+/// panel be a normal number.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Floor([Size; 3]);
+
+impl Floor {
+    /// From the rates at a state and at the same state with its last digits changed.
+    pub fn between<const N: usize, T: Scalar>(one: &Rate<N, T>, other: &Rate<N, T>) -> Self {
+        let of = |d: T| Size::of([&d]);
+        let a = (0..N).fold(Size::default(), |size, i| size.or(of(one.a[i] - other.a[i])));
+        let finite = |s: Size| Size(s.0.map(|e| if e.is_finite() { e } else { 0.0 }));
+        Floor([a, of(one.z - other.z), of(one.b - other.b)].map(finite))
+    }
+
+    /// At most what changes velocity, action and b by four roundings of these units along a panel: where rounding makes more,
+    /// the motion is not determined by its rounded state.
+    pub fn below(self, units: &[Size; 3], h: f64) -> Self {
+        let most = |i: usize, k: usize| 4.0 * f64::EPSILON * units[i].0[k] / h.abs();
+        Floor(std::array::from_fn(|i| Size(std::array::from_fn(|k| self.0[i].0[k].min(most(i, k))))))
+    }
+
+    /// The larger of two.
+    pub fn or(self, other: Self) -> Self {
+        Floor(std::array::from_fn(|i| self.0[i].or(other.0[i])))
+    }
+
+    /// A multiple of what rounding makes, and at least what changes nothing by more than some of the smallest numbers along a panel
+    /// of this length.
+    #[inline]
+    fn over(&self, h: f64, factor: f64) -> [Size; 3] {
+        let least = SMALLEST * factor / f64::min(h.abs(), 1.0);
+        self.0.map(|s| s.times(factor).or(Size([least; 2])))
+    }
+}
+
+/// Changes of a sweep and the scales to compare them with, for velocity, action and b.
+#[derive(Default)]
+struct Sweep {
+    changes: [Size; 3],
+    scales: [Size; 3],
+}
+
+impl Sweep {
+    #[inline]
+    fn see<const N: usize, T: Scalar>(&mut self, x: &State<N, T>, new: &Rate<N, T>, old: &Rate<N, T>) {
+        for i in 0..N {
+            self.changes[0].see(new.a[i] - old.a[i]);
+            self.scales[0].see(x.v[i]);
+        }
+        self.changes[1].see(new.z - old.z);
+        self.scales[1].see(new.z);
+        self.changes[2].see(new.b - old.b);
+        self.scales[2].see(new.b);
+    }
+
+    /// The largest relative change: of the velocity in units of the velocity, of the rates of z and b in units of them.
+    #[inline]
+    fn largest(&self, h: f64, floor: &[Size; 3]) -> f64 {
+        let over = |i: usize| self.changes[i].over(self.scales[i], floor[i]);
+        larger(larger(over(0) * h.abs(), over(1)), over(2))
+    }
+}
+
+/// A panel from a state at a time over a duration; where the end is given, the initial velocity is an unknown, and `from.v` not read.
+pub(crate) struct Problem<'a, const N: usize, T> {
+    pub t: f64,
+    pub h: f64,
+    pub from: &'a State<N, T>,
+    pub end: Option<End<'a, N, T>>,
+    /// The relative error that is wanted; half a unit of round-off at least.
+    pub accuracy: f64,
+    /// What is nothing beside the rates.
+    pub floor: Floor,
+    /// The part of the whole motion that the panel is.
+    pub part: f64,
+    /// Where a panel has been refused again and again: the largest velocity and action of the motion until here, and the unit of b.
+    /// Then few nodes are tried, and a jump of the rates is passed where it changes none of these by more than a rounding.
+    pub narrow: Option<[Size; 3]>,
+}
+
+/// Solves a panel, first with few nodes; with more, from where these have led, as long as they do not resolve the motion. A
+/// solution is then compared with the equations between its nodes.
+///
+/// `v0` is the initial velocity, or a guess of it that is improved upon, also if the panel is refused. A panel that the most nodes
+/// do not resolve is returned with its error. The evaluations of the rates are counted in `evaluations`.
+pub(crate) fn collocate<const N: usize, T: Scalar>(
+    rates: &impl Rates<N>,
+    problem: &Problem<N, T>,
+    guess: Rate<N, T>,
+    v0: &mut SVector<T, N>,
+    evaluations: &mut u64,
+) -> Result<Panel<N, T>, Refused> {
+    let mut nodes = [guess; MOST];
+    let mut contraction = 0.0;
+    let sizes = if problem.narrow.is_some() { 2 } else { collocations().len() };
+    for (k, g) in collocations()[..sizes].iter().enumerate() {
+        let largest = k + 1 == sizes;
+        let (mut panel, seen) = sweeps(rates, problem, g, &mut nodes[..g.s], v0, largest, evaluations)?;
+        contraction = larger(panel.contraction, contraction);
+        panel.contraction = contraction;
+        if panel.error <= problem.accuracy {
+            let start = problem.end.is_none().then_some(&guess);
+            panel.last = between_nodes(rates, problem, g, &nodes[..g.s], &panel, &seen, start, evaluations)?;
+            return Ok(panel);
+        }
+        if largest {
+            return Ok(panel);
+        }
+        let coarse = nodes;
+        for (node, row) in nodes.iter_mut().zip(&g.refine) {
+            *node = Rate::sum(&coarse[..g.s], row);
+        }
+    }
+    Err(Refused::Slow)
+}
+
+/// Compares a solution with its equations at the panel's ends and between its nodes, where something narrow may hide; the rates at
+/// the end.
+///
+/// There are so many probes that a motion is looked at in all at [`PROBES`] places and more if it is long, which is to say, if it
+/// changes its position or its velocity by as much as they are; and at [`PROBES_STILL`](crate::numerics::gauss::PROBES_STILL) if there is no
+/// force at all.
+#[expect(clippy::too_many_arguments)]
+fn between_nodes<const N: usize, T: Scalar>(
+    rates: &impl Rates<N>,
+    problem: &Problem<N, T>,
+    g: &Gauss,
+    nodes: &[Rate<N, T>],
+    panel: &Panel<N, T>,
+    seen: &Sweep,
+    start: Option<&Rate<N, T>>,
+    evaluations: &mut u64,
+) -> Result<Rate<N, T>, Refused> {
+    let Problem { t, h, from, accuracy, .. } = *problem;
+    let sizes =
+        |r: &Rate<N, T>| [r.a.iter().map(|a| a.pivot_size()).fold(0.0, larger), r.z.pivot_size(), r.b.pivot_size()];
+    let most = |rates: &[Rate<N, T>]| {
+        rates.iter().map(sizes).fold([0.0; 3], |m: [f64; 3], e| std::array::from_fn(|i| larger(m[i], e[i])))
+    };
+    let (largest, tails) = (most(nodes), most(&g.tail.map(|row| Rate::sum(nodes, &row))));
+    let floor = problem.floor.over(h, 64.0);
+    let position = from.q.iter().map(|q| q.pivot_size()).fold(0.0, larger);
+    // What a change of a rate must exceed to matter: the polynomial's own error, and what changes the state by roundings.
+    let state = [seen.scales[0].0[0], from.z.pivot_size(), 1.0];
+    let allowed: [f64; 3] = std::array::from_fn(|i| {
+        let rounding = larger(1e4 * accuracy * largest[i], 32.0 * accuracy * state[i] / h.abs());
+        larger(16.0 * tails[i], rounding) + floor[i].0[0]
+    });
+    let misfit = |found: &Rate<N, T>, row: &[f64; MOST]| {
+        let continued = Rate::sum(nodes, row);
+        Rate { a: found.a - continued.a, z: found.z - continued.z, b: found.b - continued.b }
+    };
+    let within = |misfit: &Rate<N, T>, bounds: &[f64; 3]| sizes(misfit).iter().zip(bounds).all(|(m, bound)| m <= bound);
+    if let Some(start) = start
+        && !within(&misfit(start, &g.start), &allowed)
+    {
+        return Err(Refused::Hidden(0.0));
+    }
+    let moved = panel.displacement.iter().map(|d| d.pivot_size()).fold(0.0, larger);
+    let still = largest[0] == 0.0;
+    // Of a motion of many panels also the change of the velocity tells: it may have come to rest.
+    let faster = if problem.part.abs() < 0.5 { largest[0] * h.abs() / state[0] } else { 0.0 };
+    let share = if still { 1.0 } else { larger(moved / larger(position, moved), faster).min(1.0) };
+    let places = if still { g.probes.len() } else { PROBES };
+    let wanted = (places as f64 * problem.part.abs() * share * share) as usize;
+    let count = wanted.max(g.s + 2).min(g.probes.len());
+    *evaluations += count as u64;
+    let (mut last, mut missed) = (None, [Rate::zero(); 2]);
+    for Probe { c, weight, value, once, twice } in &g.probes[..count] {
+        let Rate { a, z, b } = Rate::sum(nodes, once);
+        let aa = Rate::sum(nodes, twice).a;
+        let x = State {
+            q: SVector::from_fn(|k, _| from.q[k] + (panel.v0[k] * *c + aa[k] * h) * h),
+            v: panel.v0 + a * T::from(h),
+            z: from.z + z * h,
+            b: from.b + b * h,
+        };
+        let rate = rates.at(t + c * h, &x).map_err(Refused::Undefined)?;
+        let apart = misfit(&rate, value);
+        if !within(&apart, &allowed) {
+            return Err(Refused::Hidden(*c));
+        }
+        for (missed, weight) in missed.iter_mut().zip([*weight, *weight * *c]) {
+            missed.a += apart.a * T::from(weight);
+            missed.z += apart.z * weight;
+            missed.b += apart.b * weight;
+        }
+        last = last.or(Some(rate));
+    }
+    // In the mean the polynomial's own error vanishes, up to an order beyond the panel's, and so does its first moment. Not so those
+    // of a force which is too small to be seen beside it, and too fast for the nodes; that both do by chance is unlikely.
+    let mean = std::array::from_fn(|i| 16.0 * accuracy * larger(largest[i], state[i] / h.abs()) + floor[i].0[0]);
+    if !missed.iter().all(|missed| within(missed, &mean)) {
+        return Err(Refused::Hidden(0.0));
+    }
+    Ok(last.unwrap_or(panel.last))
+}
+
+/// Solves the collocation equations by iteration, from the rates in `nodes` and the velocity `v0`, and leaves the solution
+/// there.
+///
+/// A sweep evaluates the rates node by node, each from the latest. The iteration ends when the next change, predicted from
+/// the last two, is below the accuracy, when changes within round-off no longer fall, or when it is clear that the nodes do
+/// not resolve the motion.
+fn sweeps<const N: usize, T: Scalar>(
+    rates: &impl Rates<N>,
+    problem: &Problem<N, T>,
+    g: &Gauss,
+    nodes: &mut [Rate<N, T>],
+    v0: &mut SVector<T, N>,
+    last: bool,
+    evaluations: &mut u64,
+) -> Result<(Panel<N, T>, Sweep), Refused> {
+    let Problem { t, h, from, end, accuracy, narrow, .. } = problem;
+    let (t, h) = (*t, *h);
+    let (nothing, rounding) = (Floor::default().over(h, 1.0), problem.floor.over(h, 16.0));
+    let (mut before, mut contraction) = (f64::INFINITY, 0.0f64);
+    for sweep in 1..=SWEEPS {
+        if let Some(End { displacement, inverse, .. }) = end {
+            let twice = Rate::sum(nodes, &g.end).a;
+            let missed = SVector::<T, N>::from_fn(|i, _| displacement[i] - (v0[i] + twice[i] * h) * h);
+            for (i, j) in (0..N).flat_map(|i| (0..N).map(move |j| (i, j))) {
+                v0[i] += missed[j] * inverse[(i, j)];
+            }
+        }
+        let mut seen = Sweep::default();
+        *evaluations += g.s as u64;
+        for i in 0..g.s {
+            let (mut once, mut twice) = (Rate::<N, T>::zero(), SVector::<T, N>::from_element(T::zero()));
+            for ((rate, a), aa) in nodes.iter().zip(&g.a[i]).zip(&g.aa[i]) {
+                for k in 0..N {
+                    once.a[k] += rate.a[k] * *a;
+                    twice[k] += rate.a[k] * *aa;
+                }
+                once.z += rate.z * *a;
+                once.b += rate.b * *a;
+            }
+            let x = State {
+                q: SVector::from_fn(|k, _| from.q[k] + (v0[k] * g.c[i] + twice[k] * h) * h),
+                v: SVector::from_fn(|k, _| v0[k] + once.a[k] * h),
+                z: from.z + once.z * h,
+                b: from.b + once.b * h,
+            };
+            let rate = rates.at(t + g.c[i] * h, &x).map_err(Refused::Undefined)?;
+            seen.see(&x, &rate, &nodes[i]);
+            nodes[i] = rate;
+        }
+        if let Some([v, z, b]) = narrow {
+            let units = [*v, z.times(1.0 / h.abs()), b.times(1.0 / h.abs())];
+            seen.scales = std::array::from_fn(|i| seen.scales[i].or(units[i]));
+        }
+        let change = seen.largest(h, &nothing);
+        if !change.is_finite() {
+            // After a first guess of zero rates a scale may be zero; one sweep later a value is not a number.
+            if sweep > 1 {
+                return Err(Refused::NonFinite);
+            }
+            continue;
+        }
+        let error = estimate(problem, nodes, &seen, g);
+        let ratio = if before.is_finite() { change / before } else { 1.0 };
+        let above_noise = change > 1e3 * f64::EPSILON;
+        if sweep > 2 && above_noise {
+            contraction = contraction.max(ratio);
+        }
+        // The first ratio compares with the change from a guess, and may be far below those that follow.
+        let expected = if sweep < 3 { ratio.max(1e-3) } else { ratio };
+        let predicted = change * expected <= 0.5 * accuracy;
+        // After few sweeps a larger change may still be one that is on its way.
+        let noise = if sweep < 6 { 16.0 } else { 4096.0 } * f64::EPSILON;
+        let stagnant = before.is_finite() && ratio >= 1.0 && (change <= noise || seen.largest(h, &rounding) == 0.0);
+        let unresolved = !last && error > *accuracy && change <= 0.1 * error.sqrt();
+        if predicted || stagnant || unresolved {
+            let (mean, twice) = (Rate::sum(nodes, &g.b), Rate::sum(nodes, &g.end).a);
+            let displacement = match end {
+                Some(end) => *end.displacement,
+                None => SVector::from_fn(|i, _| (v0[i] + twice[i] * h) * h),
+            };
+            let panel = Panel {
+                v0: *v0,
+                displacement,
+                change: Rate { a: mean.a.map(|a| a * h), z: mean.z * h, b: mean.b * h },
+                last: nodes[g.s - 1],
+                error,
+                contraction,
+                nodes: g.s,
+                sweeps: sweep,
+            };
+            return Ok((panel, seen));
+        }
+        let patience = end.as_ref().map_or(1.0, |end| end.patience);
+        if (ratio >= 1.0 && sweep > 8) || (ratio > patience && sweep > 3 && above_noise) {
+            return Err(Refused::Slow);
+        }
+        before = change;
+    }
+    Err(Refused::Slow)
+}
+
+/// The estimated relative error of the changes over a panel, from the rates at its nodes.
+///
+/// The interpolation of the rates misses a part of the size of their last Legendre coefficients; Gauss' weights annihilate
+/// it up to a product with the like part of the adjoint motion. So the error is the square of the relative tail; for
+/// `v' = c v` this is exactly the error of the Padé approximation, up to the factor `1 / (2s + 1)` that is applied. That holds
+/// where the coefficients fall geometrically, so that the tail is the square of what is half-way to it: of a function with a kink
+/// they fall by a power only, and the second factor is that from half-way to the end.
+fn estimate<const N: usize, T: Scalar>(problem: &Problem<N, T>, nodes: &[Rate<N, T>], seen: &Sweep, g: &Gauss) -> f64 {
+    let h = problem.h;
+    let floor = problem.floor.over(h, 32.0);
+    let [tails, middle] = [&g.tail, &g.middle].map(|rows| {
+        let [one, two] = (*rows).map(|row| Rate::sum(nodes, &row));
+        [Size::of(one.a.iter().chain(two.a.iter())), Size::of([&one.z, &two.z]), Size::of([&one.b, &two.b])]
+    });
+    let accelerations = Size::of(nodes.iter().flat_map(|r| r.a.iter()));
+    let scales = [accelerations, seen.scales[1], seen.scales[2]];
+    let relative: [f64; 3] = std::array::from_fn(|i| {
+        let tail = tails[i].over(scales[i], floor[i]);
+        let fall = tails[i].over(middle[i], floor[i]);
+        // Below some roundings the coefficients do not fall.
+        if tail <= 64.0 * f64::EPSILON { tail * tail } else { tail * larger(tail, (fall * fall).min(1.0)) }
+    });
+    let velocity = match relative[0] {
+        0.0 => 0.0,
+        tail => tail * accelerations.over(seen.scales[0], Size::default()) * h.abs(),
+    };
+    larger(larger(velocity, relative[1]), relative[2]) / (2 * g.s + 1) as f64
+}

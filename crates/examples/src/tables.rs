@@ -1,0 +1,94 @@
+//! The tables of the README, from those in code.
+
+use contact_geom::Lagrangian;
+use contact_geom::systems::{Pendulum, System, SystemVisitor, catalogue_size, visit_catalogue};
+use discrete_herglotz::{AnyIntegrator, Facts, Integrator};
+
+/// The integrators by name, those of one kind in one line: order, what a step solves, its `sigma_d` for a linear drag, and how many of the
+/// catalogue's systems meet the hypotheses.
+pub fn integrators() -> String {
+    let mut kinds: Vec<(Facts, Vec<AnyIntegrator>)> = Vec::new();
+    for integrator in AnyIntegrator::all() {
+        let facts = facts(&integrator);
+        let same = |other: &Facts| {
+            let of =
+                |f: &Facts| (f.explicit, f.symmetric, f.exact_rate, f.by_clock, f.substeps, f.collocation.is_some());
+            let of_any_order = facts.collocation.is_some() || facts.substeps && !facts.explicit;
+            of(other) == of(&facts) && (of_any_order || other.order == facts.order)
+        };
+        match kinds.iter_mut().find(|(of_kind, _)| same(of_kind)) {
+            Some((_, kind)) => kind.push(integrator),
+            None => kinds.push((facts, vec![integrator])),
+        }
+    }
+    let mut table = format!(
+        "| Name | Order | Step | `sigma_d` of a linear drag | Takes, of {} systems |\n|---|---|---|---|---|\n",
+        catalogue_size()
+    );
+    for (facts, kind) in &kinds {
+        let names: Vec<String> = kind.iter().map(|integrator| format!("`{integrator}`")).collect();
+        let last = kind.last().map_or(0, |integrator| integrator.order());
+        let names = match (facts.collocation, names.as_slice()) {
+            (Some(_), [first, .., last_name]) => format!("{first} .. {last_name}"),
+            _ => names.join(", "),
+        };
+        let order = if last == facts.order { last.to_string() } else { format!("{} .. {last}", facts.order) };
+        let step = if facts.explicit { "explicit" } else { "implicit" };
+        let rate = if facts.exact_rate { "`e^(gamma h)`" } else { "to the order" };
+        let taken = kind.first().map_or(0, taken);
+        table += &format!("| {names} | {order} | {step} | {rate} | {taken} |\n");
+    }
+    table
+}
+
+/// The systems of the catalogue, with the numbers of their coordinates.
+pub fn systems() -> String {
+    struct Names(Vec<String>);
+    impl SystemVisitor for Names {
+        fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+            self.0.push(format!("`{}` ({N})", system.name()));
+        }
+    }
+    let mut names = Names(Vec::new());
+    visit_catalogue(&mut names);
+    names.0.join(", ") + "\n"
+}
+
+fn facts(integrator: &AnyIntegrator) -> Facts {
+    Integrator::<'_, Pendulum, 1>::facts(integrator)
+}
+
+/// How many systems of the catalogue meet the hypotheses of an integrator.
+fn taken(integrator: &AnyIntegrator) -> usize {
+    struct Taken(AnyIntegrator, usize);
+    impl SystemVisitor for Taken {
+        fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
+            self.1 += usize::from(check(&self.0, system));
+        }
+    }
+    fn check<const N: usize, L: Lagrangian<N>>(integrator: &AnyIntegrator, lagrangian: &L) -> bool {
+        integrator.check(lagrangian).is_ok()
+    }
+    let mut taken = Taken(*integrator, 0);
+    visit_catalogue(&mut taken);
+    taken.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What stands between `<!-- name -->` and `<!-- end name -->`.
+    fn part(name: &str) -> &'static str {
+        let readme = include_str!("../../../README.md");
+        let (_, rest) = readme.split_once(&format!("<!-- {name} -->\n")).unwrap_or_default();
+        rest.split_once(&format!("<!-- end {name} -->")).unwrap_or_default().0
+    }
+
+    #[test]
+    fn the_readme_has_the_tables_of_the_code() {
+        for (name, table) in [("integrators", integrators()), ("systems", systems())] {
+            assert!(part(name) == table, "README.md is to have, between the marks of {name}:\n{table}");
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! Damping and stiffness: a few steps of every family over all ratios of the step to the times of the motion.
+
+use crate::formula::{Formula, Kinetic, Rate, Smooth};
+use crate::motion::{End, FAMILIES, ORDER_ONE, Problem, Worth, distance};
+use crate::parallel::parallel;
+use crate::report::Report;
+use contact_examples::{Failure, number};
+use contact_geom::nalgebra::SMatrix;
+use contact_geom::systems::HarmonicOscillator;
+use contact_geom::{PhasePoint, VelocityPoint, larger};
+use discrete_herglotz::{AnyIntegrator, SplittingScheme};
+use std::collections::BTreeMap;
+
+/// `gamma h`.
+const DAMPINGS: [f64; 11] = [-1e6, -1e4, -1e2, -10.0, -1.0, -1e-3, 0.0, 1e-3, 1.0, 10.0, 50.0];
+
+/// `k h^2`.
+const STIFFNESSES: [f64; 11] = [1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e2, 1e4, 1e8, 1e12];
+
+/// The second mass over the first.
+const MASSES: [f64; 7] = [1e-14, 1e-9, 1e-4, 1.0, 1e4, 1e9, 1e14];
+
+/// The steps of a run, each of length 1.
+const STEPS: usize = 4;
+
+/// What the runs of one integrator are worth.
+pub type Tally = BTreeMap<Worth, usize>;
+
+/// Counts of what must never happen.
+pub fn bad<'a>(tallies: impl IntoIterator<Item = &'a Tally>) -> f64 {
+    tallies.into_iter().flatten().filter(|(worth, _)| worth.is_bad()).map(|(_, count)| *count as f64).sum()
+}
+
+/// A table's row of a tally: its counts of right, said and bad ends.
+pub fn row(name: String, tally: &Tally) -> Vec<String> {
+    let count = |worths: &[Worth]| worths.iter().filter_map(|w| tally.get(w)).sum::<usize>().to_string();
+    vec![
+        name,
+        count(&[Worth::Right]),
+        count(&[Worth::Coarse]),
+        count(&[Worth::Marked]),
+        count(&[Worth::Halted]),
+        count(&[Worth::Refused]),
+        count(&[Worth::Wrong, Worth::NotANumber, Worth::Panicked]),
+    ]
+}
+
+/// The columns of [`row`], after the first.
+pub const COLUMNS: [&str; 6] = ["right", "coarse", "marked", "halted", "refused", "wrong in silence"];
+
+/// The damped oscillator `q'' = -k q + gamma q'` by its closed form: in units of its own time.
+fn truth(gamma: f64, k: f64, t: f64, start: &VelocityPoint<1>) -> PhasePoint<1> {
+    let w = k.sqrt();
+    let scaled = VelocityPoint { v: start.v / w, ..*start };
+    let end = HarmonicOscillator { gamma: gamma / w }.solution(t * w, &scaled);
+    PhasePoint { q: end.q, p: end.v * w, z: end.z * w }
+}
+
+/// With both coordinates as velocities, so that each counts by its energy.
+fn in_velocities(x: &PhasePoint<1>, w: f64) -> PhasePoint<1> {
+    PhasePoint { q: x.q * w, ..*x }
+}
+
+pub fn run(report: &mut Report) -> Result<(), Failure> {
+    let mut cases: Vec<(AnyIntegrator, bool, f64, f64)> = Vec::new();
+    for integrator in FAMILIES {
+        for (claims, gamma) in [true, false].into_iter().flat_map(|c| DAMPINGS.map(|g| (c, g))) {
+            cases.extend(STIFFNESSES.map(|k| (integrator, claims, gamma, k)));
+        }
+    }
+    let found = parallel(&report.bar, cases.len(), |i| {
+        let (integrator, claims, gamma, k) = cases[i];
+        let smooth = Smooth { spring: k, ..Smooth::default() };
+        let system = Formula { smooth, ..Formula::<1>::oscillator(gamma) };
+        let system = if claims { system } else { system.claiming_nothing() };
+        let w = k.sqrt();
+        let start = VelocityPoint::new([1.0 / w.max(1.0)], [0.5], 0.0);
+        let problem = Problem { system, t0: 0.0, start, span: STEPS as f64 };
+        let exact = in_velocities(&truth(gamma, k, STEPS as f64, &start), w);
+        let end = match problem.by(integrator, STEPS) {
+            End::Whole(x) => End::Whole(in_velocities(&x, w)),
+            End::Marked(x) => End::Marked(in_velocities(&x, w)),
+            other => other,
+        };
+        // What decays is compared with what it was; nothing is left of it in either.
+        let scale = (start.q[0] * w).hypot(start.v[0]);
+        (end.worth(&exact, scale, ORDER_ONE), end.error(&exact, scale))
+    });
+
+    let mut tallies: BTreeMap<(usize, bool), Tally> = BTreeMap::new();
+    let mut rows = Vec::new();
+    for ((integrator, claims, gamma, k), (worth, error)) in cases.iter().zip(&found) {
+        let place = FAMILIES.iter().position(|i| i == integrator).unwrap_or(0);
+        *tallies.entry((place, *claims)).or_default().entry(*worth).or_default() += 1;
+        let names = [integrator.to_string(), claims.to_string(), "1".into()];
+        let numbers = [number(*gamma), number(*k), worth.name().into(), number(*error)];
+        rows.push(names.into_iter().chain(numbers).collect());
+    }
+    let name = |(place, claims): &(usize, bool)| {
+        format!("{}, {}", FAMILIES[*place], if *claims { "claims" } else { "no claims" })
+    };
+    let columns: Vec<&str> = ["integrator"].into_iter().chain(COLUMNS).collect();
+    report.markdown(&columns, tallies.iter().map(|(key, tally)| row(name(key), tally)));
+    report.at_most(
+        &format!(
+            "of {} runs of 4 steps, gamma h = -1e6 .. 50 and k h^2 = 1e-12 .. 1e12: wrong in silence",
+            cases.len()
+        ),
+        bad(tallies.values()),
+        0.0,
+    )?;
+    // With exact rate a motion that is nothing but drag and a slow spring has no error to speak of.
+    let mut worst = 0.0;
+    for ((integrator, claims, gamma, k), (worth, error)) in cases.iter().zip(&found) {
+        let exact = *integrator == AnyIntegrator::Splitting(SplittingScheme::STRANG);
+        if exact && *claims && *k <= 1e-9 && *gamma <= 0.0 {
+            worst = larger(worst, if *worth == Worth::Right { *error } else { f64::NAN });
+        }
+    }
+    report.at_most("strang at k h^2 <= 1e-9, any damping: error (its rate is exact)", worst, 1e-8)?;
+    masses(report, &mut rows)?;
+    report.table(&["integrator", "claims", "mass_ratio", "gamma_h", "k_h2", "worth", "error"], rows)
+}
+
+/// Two masses of very different size on equal springs, coupled through the mass matrix.
+fn masses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
+    let mut tally = Tally::new();
+    let mut worst = 0.0;
+    for ratio in MASSES {
+        let coupled = 0.3 * ratio.min(1.0 / ratio).sqrt() * ratio.sqrt();
+        let kinetic = Kinetic::Mass(SMatrix::from([[1.0, coupled], [coupled, ratio]]));
+        let smooth = Smooth { spring: ratio.min(1.0), ..Smooth::default() };
+        let system = Formula::<2> { kinetic, smooth, rate: Rate::Constant(-0.1), ..Formula::FREE };
+        let start = VelocityPoint::new([1.0, 0.5], [0.0, 0.2], 0.0);
+        let problem = Problem { system, t0: 0.0, start, span: 4.0 };
+        let exact = problem.exact()?;
+        for integrator in FAMILIES {
+            let end = problem.by(integrator, 32);
+            // Momenta differ by the ratio; positions do not.
+            let positions = |x: &PhasePoint<2>| PhasePoint { p: x.p * 0.0, ..*x };
+            let worth = match &end {
+                End::Whole(x) if distance(&positions(x), &positions(&exact), 0.0) <= ORDER_ONE => Worth::Right,
+                End::Whole(x) if distance(&positions(x), &positions(&exact), 0.0).is_nan() => Worth::NotANumber,
+                other => other.worth(&exact, 0.0, ORDER_ONE),
+            };
+            let error = match &end {
+                End::Whole(x) | End::Marked(x) => distance(&positions(x), &positions(&exact), 0.0),
+                _ => f64::NAN,
+            };
+            if integrator.order() >= 16 {
+                worst = larger(worst, error);
+            }
+            *tally.entry(worth).or_default() += 1;
+            let names = [integrator.to_string(), "true".into(), number(ratio)];
+            rows.push(
+                names.into_iter().chain(["-0.0125".into(), "-".into(), worth.name().into(), number(error)]).collect(),
+            );
+        }
+    }
+    report.at_most("mass ratios 1e-14 .. 1e14: runs wrong in silence", bad([&tally]), 0.0)?;
+    // Some hundred roundings of positions of size one.
+    report.at_most("mass ratios 1e-14 .. 1e14: error of Gauss with 8 and 16 stages", worst, 1e-12)
+}

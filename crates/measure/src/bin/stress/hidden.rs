@@ -1,0 +1,265 @@
+//! Hidden things: narrow forces, walls, kinks, jumps and drags at random places, for an accuracy that is asked for, for the exact
+//! flow, and for claims of structure that hold where one looks first.
+
+use crate::damping::{COLUMNS, Tally, bad, row};
+use crate::formula::{Feature, Force, Formula, Rate, Smooth};
+use crate::motion::{End, FAMILIES, Problem, Worth, distance, dop853_in};
+use crate::parallel::parallel;
+use crate::random::Random;
+use crate::report::Report;
+use contact_examples::{Failure, number};
+use contact_geom::{PhasePoint, Structure, VelocityPoint};
+use std::collections::BTreeMap;
+
+/// The kinds of what is hidden.
+const KINDS: [&str; 9] =
+    ["hill", "pulse of force", "pulse of drag", "region of drag", "wall", "kink", "jump", "fast drive", "fast drag"];
+
+/// The accuracy that is asked for, and the error that the exact flow may have.
+const ACCURACY: f64 = 1e-6;
+const EXACT: f64 = 1e-9;
+
+/// The part of the span above which nothing may be missed, by the documents: they are looked at in about a thousand places.
+const SEEN: f64 = 1e-3;
+
+/// A problem with its true end.
+struct Hidden {
+    kind: usize,
+    width: f64,
+    /// Whether it is narrower than what the documents promise to see.
+    narrow: bool,
+    problem: Problem<1>,
+    truth: Option<PhasePoint<1>>,
+}
+
+/// A free particle of velocity 1 from 0.
+fn free(feature: Feature) -> Problem<1> {
+    let start = VelocityPoint::new([0.0], [1.0], 0.0);
+    Problem { system: Formula { feature, ..Formula::FREE }, t0: 0.0, start, span: 10.0 }
+}
+
+/// An oscillator from `(1, 0.3)`.
+fn swinging(rate: Rate, force: Force) -> Problem<1> {
+    let start = VelocityPoint::new([1.0], [0.3], 0.2);
+    Problem { system: Formula { rate, force, ..Formula::oscillator(0.0) }, t0: 0.0, start, span: 10.0 }
+}
+
+impl Hidden {
+    fn random(i: usize, finest: f64) -> Hidden {
+        let mut random = Random::new(6, i);
+        let kind = i % KINDS.len();
+        let (at, width) = (random.between(1.0, 8.0), random.spread(finest, 0.3));
+        let sign = if random.happens(0.5) { 1.0 } else { -1.0 };
+        let strength = random.between(0.3, 2.0);
+        // How many parts of the span are so short that nothing is narrower.
+        let parts = |width: f64| Some((40.0 / width).ceil() as usize);
+        let (problem, parts) = match kind {
+            0 => (free(Feature::Hill { at, width, height: strength }), parts(width)),
+            1 => {
+                let force = Force::Pulse { size: sign * strength / width, at, width };
+                (swinging(Rate::Constant(-0.05), force), parts(width))
+            }
+            2 => (swinging(Rate::Pulse { size: -strength / width, at, width }, Force::None), parts(width)),
+            3 => {
+                let at = random.between(-0.9, 0.9);
+                (swinging(Rate::Region { size: -strength, at, width }, Force::None), parts(width))
+            }
+            4 => (free(Feature::Wall { width: at }), Some(2000)),
+            5 => (free(Feature::Kink { at, slope: strength }), None),
+            // Narrower than anything: the closed form is that of a jump.
+            6 => (free(Feature::Step { at, width: 1e-10, height: 0.5 * sign * strength }), None),
+            // Whole numbers of periods in a power of two of steps.
+            7 => {
+                let frequency = std::f64::consts::TAU * f64::from(1 << random.below(6));
+                let force = Force::Swinging { size: 4.0 * strength, frequency };
+                (Problem { span: 16.0, ..swinging(Rate::Constant(-0.1), force) }, Some(4096))
+            }
+            _ => {
+                let frequency = std::f64::consts::TAU * f64::from(1 << random.below(6));
+                (
+                    Problem { span: 16.0, ..swinging(Rate::Swinging { size: -strength, frequency }, Force::None) },
+                    Some(4096),
+                )
+            }
+        };
+        let truth = match (parts, problem.system.feature) {
+            // By another method where the exact flow gives up.
+            (Some(parts), _) => {
+                problem.exact_in(parts).ok().or_else(|| dop853_in::<1, 3>(&problem, parts, 1e-13, 1e-13))
+            }
+            (None, Feature::Kink { at, slope }) => Some(over_kink(at, slope, problem.span)),
+            (None, Feature::Step { at, height, .. }) => Some(over_jump(at, height, problem.span)),
+            _ => None,
+        };
+        let narrow = kind < 4 && width < SEEN * problem.span;
+        Hidden { kind, width, narrow, problem, truth }
+    }
+}
+
+/// From 0 with velocity 1 in `slope |q - at|`, `at > 0`: parabolas.
+fn over_kink(at: f64, slope: f64, span: f64) -> PhasePoint<1> {
+    let (mut t, mut x, mut v) = (0.0, -at, 1.0f64);
+    loop {
+        // On this side the force is towards 0; it is left when the parabola is back, at the time of the later root.
+        let side = if x == 0.0 { v.signum() } else { x.signum() };
+        let force = -side * slope;
+        let (speed, height) = (side * v, side * x);
+        let back = (speed + (speed * speed + 2.0 * slope * height).sqrt()) / slope;
+        if t + back >= span {
+            let s = span - t;
+            return PhasePoint::new([at + x + v * s + 0.5 * force * s * s], [v + force * s], 0.0);
+        }
+        (t, x, v) = (t + back, 0.0, v + force * back);
+    }
+}
+
+/// From 0 with velocity 1 over a jump of the potential: slower beyond, or back.
+fn over_jump(at: f64, height: f64, span: f64) -> PhasePoint<1> {
+    let (t, energy) = (at, 0.5 - height);
+    let v = if energy > 0.0 { (2.0 * energy).sqrt() } else { -1.0 };
+    if span <= t { PhasePoint::new([span], [1.0], 0.0) } else { PhasePoint::new([at + v * (span - t)], [v], 0.0) }
+}
+
+pub fn run(report: &mut Report) -> Result<(), Failure> {
+    let (count, finest) = if report.quick { (54, 1e-2) } else { (1800, 1e-3) };
+    let found = parallel(&report.bar, count, |i| {
+        let hidden = Hidden::random(i, finest);
+        let truth = hidden.truth?;
+        let to = hidden.problem.to(ACCURACY);
+        let exact = hidden.problem.exact();
+        let exact = exact.map_or(End::Panicked, End::Whole);
+        let exact_worth = match &exact {
+            End::Panicked => Worth::Refused,
+            end => end.worth(&truth, 0.0, EXACT),
+        };
+        let of_run = (to.worth(&truth, 0.0, 10.0 * ACCURACY), to.error(&truth, 0.0));
+        Some((hidden, of_run, (exact_worth, exact.error(&truth, 0.0))))
+    });
+    let mut rows = Vec::new();
+    let mut tallies: BTreeMap<(&str, bool, usize), Tally> = BTreeMap::new();
+    for (Hidden { kind, width, narrow, .. }, of_run, of_flow) in found.iter().flatten() {
+        for (by, (worth, error)) in [("to 1e-6", of_run), ("exact flow", of_flow)] {
+            *tallies.entry((by, *narrow, *kind)).or_default().entry(*worth).or_default() += 1;
+            rows.push(vec![KINDS[*kind].into(), by.into(), number(*width), worth.name().into(), number(*error)]);
+        }
+    }
+    let unknown = found.iter().filter(|f| f.is_none()).count();
+    report.at_most("random hidden things without a known truth", unknown as f64, 0.0)?;
+    for (by, narrow, what) in [
+        ("to 1e-6", false, "hidden things"),
+        ("exact flow", false, "hidden things"),
+        ("to 1e-6", true, "hidden things narrower than a thousandth of the span"),
+        ("exact flow", true, "hidden things narrower than a thousandth of the span"),
+    ] {
+        let of = || tallies.iter().filter(|((who, thin, _), _)| (*who, *thin) == (by, narrow)).map(|(_, tally)| tally);
+        let all: usize = of().flat_map(|tally| tally.values()).sum();
+        // A quick run has none that narrow.
+        if all > 0 {
+            report.at_most(&format!("{what}, {by}: of {all} wrong in silence"), bad(of()), 0.0)?;
+        }
+    }
+    let named = |by: &str, narrow: bool, kind: usize| {
+        format!("{}{}, {by}", KINDS[kind], if narrow { " (narrower than a thousandth)" } else { "" })
+    };
+    let mut lines: Vec<Vec<String>> =
+        tallies.iter().map(|((by, narrow, kind), tally)| row(named(by, *narrow, *kind), tally)).collect();
+    lines.extend(claims(report, &mut rows)?);
+    let columns: Vec<&str> = ["what is hidden"].into_iter().chain(COLUMNS).collect();
+    report.markdown(&columns, lines);
+    report.table(&["what", "by", "width", "worth", "error"], rows)
+}
+
+/// Claims that are true at the start and false later, and true claims beside the border of a domain.
+fn claims(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<Vec<Vec<String>>, Failure> {
+    let all = |system: Formula<1>, change: fn(&mut Structure)| {
+        let mut claims = contact_geom::Lagrangian::<1>::structure(&system);
+        change(&mut claims);
+        Formula { claims: Some(claims), ..system }
+    };
+    let steady: fn(&mut Structure) = |c| (c.autonomous, c.constant_rate) = (true, true);
+    let affine: fn(&mut Structure) = |c| (c.z_affine, c.constant_rate, c.separable) = (true, true, true);
+    let quadratic: fn(&mut Structure) = |c| c.quadratic = true;
+    let timed = |rate, force| swinging(rate, force).system;
+    let bump = |feature| Formula { feature, smooth: Smooth { spring: 1.0, ..Smooth::default() }, ..Formula::FREE };
+    let (none, still) = (Force::None, Rate::Constant(-0.1));
+    let lies = [
+        (
+            "rate -0.3 cos t said constant",
+            all(timed(Rate::Swinging { size: -0.3, frequency: 1.0 }, none), |c| c.constant_rate = true),
+        ),
+        ("force 0.5 cos 0.7 t said steady", all(timed(still, Force::Swinging { size: 0.5, frequency: 0.7 }), steady)),
+        ("late force said steady", all(timed(still, Force::Pulse { size: 2.0, at: 5.0, width: 0.5 }), steady)),
+        ("late drag said constant", all(timed(Rate::Pulse { size: -2.0, at: 5.0, width: 0.5 }, none), steady)),
+        ("region of drag said affine", all(timed(Rate::Region { size: -1.0, at: -0.5, width: 0.02 }, none), affine)),
+        ("wall said quadratic", all(bump(Feature::Wall { width: 1.5 }), quadratic)),
+        ("hill said quadratic", all(bump(Feature::Hill { at: -0.8, width: 0.05, height: 2.0 }), quadratic)),
+    ];
+    let mut lines = Vec::new();
+    let mut tallies = Vec::new();
+    for (name, system) in lies {
+        // Fast enough for the wall.
+        let start = VelocityPoint::new([0.4], [1.6], 0.3);
+        let problem = Problem { system, t0: 0.0, start, span: 10.0 };
+        let honest = Problem { system: Formula { claims: None, ..system }, ..problem };
+        let Ok(truth) = honest.exact_in(2000) else { continue };
+        let mut tally = Tally::new();
+        for integrator in FAMILIES.into_iter().filter(|i| i.check(&system).is_ok()) {
+            // An integrator that takes no notice of the claim is as right as without it.
+            let end = problem.by(integrator, 400);
+            let bound = match honest.by(integrator, 400) {
+                End::Whole(x) => (2.0 * distance(&x, &truth, 0.0)).max(1e-3),
+                _ => 1e-3,
+            };
+            let worth = end.worth(&truth, 0.0, bound);
+            *tally.entry(worth).or_default() += 1;
+            rows.push(vec![
+                name.into(),
+                integrator.to_string(),
+                "-".into(),
+                worth.name().into(),
+                number(end.error(&truth, 0.0)),
+            ]);
+        }
+        lines.push(row(name.into(), &tally));
+        tallies.push(tally);
+    }
+    report.at_most("claims that are false later: runs wrong in silence", bad(&tallies), 0.0)?;
+    // True claims at the border of the domain of L.
+    let mut refused = 0;
+    for q in [0.0, 0.9, 0.99, 0.999, -0.999] {
+        let system = Formula { feature: Feature::Domain, rate: Rate::Constant(-0.1), ..Formula::<1>::FREE };
+        let problem = Problem { system, t0: 0.0, start: VelocityPoint::new([q], [0.0], 0.0), span: 1.0 };
+        for integrator in FAMILIES {
+            let is_refused = matches!(problem.by(integrator, 1000), End::Refused(_));
+            refused += u32::from(is_refused);
+            let worth = if is_refused { "refused" } else { "right" };
+            rows.push(vec![
+                "true claims".into(),
+                integrator.to_string(),
+                q.to_string(),
+                worth.into(),
+                number(f64::NAN),
+            ]);
+        }
+    }
+    report.at_most("true claims beside the border of a domain: refused", f64::from(refused), 0.0)?;
+    Ok(lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn closed_forms_keep_the_energy() {
+        for span in [0.5, 3.0, 7.0, 20.0] {
+            let x = over_kink(2.0, 1.5, span);
+            assert!((0.5 * x.p[0] * x.p[0] + 1.5 * (x.q[0] - 2.0).abs() - 3.5).abs() < 1e-12, "{span}: {x:?}");
+            let x = over_jump(2.0, 0.3, span);
+            let height = if x.q[0] > 2.0 { 0.3 } else { 0.0 };
+            assert!((0.5 * x.p[0] * x.p[0] + height - 0.5).abs() < 1e-12, "{span}: {x:?}");
+        }
+        // Thrown back.
+        assert_eq!(over_jump(2.0, 0.6, 3.0), PhasePoint::new([1.0], [-1.0], 0.0));
+    }
+}

@@ -1,0 +1,284 @@
+//! Runs, what is true of them, and what to call their ends.
+
+use crate::formula::Formula;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{PhasePoint, Triple, VelocityPoint, herglotz_rates, larger, legendre};
+use differential_equations::methods::ExplicitRungeKutta;
+use differential_equations::prelude::{IVP, ODE};
+use discrete_herglotz::{
+    AnyIntegrator, InputError, Method, Outcome, Run, SplittingScheme, Status, StepError, Steps, Until,
+};
+use exact_lagrangian::{ExactError, herglotz_flow};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// An error of order one.
+pub const ORDER_ONE: f64 = 0.1;
+
+/// A motion to be computed.
+#[derive(Clone, Copy, Debug)]
+pub struct Problem<const N: usize> {
+    pub system: Formula<N>,
+    pub t0: f64,
+    pub start: VelocityPoint<N>,
+    pub span: f64,
+}
+
+/// The same for the library.
+pub type Motion<'a, const N: usize> = discrete_herglotz::Problem<'a, Formula<N>, N>;
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum End<const N: usize> {
+    /// At the end of the span, with nothing said against it.
+    Whole(PhasePoint<N>),
+    /// At the end of the span, with a step that is marked as one that does not resolve the motion.
+    Marked(PhasePoint<N>),
+    /// Before.
+    Halted(StepError),
+    /// It did not begin.
+    Refused(InputError),
+    /// It panicked.
+    Panicked,
+}
+
+/// What an end is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Worth {
+    /// Within the bound.
+    Right,
+    /// Not, though each step resolves the motion: many small errors of a method of low order, which is the choice of the step.
+    Coarse,
+    /// Not, and said so.
+    Marked,
+    Halted,
+    Refused,
+    /// Not, and nothing was said: what must not be.
+    Wrong,
+    /// A result with a NaN or an infinity in it.
+    NotANumber,
+    Panicked,
+}
+
+impl Worth {
+    /// Whether it must never happen.
+    pub fn is_bad(self) -> bool {
+        matches!(self, Worth::Wrong | Worth::NotANumber | Worth::Panicked)
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Worth::Right => "right",
+            Worth::Coarse => "coarse",
+            Worth::Marked => "marked",
+            Worth::Halted => "halted",
+            Worth::Refused => "refused",
+            Worth::Wrong => "wrong",
+            Worth::NotANumber => "not_a_number",
+            Worth::Panicked => "panicked",
+        }
+    }
+}
+
+impl<const N: usize> End<N> {
+    /// The error of the state against the truth, by [`distance`].
+    pub fn error(&self, truth: &PhasePoint<N>, scale: f64) -> f64 {
+        match self {
+            End::Whole(state) | End::Marked(state) => distance(state, truth, scale),
+            _ => f64::NAN,
+        }
+    }
+
+    /// What it is worth where the error may be at most a bound.
+    pub fn worth(&self, truth: &PhasePoint<N>, scale: f64, bound: f64) -> Worth {
+        match self {
+            End::Whole(state) | End::Marked(state) if !Triple::from(*state).is_finite() => Worth::NotANumber,
+            End::Whole(state) if distance(state, truth, scale) <= bound => Worth::Right,
+            End::Whole(_) => Worth::Wrong,
+            End::Marked(_) => Worth::Marked,
+            End::Halted(_) => Worth::Halted,
+            End::Refused(_) => Worth::Refused,
+            End::Panicked => Worth::Panicked,
+        }
+    }
+}
+
+/// The norm of a vector whose entries may be as small or as large as numbers are.
+pub fn norm(entries: &[f64]) -> f64 {
+    let size = contact_geom::largest(entries.iter().copied());
+    if size > 0.0 && size.is_finite() {
+        size * entries.iter().map(|e| (e / size).powi(2)).sum::<f64>().sqrt()
+    } else {
+        size
+    }
+}
+
+/// The 2-norm of the error of (q, p), relative to the truth's or to a scale that is larger.
+pub fn distance<const N: usize>(state: &PhasePoint<N>, truth: &PhasePoint<N>, scale: f64) -> f64 {
+    let entries = |f: &dyn Fn(usize) -> f64| (0..2 * N).map(f).collect::<Vec<_>>();
+    let (found, true_one) = (Triple::from(*state), Triple::from(*truth));
+    let error = entries(&|i| found.component(i) - true_one.component(i));
+    let size = norm(&entries(&|i| true_one.component(i)));
+    let error = norm(&error);
+    if error == 0.0 { 0.0 } else { error / size.max(scale) }
+}
+
+/// The outcome of a call that must not panic.
+pub fn caught<T>(call: impl FnOnce() -> T) -> Option<T> {
+    catch_unwind(AssertUnwindSafe(call)).ok()
+}
+
+impl<const N: usize> Problem<N> {
+    /// The state at the start.
+    pub fn state(&self) -> PhasePoint<N> {
+        legendre(&self.system, self.t0, &self.start)
+    }
+
+    /// It for the library, which may refuse its start.
+    pub fn motion(&self) -> Result<Motion<'_, N>, InputError> {
+        Motion::new(&self.system, self.t0, self.start)
+    }
+
+    /// Where its runs end.
+    pub fn end(&self) -> Until {
+        Until::Time(self.t0 + self.span)
+    }
+
+    /// The run with a number of steps of one integrator.
+    pub fn by(&self, integrator: AnyIntegrator, count: usize) -> End<N> {
+        self.run(|motion| motion.by(integrator).steps(Steps::Count(count)))
+    }
+
+    /// What a run with fixed steps is worth, and its error: an error of order one in silence is a wrong result where a step of it
+    /// has such an error by itself.
+    pub fn worth(&self, integrator: AnyIntegrator, count: usize, truth: &PhasePoint<N>, scale: f64) -> (Worth, f64) {
+        let end = self.by(integrator, count);
+        let (worth, error) = (end.worth(truth, scale, ORDER_ONE), end.error(truth, scale));
+        let coarse =
+            worth == Worth::Wrong && self.local_error(integrator, count, scale).is_some_and(|e| e <= ORDER_ONE);
+        (if coarse { Worth::Coarse } else { worth }, error)
+    }
+
+    /// The largest error of a step of a run, each from where it started; `None` where the exact motion is not known.
+    fn local_error(&self, integrator: AnyIntegrator, count: usize, scale: f64) -> Option<f64> {
+        let motion = self.motion().ok()?;
+        let plan = motion.by(integrator).steps(Steps::Count(count)).plan(self.end()).ok()?;
+        let mut stepper = plan.stepper().ok()?;
+        let mut worst = 0.0;
+        for _ in 0..count {
+            let (before, t0) = (stepper.state(), stepper.time());
+            stepper.advance(1).ok()?;
+            let start = VelocityPoint { q: before.q, v: self.system.velocity(&before.q, &before.p), z: before.z };
+            let exact = Problem { t0, start, span: plan.step_size(), ..*self }.exact().ok()?;
+            worst = larger(worst, distance(&stepper.state(), &exact, scale));
+            if worst > ORDER_ONE {
+                break;
+            }
+        }
+        Some(worst)
+    }
+
+    /// The run to an accuracy, with the integrator that a run takes where none is named.
+    pub fn to(&self, accuracy: f64) -> End<N> {
+        self.run(|motion| motion.accuracy(accuracy))
+    }
+
+    /// The end of a run.
+    fn run(&self, run_of: impl for<'p> FnOnce(&'p Motion<'p, N>) -> Run<'p, 'p, Formula<N>, N>) -> End<N> {
+        match caught(|| run_of(&self.motion()?).run(self.end())) {
+            None => End::Panicked,
+            Some(Err(refused)) => End::Refused(refused),
+            Some(Ok(outcome)) => end_of_outcome(&outcome),
+        }
+    }
+
+    /// The end of the motion by the exact flow, in one go.
+    pub fn exact(&self) -> Result<PhasePoint<N>, ExactError<N>> {
+        self.exact_in(1)
+    }
+
+    /// The end of the motion by the exact flow, started anew in each of so many equal parts of the span: nothing in it is longer
+    /// than a part.
+    pub fn exact_in(&self, parts: usize) -> Result<PhasePoint<N>, ExactError<N>> {
+        let (mut x, mut t) = (self.start, self.t0);
+        for part in 1..=parts {
+            let next = self.t0 + self.span * (part as f64 / parts as f64);
+            x = herglotz_flow(&self.system, t, &x, next - t)?.end;
+            t = next;
+        }
+        Ok(legendre(&self.system, t, &x))
+    }
+}
+
+/// The end that an outcome tells of.
+pub fn end_of_outcome<const N: usize>(outcome: &Outcome<N>) -> End<N> {
+    let state = outcome.state();
+    match outcome.status {
+        Status::Completed if outcome.suspicion.is_some() => End::Marked(state),
+        Status::Completed => End::Whole(state),
+        Status::Failed { cause, .. } => End::Halted(cause),
+        _ => End::Marked(state),
+    }
+}
+
+/// Herglotz' equations as a right-hand side for dop853, with `D = 2 N + 1` variables.
+struct Equations<'a, const N: usize>(&'a Formula<N>);
+
+impl<const N: usize, const D: usize> ODE<f64, [f64; D]> for Equations<'_, N> {
+    fn diff(&self, t: f64, y: &[f64; D], rate: &mut [f64; D]) {
+        let x = VelocityPoint { q: SVector::from_fn(|i, _| y[i]), v: SVector::from_fn(|i, _| y[N + i]), z: y[2 * N] };
+        match herglotz_rates(self.0, t, &x) {
+            Ok((field, _)) => {
+                let field = Triple::from(VelocityPoint { q: x.v, v: field.y, z: field.z });
+                *rate = std::array::from_fn(|i| field.component(i));
+            }
+            Err(_) => *rate = [f64::NAN; D],
+        }
+    }
+}
+
+/// The end of a motion by the dop853 of the crate differential-equations; `None` where it gives up. `D = 2 N + 1`.
+pub fn dop853<const N: usize, const D: usize>(
+    problem: &Problem<N>,
+    tolerance: f64,
+    absolute: f64,
+) -> Option<PhasePoint<N>> {
+    let Problem { system, t0, start, span } = problem;
+    let from = Triple::from(*start);
+    let from: [f64; D] = std::array::from_fn(|i| from.component(i));
+    let method = ExplicitRungeKutta::dop853().rtol(tolerance).atol(absolute).max_steps(10_000_000);
+    let equations = Equations(system);
+    let ivp = IVP::ode(&equations, *t0, t0 + span, from).t_eval([t0 + span]).method(method);
+    let solution = caught(|| ivp.solve().ok()).flatten()?;
+    let end = solution.y.last()?;
+    let end = VelocityPoint::from(Triple::<N>::from_fn(|i| end[i]));
+    Some(legendre(system, t0 + span, &end))
+}
+
+/// The same, started anew in each of so many equal parts of the span.
+pub fn dop853_in<const N: usize, const D: usize>(
+    problem: &Problem<N>,
+    parts: usize,
+    tolerance: f64,
+    absolute: f64,
+) -> Option<PhasePoint<N>> {
+    let mut x = problem.state();
+    for part in 0..parts {
+        let [t0, t1] = [part, part + 1].map(|i| problem.t0 + problem.span * (i as f64 / parts as f64));
+        let start = VelocityPoint { q: x.q, v: problem.system.velocity(&x.q, &x.p), z: x.z };
+        x = dop853::<N, D>(&Problem { t0, start, span: t1 - t0, ..*problem }, tolerance, absolute)?;
+    }
+    Some(x)
+}
+
+/// A few integrators of every kind: a rule, splittings, a composition, Gauss methods from low to high order.
+pub const FAMILIES: [AnyIntegrator; 9] = [
+    AnyIntegrator::Discrete(Method::Midpoint),
+    AnyIntegrator::Discrete(Method::Trapezoidal),
+    AnyIntegrator::Splitting(SplittingScheme::STRANG),
+    AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6),
+    AnyIntegrator::Splitting(SplittingScheme::KAHAN_LI_8),
+    AnyIntegrator::Composition(Method::Midpoint, SplittingScheme::KAHAN_LI_8),
+    AnyIntegrator::Gauss { stages: 2 },
+    AnyIntegrator::Gauss { stages: 8 },
+    AnyIntegrator::Gauss { stages: 16 },
+];

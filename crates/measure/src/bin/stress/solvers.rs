@@ -1,0 +1,295 @@
+//! Solvers where they have it hard: bounded work, and the right status.
+
+use crate::formula::{Feature, Formula, Kinetic, Rate, Smooth};
+use crate::motion::{End, FAMILIES, Problem, Worth};
+use crate::parallel::parallel;
+use crate::probe::{Ended, PROBES, ask};
+use crate::random::Random;
+use crate::report::Report;
+use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{PhasePoint, Triple, VelocityPoint, larger};
+use discrete_herglotz::{AnyIntegrator, Flow, Gauss, InputError, Midpoint, Solver, Stepper, Steps, Trapezoidal};
+use std::time::{Duration, Instant};
+
+/// A step that does not contract may take this many times one that does.
+const PRICE: f64 = 30.0;
+
+pub fn run(report: &mut Report) -> Result<(), Failure> {
+    let mut rows = Vec::new();
+    alone(report, &mut rows)?;
+    poor_guesses(report, &mut rows)?;
+    domains(report, &mut rows)?;
+    matrices(report, &mut rows)?;
+    price(report)?;
+    report.table(&["what", "by", "parameter", "ended", "error"], rows)
+}
+
+fn row(what: &str, by: &str, parameter: &str, ended: &str, error: f64) -> Vec<String> {
+    vec![what.into(), by.into(), parameter.into(), ended.into(), number(error)]
+}
+
+/// Calls that may never end, or bring the process down.
+fn alone(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
+    // A hang is ten seconds; the quick form takes less for one.
+    let patience = Duration::from_secs(if report.quick { 3 } else { 10 });
+    let found = parallel(&report.bar, PROBES.len(), |i| ask(PROBES[i].0, patience));
+    let (mut crashed, mut endless, mut otherwise) = (0, 0, 0);
+    let mut lines = Vec::new();
+    for ((name, right, _), ended) in PROBES.iter().zip(found) {
+        let ended = ended.map_err(Failure::Terminal)?;
+        match &ended {
+            Ended::Crashed => crashed += 1,
+            Ended::Never => endless += 1,
+            Ended::Said(text) => otherwise += u32::from(!right.iter().any(|word| text.starts_with(word))),
+        }
+        rows.push(row("alone", name, "-", ended.text(), f64::NAN));
+        lines.push(vec![(*name).into(), right.join(" or "), ended.text().into()]);
+    }
+    report.markdown(&["call", "right is", "found"], lines);
+    report.at_most("calls that crash", f64::from(crashed), 0.0)?;
+    report.at_most("calls that do not end", f64::from(endless), 0.0)?;
+    report.at_most("calls that end with something else than what is right", f64::from(otherwise), 0.0)
+}
+
+/// First steps of Newton's method from guesses of the velocity that are far off, where there is only one solution.
+fn poor_guesses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
+    let smooth = Smooth { spring: 1.0, quartic: 1.0, ..Smooth::default() };
+    let hard = Formula::<1> { smooth, rate: Rate::Constant(-0.1), ..Formula::FREE };
+    let fast = Formula::<1> { kinetic: Kinetic::Relativistic, ..hard };
+    let mut wrong = 0;
+    for (name, system) in [("quartic", hard), ("relativistic", fast)] {
+        let state = PhasePoint::new([0.5], [0.4], 0.1);
+        for guess in [0.0, 0.3, 0.999, 1.0, -5.0, 1e3, 1e10, 1e160, f64::MAX, f64::INFINITY, f64::NAN] {
+            let (midpoint, trapezoidal) = (Midpoint::new(&system, 0.25)?, Trapezoidal::new(&system, 0.25)?);
+            let gauss = Gauss::new(&system, 8, 0.25)?;
+            let v = SVector::from([guess]);
+            let found = [
+                ("midpoint", first_step(Flow::with_guess(&midpoint, 0.0, state, v))),
+                ("trapezoidal", first_step(Flow::with_guess(&trapezoidal, 0.0, state, v))),
+                ("gauss_8", first_step(gauss.stepper(0.0, state, v))),
+            ];
+            let start = VelocityPoint { q: state.q, v: SVector::from([velocity(&system, state.p[0])]), z: state.z };
+            let problem = Problem { system, t0: 0.0, start, span: 0.25 };
+            let truth = problem.exact().map_err(Failure::from)?;
+            for (by, found) in found {
+                let (worth, error) = match found {
+                    None => (Worth::Refused, f64::NAN),
+                    Some(x) => (End::Whole(x).worth(&truth, 0.0, 0.02), End::Whole(x).error(&truth, 0.0)),
+                };
+                wrong += u32::from(worth.is_bad());
+                rows.push(row(&format!("poor guess, {name}"), by, &format!("{guess:e}"), worth.name(), error));
+            }
+        }
+    }
+    report.at_most("first steps from poor guesses of the velocity: wrong in silence", f64::from(wrong), 0.0)
+}
+
+/// The state after a step, where there is one.
+fn first_step(stepper: Result<impl Stepper<1>, InputError>) -> Option<PhasePoint<1>> {
+    let mut stepper = stepper.ok()?;
+    stepper.advance(1).ok()?;
+    Some(stepper.state())
+}
+
+/// The velocity of a momentum.
+fn velocity(system: &Formula<1>, p: f64) -> f64 {
+    match system.kinetic {
+        Kinetic::Relativistic => p / (1.0 + p * p).sqrt(),
+        _ => p,
+    }
+}
+
+/// Motions out of the domain of L, and over kinks: a status, and never a number that is none.
+fn domains(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
+    let (mut on, mut broken) = (0, 0);
+    for speed in [0.5, 1.5, 3.0, 100.0] {
+        let system = Formula { feature: Feature::Domain, rate: Rate::Constant(-0.05), ..Formula::<1>::FREE };
+        let problem = Problem { system, t0: 0.0, start: VelocityPoint::new([0.2], [speed], 0.0), span: 5.0 };
+        // Below the height of the border it stays inside, and has a truth.
+        let truth = problem.exact().ok();
+        for (integrator, count) in FAMILIES.into_iter().flat_map(|i| [5, 50, 1000].map(|n| (i, n))) {
+            let outside = PhasePoint::new([1e9], [1e9], 0.0);
+            let (worth, error) = problem.worth(integrator, count, truth.as_ref().unwrap_or(&outside), 0.0);
+            on += u32::from(worth == Worth::Wrong);
+            broken += u32::from(matches!(worth, Worth::NotANumber | Worth::Panicked));
+            rows.push(row("domain", &integrator.to_string(), &speed.to_string(), worth.name(), error));
+        }
+    }
+    report.at_most("motions out of the domain of L: that go on in silence", f64::from(on), 0.0)?;
+    let mut silent = 0;
+    for (at, slope) in [(0.3, 1.0), (0.0, 5.0), (-0.2, 100.0)] {
+        let smooth = Smooth { spring: 1.0, ..Smooth::default() };
+        let system = Formula { smooth, feature: Feature::Kink { at, slope }, ..Formula::<1>::FREE };
+        let problem = Problem { system, t0: 0.0, start: VelocityPoint::new([1.0], [0.0], 0.0), span: 3.0 };
+        let energy = |x: &PhasePoint<1>| 0.5 * (x.p[0] * x.p[0] + x.q[0] * x.q[0]) + slope * (x.q[0] - at).abs();
+        let first = energy(&problem.state());
+        for (integrator, count) in FAMILIES.into_iter().flat_map(|i| [10, 200].map(|n| (i, n))) {
+            let end = problem.by(integrator, count);
+            let (worth, error) = match &end {
+                End::Whole(x) => {
+                    let error = (energy(x) - first).abs() / first;
+                    let finite = Triple::from(*x).is_finite();
+                    (
+                        if !finite {
+                            Worth::NotANumber
+                        } else if error <= 0.1 {
+                            Worth::Right
+                        } else {
+                            Worth::Wrong
+                        },
+                        error,
+                    )
+                }
+                other => (other.worth(&problem.state(), 0.0, 0.1), f64::NAN),
+            };
+            silent += u32::from(worth == Worth::Wrong);
+            broken += u32::from(matches!(worth, Worth::NotANumber | Worth::Panicked));
+            rows.push(row("kink", &integrator.to_string(), &slope.to_string(), worth.name(), error));
+        }
+    }
+    report.at_most("motions over kinks: energy wrong by a tenth in silence", f64::from(silent), 0.0)?;
+    report.at_most("motions over kinks and borders: no number, or a panic", f64::from(broken), 0.0)
+}
+
+/// The size from which faer solves.
+const SIZE: usize = 32;
+
+/// Singular, graded and non-finite matrices: refused, or solved to the rounding of their entries.
+fn matrices(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
+    let mut random = Random::new(9, 0);
+    let dense = SMatrix::<f64, SIZE, SIZE>::from_fn(|_, _| random.between(-1.0, 1.0));
+    let with = |i: usize, j: usize, x: f64| {
+        let mut m = dense;
+        m[(i, j)] = x;
+        m
+    };
+    let twice = SMatrix::<f64, SIZE, SIZE>::from_fn(|i, j| dense[(if i == 7 { 3 } else { i }, j)]);
+    let graded = SMatrix::<f64, SIZE, SIZE>::from_fn(|i, j| dense[(i, j)] * 10f64.powi(-(9 * i as i32)));
+    let cases = [
+        ("dense", dense),
+        ("zero", dense * 0.0),
+        ("two equal rows", twice),
+        ("rows graded to 1e-279", graded),
+        ("all of 1e300", dense * 1e300),
+        ("all of 1e-300", dense * 1e-300),
+        ("subnormal", dense * 1e-310),
+        ("one NaN", with(3, 4, f64::NAN)),
+        ("one NaN in the last place", with(SIZE - 1, SIZE - 1, f64::NAN)),
+        ("one infinity", with(0, 0, f64::INFINITY)),
+        ("one infinity below", with(SIZE - 1, 0, f64::NEG_INFINITY)),
+    ];
+    let (mut wrong, mut worst) = (0, 0.0);
+    for (name, matrix) in cases {
+        let solution = SVector::<f64, SIZE>::from_fn(|i, _| 1.0 + i as f64 / SIZE as f64);
+        for (by, mut solver) in [("stack", Solver::<SIZE>::on_the_stack()), ("faer", Solver::<SIZE>::by_faer())] {
+            let rhs = matrix * solution;
+            let (mut a, mut b) = (matrix, rhs);
+            let solved = solver.solve(&mut a, &mut b);
+            // Row by row, each in units of its own terms.
+            let residual = contact_geom::largest((0..SIZE).map(|i| {
+                let terms: f64 = (0..SIZE).map(|j| (matrix[(i, j)] * b[j]).abs()).sum();
+                let sum: f64 = (0..SIZE).map(|j| matrix[(i, j)] * b[j]).sum();
+                if sum == rhs[i] { 0.0 } else { (sum - rhs[i]).abs() / (terms + rhs[i].abs()) }
+            }));
+            let ended = match (&solved, name) {
+                (Err(_), _) => "refused",
+                (Ok(()), _) if residual <= 1e-10 => "solved",
+                (Ok(()), _) => "wrong",
+            };
+            // A regular matrix that is refused is as wrong as a singular one that is not.
+            let regular = matches!(name, "dense" | "rows graded to 1e-279" | "all of 1e300" | "all of 1e-300");
+            let singular = matches!(
+                name,
+                "zero" | "one NaN" | "one NaN in the last place" | "one infinity" | "one infinity below"
+            );
+            wrong += u32::from(ended == "wrong" || (regular && ended == "refused") || (singular && ended != "refused"));
+            if ended == "solved" {
+                worst = larger(worst, residual);
+            }
+            rows.push(row("matrix", by, name, ended, residual));
+        }
+    }
+    report.at_most(
+        "matrices that are singular or no numbers and solved, or regular and refused",
+        f64::from(wrong),
+        0.0,
+    )?;
+    report.at_most("residuals of the solved, over their terms", worst, 1e-13)
+}
+
+/// What a step costs where the iteration of the stages does not contract, over one where it does.
+fn price(report: &mut Report) -> Result<(), Failure> {
+    let smooth = Smooth { spring: 0.25, coupling: 1.0, quartic: 1.0, ..Smooth::default() };
+    let coupled = Formula::<2> { smooth, rate: Rate::Constant(-0.05), ..Formula::FREE };
+    let plain = VelocityPoint::new([1.0], [0.5], 0.2);
+    let pair = VelocityPoint::new([1.0, -0.4], [0.5, 0.3], 0.2);
+    let mut curves = Vec::new();
+    for (i, stages) in [4, 8, 16].into_iter().enumerate() {
+        let integrator = AnyIntegrator::Gauss { stages };
+        let per_step = |time: &dyn Fn(f64) -> [f64; 2]| {
+            let steps = [0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4, 12.8];
+            steps.map(|h| (h, time(h)))
+        };
+        let pendulum = per_step(&|h| of_step(Formula::<1>::pendulum(-0.1), plain, integrator, h));
+        let acting = Formula { action: 0.1, ..Formula::<1>::pendulum(-0.1) };
+        let general = per_step(&|h| of_step(acting, plain, integrator, h));
+        let coupled = per_step(&|h| of_step(coupled, pair, integrator, h));
+        for (j, (name, times)) in
+            [("pendulum", pendulum), ("pendulum, acting z", general), ("pair", coupled)].into_iter().enumerate()
+        {
+            let contracting = times[..4].iter().map(|(_, [taken, _])| *taken).fold(0.0, larger);
+            // Zero where there is none.
+            let dearest = |which: usize| times.iter().map(|(_, of)| of[which]).fold(0.0, larger);
+            for (which, of) in ["step that is taken", "step that is given up"].into_iter().enumerate() {
+                report.at_most_timed(
+                    &format!("{integrator}, {name}: dearest {of} over the dearest that contracts"),
+                    dearest(which) / contracting,
+                    PRICE,
+                )?;
+            }
+            curves.push(Curve::new(
+                &format!("{integrator}, {name}").replace('_', " "),
+                Line::Coloured(3 * i + j),
+                times.map(|(h, [taken, given_up])| (h, larger(taken, given_up))),
+            ));
+        }
+    }
+    let svg = draw(&Panel {
+        x_label: "step".into(),
+        y_label: "seconds a step".into(),
+        x: Axis::Logarithmic(-2, 2, 1),
+        y: Axis::Logarithmic(-8, -1, 1),
+        legend: (1.0, 1.0),
+        curves,
+        marks: Vec::new(),
+    });
+    report.timed_figure(&svg)
+}
+
+/// The time of a step, from a run that goes on as long as it can, and of one that is given up; zero where there is none.
+fn of_step<const N: usize>(system: Formula<N>, start: VelocityPoint<N>, integrator: AnyIntegrator, h: f64) -> [f64; 2] {
+    let problem = Problem { system, t0: 0.0, start, span: h };
+    let Ok(motion) = problem.motion() else { return [f64::NAN; 2] };
+    let Ok(plan) = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end()) else {
+        return [f64::NAN; 2];
+    };
+    let mut least = [f64::INFINITY; 2];
+    for _ in 0..3 {
+        let Ok(mut stepper) = plan.stepper() else { return [f64::NAN; 2] };
+        let clock = Instant::now();
+        let (mut tried, mut given_up, mut until) = (0, 0.0, 0.0);
+        while given_up == 0.0 && tried < 200 && until < 0.05 {
+            let taken = stepper.advance(5);
+            let now = clock.elapsed().as_secs_f64();
+            match taken {
+                Ok(()) => (tried, until) = (tried + 5, now),
+                // With up to four steps before it.
+                Err(_) => given_up = now - until,
+            }
+        }
+        let per_step = if tried == 0 { 0.0 } else { until / f64::from(tried) };
+        least = [least[0].min(per_step), least[1].min(given_up)];
+    }
+    least
+}

@@ -1,0 +1,115 @@
+//! What is measured: something that solves a problem, and has one number to trade time for accuracy.
+
+use crate::problems::Problem;
+use contact_geom::{Lagrangian, VelocityPoint};
+use discrete_herglotz::{AnyIntegrator, Halt, InputError, Steps, Until};
+use std::time::Instant;
+use thiserror::Error;
+
+/// The number that trades time for accuracy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Control {
+    /// The time step of a method with a fixed one.
+    Step,
+    /// The relative tolerance of an adaptive one.
+    Tolerance,
+}
+
+/// A method, set on one problem with or without the action.
+pub trait Candidate {
+    /// The name in tables and arguments, in lower case with underscores.
+    fn name(&self) -> &str;
+
+    /// The order.
+    fn order(&self) -> u32;
+
+    /// What [`run`](Self::run) is passed.
+    fn control(&self) -> Control;
+
+    /// Solves the problem once.
+    ///
+    /// # Errors
+    /// [`RunError`] where there is no final state.
+    fn run(&self, control: f64) -> Result<Run, RunError>;
+}
+
+/// A problem solved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// The final state: q, v, and z where it was asked for.
+    pub state: Vec<f64>,
+    /// The steps taken.
+    pub steps: u64,
+    /// The evaluations of right-hand sides, forces or gradients.
+    pub evaluations: u64,
+    /// The wall time of the integration: from a solver at the start to one at the end.
+    pub seconds: f64,
+}
+
+/// Why a run has no final state.
+#[derive(Debug, Error)]
+pub enum RunError {
+    /// The step is none, or nothing starts with it.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// A step could not be taken.
+    #[error("after {} steps: {}", .0.taken, .0.cause)]
+    Halt(Halt),
+    /// A peer gave up.
+    #[error("{0}")]
+    Peer(String),
+}
+
+/// An integrator of the library on a problem's Lagrangian.
+struct OfLibrary<L: 'static, const N: usize> {
+    lagrangian: &'static L,
+    integrator: AnyIntegrator,
+    name: String,
+    problem: Problem,
+    z: bool,
+}
+
+/// A candidate that runs an integrator of the library, by a plan. The plan is made before the clock starts, as the
+/// peers' solvers are.
+pub fn of_library<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &'static L,
+    integrator: AnyIntegrator,
+    problem: &Problem,
+    z: bool,
+) -> Box<dyn Candidate> {
+    Box::new(OfLibrary { lagrangian, integrator, name: integrator.to_string(), problem: *problem, z })
+}
+
+impl<L: Lagrangian<N>, const N: usize> Candidate for OfLibrary<L, N> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn order(&self) -> u32 {
+        self.integrator.order()
+    }
+
+    fn control(&self) -> Control {
+        Control::Step
+    }
+
+    fn run(&self, h: f64) -> Result<Run, RunError> {
+        let start = self.problem.phase_point::<N>();
+        // The momenta of the problems are velocities.
+        let start = VelocityPoint { q: start.q, v: start.p, z: start.z };
+        let motion = discrete_herglotz::Problem::new(self.lagrangian, 0.0, start)?;
+        let run = motion.by(self.integrator).steps(Steps::Size(h));
+        let run = if self.z { run } else { run.without_action() };
+        let plan = run.plan(Until::Time(self.problem.duration))?;
+        let mut stepper = plan.stepper()?;
+        let clock = Instant::now();
+        stepper.advance(plan.count()).map_err(RunError::Halt)?;
+        let seconds = clock.elapsed().as_secs_f64();
+        let end = stepper.state();
+        let mut state: Vec<f64> = end.q.iter().chain(end.p.iter()).copied().collect();
+        if self.z {
+            state.push(end.z);
+        }
+        Ok(Run { state, steps: plan.count() as u64, evaluations: stepper.evaluations(), seconds })
+    }
+}

@@ -1,0 +1,174 @@
+//! Attacks on integrators, on what makes them, and on runs that are saved and resumed.
+
+use super::runs::{BY, seven, tame};
+use super::{STEPS, starts};
+use crate::Attack;
+use crate::numbers::{Claiming, HOSTILE, Report};
+use contact_geom::{PhasePoint, VelocityPoint};
+use discrete_herglotz::rules::MidpointRule;
+use discrete_herglotz::{
+    AnyIntegrator, ByRule, Checkpoint, CheckpointError, Composed, Discrete, DiscreteLagrangian, Discretisation, Facts,
+    InputError, Integrator, Interrupted, Item, Method, Midpoint, Problem, SplittingScheme, Status, Stepper, Steps,
+    Until, Wants,
+};
+
+pub const ATTACKS: &[Attack] = &[
+    Attack {
+        on: &["Discretisation::check", "Discretisation::discretise", "Discretisation::facts", "Discrete::symmetric"],
+        run: discretisations,
+    },
+    Attack {
+        on: &[
+            "Integrator::check",
+            "Integrator::facts",
+            "Integrator::stepper",
+            "Composed::new",
+            "Stepper::account",
+            "Stepper::has_constant_rate",
+            "Item::computed",
+            "Item::skipped",
+        ],
+        run: integrators,
+    },
+    Attack { on: &["Discrete::new", "Facts::of_discrete", "Run::accuracy"], run: orders },
+    Attack { on: &["Stepper::save", "Stepper::restore"], run: saved },
+    Attack { on: &["Checkpoint::every", "Interrupted::read", "Run::resume"], run: resumed },
+];
+
+/// A discrete Lagrangian is made of each step that is one.
+fn discretisations(report: &mut Report) {
+    fn one(report: &mut Report, rule: &impl Discretisation<'static, Claiming, 1>) {
+        let facts = rule.facts();
+        report.check(rule.check(&Claiming).is_ok() && facts.symmetric && facts.order == 2, || format!("{facts:?}"));
+        for h in HOSTILE.into_iter().chain(STEPS) {
+            let made = rule.discretise(&tame(), h).map(|ld| ld.step_size());
+            let good = h != 0.0 && h.is_finite();
+            report.check(if good { made == Ok(h) } else { made.is_err() }, || format!("{}: {made:?}", facts.name));
+        }
+    }
+    one(report, &ByRule::<MidpointRule>::default());
+    one(report, &Method::Trapezoidal);
+    one(report, &Discrete::new("mine", 2, |h| Midpoint::new(Claiming, h)).symmetric());
+}
+
+/// A stepper starts at a finite state by a step that is one, and its states are finite.
+fn integrators(report: &mut Report) {
+    fn one(report: &mut Report, by: &dyn Integrator<'static, Claiming, 1>, wants: Wants) {
+        let facts = by.facts();
+        let said = !facts.name.is_empty() && facts.order > 0 && facts.price > 0;
+        report.check(said && by.check(&Claiming).is_ok(), || format!("{facts:?}"));
+        let driven = |mut stepper: Box<dyn Stepper<1>>| {
+            let _ = stepper.advance(3);
+            (stepper.state(), stepper.time())
+        };
+        for (t, x) in starts() {
+            let made = Problem::new(&Claiming, t, x).and_then(|problem| by.stepper(&problem, 0.1, wants));
+            report.door(&(t, x), made.map(driven));
+        }
+        for h in HOSTILE.into_iter().chain(STEPS) {
+            let made = by.stepper(&tame(), h, wants);
+            let refused = h == 0.0 || !h.is_finite();
+            report.check(!refused || made.is_err(), || format!("{}: the step {h} is taken", facts.name));
+            report.door(&h, made.map(driven));
+        }
+        let mut stepper = by.stepper(&tame(), 0.1, wants).unwrap();
+        let account = stepper.account();
+        report.check(!account.is_empty() && account.iter().all(|i| !i.why.is_empty()), || format!("{account:?}"));
+        // What says that its rate is constant has the same in all steps.
+        let mut rate = || stepper.advance(1).map(|()| stepper.sigma());
+        let same = rate() == rate();
+        report.check(same || !stepper.has_constant_rate(), || format!("{}: another rate", facts.name));
+    }
+    let rule = ByRule::<MidpointRule>::default();
+    for wants in [Wants::default(), Wants { action: true, watched: true }] {
+        one(report, &rule, wants);
+        one(report, &Composed::new(rule, SplittingScheme::YOSHIDA_4), wants);
+        for by in BY.into_iter().flatten() {
+            one(report, &by, wants);
+        }
+    }
+    let nystrom = Composed::new(rule, SplittingScheme::BLANES_MOAN_6);
+    let refused = Integrator::<'_, Claiming, 1>::check(&nystrom, &Claiming);
+    report.check(matches!(refused, Err(InputError::Hypothesis { .. })), || format!("{refused:?}"));
+    let items = [Item::computed("this", "said"), Item::skipped("that", "said")];
+    report.check(items.map(|item| item.computed) == [true, false], || "items".into());
+}
+
+/// The order is what a user says; a false one costs evaluations, or the run.
+fn orders(report: &mut Report) {
+    let problem = tame();
+    for order in [0, 1, 2, 1000, u32::MAX] {
+        let by = || Discrete::new("mine", order, |h| Midpoint::new(Claiming, h));
+        report.check(Facts::of_discrete::<1>("mine", order).order == order, || "another order".into());
+        let given = problem.by(by()).steps(Steps::Count(7)).run(Until::Time(0.5)).map(|o| (o.q, o.p));
+        report.check(given.is_ok() == (order > 0), || format!("order {order}: {given:?}"));
+        for error in [1e-4, 0.0, f64::NAN, -1.0] {
+            let found = problem.by(by()).accuracy(error).run(Until::Time(0.5)).map(|o| (o.q, o.p));
+            let told = matches!(found, Ok(_) | Err(InputError::Accuracy { .. }));
+            let good = if order > 0 && error > 0.0 { told } else { found.is_err() };
+            report.check(good, || format!("order {order} to an error of {error}: {found:?}"));
+        }
+    }
+}
+
+/// Words that are too few, or too many, are none of a stepper.
+fn saved(report: &mut Report) {
+    let start: PhasePoint<1> = *tame().state();
+    for by in BY.into_iter().flatten() {
+        let stepper = || Integrator::stepper(&by, &tame(), 0.1, Wants { action: true, watched: true }).unwrap();
+        let mut first = stepper();
+        report.check(first.advance(3).is_ok(), || format!("{by}: three steps"));
+        let words = first.save().unwrap();
+        for cut in [0, 1, words.len() / 2, words.len() - 1] {
+            report.check(!stepper().restore(&words[..cut]), || format!("{by}: {cut} words of {}", words.len()));
+        }
+        let longer: Vec<u64> = words.iter().copied().chain([0]).collect();
+        report.check(!stepper().restore(&longer), || format!("{by}: a word too many"));
+        let mut second = stepper();
+        report.check(second.state() == start && second.restore(&words), || format!("{by}: its own words"));
+        let on = first.advance(2).is_ok() && second.advance(2).is_ok();
+        let same = (first.state(), first.time(), first.sigma()) == (second.state(), second.time(), second.sigma());
+        report.check(on && same, || format!("{by}: {:?} and {:?}", first.state(), second.state()));
+    }
+}
+
+/// What is no checkpoint is refused, and so is one of another run.
+fn resumed(report: &mut Report) {
+    let path = std::env::temp_dir().join(format!("hostile_checkpoint_{}", std::process::id()));
+    report.check(Checkpoint::every(0, &path).is_err(), || "a checkpoint every 0 steps".into());
+    for count in 0..6 {
+        for value in HOSTILE {
+            std::fs::write(&path, value.to_le_bytes().repeat(count)).unwrap();
+            let read = Interrupted::read(&path);
+            report.check(matches!(read, Err(CheckpointError::Foreign)), || format!("{count} of {value}: {read:?}"));
+        }
+    }
+    let problem = tame();
+    for by in BY {
+        let until = Until::Time(0.5);
+        let whole = seven(&problem, by).run(until).unwrap();
+        for stride in [3, 7, usize::MAX] {
+            let mut last = Checkpoint::every(stride, &path).unwrap();
+            let outcome = seven(&problem, by).observe(&mut last).run(until).unwrap();
+            report.check(outcome == whole && last.error.is_none(), || format!("{:?}: {outcome:?}", last.error));
+            // The last one is at the end, where nothing is left to do.
+            let resumed = || seven(&problem, by).resume(Interrupted::read(&path).unwrap());
+            report.check(resumed().run(until) == Ok(whole), || format!("{:?}", resumed().run(until)));
+            let others = [resumed().run(Until::Time(0.6)), resumed().steps(Steps::Count(8)).run(until)];
+            let others = others.into_iter().chain([
+                resumed().by(AnyIntegrator::Gauss { stages: 3 }).run(until),
+                resumed().with_conformal_factor().run(until),
+            ]);
+            for other in others {
+                report.check(other == Err(InputError::AnotherRun), || format!("another run: {other:?}"));
+            }
+        }
+        for value in HOSTILE.into_iter().filter(|value| value.abs() < 10.0) {
+            let other = Problem::new(&Claiming, 0.0, VelocityPoint::new([value], [0.7], 0.2)).unwrap();
+            let run = seven(&other, by).resume(Interrupted::read(&path).unwrap()).run(until);
+            report.check(run == Err(InputError::AnotherRun), || format!("from {value}: {run:?}"));
+        }
+        report.check(whole.status == Status::Completed, || format!("{whole:?}"));
+    }
+    std::fs::remove_file(path).unwrap();
+}
