@@ -82,7 +82,6 @@ pub fn refused(error: &InputError) -> Verdict {
         InputError::FalseClaim { .. } => "false claim",
         InputError::Hypothesis { .. } => "hypothesis",
         InputError::FirstStep(_) => "first step",
-        #[allow(unreachable_patterns)] // Variants that join do not concern this tally.
         _ => "another",
     })
 }
@@ -97,7 +96,6 @@ pub fn ended(cause: &StepError) -> Verdict {
         StepError::ConjugatePoint { .. } => "conjugate point",
         StepError::NonFinite => "not finite",
         StepError::Event { .. } => "event",
-        #[allow(unreachable_patterns)] // As above.
         _ => "another",
     })
 }
@@ -110,7 +108,5 @@ pub fn exact<const N: usize>(error: &ExactError<N>) -> Verdict {
         ExactError::Unfinished { .. } => Verdict::Ended("unfinished"),
         ExactError::NotConverged { .. } => Verdict::Ended("not converged"),
         ExactError::ConjugatePoint { .. } => Verdict::Ended("conjugate point"),
-        #[allow(unreachable_patterns)] // As above.
-        _ => Verdict::Ended("another"),
     }
 }

@@ -45,7 +45,9 @@ pub use forms::{
     PhasePoint, SecondDiscreteJet, Smooth, SmoothFunction, Triple, VelocityPoint, conformality,
     conformality_with_jacobian, generic, seed,
 };
-pub use number::{Border, Dual, KernelDual, Larger, Largest, Module, Scalar, larger, largest, linear};
+pub use number::{
+    Border, Dual, KernelDual, Larger, Largest, Module, Scalar, larger, largest, legendre_polynomials, linear,
+};
 pub use statement::Statement;
 
 pub use nalgebra;

@@ -1,12 +1,11 @@
-//! The tables of the README, from those in code.
+//! The tables of the README are those that the code makes.
 
-use contact_geom::Lagrangian;
 use contact_geom::systems::{Pendulum, System, SystemVisitor, catalogue_size, visit_catalogue};
 use discrete_herglotz::{AnyIntegrator, Facts, Integrator};
 
 /// The integrators by name, those of one kind in one line: order, what a step solves, its `sigma_d` for a linear drag, and how many of the
 /// catalogue's systems meet the hypotheses.
-pub fn integrators() -> String {
+fn integrators() -> String {
     let mut kinds: Vec<(Facts, Vec<AnyIntegrator>)> = Vec::new();
     for integrator in AnyIntegrator::all() {
         let facts = facts(&integrator);
@@ -42,7 +41,7 @@ pub fn integrators() -> String {
 }
 
 /// The systems of the catalogue, with the numbers of their coordinates.
-pub fn systems() -> String {
+fn systems() -> String {
     struct Names(Vec<String>);
     impl SystemVisitor for Names {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
@@ -63,32 +62,24 @@ fn taken(integrator: &AnyIntegrator) -> usize {
     struct Taken(AnyIntegrator, usize);
     impl SystemVisitor for Taken {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-            self.1 += usize::from(check(&self.0, system));
+            self.1 += usize::from(self.0.check(system).is_ok());
         }
-    }
-    fn check<const N: usize, L: Lagrangian<N>>(integrator: &AnyIntegrator, lagrangian: &L) -> bool {
-        integrator.check(lagrangian).is_ok()
     }
     let mut taken = Taken(*integrator, 0);
     visit_catalogue(&mut taken);
     taken.1
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// What stands between `<!-- name -->` and `<!-- end name -->`.
+fn part(name: &str) -> &'static str {
+    let readme = include_str!("../../../README.md");
+    let (_, rest) = readme.split_once(&format!("<!-- {name} -->\n")).unwrap_or_default();
+    rest.split_once(&format!("<!-- end {name} -->")).unwrap_or_default().0
+}
 
-    /// What stands between `<!-- name -->` and `<!-- end name -->`.
-    fn part(name: &str) -> &'static str {
-        let readme = include_str!("../../../README.md");
-        let (_, rest) = readme.split_once(&format!("<!-- {name} -->\n")).unwrap_or_default();
-        rest.split_once(&format!("<!-- end {name} -->")).unwrap_or_default().0
-    }
-
-    #[test]
-    fn the_readme_has_the_tables_of_the_code() {
-        for (name, table) in [("integrators", integrators()), ("systems", systems())] {
-            assert!(part(name) == table, "README.md is to have, between the marks of {name}:\n{table}");
-        }
+#[test]
+fn the_readme_has_the_tables_of_the_code() {
+    for (name, table) in [("integrators", integrators()), ("systems", systems())] {
+        assert!(part(name) == table, "README.md is to have, between the marks of {name}:\n{table}");
     }
 }

@@ -233,8 +233,8 @@ fn odd_observers(report: &mut Report) {
     report.check(last.1 == [outcome.steps] && outcome.status == Status::Completed, || format!("{outcome:?}"));
     let all = [(false, false), (false, true), (true, false), (true, true)];
     for (a, b) in all.into_iter().flat_map(|a| all.map(|b| (a, b))) {
-        let [of_a, of_b] = [a, b].map(|(action, conformal_factor)| Needs { action, conformal_factor });
-        let both = Needs { action: a.0 || b.0, conformal_factor: a.1 || b.1 };
+        let [of_a, of_b] = [a, b].map(|(action, conformal_factor)| Needs { action, conformal_factor, saved: false });
+        let both = Needs { action: a.0 || b.0, conformal_factor: a.1 || b.1, saved: false };
         report.check(of_a.and(of_b) == both, || format!("{of_a:?} and {of_b:?}"));
     }
 }

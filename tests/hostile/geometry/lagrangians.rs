@@ -8,11 +8,12 @@ use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler
 use contact_geom::{
     Clock, Derivatives, Dual, Lagrangian, Regularity, Statement, Structure, ValueOnly, VelocityPoint,
     check_closed_derivatives, derived_gradient, derived_hessian, herglotz_field, herglotz_rates, legendre,
-    legendre_jacobian, regularity, statements,
+    legendre_jacobian, legendre_polynomials, regularity, statements,
 };
 
 pub const ATTACKS: &[Attack] = &[
     Attack { on: &["legendre", "legendre_jacobian", "herglotz_field", "herglotz_rates"], run: herglotz },
+    Attack { on: &["legendre_polynomials"], run: polynomials },
     Attack { on: &["regularity", "Regularity::of", "Regularity::condition"], run: regularities },
     Attack {
         on: &[
@@ -188,5 +189,21 @@ fn clocks(report: &mut Report) {
         let q = SVector::from([value, 0.3]);
         report.formula(&value, fine(clock.rate(&q)));
         report.formula(&value, fine(kepler.clock_rate(&q)));
+    }
+}
+
+/// Of any degree and any room: no more than fit.
+fn polynomials(report: &mut Report) {
+    for x in HOSTILE {
+        for s in [0, 1, 2, 3, 9, usize::MAX] {
+            let [_, p1, p2, ..]: [f64; 4] = legendre_polynomials(s, x);
+            report.check(p1.to_bits() == x.to_bits(), || format!("P_1({x}) = {p1}"));
+            let second = if s < 2 { 1.0 } else { (3.0 * x * x - 1.0) / 2.0 };
+            report.check(p2.to_bits() == second.to_bits() || p2.is_nan() && second.is_nan(), || {
+                format!("P_2({x}) = {p2}")
+            });
+            let ([], [one]): ([f64; 0], [f64; 1]) = (legendre_polynomials(s, x), legendre_polynomials(s, x));
+            report.check(one == 1.0, || format!("P_0({x}) = {one}"));
+        }
     }
 }

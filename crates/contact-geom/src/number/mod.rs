@@ -2,6 +2,7 @@
 
 mod dual;
 mod largest;
+mod legendre_polynomials;
 pub mod linear;
 mod module;
 #[cfg(feature = "num-dual")]
@@ -11,5 +12,6 @@ mod scalar;
 
 pub use dual::{Dual, KernelDual};
 pub use largest::{Larger, Largest, larger, largest};
+pub use legendre_polynomials::legendre_polynomials;
 pub use module::{Border, Module};
 pub use scalar::Scalar;

@@ -1,5 +1,6 @@
 //! Coefficients of Gauss collocation, in double-double precision.
 
+use contact_geom::legendre_polynomials;
 use num_traits::{One, Zero};
 use qd::Quad;
 use std::array::from_fn;
@@ -29,16 +30,8 @@ pub(crate) struct Coefficients {
     pub ends: [[f64; MOST]; 2],
 }
 
-/// The Legendre polynomials `P_0(x) .. P_s(x)` on `[-1, 1]`.
-pub(super) fn legendre(s: usize, x: Quad) -> [Quad; MOST + 1] {
-    let mut p = [Quad::one(); MOST + 1];
-    p[1] = x;
-    for k in 1..s {
-        let n = Quad::from(k as f64);
-        p[k + 1] = ((n + n + Quad::one()) * x * p[k] - n * p[k - 1]) / (n + Quad::one());
-    }
-    p
-}
+/// The Legendre polynomials that any number of stages asks for.
+pub(super) const POLYNOMIALS: usize = MOST + 1;
 
 impl Coefficients {
     /// The coefficients for a number of stages from 1 to 16, made once.
@@ -56,12 +49,12 @@ impl Coefficients {
             // Tricomi's guess, then Newton: quadratic, so that six steps are more than enough for 30 digits.
             let mut x = Quad::from(-(std::f64::consts::PI * (i as f64 + 0.75) / (s as f64 + 0.5)).cos());
             for _ in 0..6 {
-                let p = legendre(s, x);
+                let p = legendre_polynomials::<_, POLYNOMIALS>(s, x);
                 x = x - p[s] * (x * x - one) / (n * (x * p[s] - p[s - 1]));
             }
             x
         });
-        let at = nodes.map(|x| legendre(s, x));
+        let at = nodes.map(|x| legendre_polynomials::<_, POLYNOMIALS>(s, x));
         let odd = |k: usize| Quad::from((2 * k + 1) as f64);
         let c = nodes.map(|x| (x + one) * half);
         let b: [Quad; MOST] = from_fn(|j| {
@@ -76,7 +69,7 @@ impl Coefficients {
             })
         });
         let ahead = from_fn(|i| {
-            let p = legendre(s, nodes[i] + one + one);
+            let p = legendre_polynomials::<_, POLYNOMIALS>(s, nodes[i] + one + one);
             from_fn(|j| {
                 let sum = (0..s).fold(Quad::zero(), |sum, k| sum + odd(k) * at[j][k] * p[k]);
                 if i < s { (b[j] * sum).0 } else { 0.0 }
@@ -89,7 +82,7 @@ impl Coefficients {
         });
         // P_k(-1) = (-1)^k and P_k(1) = 1.
         let ends = [-one, one].map(|end| {
-            let p = legendre(s, end);
+            let p = legendre_polynomials::<_, POLYNOMIALS>(s, end);
             from_fn(|j| {
                 let sum = (0..s).fold(Quad::zero(), |sum, k| sum + odd(k) * at[j][k] * p[k]);
                 if j < s { (b[j] * sum).0 } else { 0.0 }
@@ -103,7 +96,7 @@ impl Coefficients {
 /// their integrals from 0: `[i][j]` for point i and node j.
 pub(crate) fn lagrange_rows(s: usize, points: &[f64; MOST]) -> [[[f64; MOST]; MOST]; 2] {
     let g = Coefficients::of(s);
-    let polynomials = |x: f64| legendre(s, Quad::from(x)).map(|p| p.0);
+    let polynomials = |x: f64| legendre_polynomials::<_, POLYNOMIALS>(s, Quad::from(x)).map(|p| p.0);
     let at: [_; MOST] = from_fn(|j| polynomials(2.0 * g.c[j].0 - 1.0));
     let mut rows = [[[0.0; MOST]; MOST]; 2];
     for (i, x) in points.iter().enumerate() {

@@ -3,11 +3,11 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use super::coefficients::{Coefficients, MOST};
+use super::coefficients::{Coefficients, MOST, POLYNOMIALS};
 use super::condensed::Condensed;
 use crate::run::saved::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, linear};
+use contact_geom::{Lagrangian, PhasePoint, legendre_polynomials, linear};
 use std::array::from_fn;
 
 /// The state at the start of a step as a route holds it: momenta, or velocities in the condensed routes.
@@ -123,7 +123,7 @@ impl<const N: usize> DenseStep<N> {
 
     /// The velocity `dq/dt` of the curve at a time: a polynomial of degree `s - 1`, the stages' velocities at their times.
     pub fn velocity(&self, t: f64) -> SVector<f64, N> {
-        let p = legendre(self.s, 2.0 * ((t - self.t) / self.h) - 1.0);
+        let p = legendre_polynomials::<_, POLYNOMIALS>(self.s, 2.0 * ((t - self.t) / self.h) - 1.0);
         SVector::from_fn(|d, _| self.v[d].value(&p, self.s))
     }
 
@@ -134,7 +134,7 @@ impl<const N: usize> DenseStep<N> {
 
     /// The state at a fraction of the step.
     pub(crate) fn at_fraction(&self, fraction: f64) -> PhasePoint<N> {
-        let p = legendre(self.s, 2.0 * fraction - 1.0);
+        let p = legendre_polynomials::<_, POLYNOMIALS>(self.s, 2.0 * fraction - 1.0);
         let integral = |series: &Series| self.h * series.integral(&p, fraction, self.s);
         let rho = 1.0 - integral(&self.rate);
         PhasePoint {
@@ -155,7 +155,7 @@ impl Series {
         let g = Coefficients::of(s);
         let mut c = [0.0; MOST];
         for j in 0..s {
-            let p = legendre(s, 2.0 * g.c[j].0 - 1.0);
+            let p = legendre_polynomials::<_, POLYNOMIALS>(s, 2.0 * g.c[j].0 - 1.0);
             for (k, c) in c.iter_mut().enumerate().take(s) {
                 *c += (2 * k + 1) as f64 * g.b[j].0 * p[k] * values[j];
             }
@@ -172,15 +172,4 @@ impl Series {
         let rest = (1..s).fold(0.0, |sum, k| sum + self.0[k] * (p[k + 1] - p[k - 1]) / (2 * k + 1) as f64);
         self.0[0] * fraction + 0.5 * rest
     }
-}
-
-/// The Legendre polynomials `P_0(x) .. P_s(x)`.
-fn legendre(s: usize, x: f64) -> [f64; MOST + 1] {
-    let mut p = [1.0; MOST + 1];
-    p[1] = x;
-    for k in 1..s {
-        let n = k as f64;
-        p[k + 1] = ((2.0 * n + 1.0) * x * p[k] - n * p[k - 1]) / (n + 1.0);
-    }
-    p
 }

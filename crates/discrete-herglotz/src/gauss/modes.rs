@@ -1,8 +1,9 @@
 //! The modes of Gauss collocation: coordinates of the stages in which it integrates each by itself.
 
-use super::coefficients::{Coefficients, MOST, legendre};
+use super::coefficients::{Coefficients, MOST, POLYNOMIALS};
 use super::stages::{StageMap, Stages};
 use crate::gauss::lanes::Lanes;
+use contact_geom::legendre_polynomials;
 use contact_geom::nalgebra::{Complex, DMatrix};
 use num_traits::{One, Zero};
 use pulp::Simd;
@@ -40,7 +41,7 @@ impl Modes {
 
     fn new(s: usize) -> Self {
         let g = Coefficients::of(s);
-        let at = g.c.map(|c| legendre(s, c + c - Quad::one()));
+        let at = g.c.map(|c| legendre_polynomials::<_, POLYNOMIALS>(s, c + c - Quad::one()));
         let (mut modes, mut into, mut back) = (Vec::with_capacity(s), [[0.0; MOST]; MOST], [[0.0; MOST]; MOST]);
         let mut place = 0;
         for guess in eigenvalues(s).into_iter().filter(|value| value.im >= -1e-9 * value.re) {

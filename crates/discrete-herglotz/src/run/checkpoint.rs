@@ -1,7 +1,7 @@
 //! Checkpoints: a run that is interrupted goes on as if it had not been.
 
 use super::saved::{Saved, load_option, save_option, word};
-use super::{Course, Moment, Needs, Observer, Stop};
+use super::{Moment, Needs, Observer, Stop};
 use crate::{InputError, Suspicion};
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -121,11 +121,7 @@ impl Checkpoint {
 
 impl<const N: usize> Observer<N> for Checkpoint {
     fn needs(&self) -> Needs {
-        Needs::default()
-    }
-
-    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
-        if course.can_be_saved { Ok(()) } else { Err(InputError::Unsaved) }
+        Needs { saved: true, ..Needs::default() }
     }
 
     fn next(&self, taken: usize) -> usize {

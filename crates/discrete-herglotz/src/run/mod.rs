@@ -134,8 +134,7 @@ pub struct Run<'p, 'o, L, const N: usize> {
 
 impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     fn of(problem: &'p Problem<'p, L, N>) -> Self {
-        let needs = Needs { action: true, conformal_factor: false };
-        Run { problem, integrator: None, length: None, needs, observers: Vec::new(), from: None }
+        Run { problem, integrator: None, length: None, needs: Needs::ACTION, observers: Vec::new(), from: None }
     }
 
     /// The same by this integrator.

@@ -39,7 +39,7 @@ impl<G> MomentumDecay<G> {
 
 impl<const N: usize, G: OneParameterGroup<N>> Observer<N> for MomentumDecay<G> {
     fn needs(&self) -> Needs {
-        Needs { action: false, conformal_factor: true }
+        Needs { conformal_factor: true, ..Needs::default() }
     }
 
     fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {

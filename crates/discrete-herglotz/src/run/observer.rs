@@ -15,12 +15,21 @@ pub struct Needs {
     pub action: bool,
     /// The conformal factor of the motion, the product of the `sigma_d`.
     pub conformal_factor: bool,
+    /// That the stepper can be [saved](Stepper::save).
+    pub saved: bool,
 }
 
 impl Needs {
+    /// The action alone.
+    pub const ACTION: Needs = Needs { action: true, conformal_factor: false, saved: false };
+
     /// What either asks for.
     pub fn and(self, other: Self) -> Self {
-        Needs { action: self.action || other.action, conformal_factor: self.conformal_factor || other.conformal_factor }
+        Needs {
+            action: self.action || other.action,
+            conformal_factor: self.conformal_factor || other.conformal_factor,
+            saved: self.saved || other.saved,
+        }
     }
 }
 
@@ -35,13 +44,11 @@ pub struct Course {
     pub h: Option<f64>,
     /// The number of its steps, where that is known before: of a clock it shows at the end.
     pub count: Option<usize>,
-    /// Whether its stepper can be [saved](Stepper::save).
-    pub can_be_saved: bool,
 }
 
 impl Course {
     /// Of an observer that has not been told its own.
-    pub(super) const NONE: Course = Course { t0: 0.0, t_end: 0.0, h: None, count: None, can_be_saved: false };
+    pub(super) const NONE: Course = Course { t0: 0.0, t_end: 0.0, h: None, count: None };
 }
 
 /// What a run does with its states: it is shown the start, at least the steps that it asks for, and the last one.
@@ -50,7 +57,7 @@ impl Course {
 pub trait Observer<const N: usize> {
     /// What it asks of the run. By default the action.
     fn needs(&self) -> Needs {
-        Needs { action: true, conformal_factor: false }
+        Needs::ACTION
     }
 
     /// Is told what the run will be, before work starts.

@@ -138,8 +138,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let h = (!by_clock).then_some(self.h);
         let count = (!by_clock || self.error.is_some()).then_some(self.count);
         let mut stepper = self.make_stepper(self.problem, self.h, self.error.is_none())?;
-        let can_be_saved = stepper.save().is_some();
-        observers.prepare(&Course { t0: self.problem.t0, t_end: self.t_end, h, count, can_be_saved })?;
+        if self.needs.saved && stepper.save().is_none() {
+            return Err(InputError::Unsaved);
+        }
+        observers.prepare(&Course { t0: self.problem.t0, t_end: self.t_end, h, count })?;
         // The logarithm of the product of the sigma_d; in single steps only where they differ.
         let (mut log_factor, single) = (0.0, self.needs.conformal_factor && !self.constant_rate);
         let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
@@ -221,7 +223,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
                 None => Status::Stopped { step: taken, t, by },
             };
         }
-        let Needs { action, conformal_factor } = self.needs;
+        let Needs { action, conformal_factor, .. } = self.needs;
         Ok(Outcome {
             status,
             suspicion: first(suspicion, stepper.suspicion()),
@@ -301,7 +303,7 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
         let vectors = [&start.q, &start.v, &state.p, &slope.x, &slope.y];
         let numbers = numbers.iter().chain(vectors.into_iter().flat_map(|x| x.iter())).map(|x| x.to_bits());
         let name = self.facts.name.bytes().map(u64::from);
-        let Needs { action, conformal_factor } = self.needs;
+        let Needs { action, conformal_factor, .. } = self.needs;
         let counts = [N as u64, self.count as u64, action.into(), conformal_factor.into()];
         digest(&numbers.chain(name).chain(counts).collect::<Vec<u64>>())
     }

@@ -48,7 +48,7 @@ impl<'f, const N: usize> Quotient<'f, N> {
 impl<const N: usize> Observer<N> for Quotient<'_, N> {
     /// The quantities may have the action in them.
     fn needs(&self) -> Needs {
-        Needs { action: true, conformal_factor: false }
+        Needs::ACTION
     }
 
     fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {

@@ -93,12 +93,11 @@ impl<'f, const N: usize> Rows<'f, N> {
     }
 
     fn when(when: When) -> Self {
-        let needs = Needs { action: true, conformal_factor: false };
         Rows {
             rows: Vec::new(),
             when,
             columns: Vec::new(),
-            needs,
+            needs: Needs::ACTION,
             velocity: false,
             energy: false,
             course: Course::NONE,

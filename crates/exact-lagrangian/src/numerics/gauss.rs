@@ -1,5 +1,6 @@
 //! Coefficients of Gauss collocation.
 
+use contact_geom::legendre_polynomials;
 use std::array::from_fn;
 use std::sync::LazyLock;
 
@@ -59,20 +60,12 @@ pub(crate) const PROBES: usize = 128;
 /// The number of probes of the collocation with fewest nodes.
 pub(crate) const PROBES_STILL: usize = 1024;
 
-/// The Legendre polynomials `P_0(x) .. P_s(x)` on `[-1, 1]`.
-fn legendre(s: usize, x: f64) -> [f64; MOST + 2] {
-    let mut p = [1.0; MOST + 2];
-    p[1] = x;
-    for k in 1..s {
-        let n = k as f64;
-        p[k + 1] = ((2.0 * n + 1.0) * x * p[k] - n * p[k - 1]) / (n + 1.0);
-    }
-    p
-}
+/// The Legendre polynomials that any number of nodes asks for.
+const POLYNOMIALS: usize = MOST + 2;
 
 /// Gauss' weight for `[0, 1]` of a node x among s on `[-1, 1]`.
 fn weight(s: usize, x: f64) -> f64 {
-    let below = s as f64 * legendre(s, x)[s - 1];
+    let below = s as f64 * legendre_polynomials::<_, POLYNOMIALS>(s, x)[s - 1];
     (1.0 - x * x) / (below * below)
 }
 
@@ -87,7 +80,7 @@ impl Gauss {
             // Tricomi's guess, then Newton: quadratic, so that five steps are more than enough.
             let mut x = -(std::f64::consts::PI * (i as f64 + 0.75) / (n + 0.5)).cos();
             for _ in 0..5 {
-                let p = legendre(s, x);
+                let p = legendre_polynomials::<_, POLYNOMIALS>(s, x);
                 x -= p[s] * (x * x - 1.0) / (n * (x * p[s] - p[s - 1]));
             }
             x
@@ -96,7 +89,7 @@ impl Gauss {
 
     fn new(s: usize, next: usize) -> Self {
         let (nodes, beyond, between) = (Self::nodes(s), Self::nodes(next), Self::nodes(s + 1));
-        let polynomials: [_; MOST] = from_fn(|j| legendre(s, nodes[j]));
+        let polynomials: [_; MOST] = from_fn(|j| legendre_polynomials::<_, POLYNOMIALS>(s, nodes[j]));
         let c = from_fn(|j| (1.0 + nodes[j]) * 0.5);
         let rough: [f64; MOST] = from_fn(|j| if j < s { weight(s, nodes[j]) } else { 0.0 });
         // The closed formula amplifies the nodes' rounding. One correction by the Legendre polynomials, whose integrals the
@@ -111,7 +104,7 @@ impl Gauss {
         });
         // The Lagrange polynomial of node j is b_j sum (2k+1) P_k(x_j) P_k, and the integral of P_k a difference of two.
         let integrals = |x: f64| -> [f64; MOST] {
-            let at = legendre(s, x);
+            let at = legendre_polynomials::<_, POLYNOMIALS>(s, x);
             from_fn(|j| {
                 let p = polynomials[j];
                 let rest: f64 = (1..s).map(|k| p[k] * (at[k + 1] - at[k - 1])).sum();
@@ -123,7 +116,7 @@ impl Gauss {
         let coefficient = |k: usize| from_fn(|j| (2 * k + 1) as f64 * b[j] * polynomials[j][k]);
         // The values of the Lagrange polynomials, and their integrals from -1, at x.
         let lagrange = |x: f64| {
-            let at = legendre(s, x);
+            let at = legendre_polynomials::<_, POLYNOMIALS>(s, x);
             from_fn(|j| {
                 let p = polynomials[j];
                 b[j] * (0..s).map(|k| (2 * k + 1) as f64 * p[k] * at[k]).sum::<f64>()
@@ -219,8 +212,11 @@ mod tests {
     fn the_tail_is_the_last_two_legendre_coefficients() {
         for g in collocations() {
             for (row, k) in [g.s - 1, g.s - 2].into_iter().enumerate() {
-                let of =
-                    |m: usize| (0..g.s).map(|j| g.tail[row][j] * legendre(g.s, 2.0 * g.c[j] - 1.0)[m]).sum::<f64>();
+                let of = |m: usize| {
+                    (0..g.s)
+                        .map(|j| g.tail[row][j] * legendre_polynomials::<_, POLYNOMIALS>(g.s, 2.0 * g.c[j] - 1.0)[m])
+                        .sum::<f64>()
+                };
                 assert!((of(k) - 1.0).abs() < 1e-14);
                 assert!((0..g.s).filter(|m| *m != k).all(|m| of(m).abs() < 1e-14));
             }

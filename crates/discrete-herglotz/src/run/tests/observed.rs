@@ -211,6 +211,25 @@ fn events_by_every_integrator() {
     }
 }
 
+/// The factor of a run that an event ends within a step is that up to there, as of a run to that time.
+#[test]
+fn the_factor_of_a_stop_is_that_up_to_it() {
+    let system = QuadraticInZ::default();
+    let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
+    for integrator in takers(&system) {
+        let mut events = Events::new([Event::new(|t, _: &PhasePoint<1>| t - 0.53).terminal()]);
+        let run = run_in(&problem, integrator, 20, 1.0).with_conformal_factor();
+        let stopped = run.observe(&mut events).run(Until::Time(1.0)).unwrap();
+        let mut rows = Rows::at([0.53]).unwrap().with_conformal_factor();
+        run_in(&problem, integrator, 20, 1.0).observe(&mut rows).run(Until::Time(1.0)).unwrap();
+        let (found, row) = (stopped.log_factor.unwrap(), rows.rows[0].log_factor.unwrap());
+        // The time of the event is rounded, and the factor with it.
+        assert!((found - row).abs() <= 8.0 * f64::EPSILON, "{integrator}: {found} and {row}");
+        let whole = run_in(&problem, integrator, 20, 1.0).with_conformal_factor().run(Until::Time(1.0)).unwrap();
+        assert!((found - whole.log_factor.unwrap()).abs() > 1e-2, "{integrator}");
+    }
+}
+
 /// A function that is not finite ends the run there; one that is zero at the start has no sign before it moves.
 #[test]
 fn events_that_are_not_defined() {

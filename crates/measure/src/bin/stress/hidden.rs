@@ -26,8 +26,6 @@ const SEEN: f64 = 1e-3;
 struct Hidden {
     kind: usize,
     width: f64,
-    /// Whether it is narrower than what the documents promise to see.
-    narrow: bool,
     problem: Problem<1>,
     truth: Option<PhasePoint<1>>,
 }
@@ -91,8 +89,12 @@ impl Hidden {
             (None, Feature::Step { at, height, .. }) => Some(over_jump(at, height, problem.span)),
             _ => None,
         };
-        let narrow = kind < 4 && width < SEEN * problem.span;
-        Hidden { kind, width, narrow, problem, truth }
+        Hidden { kind, width, problem, truth }
+    }
+
+    /// Whether it is narrower than what the documents promise to see; of the first kinds only is the width theirs.
+    fn is_narrow(&self) -> bool {
+        self.kind < 4 && self.width < SEEN * self.problem.span
     }
 }
 
@@ -137,9 +139,10 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     });
     let mut rows = Vec::new();
     let mut tallies: BTreeMap<(&str, bool, usize), Tally> = BTreeMap::new();
-    for (Hidden { kind, width, narrow, .. }, of_run, of_flow) in found.iter().flatten() {
+    for (hidden, of_run, of_flow) in found.iter().flatten() {
+        let Hidden { kind, width, .. } = hidden;
         for (by, (worth, error)) in [("to 1e-6", of_run), ("exact flow", of_flow)] {
-            *tallies.entry((by, *narrow, *kind)).or_default().entry(*worth).or_default() += 1;
+            *tallies.entry((by, hidden.is_narrow(), *kind)).or_default().entry(*worth).or_default() += 1;
             rows.push(vec![KINDS[*kind].into(), by.into(), number(*width), worth.name().into(), number(*error)]);
         }
     }

@@ -1,0 +1,25 @@
+//! Legendre polynomials.
+
+use std::ops::{Add, Div, Mul, Sub};
+
+/// The Legendre polynomials `P_0(x) .. P_s(x)` on `[-1, 1]`, by Bonnet's recursion, as many as there is room for; those beyond `P_s` stay 1. Of
+/// numbers of any precision, as the nodes of Gauss collocation ask for.
+///
+/// ```
+/// let p: [f64; 4] = contact_geom::legendre_polynomials(3, 0.5);
+/// assert_eq!(p, [1.0, 0.5, -0.125, -0.4375]);
+/// ```
+pub fn legendre_polynomials<T, const M: usize>(s: usize, x: T) -> [T; M]
+where
+    T: Copy + From<f64> + Add<Output = T> + Sub<Output = T> + Mul<Output = T> + Div<Output = T>,
+{
+    let mut p = [T::from(1.0); M];
+    if let Some(first) = p.get_mut(1) {
+        *first = x;
+    }
+    for k in 1..s.min(M.saturating_sub(1)) {
+        let n = T::from(k as f64);
+        p[k + 1] = ((n + n + T::from(1.0)) * x * p[k] - n * p[k - 1]) / (n + T::from(1.0));
+    }
+    p
+}
