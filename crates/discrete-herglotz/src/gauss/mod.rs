@@ -29,7 +29,6 @@ mod sweeps;
 mod table;
 mod time_transformation;
 
-pub(crate) use beginning::velocity;
 pub use clocked::ClockedStepper;
 pub use dense::DenseStep;
 pub use integrator::{ClockedGauss, GaussCollocation};

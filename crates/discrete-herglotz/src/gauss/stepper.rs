@@ -4,7 +4,7 @@ mod marks;
 mod words;
 
 use super::account::account;
-use super::beginning::{Beginning, velocity};
+use super::beginning::Beginning;
 use super::condensed::Condensed;
 use super::dense::{DenseStep, Solved, StepStart};
 use super::general::General;
@@ -19,7 +19,7 @@ use super::time_transformation::{Extension, Physical};
 use crate::gauss::lanes::forget_branches;
 use crate::rules::step_equations::is_identity;
 use crate::run::watch::Watch;
-use crate::{Doubt, Halt, InputError, Item, StepError, Stepper, Suspicion};
+use crate::{Doubt, Halt, InputError, Item, StepError, Stepper, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 pub(crate) use marks::FEW;
@@ -275,9 +275,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
                 run.linearise(t, state.q)
             }
             Route::General(run) => {
-                let Ok(v) = velocity(self.lagrangian, t, &state, SVector::zeros()) else { return false };
-                let x = VelocityPoint { q: state.q, v, z: state.z };
-                run.guess(&v);
+                let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return false };
+                run.guess(&x.v);
                 run.linearise(&self.lagrangian.gradient(t, &x), &self.lagrangian.hessian(t, &x))
             }
         }
@@ -294,11 +293,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         };
         let equations = StageEquations { lagrangian: self.lagrangian, products: &self.products, t };
         let given = Given::Start(from);
-        let v = match velocity(self.lagrangian, t, &from, SVector::zeros()) {
-            Ok(v) => v,
-            Err(InputError::FirstStep(cause)) => return Err(cause),
-            Err(_) => return Err(StepError::NonFinite),
-        };
+        let VelocityPoint { v, .. } = legendre_inverse(self.lagrangian, t, &from, &SVector::zeros())?;
         let work = self.workspace.get_or_insert_with(|| Box::new(equations.workspace(&given)));
         equations.solve(&given, &v, &from.p, work)?;
         let Workspace { x, l, .. } = &**work;
