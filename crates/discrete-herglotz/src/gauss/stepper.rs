@@ -8,6 +8,7 @@ use super::beginning::Beginning;
 use super::condensed::Condensed;
 use super::dense::{DenseStep, Solved, StepStart};
 use super::general::General;
+use super::instructions::Instructions;
 use super::linear::Linear;
 use super::mass::Mass;
 use super::resolution;
@@ -24,7 +25,7 @@ use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 pub(crate) use marks::FEW;
 use marks::Sequence;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 /// How the steps of contact Gauss collocation are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +72,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     products: Products,
     route: Box<Route<'a, L, N>>,
     mass: Option<Box<SMatrix<f64, N, N>>>,
-    arch: Arch,
+    arch: Instructions,
     t0: f64,
     k: usize,
     /// The state at the start of the last step.
@@ -137,7 +138,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             products,
             route: Box::new(route),
             mass,
-            arch: Arch::new(),
+            arch: Instructions::new(),
             t0,
             k: 0,
             from,
