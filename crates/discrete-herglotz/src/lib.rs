@@ -49,8 +49,8 @@ pub use splitting::{
 pub use theory::{
     DiscreteLagrangian, DiscretePath, DiscreteRegularity, HamiltonianFlow, Transition, derived_jet, derived_second_jet,
     discrete_action, discrete_flow, discrete_flow_jacobian, discrete_momentum, discrete_regularity,
-    discrete_symmetry_defect, hamiltonian_flow, hamiltonian_flow_jacobian, legendre_minus, legendre_minus_inverse,
-    legendre_plus, legendre_plus_inverse, sigma_d, statements,
+    discrete_symmetry_defect, hamiltonian_flow, hamiltonian_flow_jacobian, legendre_inverse, legendre_minus,
+    legendre_minus_inverse, legendre_plus, legendre_plus_inverse, sigma_d, statements,
 };
 
 pub use contact_geom;

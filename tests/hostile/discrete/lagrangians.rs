@@ -11,7 +11,8 @@ use discrete_herglotz::{
     MomentumDecay, MomentumRow, Problem, Rectangle, Riccati, Solver, Steps, Strang, Transition, Trapezoidal, Until,
     derived_jet, derived_second_jet, discrete_action, discrete_flow, discrete_flow_jacobian, discrete_momentum,
     discrete_regularity, discrete_symmetry_defect, hamiltonian_flow, hamiltonian_flow_jacobian, last_correction,
-    legendre_minus, legendre_minus_inverse, legendre_plus, legendre_plus_inverse, sigma_d, statements, verified,
+    legendre_inverse, legendre_minus, legendre_minus_inverse, legendre_plus, legendre_plus_inverse, sigma_d,
+    statements, verified,
 };
 
 pub const ATTACKS: &[Attack] = &[
@@ -39,6 +40,7 @@ pub const ATTACKS: &[Attack] = &[
             "discrete_flow_jacobian",
             "hamiltonian_flow",
             "hamiltonian_flow_jacobian",
+            "legendre_inverse",
             "legendre_minus_inverse",
             "legendre_plus_inverse",
             "DiscreteLagrangian::forward",
@@ -125,6 +127,7 @@ fn steps(report: &mut Report) {
                 report.door(&input, ld.forward(t, &x, &guess, solver).map(|s| (s.end, s.velocity, s.sigma)));
                 report.door(&input, ld.backward(t, &x, &guess, solver).map(|s| (s.end, s.velocity, s.sigma)));
             }
+            report.door(&input, legendre_inverse(&Everything, t, &x, &guess));
             report.door(&input, legendre_minus_inverse(ld, t, &x, &guess));
             report.door(&input, legendre_plus_inverse(ld, t, &x, &guess));
             for way in [HamiltonianFlow::Direct, HamiltonianFlow::ThroughPlus, HamiltonianFlow::ThroughMinus] {

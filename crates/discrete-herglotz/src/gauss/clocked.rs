@@ -4,6 +4,7 @@ use super::account::account_by_clock;
 use super::beginning::Beginning;
 use super::compensated::Compensated;
 use super::general::General;
+use super::instructions::Instructions;
 use super::look::{Compare, Curve, Look};
 use super::mass::Mass;
 use super::stage_equations::Products;
@@ -15,7 +16,7 @@ use crate::run::saved::{Saved, load_option, save_option};
 use crate::{Halt, ITERATION_LIMIT, InputError, Item, StepError, Stepper, Suspicion};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Clock, Lagrangian, PhasePoint, Scalar, Structure};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 /// The clock that a Lagrangian states.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +56,7 @@ impl<L: Lagrangian<N>, const N: usize> Clock<N> for OwnClock<'_, L> {
 /// ```
 pub struct ClockedStepper<'a, L, C, const N: usize> {
     general: Box<General<'a, L, Fictitious<C>, N>>,
-    arch: Arch,
+    arch: Instructions,
     h: f64,
     tau: f64,
     taken: usize,
@@ -90,7 +91,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         let extension = Extension::new(Fictitious(clock), t0, -energy);
         let (table, mass) = (StageTable::new(s, h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, &state, &start.v));
-        Ok(ClockedStepper { general, arch: Arch::new(), h, tau: 0.0, taken: 0, from: None, suspicion: None })
+        Ok(ClockedStepper { general, arch: Instructions::new(), h, tau: 0.0, taken: 0, from: None, suspicion: None })
     }
 
     /// The momentum `p_t` of the time, minus the energy but for the method's error: `E + p_t = K / g`. It is contracted as every

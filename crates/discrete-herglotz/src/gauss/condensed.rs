@@ -6,10 +6,11 @@
 use super::coefficients::{Coefficients, MOST};
 use super::compensated::{Twofold, exact_sum};
 use super::double_double::{ExactRow, solve_exactly};
+use super::instructions::Instructions;
 use super::stages::{Exact, StageMap, Stages, Weights, padded};
 use crate::{InputError, StepError};
 use num_traits::{One, Zero};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use qd::Quad;
 use std::array::from_fn;
 
@@ -82,7 +83,7 @@ impl Condensed {
         if !(end_rho.0 > 0.0 && end_rho.0.is_finite()) {
             return Err(InputError::Sigma { sigma: 1.0 / end_rho.0 });
         }
-        let Products { velocity, positions } = Arch::new().dispatch(Multiply { s, h, rho: &rho });
+        let Products { velocity, positions } = Instructions::new().dispatch(Multiply { s, h, rho: &rho });
         let exact = ExactEnd {
             d: velocity.map(|row| from_fn(|j| row.at(j))),
             inverse_rho: rho.map(|r| if gamma == 0.0 { one } else { one / r }),
@@ -281,7 +282,7 @@ impl Preconditioned {
     /// Finds the tail, at a price of about three steps: worth it for matrices that last.
     pub fn refine(&mut self, table: &Condensed) {
         if self.tail.is_none() {
-            self.tail = Some(Arch::new().dispatch(LeftOut { table, left: self }));
+            self.tail = Some(Instructions::new().dispatch(LeftOut { table, left: self }));
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Rows of numbers in double-double precision, in the lanes of an instruction set with a fused product.
 
 use super::compensated::exact_sum;
-use pulp::{Arch, Simd, WithSimd};
+use super::instructions::Instructions;
+use pulp::{Simd, WithSimd};
 use qd::Quad;
 
 /// A row of numbers: heads and tails apart, so that both fill registers.
@@ -74,7 +75,7 @@ pub(super) fn solve_exactly(rows: &mut [Vec<Quad>]) -> bool {
         parts.extend(row.iter().map(|e| e.0));
         parts.extend(row.iter().map(|e| e.1));
     }
-    let regular = Arch::new().dispatch(Eliminate { parts: &mut parts, width });
+    let regular = Instructions::new().dispatch(Eliminate { parts: &mut parts, width });
     for (row, parts) in rows.iter_mut().zip(parts.chunks_exact(2 * width)) {
         let (head, tail) = parts.split_at(width);
         row.iter_mut().zip(head.iter().zip(tail)).for_each(|(e, (head, tail))| *e = Quad(*head, *tail));

@@ -5,6 +5,7 @@
 
 use super::coefficients::MOST;
 use super::compensated::{Compensated, Twofold, add, finite};
+use super::instructions::Instructions;
 use super::mass::Mass;
 use super::resolution::Tail;
 use super::simplified::{CorrectStages, StageNewton};
@@ -15,7 +16,7 @@ use super::time_transformation::{Extension, TimeTransformation, Values};
 use crate::gauss::lanes::{Lanes, branched};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
-use pulp::{Arch, Simd};
+use pulp::Simd;
 use std::array::from_fn;
 
 /// The coordinates up to which W is inverted at several stages at once: the matrices take room on the stack.
@@ -372,7 +373,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
     #[inline(never)]
     fn correct(&mut self) -> (f64, f64) {
         let Some(newton) = &self.newton else { return (f64::NAN, f64::NAN) };
-        Arch::new().dispatch(CorrectStages {
+        Instructions::new().dispatch(CorrectStages {
             newton,
             table: &self.table,
             start: (self.q.map(|q| q.value), self.p.map(|p| p.value), self.z.value),

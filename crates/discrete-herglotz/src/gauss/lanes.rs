@@ -8,7 +8,7 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 
 /// As many numbers as a register of the instruction set `S` has lanes, worked on at once.
 ///
-/// The instruction set is found at run time: kernels are generic over `S` and entered through [`pulp::Arch::dispatch`], so that a
+/// The instruction set is found at run time: kernels are generic over `S` and entered through `Instructions::dispatch`, so that a
 /// default build uses what the processor has. Lanes are made inside such kernels only, and never leave them.
 #[derive(Clone, Copy)]
 pub(crate) struct Lanes<S: Simd>(pub S::f64s);
@@ -19,7 +19,7 @@ pub(crate) struct Lanes<S: Simd>(pub S::f64s);
 fn token<S: Simd>() -> S {
     const { assert!(size_of::<S>() == 0, "a token carries nothing") };
     // SAFETY: a token is a proof, of size 0, that the processor has the instructions. `Lanes<S>` is private to this crate, which
-    // makes them only below `Arch::dispatch`, which has handed out a token of the same type there.
+    // makes them only below `Instructions::dispatch`, which has handed out a token of the same type there.
     unsafe { std::mem::zeroed() }
 }
 

@@ -12,6 +12,7 @@ mod double_double;
 mod general;
 mod general_saved;
 mod general_stages;
+mod instructions;
 mod integrator;
 pub(crate) mod lanes;
 mod linear;
@@ -29,7 +30,6 @@ mod sweeps;
 mod table;
 mod time_transformation;
 
-pub(crate) use beginning::velocity;
 pub use clocked::ClockedStepper;
 pub use dense::DenseStep;
 pub use integrator::{ClockedGauss, GaussCollocation};

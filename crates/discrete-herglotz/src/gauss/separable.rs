@@ -5,6 +5,7 @@
 
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
+use super::instructions::Instructions;
 use super::position_newton::{At, PositionNewton, curvature};
 use super::resolution::{FORETOLD, Tail};
 use super::simplified::SlopeNewton;
@@ -15,7 +16,7 @@ use crate::gauss::lanes::{Lanes, branched};
 use crate::run::saved::{Saved, load_option, save_option, saved};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, largest};
-use pulp::{Arch, Simd};
+use pulp::Simd;
 
 /// The steps after which a matrix is expected to last.
 const LASTING: usize = 64;
@@ -318,7 +319,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
     #[inline(never)]
     fn correct(&mut self) -> (f64, bool) {
         let Some(newton) = &mut self.newton else { return (f64::NAN, false) };
-        let (change, moved) = newton.correct(Arch::new(), &mut self.rest);
+        let (change, moved) = newton.correct(Instructions::new(), &mut self.rest);
         let width = largest(self.x.iter().flat_map(|x| &x.0[..self.table.s]).copied());
         (change, moved <= 4.0 * f64::EPSILON * width)
     }

@@ -7,6 +7,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::condensed::Condensed;
+use super::instructions::Instructions;
 use super::modes::Modes;
 use super::stages::{Stages, blocks};
 use super::table::StageTable;
@@ -14,7 +15,7 @@ use crate::gauss::lanes::Lanes;
 use crate::run::saved::saved;
 use contact_geom::nalgebra::{Complex, DMatrix, SMatrix, SVector};
 use contact_geom::{Hessian, Scalar, Triple, larger};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 type Matrix<const N: usize> = SMatrix<Complex<f64>, N, N>;
 type Vector<const N: usize> = SVector<Complex<f64>, N>;
@@ -58,7 +59,7 @@ impl<const N: usize> SlopeNewton<N> {
 
     /// Corrects the accelerations that a sweep has found from `self.a`; returns the largest change, and the largest of the
     /// positions.
-    pub fn correct(&mut self, arch: Arch, found: &mut [Stages; N]) -> (f64, f64) {
+    pub fn correct(&mut self, arch: Instructions, found: &mut [Stages; N]) -> (f64, f64) {
         arch.dispatch(CorrectSlope { newton: self, found })
     }
 }

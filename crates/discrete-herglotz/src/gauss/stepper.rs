@@ -4,10 +4,11 @@ mod marks;
 mod words;
 
 use super::account::account;
-use super::beginning::{Beginning, velocity};
+use super::beginning::Beginning;
 use super::condensed::Condensed;
 use super::dense::{DenseStep, Solved, StepStart};
 use super::general::General;
+use super::instructions::Instructions;
 use super::linear::Linear;
 use super::mass::Mass;
 use super::resolution;
@@ -19,12 +20,12 @@ use super::time_transformation::{Extension, Physical};
 use crate::gauss::lanes::forget_branches;
 use crate::rules::step_equations::is_identity;
 use crate::run::watch::Watch;
-use crate::{Doubt, Halt, InputError, Item, StepError, Stepper, Suspicion};
+use crate::{Doubt, Halt, InputError, Item, StepError, Stepper, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 pub(crate) use marks::FEW;
 use marks::Sequence;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 /// How the steps of contact Gauss collocation are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +72,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     products: Products,
     route: Box<Route<'a, L, N>>,
     mass: Option<Box<SMatrix<f64, N, N>>>,
-    arch: Arch,
+    arch: Instructions,
     t0: f64,
     k: usize,
     /// The state at the start of the last step.
@@ -137,7 +138,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             products,
             route: Box::new(route),
             mass,
-            arch: Arch::new(),
+            arch: Instructions::new(),
             t0,
             k: 0,
             from,
@@ -275,9 +276,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
                 run.linearise(t, state.q)
             }
             Route::General(run) => {
-                let Ok(v) = velocity(self.lagrangian, t, &state, SVector::zeros()) else { return false };
-                let x = VelocityPoint { q: state.q, v, z: state.z };
-                run.guess(&v);
+                let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return false };
+                run.guess(&x.v);
                 run.linearise(&self.lagrangian.gradient(t, &x), &self.lagrangian.hessian(t, &x))
             }
         }
@@ -294,11 +294,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         };
         let equations = StageEquations { lagrangian: self.lagrangian, products: &self.products, t };
         let given = Given::Start(from);
-        let v = match velocity(self.lagrangian, t, &from, SVector::zeros()) {
-            Ok(v) => v,
-            Err(InputError::FirstStep(cause)) => return Err(cause),
-            Err(_) => return Err(StepError::NonFinite),
-        };
+        let VelocityPoint { v, .. } = legendre_inverse(self.lagrangian, t, &from, &SVector::zeros())?;
         let work = self.workspace.get_or_insert_with(|| Box::new(equations.workspace(&given)));
         equations.solve(&given, &v, &from.p, work)?;
         let Workspace { x, l, .. } = &**work;

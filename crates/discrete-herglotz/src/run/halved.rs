@@ -1,9 +1,8 @@
 //! Steps against twice as many of half their length: whether given steps resolve the motion at all.
 
 use super::{Plan, Problem};
-use crate::gauss::velocity;
 use crate::run::watch::{LEAST, rounding};
-use crate::{Doubt, InputError, Stepper};
+use crate::{Doubt, InputError, Stepper, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
 
@@ -15,9 +14,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// The misfit of some steps; above one where they do not resolve the motion. `None` where there is nothing to compare with.
     pub(super) fn against_halves(&self, Doubt { steps, t, from, to, .. }: &Doubt<N>) -> Option<f64> {
         let Problem { lagrangian, start, .. } = *self.problem;
-        let v = velocity(lagrangian, *t, from, start.v).ok()?;
+        let VelocityPoint { v, .. } = legendre_inverse(lagrangian, *t, from, &start.v).ok()?;
         let end = t + *steps as f64 * self.h;
-        let at_end = |x: &PhasePoint<N>| velocity(lagrangian, end, x, v).ok();
+        let at_end = |x: &PhasePoint<N>| legendre_inverse(lagrangian, end, x, &v).map(|x| x.v).ok();
         if self.facts.by_clock {
             return None;
         }

@@ -1,9 +1,8 @@
 //! Steps in doubt: whether what turned the velocity is narrower than they are.
 
 use super::{Plan, Problem};
-use crate::gauss::velocity;
 use crate::run::watch::{rounding, size};
-use crate::{Doubt, Suspicion};
+use crate::{Doubt, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, herglotz_rates, larger, largest};
 
@@ -30,8 +29,8 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
     fn jump(&self, Doubt { step, steps, t, from, to }: &Doubt<N>) -> Option<f64> {
         let Problem { lagrangian, start: first, .. } = *self.problem;
         let span = *steps as f64 * self.h;
-        let start = VelocityPoint { q: from.q, v: velocity(lagrangian, *t, from, first.v).ok()?, z: from.z };
-        let end = VelocityPoint { q: to.q, v: velocity(lagrangian, t + span, to, start.v).ok()?, z: to.z };
+        let start = legendre_inverse(lagrangian, *t, from, &first.v).ok()?;
+        let end = legendre_inverse(lagrangian, t + span, to, &start.v).ok()?;
         // Substeps back and forth meet what lies beside the steps; but nothing is beside the run.
         let aside = if self.facts.substeps { 0.5 * self.h } else { 0.0 };
         // However strong.

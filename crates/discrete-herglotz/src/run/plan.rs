@@ -5,9 +5,9 @@ use super::checkpoint::digest;
 use super::{
     Course, Facts, Interrupted, Item, Moment, Motion, Needs, Observer, Outcome, Problem, Shared, Stop, Task, Wants,
 };
-use crate::gauss::{FEW, velocity};
+use crate::gauss::FEW;
 use crate::run::verified::refuted;
-use crate::{Doubt, InputError, Status, StepError, Stepper, Suspicion};
+use crate::{Doubt, InputError, Status, StepError, Stepper, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 
@@ -280,7 +280,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
 
 impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
     fn velocity(&self, t: f64, state: &PhasePoint<N>) -> Result<SVector<f64, N>, StepError> {
-        velocity(self.problem.lagrangian, t, state, self.problem.start.v).map_err(step_error)
+        legendre_inverse(self.problem.lagrangian, t, state, &self.problem.start.v).map(|x| x.v)
     }
 
     fn energy(&self, t: f64, state: &PhasePoint<N>) -> Result<f64, StepError> {

@@ -1,9 +1,10 @@
 //! Problems: a Lagrangian with a start.
 
 use super::{Integrator, Run, Steps};
-use crate::gauss::velocity;
 use crate::run::verified::verified;
-use crate::{DiscreteLagrangian, GaussCollocation, InputError, StepError, discrete_regularity, legendre_minus};
+use crate::{
+    DiscreteLagrangian, GaussCollocation, InputError, StepError, discrete_regularity, legendre_inverse, legendre_minus,
+};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
     Derivatives, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Regularity, Structure, VelocityPoint, largest,
@@ -82,7 +83,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
             }
             Start::Momentum(x, guess) => {
                 x.check()?;
-                (VelocityPoint { q: x.q, v: velocity(lagrangian, t0, &x, guess)?, z: x.z }, Some(x))
+                (legendre_inverse(lagrangian, t0, &x, &guess).map_err(InputError::FirstStep)?, Some(x))
             }
         };
         check_regular(lagrangian, t0, &start)?;

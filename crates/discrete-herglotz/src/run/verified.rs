@@ -1,7 +1,6 @@
 //! The declared structure of a Lagrangian, after a probe.
 
-use crate::InputError;
-use crate::gauss::velocity;
+use crate::{InputError, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
@@ -46,8 +45,7 @@ pub(crate) fn refuted<const N: usize>(
     state: &PhasePoint<N>,
     guess: &SVector<f64, N>,
 ) -> Option<Defect> {
-    let v = velocity(lagrangian, t, state, *guess).ok()?;
-    let x = VelocityPoint { q: state.q, v, z: state.z };
+    let x = legendre_inverse(lagrangian, t, state, guess).ok()?;
     lagrangian.structure().defects(lagrangian, t, &x)?.find(|d| d.size > PROBE)
 }
 

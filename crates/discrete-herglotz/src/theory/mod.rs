@@ -3,6 +3,7 @@
 mod discrete_lagrangian;
 mod flow;
 mod legendre;
+mod legendre_inverse;
 mod momentum;
 mod path;
 pub mod statements;
@@ -13,5 +14,6 @@ pub use legendre::{
     DiscreteRegularity, discrete_regularity, legendre_minus, legendre_minus_inverse, legendre_plus,
     legendre_plus_inverse, sigma_d,
 };
+pub use legendre_inverse::legendre_inverse;
 pub use momentum::{discrete_momentum, discrete_symmetry_defect};
 pub use path::{DiscretePath, discrete_action};

@@ -4,6 +4,7 @@ use super::*;
 use crate::Gauss;
 use crate::{DiscreteLagrangian, Solver, Transition};
 use contact_geom::{Scalar, Structure};
+use pulp::Arch;
 
 /// How a spring that pulls where `q > 0`, and only there, says so.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,7 +71,7 @@ fn follow(gauss: &Gauss<OneSided>, set: Arch, route: GaussRoute) -> (usize, u64)
     let start = PhasePoint::new([-0.4], [0.0], 0.0);
     let mut run = gauss.stepper(0.0, start, SVector::zeros()).unwrap();
     assert_eq!(run.route(), route);
-    run.arch = set;
+    run.arch = Instructions::only(set);
     let mut across = 0;
     for _ in 0..100 {
         let (t, from) = (run.time(), run.state());
@@ -111,7 +112,7 @@ fn lanes_have_no_value_to_branch_on() {
                 continue;
             }
             let mut run = gauss.stepper(0.0, PhasePoint::new([-0.4], [0.0], 0.0), SVector::zeros()).unwrap();
-            run.arch = set;
+            run.arch = Instructions::only(set);
             assert_eq!(run.advance(3), Err(Halt { taken: 0, cause: StepError::Branched }), "{set:?}");
         }
     }
