@@ -23,7 +23,7 @@
 
 mod error;
 mod gauss;
-pub mod rules;
+mod rules;
 mod run;
 mod solve;
 mod splitting;
@@ -31,10 +31,7 @@ mod theory;
 
 pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
 pub use gauss::{ClockedGauss, ClockedStepper, DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper};
-pub use rules::{
-    ByRule, Composed, Composition, Discrete, Discretisation, Discretised, ExtendedJet, Flow, FlowStep, LeftMidpoint,
-    Method, Midpoint, Node, Quadrature, Rectangle, Rule, Trapezoidal, UnknownMethod,
-};
+pub use rules::*;
 #[cfg(feature = "csv")]
 pub use run::CsvRows;
 pub use run::{
