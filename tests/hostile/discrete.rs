@@ -24,6 +24,8 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Method::exact_rate", "takes no number"),
     ("Method::check", "takes no number"),
     ("Method::applicable", "takes no number"),
+    ("Method::visit_rules", "takes no number"),
+    ("RuleVisitor::*", "the implementor's"),
     ("SplittingScheme::*", "tables: take no number"),
     ("AnyIntegrator::all", "takes no number"),
     ("AnyIntegrator::order", "takes no number; that of any number of stages is in the attack on check"),

@@ -23,7 +23,7 @@
 
 mod error;
 mod gauss;
-mod rules;
+pub mod rules;
 mod run;
 mod solve;
 mod splitting;
