@@ -147,12 +147,13 @@ fn what_rows_hold() {
 fn progress_is_told() {
     let kepler = Kepler::<2>::default();
     let problem = Problem::new(&kepler, 0.0, kepler.initial()).unwrap();
-    for (integrator, count) in [(AnyIntegrator::Gauss { stages: 2 }, 777), (AnyIntegrator::Clocked { stages: 2 }, 7000)]
-    {
+    // By a clock the number of steps is not known, and it is told after so many steps.
+    let (gauss, clocked) = (AnyIntegrator::Gauss { stages: 2 }, AnyIntegrator::Clocked { stages: 2 });
+    for (integrator, count, least) in [(gauss, 777, 98), (clocked, 7000, 6)] {
         let mut parts = Vec::new();
         let mut progress = Progress::new(|part| parts.push(part));
         run_in(&problem, integrator, count, 5.0).observe(&mut progress).run(Until::Time(5.0)).unwrap();
-        assert!(parts.len() > 5 && parts.len() <= 102, "{integrator}: {}", parts.len());
+        assert!(parts.len() >= least && parts.len() <= 102, "{integrator}: {}", parts.len());
         assert_eq!((parts[0], parts[parts.len() - 1]), (0.0, 1.0));
         assert!(parts.windows(2).all(|pair| pair[0] < pair[1]), "{parts:?}");
     }
