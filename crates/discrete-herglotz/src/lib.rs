@@ -19,6 +19,8 @@
 //! # Ok::<(), discrete_herglotz::InputError>(())
 //! ```
 //!
+//! Features: `faer` (default) for large linear systems, `csv` for rows written while a run goes on, `serde` for integrators by name.
+//!
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
 mod error;

@@ -5,7 +5,7 @@
 use super::coefficients::{Coefficients, MOST};
 use super::damping::{Damping, ITERATIONS, Verdict, chances};
 use crate::rules::step_equations::BLOCK;
-use crate::solve::solver::DenseLu;
+use crate::solve::DenseLu;
 use crate::{ITERATION_LIMIT, StepError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{Derivatives, Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, seed};
