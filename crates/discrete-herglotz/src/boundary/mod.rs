@@ -1,0 +1,13 @@
+//! The discrete Herglotz principle as a boundary-value problem.
+
+mod critical_path;
+mod deflation;
+mod elimination;
+mod end;
+mod newton;
+mod problem;
+mod sweep;
+
+pub use critical_path::{CriticalPath, PathStatus};
+pub use end::End;
+pub use problem::BoundaryPath;
