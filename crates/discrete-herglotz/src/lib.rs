@@ -30,7 +30,7 @@ mod solve;
 mod splitting;
 mod theory;
 
-pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus};
+pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus, continuation};
 pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
 pub use gauss::{ClockedGauss, ClockedStepper, DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper};
 pub use rules::{

@@ -3,6 +3,7 @@
 use super::critical_path::CriticalPath;
 use super::deflation::Deflation;
 use super::end::{Conditions, End};
+use super::index::inertia;
 use super::newton::search;
 use super::sweep::{Equations, Nodes};
 use crate::{DiscreteLagrangian, DiscretePath, InputError};
@@ -125,12 +126,62 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
     /// Searches for a critical path; the status says how that ended.
     pub fn search(&self) -> CriticalPath<N> {
         let nodes = Nodes { q: self.start(), z: vec![self.z0; self.steps + 1] };
-        let of = Equations { ld: &self.ld, conditions: &self.conditions, t0: self.t0, steps: self.steps };
-        search(&of, nodes, &Deflation { known: &self.known, length: self.length })
+        search(&self.equations(), nodes, &Deflation { known: &self.known, length: self.length })
     }
 
-    /// The path from which the search starts.
+    /// The number of steps.
+    pub fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// The index of a critical path of this problem: the number of negative directions of the second variation of the action.
+    ///
+    /// That is the number of negative eigenvalues of the Hessian of `A_d` (minus `p_N . q_N` where that momentum is given) in the
+    /// positions that are not given. Where `p_0` is given, the action at the start moves along: `dz_0 = p_0 . dq_0`, so that the path
+    /// is critical in `q_0` as well. For `h > 0` and W positive definite it is 0 on short paths between given ends and grows by the
+    /// multiplicity of each conjugate point that the path meets: the index theorem of Morse, for which see Milnor, "Morse theory"
+    /// (1963). `None` where it is not defined: for a periodic path, which is not critical for the action of all its points, where a
+    /// sigma_d is not positive, and where the second variation is degenerate.
+    ///
+    /// # Errors
+    /// [`InputError::PathLength`] unless the path has as many steps as the problem, [`InputError::Undefined`] where the discrete
+    /// Lagrangian is not defined along it.
+    pub fn index(&self, path: &CriticalPath<N>) -> Result<Option<usize>, InputError> {
+        if path.points.len() != self.steps + 1 || path.actions.len() != self.steps + 1 {
+            let found = path.points.len().min(path.actions.len()).saturating_sub(1);
+            return Err(InputError::PathLength { expected: self.steps, found });
+        }
+        let nodes = Nodes { q: path.points.clone(), z: path.actions.clone() };
+        let found = inertia(&self.equations(), &nodes).map_err(|_| InputError::Undefined)?;
+        Ok(found.and_then(|(negative, vanishing)| (vanishing == 0).then_some(negative)))
+    }
+
+    fn equations(&self) -> Equations<'_, D, N> {
+        Equations { ld: &self.ld, conditions: &self.conditions, t0: self.t0, steps: self.steps }
+    }
+
+    /// The path from which the search starts: not a known one, from which nothing leads away.
     fn start(&self) -> Vec<SVector<f64, N>> {
+        let mut points = self.undisturbed();
+        let near = |known: &Vec<SVector<f64, N>>| {
+            let square =
+                points.iter().zip(known).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / points.len() as f64;
+            square <= (1e-3 * self.length).powi(2)
+        };
+        if self.known.iter().any(near) {
+            // An arc that leaves the ends where they are.
+            for (k, q) in points.iter_mut().enumerate() {
+                let arc = (std::f64::consts::PI * k as f64 / self.steps as f64).sin() * self.length;
+                if k > 0 && k < self.steps {
+                    *q += SVector::from_element(arc);
+                }
+            }
+        }
+        points
+    }
+
+    /// The user's path, or the straight line.
+    fn undisturbed(&self) -> Vec<SVector<f64, N>> {
         let (first, last) = match &self.conditions {
             Conditions::Ends(start, end) => (start.position().copied(), end.position().copied()),
             Conditions::Periodic(_) => (None, None),

@@ -82,7 +82,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
 
     /// The second jet of a step, all of whose entries are finite.
     #[inline(always)]
-    fn jet(
+    pub fn jet(
         &self,
         k: usize,
         q0: &SVector<f64, N>,
