@@ -23,6 +23,7 @@
 //!
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
+mod boundary;
 mod error;
 mod gauss;
 pub mod rules;
@@ -31,6 +32,7 @@ mod solve;
 mod splitting;
 mod theory;
 
+pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus, continuation};
 pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
 pub use gauss::{ClockedGauss, ClockedStepper, DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper};
 pub use rules::*;
