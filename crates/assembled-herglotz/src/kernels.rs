@@ -3,6 +3,7 @@
 use crate::Potential;
 use crate::blocks::BLOCK;
 use crate::elements::{Elements, Piece, Run};
+use crate::implicit::Pattern;
 use crate::lanes::{LANES, Lanes};
 use crate::term::column;
 use contact_geom::nalgebra::SVector;
@@ -23,6 +24,15 @@ pub(crate) trait PotentialList: Send + Sync {
 
     /// The energy of the elements that begin in a block.
     fn energy(&self, block: usize, blocks: usize, t: f64, q: &[f64]) -> f64;
+
+    /// Calls a function with the places of each element.
+    fn visit(&self, f: &mut dyn FnMut(&[usize]));
+
+    /// Where the second derivatives of each element stand in a matrix: for each pair of unknowns with the second not after the first.
+    fn entries(&self, pattern: &Pattern) -> Vec<u32>;
+
+    /// Adds the second derivatives, times a factor, to the entries of the matrix.
+    fn hessian(&self, t: f64, q: &[f64], factor: f64, places: &[u32], entries: &mut [f64]);
 }
 
 /// A potential with its elements.
@@ -73,28 +83,49 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> PotentialList for Kind<
         }
         rest + sum.to_array().iter().sum::<f64>()
     }
+
+    fn visit(&self, f: &mut dyn FnMut(&[usize])) {
+        for run in &self.elements.runs {
+            (0..run.len).for_each(|e| f(&run.start.map(|s| s + e)));
+        }
+        self.elements.loose.iter().for_each(|places| f(&places.map(|p| p as usize)));
+    }
+
+    fn entries(&self, pattern: &Pattern) -> Vec<u32> {
+        let mut entries = Vec::new();
+        self.visit(&mut |places| {
+            for (i, a) in places.iter().enumerate() {
+                entries.extend(places[..=i].iter().map(|b| pattern.entry(*a, *b)));
+            }
+        });
+        entries
+    }
+
+    fn hessian(&self, t: f64, q: &[f64], factor: f64, places: &[u32], entries: &mut [f64]) {
+        self.add_second(t, q, factor, places, entries);
+    }
 }
 
 /// The unknowns of eight elements of a run.
 #[inline(always)]
-fn unknowns<const K: usize>(q: &[f64], run: &Run<K>, e: usize) -> SVector<Lanes, K> {
+pub(crate) fn unknowns<const K: usize>(q: &[f64], run: &Run<K>, e: usize) -> SVector<Lanes, K> {
     column(std::array::from_fn(|i| Lanes::load(q, run.start[i] + e)))
 }
 
 /// The unknowns of fewer.
 #[inline(always)]
-fn unknowns_part<const K: usize>(q: &[f64], run: &Run<K>, e: usize, count: usize) -> SVector<Lanes, K> {
+pub(crate) fn unknowns_part<const K: usize>(q: &[f64], run: &Run<K>, e: usize, count: usize) -> SVector<Lanes, K> {
     column(std::array::from_fn(|i| Lanes::load_part(q, run.start[i] + e, count)))
 }
 
 impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
     #[inline(always)]
-    fn parameters(&self, run: &Run<K>, e: usize) -> [Lanes; P] {
+    pub(crate) fn parameters(&self, run: &Run<K>, e: usize) -> [Lanes; P] {
         std::array::from_fn(|p| Lanes::load(&self.elements.run_parameters[p], run.first + e))
     }
 
     #[inline(always)]
-    fn parameters_part(&self, run: &Run<K>, e: usize, count: usize) -> [Lanes; P] {
+    pub(crate) fn parameters_part(&self, run: &Run<K>, e: usize, count: usize) -> [Lanes; P] {
         std::array::from_fn(|p| Lanes::load_part(&self.elements.run_parameters[p], run.first + e, count))
     }
 
@@ -177,7 +208,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
 
     /// Unknowns and parameters of elements that are in no run; the first stands in the lanes that are left.
     #[inline(always)]
-    fn gathered(&self, q: &[f64], count: usize, element: impl Fn(usize) -> usize) -> (SVector<Lanes, K>, [Lanes; P]) {
+    pub(crate) fn gathered(&self, q: &[f64], count: usize, element: impl Fn(usize) -> usize) -> (SVector<Lanes, K>, [Lanes; P]) {
         let of = |lane: usize| element(if lane < count { lane } else { 0 });
         let elements: [usize; LANES] = std::array::from_fn(of);
         let nan = f64::NAN;

@@ -2,7 +2,7 @@
 
 use contact_geom::Scalar;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
-use wide::{CmpGe, CmpLt, f64x8};
+use wide::f64x8;
 
 /// The number of lanes.
 pub(crate) const LANES: usize = 8;

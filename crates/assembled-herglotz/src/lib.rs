@@ -22,6 +22,7 @@
 mod blocks;
 mod elements;
 mod error;
+mod implicit;
 mod kernels;
 mod lanes;
 mod splitting;
@@ -31,6 +32,7 @@ mod term;
 
 pub use elements::{ElementData, FIXED};
 pub use error::AssemblyError;
+pub use implicit::AssembledMidpoint;
 pub use splitting::AssembledSplitting;
 pub use system::{AssembledSystem, State};
 pub use term::{Difference, Potential};

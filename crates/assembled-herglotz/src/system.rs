@@ -1,5 +1,6 @@
 //! A Lagrangian as a sum of local terms.
 
+use crate::blocks;
 use crate::elements::{ElementData, Elements};
 use crate::kernels::{Kind, PotentialList};
 use crate::{AssemblyError, Potential};
@@ -101,6 +102,38 @@ impl AssembledSystem {
     /// The rate `gamma` of the drag.
     pub fn gamma(&self) -> f64 {
         self.gamma
+    }
+
+    /// The energy `E_L = sum m_i v_i^2/2 + V - gamma z`, which decays as `e^(gamma t)` where V does not depend on time.
+    ///
+    /// # Errors
+    /// [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state.
+    pub fn energy(&self, state: State) -> Result<f64, AssemblyError> {
+        state.check(self)?;
+        let mut q = vec![0.0; self.unknowns + 2];
+        q[1..=self.unknowns].copy_from_slice(state.q);
+        let kinetic: f64 = state.v.iter().enumerate().map(|(i, v)| 0.5 * self.mass(i) * v * v).sum();
+        Ok(kinetic + self.potential(state.t, &q) - self.gamma * state.z)
+    }
+
+    /// The potential energy, of positions between fixed places.
+    pub(crate) fn potential(&self, t: f64, q: &[f64]) -> f64 {
+        let blocks = blocks::count(self.unknowns);
+        let mut sum = 0.0;
+        for block in 0..blocks {
+            for list in &self.potentials {
+                sum += list.energy(block, blocks, t, q);
+            }
+        }
+        sum
+    }
+
+    /// The mass of an unknown.
+    pub(crate) fn mass(&self, i: usize) -> f64 {
+        match &self.masses {
+            Masses::Same(m) => *m,
+            Masses::Each(masses) => masses.get(i).copied().unwrap_or(0.0),
+        }
     }
 
     /// Checks that each unknown has a mass.

@@ -2,7 +2,6 @@
 
 use contact_geom::nalgebra::{ArrayStorage, SVector};
 use contact_geom::{KernelDual, Scalar};
-use num_traits::One;
 
 /// A local potential energy `V(t, q; c)` of `K` unknowns with `P` parameters: a site, a bond, a finite element.
 ///
