@@ -10,7 +10,12 @@
 //! Writes `scale.csv`, a log-log figure of each case, and `verdicts.csv`. Ends with 1 if a figure is above its bound, with 2 if a name
 //! is unknown or the output cannot be written.
 
+mod chain;
+mod lattice;
+mod memory;
 mod report;
+mod seconds;
+mod solar;
 
 use clap::Parser;
 use contact_examples::{Directory, Failure, finish};
@@ -35,7 +40,7 @@ struct Arguments {
 /// A case: its name, and what it does.
 type Case = (&'static str, fn(&mut Report) -> Result<(), Failure>);
 
-const CASES: &[Case] = &[];
+const CASES: &[Case] = &[("chain", chain::run), ("lattice", lattice::run), ("solar", solar::run)];
 
 fn main() -> ExitCode {
     finish(run(&Arguments::parse()))
