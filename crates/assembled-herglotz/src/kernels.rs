@@ -133,15 +133,15 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
     /// evaluated once for each of its unknowns, which costs less than to write its forces and to read them again.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    fn kick_piece<const FULL: bool, const MASSES: bool>(
-        &self,
+    fn kick_piece<'a, const FULL: bool, const MASSES: bool>(
+        &'a self,
         block: usize,
         t: f64,
-        q: &[f64],
+        q: &'a [f64],
         run: &Run<K>,
         piece: &Piece,
         weight: f64,
-        inverse_masses: &[f64],
+        inverse_masses: &'a [f64],
         v: &mut [f64],
     ) {
         let (from, to) = (piece.from as usize, piece.to as usize);
@@ -152,16 +152,31 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         let place = block * BLOCK + from + 1;
         let acts = |k: usize| FULL || piece.slots >> k & 1 == 1;
         let (chunks, rest) = v.as_chunks_mut::<LANES>();
+        let count = chunks.len();
+        // For each slot its elements' unknowns and parameters, as many registers of each as there are of velocities: then no load
+        // asks whether it is inside.
+        let of = |x: &'a [f64], from: usize| x.get(from..).and_then(|x| x.as_chunks::<LANES>().0.get(..count)).unwrap_or(&[]);
+        let first = |k: usize| if acts(k) { place - run.start[k] } else { 0 };
+        let x: [[&[[f64; LANES]]; K]; K] =
+            std::array::from_fn(|k| std::array::from_fn(|i| of(q, run.start[i] + first(k))));
+        let c: [[&[[f64; LANES]]; P]; K] = std::array::from_fn(|k| {
+            std::array::from_fn(|p| of(&self.elements.run_parameters[p], run.first + first(k)))
+        });
+        let masses = if MASSES { of(inverse_masses, 0) } else { &[] };
+        let inside = |slices: &[&[[f64; LANES]]]| slices.iter().all(|s| s.len() == count);
+        if !(0..K).all(|k| !acts(k) || inside(&x[k]) && inside(&c[k])) || MASSES && masses.len() != count {
+            return;
+        }
         for (number, chunk) in chunks.iter_mut().enumerate() {
-            let at = place + number * LANES;
             let mut force = Lanes::splat(0.0);
             for k in 0..K {
                 if acts(k) {
-                    let e = at - run.start[k];
-                    force -= self.term.gradient(t, &unknowns(q, run, e), &self.parameters(run, e))[k];
+                    let x = std::array::from_fn(|i| Lanes::new(x[k][i][number]));
+                    let c = std::array::from_fn(|p| Lanes::new(c[k][p][number]));
+                    force -= self.term.gradient(t, &column(x), &c)[k];
                 }
             }
-            let factor = if MASSES { Lanes::load(inverse_masses, number * LANES) * weight } else { Lanes::splat(weight) };
+            let factor = if MASSES { Lanes::new(masses[number]) * weight } else { Lanes::splat(weight) };
             *chunk = (Lanes::new(*chunk) + force * factor).to_array();
         }
         if rest.is_empty() {

@@ -19,6 +19,7 @@
 //! # Ok::<(), assembled_herglotz::AssemblyError>(())
 //! ```
 
+mod aligned;
 mod blocks;
 mod elements;
 mod error;

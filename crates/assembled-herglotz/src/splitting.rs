@@ -4,6 +4,7 @@ use crate::blocks::{self, BLOCK};
 use crate::kernels::Weight;
 use crate::system::{AssembledSystem, Masses, State};
 use crate::AssemblyError;
+use crate::aligned::Aligned;
 use discrete_herglotz::{Halt, InputError, SplittingScheme, StepError};
 use rayon::prelude::*;
 
@@ -35,11 +36,11 @@ pub struct AssembledSplitting<'a> {
     t0: f64,
     taken: usize,
     /// Positions between fixed places, before and after a pass.
-    q: Vec<f64>,
-    next: Vec<f64>,
-    v: Vec<f64>,
-    /// The velocities of a state that is asked for; empty before.
-    end: Vec<f64>,
+    q: Aligned,
+    next: Aligned,
+    v: Aligned,
+    /// The velocities of a state that is asked for.
+    end: Aligned,
     inverse_masses: InverseMasses,
     z: f64,
     action: bool,
@@ -126,8 +127,7 @@ impl<'a> AssembledSplitting<'a> {
         system.check_masses()?;
         AssembledSystem::check_number("gamma", system.gamma())?;
         let n = system.unknowns();
-        let mut q = vec![0.0; n + 2];
-        q[1..=n].copy_from_slice(start.q);
+        let q = Aligned::between_fixed(start.q);
         let inverse_masses = match &system.masses {
             Masses::Same(m) => InverseMasses::Same(1.0 / m),
             Masses::Each(masses) => InverseMasses::Each(masses.iter().map(|m| 1.0 / m).collect()),
@@ -138,10 +138,10 @@ impl<'a> AssembledSplitting<'a> {
             h,
             t0: start.t,
             taken: 0,
-            next: q.clone(),
+            next: Aligned::between_fixed(start.q),
             q,
-            v: start.v.to_vec(),
-            end: Vec::new(),
+            v: Aligned::from_slice(start.v),
+            end: Aligned::zeros(n, 0),
             inverse_masses,
             z: start.z,
             action: false,
@@ -209,8 +209,7 @@ impl<'a> AssembledSplitting<'a> {
     pub fn state(&mut self) -> State<'_> {
         let n = self.system.unknowns();
         let t = self.t0 + self.taken as f64 * self.h;
-        self.end.clear();
-        self.end.extend_from_slice(&self.v);
+        self.end.copy_from_slice(&self.v);
         let mut z = self.z;
         if self.taken == 0 {
             self.next.copy_from_slice(&self.q);

@@ -54,9 +54,6 @@ impl Factors {
         Ok(Factors { pattern, symbolic, values, scratch, definite: true })
     }
 
-    pub fn pattern(&self) -> &Pattern {
-        &self.pattern
-    }
 
     /// Factorises the matrix with these entries of its lower triangle.
     ///
