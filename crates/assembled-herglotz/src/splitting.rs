@@ -102,7 +102,8 @@ impl SubstepTable {
         // Only a scheme that begins with a drift ends with one.
         let (last_kick, last_drift) = (kicks[stages], drifts.get(stages).copied().unwrap_or(0.0));
         let mut joined = first.clone();
-        joined[0] = stage(last_kick + kicks[0], last_drift + drifts[0], 0.0);
+        // Its kick stands before the last drift.
+        joined[0] = stage(last_kick + kicks[0], last_drift + drifts[0], -last_drift * h);
         SubstepTable { first, joined, closing: stage(last_kick, last_drift, if last_drift == 0.0 { h } else { time * h }) }
     }
 }
@@ -194,7 +195,6 @@ impl<'a> AssembledSplitting<'a> {
         let t = self.t0 + self.taken as f64 * self.h;
         for i in 0..self.table.first.len() {
             let stage = if self.taken == 0 { self.table.first[i] } else { self.table.joined[i] };
-            // The joined kick of a scheme that begins with a kick stands at the end of the step before, which is this time.
             let pass = Pass { system: self.system, inverse: &self.inverse_masses, q: &self.q, t: t + stage.time, stage };
             pass.run(&mut self.v, &mut self.next, &mut self.energies);
             if self.action {

@@ -180,7 +180,6 @@ impl<'a> AssembledMidpoint<'a> {
         let (h, n) = (self.h, self.system.unknowns());
         let resolution = largest(&self.q) / h.abs();
         let mut last = f64::INFINITY;
-        let mut fresh = false;
         let mut size = f64::INFINITY;
         for _ in 0..ITERATION_LIMIT {
             for i in 0..n {
@@ -197,13 +196,14 @@ impl<'a> AssembledMidpoint<'a> {
             if !size.is_finite() {
                 return Err(StepError::NonFinite);
             }
-            if !self.factorised {
+            let fresh = !self.factorised;
+            if fresh {
                 self.factorise(t)?;
-                (fresh, last) = (true, f64::INFINITY);
+                last = f64::INFINITY;
             }
             self.change.copy_from_slice(&self.residual);
             self.factors.solve(&mut self.change)?;
-            if fresh && last == f64::INFINITY {
+            if fresh {
                 self.check_factors()?;
             }
             for (u, change) in self.before.iter_mut().zip(&self.change) {
@@ -216,21 +216,22 @@ impl<'a> AssembledMidpoint<'a> {
             }
             // Below this a correction does not move the position or the velocity.
             let round_off = f64::EPSILON * (speed + resolution);
-            let rate = now / last;
-            let converged = now <= round_off * f64::EPSILON
-                || rate < 1.0 && now * rate / (1.0 - rate) <= round_off
-                // What round-off leaves of the residual comes back at each solve.
-                || rate >= 0.5 && now <= 8.0 * round_off;
-            if converged {
+            if now <= round_off * f64::EPSILON {
                 return Ok(());
             }
-            if rate.is_finite() && last.is_finite() && !fresh {
-                let left = (now / round_off).ln() / -(rate.min(1.0)).ln();
+            // The first correction tells nothing of the next.
+            if last.is_finite() {
+                let rate = now / last;
+                let next = if rate < 1.0 { now * rate / (1.0 - rate) } else { f64::INFINITY };
+                // What round-off leaves of the residual comes back at each solve.
+                if next <= round_off || rate >= 0.5 && now <= 8.0 * round_off {
+                    return Ok(());
+                }
+                // The solves that are left at this rate; new factors are worth their price where those are many.
+                let left = (round_off / now).ln() / rate.min(1.0).ln();
                 if left.is_nan() || left > PATIENCE {
                     self.factorised = false;
                 }
-            } else if fresh && rate > 0.1 && last.is_finite() {
-                self.factorised = false;
             }
             last = now;
         }
