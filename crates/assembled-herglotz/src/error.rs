@@ -15,7 +15,9 @@ pub enum AssemblyError {
         most: usize,
     },
     /// An element names an unknown that there is none of.
-    #[error("element {element} of list {list} has the unknown {unknown}; the system has the unknowns 0 to {last} (and FIXED)")]
+    #[error(
+        "element {element} of list {list} has the unknown {unknown}; the system has the unknowns 0 to {last} (and FIXED)"
+    )]
     OutOfRange {
         /// The list of elements, counted from 0 in the order in which they were added.
         list: usize,
@@ -75,16 +77,22 @@ pub enum AssemblyError {
         value: f64,
     },
     /// The force is not finite at the start.
-    #[error("the force on the unknown {unknown} is not finite at the start; choose a start inside the domain of the terms")]
+    #[error(
+        "the force on the unknown {unknown} is not finite at the start; choose a start inside the domain of the terms"
+    )]
     Undefined {
         /// The first such unknown.
         unknown: usize,
     },
     /// A method for separable systems is asked of one with general local terms.
-    #[error("the system has terms in the velocity or the action; splittings take potentials only: use the midpoint rule")]
+    #[error(
+        "the system has terms in the velocity or the action; splittings take potentials only: use the midpoint rule"
+    )]
     NotSeparable,
     /// The factors of the step's matrix need more memory than the limit.
-    #[error("the factors of the step's matrix need {needed} bytes, and the limit is {limit}; raise it, or take an explicit method")]
+    #[error(
+        "the factors of the step's matrix need {needed} bytes, and the limit is {limit}; raise it, or take an explicit method"
+    )]
     Memory {
         /// The estimate from the symbolic analysis.
         needed: usize,

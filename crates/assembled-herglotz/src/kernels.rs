@@ -155,7 +155,9 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         let count = chunks.len();
         // For each slot its elements' unknowns and parameters, as many registers of each as there are of velocities: then no load
         // asks whether it is inside.
-        let of = |x: &'a [f64], from: usize| x.get(from..).and_then(|x| x.as_chunks::<LANES>().0.get(..count)).unwrap_or(&[]);
+        let of = |x: &'a [f64], from: usize| {
+            x.get(from..).and_then(|x| x.as_chunks::<LANES>().0.get(..count)).unwrap_or(&[])
+        };
         let first = |k: usize| if acts(k) { place - run.start[k] } else { 0 };
         let x: [[&[[f64; LANES]]; K]; K] =
             std::array::from_fn(|k| std::array::from_fn(|i| of(q, run.start[i] + first(k))));
@@ -208,7 +210,9 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
             for k in 0..K {
                 for (e, g) in group.iter().zip(gradient[k].to_array()) {
                     // A fixed place, or one of another block, is none of these unknowns.
-                    let Some(place) = self.elements.loose.get(*e as usize).map(|places| places[k] as usize) else { continue };
+                    let Some(place) = self.elements.loose.get(*e as usize).map(|places| places[k] as usize) else {
+                        continue;
+                    };
                     let Some(at) = place.checked_sub(first) else { continue };
                     if let Some(v) = v.get_mut(at) {
                         *v -= g * match weight {
@@ -223,7 +227,12 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
 
     /// Unknowns and parameters of elements that are in no run; the first stands in the lanes that are left.
     #[inline(always)]
-    pub(crate) fn gathered(&self, q: &[f64], count: usize, element: impl Fn(usize) -> usize) -> (SVector<Lanes, K>, [Lanes; P]) {
+    pub(crate) fn gathered(
+        &self,
+        q: &[f64],
+        count: usize,
+        element: impl Fn(usize) -> usize,
+    ) -> (SVector<Lanes, K>, [Lanes; P]) {
         let of = |lane: usize| element(if lane < count { lane } else { 0 });
         let elements: [usize; LANES] = std::array::from_fn(of);
         let nan = f64::NAN;

@@ -37,3 +37,8 @@ pub use implicit::AssembledMidpoint;
 pub use splitting::AssembledSplitting;
 pub use system::{AssembledSystem, State};
 pub use term::{Difference, Potential};
+
+/// The program of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

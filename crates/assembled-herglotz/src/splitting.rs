@@ -1,10 +1,10 @@
 //! Explicit steps: kicks and drifts.
 
+use crate::AssemblyError;
+use crate::aligned::Aligned;
 use crate::blocks::{self, BLOCK};
 use crate::kernels::Weight;
 use crate::system::{AssembledSystem, Masses, State};
-use crate::AssemblyError;
-use crate::aligned::Aligned;
 use discrete_herglotz::{Halt, InputError, SplittingScheme, StepError};
 use rayon::prelude::*;
 
@@ -90,7 +90,8 @@ impl SubstepTable {
     fn new(scheme: &SplittingScheme, gamma: f64, h: f64) -> Self {
         let (drifts, kicks) = scheme.coefficients();
         let stages = scheme.stages();
-        let stage = |kick: f64, span: f64, time: f64| Stage { kick: kick * h, drift: Drift::new(gamma, span * h), time };
+        let stage =
+            |kick: f64, span: f64, time: f64| Stage { kick: kick * h, drift: Drift::new(gamma, span * h), time };
         let mut time = 0.0;
         let first: Vec<Stage> = (0..stages)
             .map(|i| {
@@ -104,7 +105,11 @@ impl SubstepTable {
         let mut joined = first.clone();
         // Its kick stands before the last drift.
         joined[0] = stage(last_kick + kicks[0], last_drift + drifts[0], -last_drift * h);
-        SubstepTable { first, joined, closing: stage(last_kick, last_drift, if last_drift == 0.0 { h } else { time * h }) }
+        SubstepTable {
+            first,
+            joined,
+            closing: stage(last_kick, last_drift, if last_drift == 0.0 { h } else { time * h }),
+        }
     }
 }
 
@@ -195,7 +200,8 @@ impl<'a> AssembledSplitting<'a> {
         let t = self.t0 + self.taken as f64 * self.h;
         for i in 0..self.table.first.len() {
             let stage = if self.taken == 0 { self.table.first[i] } else { self.table.joined[i] };
-            let pass = Pass { system: self.system, inverse: &self.inverse_masses, q: &self.q, t: t + stage.time, stage };
+            let pass =
+                Pass { system: self.system, inverse: &self.inverse_masses, q: &self.q, t: t + stage.time, stage };
             pass.run(&mut self.v, &mut self.next, &mut self.energies);
             if self.action {
                 self.z = act(self.z, &stage, &self.energies);

@@ -4,7 +4,9 @@
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{FputBond, Gravitation, OuterSolarSystem, SineGordon, Spring, fput_chain, lattice};
-use assembled_herglotz::{AssembledMidpoint, AssembledSplitting, AssembledSystem, AssemblyError, Difference, FIXED, State};
+use assembled_herglotz::{
+    AssembledMidpoint, AssembledSplitting, AssembledSystem, AssemblyError, Difference, FIXED, State,
+};
 use discrete_herglotz::{InputError, SplittingScheme, StepError};
 
 fn chain() -> AssembledSystem {
@@ -28,18 +30,25 @@ fn refused(system: &AssembledSystem, h: f64, start: State) -> AssemblyError {
 fn elements() {
     let system = || AssembledSystem::new(3).unwrap();
     let many: Vec<[usize; 2]> = (0..40).map(|i| [i, i + 1]).collect();
-    assert_eq!(of(system(), &[[0, 1], [1, 3]]), Some(AssemblyError::OutOfRange { list: 0, element: 1, unknown: 3, last: 2 }));
+    assert_eq!(
+        of(system(), &[[0, 1], [1, 3]]),
+        Some(AssemblyError::OutOfRange { list: 0, element: 1, unknown: 3, last: 2 })
+    );
     // In the middle of a run as well.
     let large = AssembledSystem::new(30).unwrap();
     assert_eq!(of(large, &many), Some(AssemblyError::OutOfRange { list: 0, element: 29, unknown: 30, last: 29 }));
     assert_eq!(of(chain(), &[[0, 1], [5, 5]]), Some(AssemblyError::Repeated { list: 1, element: 1, unknown: 5 }));
     assert_eq!(of(system(), &[[FIXED, FIXED]]), None);
-    let weighted = system().with_potential(Difference(Gravitation), [([0, 1, 2, FIXED, FIXED, FIXED], [f64::INFINITY])]);
+    let weighted =
+        system().with_potential(Difference(Gravitation), [([0, 1, 2, FIXED, FIXED, FIXED], [f64::INFINITY])]);
     assert_eq!(weighted.err(), Some(AssemblyError::Parameter { list: 0, element: 0, value: f64::INFINITY }));
     for n in [0, usize::MAX] {
         assert!(matches!(AssembledSystem::new(n), Err(AssemblyError::Unknowns { found, .. }) if found == n));
     }
-    assert!(matches!(lattice([3, 0], SineGordon { omega_squared: 1.0 }, 1.0, 0.0), Err(AssemblyError::Unknowns { .. })));
+    assert!(matches!(
+        lattice([3, 0], SineGordon { omega_squared: 1.0 }, 1.0, 0.0),
+        Err(AssemblyError::Unknowns { .. })
+    ));
     assert!(matches!(OuterSolarSystem::system(7, 0.0), Err(AssemblyError::Parameters { .. })));
 }
 
@@ -56,8 +65,14 @@ fn starts_and_steps() {
     let bad = [&v[..7], &[f64::INFINITY], &v[8..]].concat();
     let infinite = refused(&system, 0.1, State { v: &bad, ..start });
     assert_eq!(infinite, AssemblyError::NonFinite { what: "v", index: 7, value: f64::INFINITY });
-    assert!(matches!(refused(&system, 0.1, State { t: f64::NAN, ..start }), AssemblyError::NonFinite { what: "t", .. }));
-    assert!(matches!(refused(&system, 0.1, State { z: f64::NAN, ..start }), AssemblyError::NonFinite { what: "z", .. }));
+    assert!(matches!(
+        refused(&system, 0.1, State { t: f64::NAN, ..start }),
+        AssemblyError::NonFinite { what: "t", .. }
+    ));
+    assert!(matches!(
+        refused(&system, 0.1, State { z: f64::NAN, ..start }),
+        AssemblyError::NonFinite { what: "z", .. }
+    ));
     let drag = refused(&chain().with_drag(f64::NAN), 0.1, start);
     assert!(matches!(drag, AssemblyError::NonFinite { what: "gamma", .. }));
     let mut masses = vec![1.0; 20];
@@ -84,7 +99,8 @@ fn too_little_memory() {
     let system = lattice([30, 30], SineGordon { omega_squared: 1.0 }, 1.0, 0.0).unwrap();
     let zeros = vec![0.0; 900];
     let start = State { t: 0.0, q: &zeros, v: &zeros, z: 0.0 };
-    let Some(AssemblyError::Memory { needed, limit: 1000 }) = AssembledMidpoint::new(&system, 0.1, start, 1000).err() else {
+    let Some(AssemblyError::Memory { needed, limit: 1000 }) = AssembledMidpoint::new(&system, 0.1, start, 1000).err()
+    else {
         panic!("1000 bytes are not enough");
     };
     // At least the matrix itself, 900 + 1740 entries of 8 bytes.

@@ -14,7 +14,8 @@ fn run(system: &AssembledSystem, threads: usize, parts: &[usize]) -> Vec<u64> {
     let v: Vec<f64> = (0..n).map(|i| (0.03 * i as f64).cos()).collect();
     let start = State { t: 0.0, q: &q, v: &v, z: 0.5 };
     pool.install(|| {
-        let mut motion = AssembledSplitting::new(system, &SplittingScheme::BLANES_MOAN_4, 0.1, start).unwrap().with_action();
+        let mut motion =
+            AssembledSplitting::new(system, &SplittingScheme::BLANES_MOAN_4, 0.1, start).unwrap().with_action();
         for steps in parts {
             motion.advance(*steps).unwrap();
             motion.state();

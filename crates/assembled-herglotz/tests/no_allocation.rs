@@ -54,7 +54,8 @@ fn steps() {
     let chain = fput_chain(n, FputBond { alpha: 0.1, beta: 1.0 }, -0.01).unwrap();
     let (q, v) = (vec![0.5; n], vec![0.1; n]);
     let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
-    let mut explicit = AssembledSplitting::new(&chain, &SplittingScheme::BLANES_MOAN_6, 0.1, start).unwrap().with_action();
+    let mut explicit =
+        AssembledSplitting::new(&chain, &SplittingScheme::BLANES_MOAN_6, 0.1, start).unwrap().with_action();
     explicit.state();
     let found = allocations(|| {
         explicit.advance(300).unwrap();
@@ -65,7 +66,11 @@ fn steps() {
     implicit.advance(5).unwrap();
     let before = implicit.factorisations();
     assert_eq!(allocations(|| implicit.advance(50).unwrap()), 0);
-    assert!(implicit.factorisations() - before <= 5, "{} factorisations in 50 steps", implicit.factorisations() - before);
+    assert!(
+        implicit.factorisations() - before <= 5,
+        "{} factorisations in 50 steps",
+        implicit.factorisations() - before
+    );
 }
 
 /// A chain and its motion hold at most six vectors, the start of the user included.

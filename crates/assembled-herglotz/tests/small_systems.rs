@@ -66,7 +66,11 @@ fn chains_between_walls() {
     let chain = |n| fput_chain(n, FputBond { alpha: 0.0, beta: 0.5 }, -0.1).unwrap();
     compare(&Chain::<8> { ends: Ends::Fixed, beta: 0.5, gamma: -0.1 }, &chain(8), [1.0; 8]);
     compare(&Chain::<5> { ends: Ends::Fixed, beta: 0.5, gamma: -0.1 }, &chain(5), [1.0; 5]);
-    compare(&Chain::<5> { ends: Ends::Fixed, beta: 0.5, gamma: 0.0 }, &fput_chain(5, FputBond { alpha: 0.0, beta: 0.5 }, 0.0).unwrap(), [1.0; 5]);
+    compare(
+        &Chain::<5> { ends: Ends::Fixed, beta: 0.5, gamma: 0.0 },
+        &fput_chain(5, FputBond { alpha: 0.0, beta: 0.5 }, 0.0).unwrap(),
+        [1.0; 5],
+    );
 }
 
 /// A sine-Gordon lattice of 3 x 3 sites, whole.

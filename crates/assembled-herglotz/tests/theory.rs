@@ -37,7 +37,8 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
     let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|(h, e)| (h.ln(), e.ln())).unzip();
     let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
-    let (top, bottom) = x.iter().zip(&y).fold((0.0, 0.0), |(t, b), (x, y)| (t + (x - mx) * (y - my), b + (x - mx).powi(2)));
+    let (top, bottom) =
+        x.iter().zip(&y).fold((0.0, 0.0), |(t, b), (x, y)| (t + (x - mx) * (y - my), b + (x - mx).powi(2)));
     top / bottom
 }
 

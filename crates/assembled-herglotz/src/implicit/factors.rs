@@ -31,13 +31,9 @@ impl Factors {
         let own = 4 * pattern.rows.len();
         let too_much = |needed: usize| AssemblyError::Memory { needed, limit };
         let lower = SymbolicSparseColMatRef::new_checked(n, n, &pattern.begins, None, &pattern.rows);
-        let symbolic = factorize_symbolic_cholesky(
-            lower,
-            Side::Lower,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
-        )
-        .map_err(|_| too_much(own))?;
+        let symbolic =
+            factorize_symbolic_cholesky(lower, Side::Lower, SymmetricOrdering::Amd, CholeskySymbolicParams::default())
+                .map_err(|_| too_much(own))?;
         let request = StackReq::any_of(&[
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
             symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default()),
@@ -54,6 +50,10 @@ impl Factors {
         Ok(Factors { pattern, symbolic, values, scratch, definite: true })
     }
 
+    #[cfg(test)]
+    pub fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
 
     /// Factorises the matrix with these entries of its lower triangle.
     ///
@@ -70,15 +70,20 @@ impl Factors {
         let matrix = SparseColMatRef::new(lower, entries);
         let mut stack = MemStack::new(scratch);
         let (regular, par) = (Default::default(), Par::Seq);
-        let llt = symbolic.factorize_numeric_llt(
-            values, matrix, Side::Lower, regular, par, &mut stack, Default::default(),
-        );
+        let llt =
+            symbolic.factorize_numeric_llt(values, matrix, Side::Lower, regular, par, &mut stack, Default::default());
         *definite = llt.is_ok();
         if *definite {
             return Ok(());
         }
         let ldlt = symbolic.factorize_numeric_ldlt(
-            values, matrix, Side::Lower, Default::default(), par, &mut stack, Default::default(),
+            values,
+            matrix,
+            Side::Lower,
+            Default::default(),
+            par,
+            &mut stack,
+            Default::default(),
         );
         ldlt.map(|_| ()).map_err(|_| StepError::Singular { pivot: 0.0 })
     }

@@ -3,10 +3,10 @@
 use super::factors::Factors;
 use super::largest;
 use super::pattern::Pattern;
+use crate::AssemblyError;
 use crate::blocks::BLOCK;
 use crate::kernels::Weight;
 use crate::system::{AssembledSystem, Masses, State};
-use crate::AssemblyError;
 use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError};
 
 /// The most iterations with kept factors that are worth one factorisation.
@@ -24,11 +24,11 @@ const PATIENCE: f64 = 6.0;
 /// solves would cost more, and stops where the next correction is below round-off.
 pub struct AssembledMidpoint<'a> {
     system: &'a AssembledSystem,
-    factors: Factors,
+    pub(super) factors: Factors,
     /// The entries of each list's elements.
     places: Vec<Vec<u32>>,
     diagonal: Vec<u32>,
-    entries: Vec<f64>,
+    pub(super) entries: Vec<f64>,
     h: f64,
     t0: f64,
     taken: usize,
@@ -250,7 +250,7 @@ impl<'a> AssembledMidpoint<'a> {
     }
 
     /// Factorises `M + (h^2/4) V_qq` at the middle.
-    fn factorise(&mut self, t: f64) -> Result<(), StepError> {
+    pub(super) fn factorise(&mut self, t: f64) -> Result<(), StepError> {
         self.entries.fill(0.0);
         for (i, at) in self.diagonal.iter().enumerate() {
             self.entries[*at as usize] = match &self.system.masses {

@@ -4,6 +4,8 @@ mod factors;
 mod midpoint;
 mod pattern;
 mod second;
+#[cfg(test)]
+mod tests;
 
 pub use midpoint::AssembledMidpoint;
 pub(crate) use pattern::Pattern;

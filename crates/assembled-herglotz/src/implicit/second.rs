@@ -4,8 +4,8 @@ use crate::Potential;
 use crate::kernels::{Kind, unknowns, unknowns_part};
 use crate::lanes::{LANES, Lanes};
 use crate::term::column;
-use contact_geom::nalgebra::SVector;
 use contact_geom::Dual;
+use contact_geom::nalgebra::SVector;
 
 impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
     /// See [`PotentialList::hessian`](crate::kernels::PotentialList::hessian).

@@ -78,10 +78,8 @@ pub fn lattice<W: Potential<1>, const D: usize>(
     gamma: f64,
 ) -> Result<AssembledSystem, AssemblyError> {
     let sites = size.iter().try_fold(1usize, |product, s| product.checked_mul(*s)).unwrap_or(usize::MAX);
-    let mut system = AssembledSystem::new(sites)?
-        .with_mass(1.0)
-        .with_drag(gamma)
-        .with_potential(site, (0..sites).map(|i| [i]))?;
+    let mut system =
+        AssembledSystem::new(sites)?.with_mass(1.0).with_drag(gamma).with_potential(site, (0..sites).map(|i| [i]))?;
     let mut stride = 1;
     for along in size {
         // A site has a neighbour along this direction unless it is in the last layer.

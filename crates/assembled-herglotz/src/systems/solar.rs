@@ -52,14 +52,8 @@ impl OuterSolarSystem {
     pub const G: f64 = 2.95912208286e-4;
 
     /// The masses; that of the Sun has those of the inner planets.
-    pub const MASSES: [f64; 6] = [
-        1.00000597682,
-        0.000954786104043,
-        0.000285583733151,
-        0.0000437273164546,
-        0.0000517759138449,
-        1.0 / 1.3e8,
-    ];
+    pub const MASSES: [f64; 6] =
+        [1.00000597682, 0.000954786104043, 0.000285583733151, 0.0000437273164546, 0.0000517759138449, 1.0 / 1.3e8];
 
     /// The positions in au.
     pub const POSITIONS: [[f64; 3]; 6] = [
@@ -88,7 +82,11 @@ impl OuterSolarSystem {
     pub fn system(count: usize, gamma: f64) -> Result<AssembledSystem, AssemblyError> {
         match Self::MASSES.get(..count) {
             Some(masses) if count >= 2 => bodies(masses, Self::G, gamma),
-            _ => Err(AssemblyError::Parameters { what: "the number of bodies", value: count as f64, remedy: "take 2 to 6" }),
+            _ => Err(AssemblyError::Parameters {
+                what: "the number of bodies",
+                value: count as f64,
+                remedy: "take 2 to 6",
+            }),
         }
     }
 

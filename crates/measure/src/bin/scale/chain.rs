@@ -61,9 +61,8 @@ fn p4(report: &mut Report) -> Result<(), Failure> {
         [end.q, end.v].concat()
     };
     let norm = reference.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let error = |y: &mut dyn Iterator<Item = f64>| {
-        y.zip(&reference).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt() / norm
-    };
+    let error =
+        |y: &mut dyn Iterator<Item = f64>| y.zip(&reference).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt() / norm;
     let rounds = if report.quick { 50 } else { 400 };
     // Errors, the library's times and those of the loop.
     let mut found: Vec<[f64; 3]> = Vec::new();
@@ -92,9 +91,7 @@ fn p4(report: &mut Report) -> Result<(), Failure> {
         }
     }
     for (level, boost) in BOOST {
-        let cheapest = |k: usize| {
-            found.iter().filter(|f| f[0] <= level).map(|f| f[k]).fold(f64::INFINITY, f64::min)
-        };
+        let cheapest = |k: usize| found.iter().filter(|f| f[0] <= level).map(|f| f[k]).fold(f64::INFINITY, f64::min);
         report.row(CASE, &format!("P4 to {level:e}"), n, cheapest(1), None);
         report.row(CASE, &format!("P4 to {level:e} by a loop"), n, cheapest(2), None);
         report.verdict(CASE, &format!("P4 to {level:e} over a loop written by hand"), cheapest(1) / cheapest(2), 1.2);

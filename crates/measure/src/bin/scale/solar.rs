@@ -30,7 +30,9 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     let (exact, exact_free) = (motion(&system, &scheme, days, finest)?.0, motion(&free, &scheme, days, finest)?.0);
     let mut ours: Vec<Found> = Vec::new();
     let schemes = [SplittingScheme::BLANES_MOAN_6, SplittingScheme::BLANES_CASAS_8, scheme];
-    for (scheme, widths) in schemes.iter().zip([[400.0, 300.0, 200.0, 150.0], [400.0, 300.0, 220.0, 150.0], [400.0, 300.0, 220.0, 150.0]]) {
+    for (scheme, widths) in
+        schemes.iter().zip([[400.0, 300.0, 200.0, 150.0], [400.0, 300.0, 220.0, 150.0], [400.0, 300.0, 220.0, 150.0]])
+    {
         let mut ratio = 0.0f64;
         for h in widths {
             let steps = (days / h).ceil() as usize;
@@ -49,7 +51,9 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         }
     }
     let Some(theirs) = ias15(days, &exact)? else {
-        return print("            REBOUND is not there (python3 with the package rebound, and cc): nothing to compare with\n");
+        return print(
+            "            REBOUND is not there (python3 with the package rebound, and cc): nothing to compare with\n",
+        );
     };
     for (error, seconds) in &theirs {
         report.row(CASE, &format!("REBOUND's IAS15 to {error:.0e} au"), years, *seconds, None);
@@ -60,7 +64,12 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
 }
 
 /// The positions at the end, and the seconds that they took.
-fn motion(system: &AssembledSystem, scheme: &SplittingScheme, days: f64, steps: usize) -> Result<(Vec<f64>, f64), Failure> {
+fn motion(
+    system: &AssembledSystem,
+    scheme: &SplittingScheme,
+    days: f64,
+    steps: usize,
+) -> Result<(Vec<f64>, f64), Failure> {
     let (q, v) = (OuterSolarSystem::positions(BODIES), OuterSolarSystem::velocities(BODIES));
     let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
     let mut motion = AssembledSplitting::new(system, scheme, days / steps as f64, start).map_err(refused)?;
