@@ -294,8 +294,10 @@ impl Pass<'_> {
         }
         if let Some(energies) = energies {
             let blocks = blocks::count(self.system.unknowns());
-            let of = |list: &Box<dyn crate::kernels::PotentialList>| list.energy(block, blocks, self.t, self.q);
-            energies[0] = if kick == 0.0 { 0.0 } else { self.system.potentials.iter().map(of).sum() };
+            let lists = self.system.potentials.iter();
+            let potential = lists.map(|list| list.energy(block, blocks, self.t, self.q)).sum();
+            // Without a kick the action has nothing of it.
+            energies[0] = if kick == 0.0 { 0.0 } else { potential };
             energies[1] = match &self.system.masses {
                 Masses::Same(m) => m * sum_of_squares(v),
                 Masses::Each(masses) => masses[from..from + v.len()].iter().zip(&*v).map(|(m, v)| m * v * v).sum(),

@@ -26,8 +26,8 @@ fn tolerance(stages: usize) -> f64 {
 }
 
 fn assert_same<const N: usize>(name: &str, found: State, expected: PhasePoint<N>, masses: [f64; N], tolerance: f64) {
-    for i in 0..N {
-        let (dq, dp) = (found.q[i] - expected.q[i], masses[i] * found.v[i] - expected.p[i]);
+    for (i, mass) in masses.iter().enumerate() {
+        let (dq, dp) = (found.q[i] - expected.q[i], mass * found.v[i] - expected.p[i]);
         assert!(dq.abs() <= tolerance && dp.abs() <= tolerance, "{name}, unknown {i}: {dq:e}, {dp:e} > {tolerance:e}");
     }
     let dz = found.z - expected.z;

@@ -68,10 +68,9 @@ impl Factors {
         let n = pattern.unknowns();
         let lower = SymbolicSparseColMatRef::new_checked(n, n, &pattern.begins, None, &pattern.rows);
         let matrix = SparseColMatRef::new(lower, entries);
-        let mut stack = MemStack::new(scratch);
+        let stack = MemStack::new(scratch);
         let (regular, par) = (Default::default(), Par::Seq);
-        let llt =
-            symbolic.factorize_numeric_llt(values, matrix, Side::Lower, regular, par, &mut stack, Default::default());
+        let llt = symbolic.factorize_numeric_llt(values, matrix, Side::Lower, regular, par, stack, Default::default());
         *definite = llt.is_ok();
         if *definite {
             return Ok(());
@@ -82,7 +81,7 @@ impl Factors {
             Side::Lower,
             Default::default(),
             par,
-            &mut stack,
+            stack,
             Default::default(),
         );
         ldlt.map(|_| ()).map_err(|_| StepError::Singular { pivot: 0.0 })
@@ -95,13 +94,13 @@ impl Factors {
     pub fn solve(&mut self, b: &mut [f64]) -> Result<(), StepError> {
         let n = b.len();
         let rhs = MatMut::from_column_major_slice_mut(b, n, 1);
-        let mut stack = MemStack::new(&mut self.scratch);
+        let stack = MemStack::new(&mut self.scratch);
         if self.definite {
             let factors = LltRef::new(&self.symbolic, &self.values);
-            factors.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, &mut stack);
+            factors.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
         } else {
             let factors = LdltRef::new(&self.symbolic, &self.values);
-            factors.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, &mut stack);
+            factors.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
         }
         if b.iter().sum::<f64>().is_finite() { Ok(()) } else { Err(StepError::Singular { pivot: 0.0 }) }
     }
@@ -111,8 +110,9 @@ impl Factors {
         work.copy_from_slice(b);
         let mut size = 0.0f64;
         for (column, ends) in self.pattern.begins.windows(2).enumerate() {
-            for at in ends[0] as usize..ends[1] as usize {
-                let (row, a) = (self.pattern.rows[at] as usize, entries[at]);
+            let (from, to) = (ends[0] as usize, ends[1] as usize);
+            for (row, a) in self.pattern.rows[from..to].iter().zip(&entries[from..to]) {
+                let row = *row as usize;
                 work[row] -= a * x[column];
                 if row != column {
                     work[column] -= a * x[row];
