@@ -179,7 +179,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
                 }
             }
             let factor = if MASSES { Lanes::new(masses[number]) * weight } else { Lanes::splat(weight) };
-            *chunk = (Lanes::new(*chunk) + force * factor).to_array();
+            *chunk = force.mul_add(factor, Lanes::new(*chunk)).to_array();
         }
         if rest.is_empty() {
             return;

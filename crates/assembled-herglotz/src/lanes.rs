@@ -43,6 +43,12 @@ impl Lanes {
         Self::new(all)
     }
 
+    /// `self * b + c`, fused where the build has the instruction.
+    #[inline(always)]
+    pub fn mul_add(self, b: Self, c: Self) -> Self {
+        Lanes(self.0.mul_add(b.0, c.0))
+    }
+
     #[inline(always)]
     pub fn to_array(self) -> [f64; LANES] {
         self.0.to_array()

@@ -3,12 +3,11 @@
 use crate::chain::refused;
 use crate::memory::peak;
 use crate::report::Report;
-use crate::seconds::best;
+use crate::seconds::{best, done};
 use assembled_herglotz::systems::{SineGordon, lattice};
 use assembled_herglotz::{AssembledMidpoint, AssembledSplitting, State};
 use contact_examples::Failure;
 use discrete_herglotz::SplittingScheme;
-use std::hint::black_box;
 
 const CASE: &str = "lattice";
 
@@ -27,8 +26,8 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         let (seconds, bytes) = peak(|| {
             let system = lattice([side, side], site, 4.0, -0.01).map_err(refused)?;
             let mut motion = AssembledMidpoint::new(&system, 0.2, from, MEMORY).map_err(refused)?;
-            let first = best(1, || drop(black_box(motion.advance(1))));
-            Ok::<_, Failure>((first, best(3, || drop(black_box(motion.advance(2)))) / 2.0))
+            let first = best(1, || done(motion.advance(1)));
+            Ok::<_, Failure>((first, best(3, || done(motion.advance(2))) / 2.0))
         });
         let (first, later) = seconds?;
         report.row(CASE, "the first step by the midpoint rule", n, first, Some(bytes));
@@ -36,7 +35,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         let (seconds, bytes) = peak(|| {
             let system = lattice([side, side], site, 4.0, -0.01).map_err(refused)?;
             let mut motion = AssembledSplitting::new(&system, &SplittingScheme::STRANG, 0.2, from).map_err(refused)?;
-            Ok::<_, Failure>(best(3, || drop(black_box(motion.advance(5)))) / 5.0)
+            Ok::<_, Failure>(best(3, || done(motion.advance(5))) / 5.0)
         });
         report.row(CASE, "a step by strang", n, seconds?, Some(bytes));
     }
