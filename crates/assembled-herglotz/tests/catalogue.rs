@@ -83,13 +83,9 @@ fn a_cloth_falls() {
     for (end, tolerance) in [(explicit.state(), 1e-9), (implicit.state(), 1e-5)] {
         for i in 0..30 {
             let expected = [q[3 * i], q[3 * i + 1], fallen];
-            for k in 0..3 {
+            for (k, expected) in expected.into_iter().enumerate() {
                 let found = end.q[3 * i + k];
-                assert!(
-                    (found - expected[k]).abs() < tolerance,
-                    "mass {i}, coordinate {k}: {found}, not {}",
-                    expected[k]
-                );
+                assert!((found - expected).abs() < tolerance, "mass {i}, coordinate {k}: {found}, not {expected}");
             }
         }
     }

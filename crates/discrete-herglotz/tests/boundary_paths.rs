@@ -6,8 +6,8 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
-    CoupledPlane, DoublePendulum, Duffing, FreeParticle, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ,
-    Relativistic, System,
+    CoupledPlane, DoublePendulum, Duffing, FreeParticle, HarmonicOscillator, Pendulum, QuadraticInZ, Relativistic,
+    System,
 };
 use contact_geom::{DiscretePoint, GeometryError, Lagrangian, Largest, Scalar, VelocityPoint, largest, legendre};
 use discrete_herglotz::{BoundaryPath, CriticalPath, End, PathStatus, continuation};

@@ -58,8 +58,7 @@ pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
     let mut best: Option<(Nodes<N>, Measured<N>)> = None;
     let mut leaps = 0;
     for iterations in 1..=LIMIT {
-        // Not `<=`, which would let a NaN pass.
-        if !(at.regularity > least) {
+        if at.regularity.is_nan() || at.regularity <= least {
             let status = PathStatus::Conjugate { regularity: at.regularity };
             return CriticalPath::ended(status, x, iterations - 1).measured(&at);
         }
