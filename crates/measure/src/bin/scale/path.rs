@@ -29,8 +29,7 @@ fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str;
         let (mut best, mut best_by_hand, mut agreed) = (f64::INFINITY, f64::INFINITY, 0.0);
         // In turns, so that what disturbs one disturbs the other.
         for _ in 0..(200_000 / steps).clamp(3, 50) {
-            let ld =
-                LeftMidpoint::new(Chain::<N> { beta: BETA, gamma: GAMMA, ..Chain::default() }, SPAN / steps as f64)?;
+            let ld = LeftMidpoint::new(Springs::<N>, SPAN / steps as f64)?;
             let problem = BoundaryPath::new(&ld, steps, ends().map(End::Position))?;
             let start = Instant::now();
             let found = black_box(problem.search());
