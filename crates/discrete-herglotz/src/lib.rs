@@ -21,6 +21,7 @@
 //!
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
+mod ensemble;
 mod error;
 mod gauss;
 pub mod rules;
@@ -29,6 +30,7 @@ mod solve;
 mod splitting;
 mod theory;
 
+pub use ensemble::{Ending, Ensemble, EnsembleError, InLanes, Member, Tally};
 pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
 pub use gauss::{ClockedGauss, ClockedStepper, DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper};
 pub use rules::{

@@ -12,7 +12,7 @@ mod double_double;
 mod general;
 mod general_saved;
 mod general_stages;
-mod instructions;
+pub(crate) mod instructions;
 mod integrator;
 pub(crate) mod lanes;
 mod linear;

@@ -15,7 +15,7 @@ pub(crate) struct SeparableForm<L, const N: usize> {
     pub(crate) lagrangian: L,
     mass: Box<SMatrix<f64, N, N>>,
     /// `None` for the identity: a product with it would cost a third of a step of the oscillator.
-    inverse: Option<Box<SMatrix<f64, N, N>>>,
+    pub(crate) inverse: Option<Box<SMatrix<f64, N, N>>>,
 }
 
 impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {

@@ -1,0 +1,284 @@
+//! Ensembles: many motions at once, each in a lane of a vector register.
+
+mod error;
+mod member;
+mod pack;
+mod shards;
+mod sine;
+mod single;
+mod splitting;
+
+pub use error::EnsembleError;
+pub use member::{Ending, Member, Tally};
+
+use crate::gauss::instructions::Instructions;
+use crate::gauss::lanes::{branched, forget_branches};
+use crate::run::watch::size;
+use crate::{GaussCollocation, InputError, Integrator, SplittingScheme, Start, Status, Steps, Until};
+use contact_geom::{Lagrangian, PhasePoint, Triple, legendre};
+use single::Course;
+use splitting::SplittingPacks;
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+
+/// What an [`Integrator`] has a kernel for that takes a step of many motions at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InLanes {
+    /// The steps of a splitting with linear drag.
+    Splitting(SplittingScheme),
+    /// Those of contact Gauss collocation, for constant mass and constant rate of the conformal factor.
+    Gauss(GaussCollocation),
+}
+
+/// The members that are computed, kept and handed on together.
+const SHARD: usize = 256;
+
+/// The members of an ensemble that get all checks of a run before it begins.
+const SAMPLE: usize = 16;
+
+/// A member by its index: its Lagrangian and its start.
+type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a>;
+
+/// Many motions, by one integrator and the same steps.
+pub struct Ensemble<'a, L, const N: usize> {
+    members: MemberOf<'a, L, N>,
+    /// Whether all members have one Lagrangian.
+    shared: bool,
+    count: usize,
+    t0: f64,
+    integrator: Option<Box<dyn Integrator<'a, L, N> + Sync + 'a>>,
+    steps: Option<Steps>,
+    action: bool,
+    threads: Option<usize>,
+    instructions: Instructions,
+}
+
+impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
+    /// So many motions of one Lagrangian from the time `t0`: the start of each is a function of its index.
+    pub fn new<X: Into<Start<N>>>(
+        lagrangian: &'a L,
+        t0: f64,
+        count: usize,
+        start: impl Fn(usize) -> X + Sync + 'a,
+    ) -> Self {
+        let members = move |index: usize| (lagrangian, start(index).into());
+        Ensemble { shared: true, ..Self::of(t0, count, members) }
+    }
+
+    /// So many motions from the time `t0`: Lagrangian and start of each are functions of its index.
+    pub fn of<X: Into<Start<N>>>(t0: f64, count: usize, member: impl Fn(usize) -> (&'a L, X) + Sync + 'a) -> Self {
+        let members = move |index: usize| {
+            let (lagrangian, start) = member(index);
+            (lagrangian, start.into())
+        };
+        Ensemble {
+            members: Box::new(members),
+            shared: false,
+            count,
+            t0,
+            integrator: None,
+            steps: None,
+            action: true,
+            threads: None,
+            instructions: Instructions::new(),
+        }
+    }
+
+    /// The same by this integrator.
+    pub fn by(self, integrator: impl Integrator<'a, L, N> + Sync + 'a) -> Self {
+        Ensemble { integrator: Some(Box::new(integrator)), ..self }
+    }
+
+    /// The same by steps of a given length or number.
+    pub fn steps(self, steps: Steps) -> Self {
+        Ensemble { steps: Some(steps), ..self }
+    }
+
+    /// The same on so many threads; as many as there are processors where nothing is said.
+    pub fn threads(self, threads: usize) -> Self {
+        Ensemble { threads: Some(threads), ..self }
+    }
+
+    /// Without the action: where z does not act back on the motion it is not computed.
+    pub fn without_action(self) -> Self {
+        Ensemble { action: false, ..self }
+    }
+
+    /// Runs it, and hands each member at its end to a fold, in the order of the index, on this thread.
+    ///
+    /// # Errors
+    /// [`EnsembleError`].
+    pub fn run(&self, until: Until, mut fold: impl FnMut(&Member<N>)) -> Result<Tally, EnsembleError> {
+        let task = self.task(until)?;
+        let threads = match self.threads {
+            Some(0) => return Err(EnsembleError::Threads),
+            Some(threads) => threads,
+            None => std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
+        };
+        let mut tally = Tally::default();
+        shards::in_order(
+            threads,
+            0,
+            self.count.div_ceil(SHARD),
+            || (),
+            |(), shard| task.shard(shard),
+            |_, Shard { members, in_lanes }| {
+                tally.in_lanes += in_lanes;
+                for member in &members {
+                    tally.add(member);
+                    fold(member);
+                }
+                ControlFlow::Continue(())
+            },
+        );
+        Ok(tally)
+    }
+
+    /// Checks what all members have in common, and some of them wholly.
+    fn task(&self, until: Until) -> Result<Task<'_, 'a, L, N>, EnsembleError> {
+        if self.count == 0 {
+            return Err(EnsembleError::Empty);
+        }
+        let refused = |cause| EnsembleError::Member { index: 0, cause };
+        let Some(integrator) = self.integrator.as_deref() else { return Err(refused(InputError::NoIntegrator)) };
+        let Some(steps) = self.steps else { return Err(refused(InputError::NoSteps)) };
+        let course = Course { t0: self.t0, steps, until, action: self.action };
+        let (mut planned, mut refused) = (None, None);
+        let sample = self.count.min(SAMPLE);
+        for i in 0..sample {
+            // The first and the last among them.
+            let index = i * (self.count - 1) / (sample - 1).max(1);
+            let (lagrangian, start) = (self.members)(index);
+            match course.plan(integrator, lagrangian, start) {
+                Ok(plan) => planned = planned.or(Some((index, plan))),
+                Err(cause @ InputError::FalseClaim { .. }) => return Err(EnsembleError::Member { index, cause }),
+                Err(cause) => refused = refused.or(Some(EnsembleError::Member { index, cause })),
+            }
+        }
+        let Some((index, plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
+        let mut task = Task { ensemble: self, integrator, course, plan, kernel: None };
+        if self.shared {
+            let (lagrangian, start) = (self.members)(index);
+            task.kernel = Some(task.kernel_of(lagrangian, start.state(lagrangian, self.t0).as_ref()));
+        }
+        Ok(task)
+    }
+}
+
+/// How the members of one Lagrangian are advanced.
+enum Kernel<'a, L, const N: usize> {
+    OneByOne,
+    Splitting(SplittingPacks<'a, L, N>),
+}
+
+/// A run of an ensemble after its checks.
+struct Task<'e, 'a, L, const N: usize> {
+    ensemble: &'e Ensemble<'a, L, N>,
+    integrator: &'e (dyn Integrator<'a, L, N> + Sync + 'a),
+    course: Course,
+    /// The step, and how many.
+    plan: (f64, usize),
+    /// That of all members, where they have one Lagrangian.
+    kernel: Option<Kernel<'a, L, N>>,
+}
+
+/// The members of a shard at their ends.
+struct Shard<const N: usize> {
+    members: Vec<Member<N>>,
+    in_lanes: usize,
+}
+
+impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
+    /// The kernel for a Lagrangian, by what is read of it at a state.
+    fn kernel_of(&self, lagrangian: &'a L, state: Option<&PhasePoint<N>>) -> Kernel<'a, L, N> {
+        let (structure, Some(state)) = (lagrangian.structure(), state) else { return Kernel::OneByOne };
+        let kernel = match self.integrator.in_lanes() {
+            Some(InLanes::Splitting(scheme)) if structure.separable && structure.is_affine_in_z() => {
+                SplittingPacks::new(lagrangian, &scheme, self.plan, self.course.t0, state).map(Kernel::Splitting)
+            }
+            _ => Ok(Kernel::OneByOne),
+        };
+        // Where L cannot be read a run of the member says why.
+        kernel.unwrap_or(Kernel::OneByOne)
+    }
+
+    /// Runs the members of a shard.
+    fn shard(&self, shard: usize) -> Shard<N> {
+        let range = shard * SHARD..self.ensemble.count.min((shard + 1) * SHARD);
+        let mut members: Vec<Member<N>> = Vec::with_capacity(range.len());
+        let mut starts = Vec::with_capacity(range.len());
+        for index in range {
+            starts.push((self.ensemble.members)(index));
+            members.push(Member { index, ending: Err(InputError::NoSteps) });
+        }
+        let mut in_lanes = 0;
+        let mut from = 0;
+        // Members in sequence that have one Lagrangian.
+        for group in starts.chunk_by(|a, b| std::ptr::eq(a.0, b.0)) {
+            in_lanes += self.group(group, &mut members[from..from + group.len()]);
+            from += group.len();
+        }
+        Shard { members, in_lanes }
+    }
+
+    /// Runs members of one Lagrangian; returns how many of them in lanes.
+    fn group(&self, starts: &[(&'a L, Start<N>)], members: &mut [Member<N>]) -> usize {
+        let Some(lagrangian) = starts.first().map(|start| start.0) else { return 0 };
+        let (t0, (h, steps)) = (self.course.t0, self.plan);
+        let (mut places, mut states) = (Vec::with_capacity(starts.len()), Vec::with_capacity(starts.len()));
+        let mut own = None;
+        let kernel = self.kernel.as_ref().unwrap_or_else(|| {
+            let state = starts.iter().find_map(|(_, start)| start.state(lagrangian, t0));
+            own.insert(self.kernel_of(lagrangian, state.as_ref()))
+        });
+        if !matches!(kernel, Kernel::OneByOne) {
+            for (place, (_, start)) in starts.iter().enumerate() {
+                if let Some(state) = start.state(lagrangian, t0) && !tiny(&state, h) {
+                    places.push(place);
+                    states.push(state);
+                }
+            }
+        }
+        let mut done = [false; SHARD];
+        let mut in_lanes = 0;
+        forget_branches();
+        match kernel {
+            Kernel::OneByOne => {}
+            Kernel::Splitting(packs) => packs.run(self.ensemble.instructions, &mut states, self.course.action),
+        }
+        if !branched() {
+            for (place, state) in places.iter().zip(&states) {
+                if Triple::from(*state).is_finite() {
+                    let t = t0 + steps as f64 * h;
+                    members[*place].ending =
+                        Ok(Ending { status: Status::Completed, suspicion: None, steps, t, state: *state });
+                    done[*place] = true;
+                    in_lanes += 1;
+                }
+            }
+        }
+        for ((_, start), (member, _)) in
+            starts.iter().zip(members.iter_mut().zip(done)).filter(|(_, (_, done))| !done)
+        {
+            member.ending = self.course.run(self.integrator, lagrangian, *start);
+        }
+        in_lanes
+    }
+}
+
+/// Whether steps are so short that a single run compensates their sums: half of the digits are lost in each.
+fn tiny<const N: usize>(state: &PhasePoint<N>, h: f64) -> bool {
+    let moved = h.abs() * size(&state.p);
+    moved > 0.0 && moved < f64::EPSILON.sqrt() * size(&state.q)
+}
+
+impl<const N: usize> Start<N> {
+    /// The state `(q, p, z)`, where it is finite.
+    fn state<L: Lagrangian<N>>(&self, lagrangian: &L, t0: f64) -> Option<PhasePoint<N>> {
+        let state = match self {
+            Start::Velocity(x) => legendre(lagrangian, t0, x),
+            Start::Momentum(x, _) => *x,
+        };
+        Triple::from(state).is_finite().then_some(state)
+    }
+}
