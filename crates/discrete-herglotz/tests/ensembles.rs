@@ -2,7 +2,7 @@
 
 use contact_geom::VelocityPoint;
 use contact_geom::systems::{Kepler, Pendulum};
-use discrete_herglotz::{Ending, Ensemble, Problem, SplittingScheme, Status, Steps, Until};
+use discrete_herglotz::{Ending, Ensemble, GaussCollocation, Problem, SplittingScheme, Status, Steps, Until};
 
 #[test]
 fn first() {
@@ -28,5 +28,19 @@ fn first() {
         assert_eq!(tally.members, 300);
     }
     let pendulum = Pendulum { gamma: -0.01 };
-    let _ = pendulum;
+    let start = |i: usize| VelocityPoint::new([-2.0 + 4.0 * i as f64 / 299.0], [0.5], 0.1);
+    for stages in 1..=16 {
+        let gauss = GaussCollocation { stages };
+        let ensemble = Ensemble::new(&pendulum, 0.0, 300, start).by(gauss).steps(Steps::Count(20)).threads(1);
+        let mut worst = 0.0f64;
+        let tally = ensemble.run(Until::Time(10.0), |member| {
+            let state = member.ending.unwrap().state;
+            if member.index % 50 == 0 {
+                    let problem = Problem::new(&pendulum, 0.0, start(member.index)).unwrap();
+                    let own = problem.by(gauss).steps(Steps::Count(20)).run(Until::Time(10.0)).unwrap().state();
+                    worst = worst.max((own.q - state.q).norm()).max((own.p - state.p).norm()).max((own.z - state.z).abs());
+            }
+        }).unwrap();
+        println!("{stages} {tally:?} {worst:e}");
+    }
 }

@@ -1,12 +1,14 @@
 //! Ensembles: many motions at once, each in a lane of a vector register.
 
 mod error;
+mod gauss;
 mod member;
 mod pack;
 mod shards;
 mod sine;
 mod single;
 mod splitting;
+mod twofold;
 
 pub use error::EnsembleError;
 pub use member::{Ending, Member, Tally};
@@ -16,6 +18,7 @@ use crate::gauss::lanes::{branched, forget_branches};
 use crate::run::watch::size;
 use crate::{GaussCollocation, InputError, Integrator, SplittingScheme, Start, Status, Steps, Until};
 use contact_geom::{Lagrangian, PhasePoint, Triple, legendre};
+use gauss::GaussPacks;
 use single::Course;
 use splitting::SplittingPacks;
 use std::num::NonZeroUsize;
@@ -169,6 +172,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
 enum Kernel<'a, L, const N: usize> {
     OneByOne,
     Splitting(SplittingPacks<'a, L, N>),
+    Gauss(GaussPacks<'a, L, N>),
 }
 
 /// A run of an ensemble after its checks.
@@ -195,6 +199,9 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let kernel = match self.integrator.in_lanes() {
             Some(InLanes::Splitting(scheme)) if structure.separable && structure.is_affine_in_z() => {
                 SplittingPacks::new(lagrangian, &scheme, self.plan, self.course.t0, state).map(Kernel::Splitting)
+            }
+            Some(InLanes::Gauss(GaussCollocation { stages })) if structure.separable && structure.has_constant_rate() => {
+                GaussPacks::new(lagrangian, stages, self.plan, self.course.t0, state).map(Kernel::Gauss)
             }
             _ => Ok(Kernel::OneByOne),
         };
@@ -245,6 +252,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         match kernel {
             Kernel::OneByOne => {}
             Kernel::Splitting(packs) => packs.run(self.ensemble.instructions, &mut states, self.course.action),
+            Kernel::Gauss(packs) => packs.run(self.ensemble.instructions, &mut states, self.course.action),
         }
         if !branched() {
             for (place, state) in places.iter().zip(&states) {

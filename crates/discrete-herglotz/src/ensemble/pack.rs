@@ -60,19 +60,39 @@ impl<S: Simd, const K: usize> Pack<S, K> {
         self
     }
 
-    /// Whether a lane is beyond the range of the argument reduction, or not a number.
+    /// `then` in lanes that are at most those of `b`, `otherwise` in all others, those that are not numbers among them.
+    #[inline(always)]
+    pub fn at_most(self, b: Self, then: Self, otherwise: Self) -> Self {
+        let set = token::<S>();
+        Pack(std::array::from_fn(|k| {
+            set.select_f64s(set.less_than_or_equal_f64s(self.0[k], b.0[k]), then.0[k], otherwise.0[k])
+        }))
+    }
+
+    /// Lane by lane the larger; where one is not a number, the result may be either.
+    #[inline(always)]
+    pub fn larger(self, b: Self) -> Self {
+        let set = token::<S>();
+        Pack(std::array::from_fn(|k| set.max_f64s(self.0[k], b.0[k])))
+    }
+
+    /// Whether a lane is not 0.
+    #[inline(always)]
+    pub fn any(self) -> bool {
+        self.lanes().iter().any(|x| *x != 0.0)
+    }
+
+    /// Whether a lane is beyond the range of the argument reduction.
     #[inline(always)]
     fn beyond(self) -> bool {
         let set = token::<S>();
         let range = set.splat_f64s(super::sine::REDUCIBLE);
-        let mut largest = set.abs_f64s(self.0[0]);
+        let beyond = |x: S::f64s| set.greater_than_or_equal_f64s(set.abs_f64s(x), range);
+        let mut any = beyond(self.0[0]);
         for x in &self.0[1..] {
-            largest = set.max_f64s(largest, set.abs_f64s(*x));
+            any = set.or_m64s(any, beyond(*x));
         }
-        // A register in which each lane is below the range.
-        set.first_true_m64s(set.transmute_m64s_u64s(
-            set.not_u64s(set.transmute_u64s_m64s(set.less_than_f64s(largest, range))),
-        )) < S::F64_LANES
+        set.first_true_m64s(any) < S::F64_LANES
     }
 
     /// The function of each lane that is beyond the range, for those lanes alone.
@@ -80,7 +100,7 @@ impl<S: Simd, const K: usize> Pack<S, K> {
     #[inline(never)]
     fn mended(mut self, argument: Self, f: impl Fn(f64) -> f64) -> Self {
         for (y, x) in self.lanes_mut().iter_mut().zip(argument.lanes()) {
-            if !(x.abs() < super::sine::REDUCIBLE) {
+            if x.abs() >= super::sine::REDUCIBLE {
                 *y = f(*x);
             }
         }

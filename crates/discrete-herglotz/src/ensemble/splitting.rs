@@ -148,7 +148,7 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
             m.p[d] += kick * m.force[d];
         }
         let Drift { length, damping, lift } = self.drift_of(t, stage);
-        let v = self.velocity(&m.p);
+        let v = velocity(&self.form, &m.p);
         if ACTION {
             m.z = m.z + (Pack::splat(damping) * m.z + Pack::splat(lift) * m.p.dot(&v));
         }
@@ -169,17 +169,20 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
             Drag::Timed { .. } => self.drag.drift(&self.form.lagrangian, t + (stage.time - stage.span), stage.span),
         }
     }
+}
 
-    /// `M^-1 p`.
-    #[inline(always)]
-    fn velocity<S: Simd, const K: usize>(&self, p: &SVector<Pack<S, K>, N>) -> SVector<Pack<S, K>, N> {
-        let Some(inverse) = &self.form.inverse else { return *p };
-        SVector::from_fn(|i, _| {
-            let mut sum = p[0] * inverse[(i, 0)];
-            for j in 1..N {
-                sum += p[j] * inverse[(i, j)];
-            }
-            sum
-        })
-    }
+/// `M^-1 p`, by the operations of a product of a matrix with one vector, in their order.
+#[inline(always)]
+pub(super) fn velocity<L, S: Simd, const K: usize, const N: usize>(
+    form: &SeparableForm<L, N>,
+    p: &SVector<Pack<S, K>, N>,
+) -> SVector<Pack<S, K>, N> {
+    let Some(inverse) = &form.inverse else { return *p };
+    SVector::from_fn(|i, _| {
+        let mut sum = p[0] * inverse[(i, 0)];
+        for j in 1..N {
+            sum += p[j] * inverse[(i, j)];
+        }
+        sum
+    })
 }

@@ -5,7 +5,7 @@ mod beginning;
 mod clocked;
 pub(crate) mod coefficients;
 mod compensated;
-mod condensed;
+pub(crate) mod condensed;
 mod damping;
 mod dense;
 mod double_double;

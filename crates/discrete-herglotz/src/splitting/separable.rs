@@ -99,6 +99,14 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         sum
     }
 
+    /// `M v`.
+    pub(crate) fn momentum(&self, v: &SVector<f64, N>) -> SVector<f64, N> {
+        match &self.inverse {
+            None => *v,
+            Some(_) => *self.mass * v,
+        }
+    }
+
     /// `M^-1 p`.
     #[inline(always)]
     pub(crate) fn velocity(&self, p: &SVector<f64, N>) -> SVector<f64, N> {
