@@ -1,5 +1,6 @@
 //! Ensembles: many motions at once, each in a lane of a vector register.
 
+mod checkpoint;
 mod error;
 mod gauss;
 mod member;
@@ -15,14 +16,17 @@ pub use member::{Ending, Member, Tally};
 
 use crate::gauss::instructions::Instructions;
 use crate::gauss::lanes::{branched, forget_branches};
+use crate::run::digest;
 use crate::run::watch::size;
 use crate::{GaussCollocation, InputError, Integrator, SplittingScheme, Start, Status, Steps, Until};
-use contact_geom::{Lagrangian, PhasePoint, Triple, legendre};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
+use checkpoint::Shards;
 use gauss::GaussPacks;
 use single::Course;
 use splitting::SplittingPacks;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 
 /// What an [`Integrator`] has a kernel for that takes a step of many motions at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +47,39 @@ const SAMPLE: usize = 16;
 type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a>;
 
 /// Many motions, by one integrator and the same steps.
+///
+/// Where the [integrator](Integrator::in_lanes) has a kernel for it the motions lie in the lanes of the processor's vector registers, so that a whole
+/// pack takes a step together: every [`SplittingScheme`] for separable Lagrangians with linear drag, and [`GaussCollocation`] for those
+/// of a constant rate. All other members, and those that a lane cannot finish (what is not finite, an iteration that does not contract, a
+/// formula that branches), have a run of their own. Packs are shared among threads, in shards; the fold is given the members in the order of
+/// their index, on the thread of the caller, while others are computed, so that the memory does not grow with the count. What a member is
+/// drawn from should be a function of its index, as a random number seeded with it.
+///
+/// A member's bits depend on that member alone: not on the number of threads, the width of the registers, its neighbours or the order. By
+/// splittings they are those of a single run, as long as L is made of sums, products, quotients and roots. The sine and the cosine of a lane are within 2
+/// units in the last place, as those of the standard library are within one, so that with them a member differs from a single run by what
+/// its rounding makes of it. By collocation both are exact but for rounding.
+///
+/// Of what a single run looks at: the claims of the structure are probed for some members, the first and the last among them, and not along
+/// all motions; a start must be finite, a motion must end finite; whether steps resolve the motion is not watched. A single run of a
+/// member that matters looks at all of it.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use discrete_herglotz::{Ensemble, SplittingScheme, Steps, Until};
+///
+/// let pendulum = Pendulum { gamma: -0.01 };
+/// let start = |i: usize| VelocityPoint::new([0.001 * i as f64], [0.5], 0.0);
+/// let ensemble = Ensemble::new(&pendulum, 0.0, 1000, start).by(SplittingScheme::BLANES_MOAN_6).steps(Steps::Size(0.25));
+/// let mut farthest = 0.0f64;
+/// let tally = ensemble.run(Until::Time(10.0), |member| {
+///     if let Ok(ending) = member.ending {
+///         farthest = farthest.max(ending.state.q[0]);
+///     }
+/// })?;
+/// println!("{} of {} completed, farthest {farthest}", tally.completed, tally.members);
+/// # Ok::<(), discrete_herglotz::EnsembleError>(())
+/// ```
 pub struct Ensemble<'a, L, const N: usize> {
     members: MemberOf<'a, L, N>,
     /// Whether all members have one Lagrangian.
@@ -54,6 +91,8 @@ pub struct Ensemble<'a, L, const N: usize> {
     action: bool,
     threads: Option<usize>,
     instructions: Instructions,
+    checkpoint: Option<PathBuf>,
+    progress: Option<Box<dyn Fn(f64) + 'a>>,
 }
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
@@ -68,7 +107,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         Ensemble { shared: true, ..Self::of(t0, count, members) }
     }
 
-    /// So many motions from the time `t0`: Lagrangian and start of each are functions of its index.
+    /// So many motions from the time `t0`: Lagrangian and start of each are functions of its index, as in a study of parameters. Those in
+    /// sequence that have the same Lagrangian share their registers.
     pub fn of<X: Into<Start<N>>>(t0: f64, count: usize, member: impl Fn(usize) -> (&'a L, X) + Sync + 'a) -> Self {
         let members = move |index: usize| {
             let (lagrangian, start) = member(index);
@@ -84,6 +124,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             action: true,
             threads: None,
             instructions: Instructions::new(),
+            checkpoint: None,
+            progress: None,
         }
     }
 
@@ -107,10 +149,30 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         Ensemble { action: false, ..self }
     }
 
+    /// With a file of the shards that are done. Where it is there already, the ensemble goes on behind them: the fold is given their members
+    /// again, to the last bit, and the rest is computed. A process that is killed loses the shards under way. Members that have failed
+    /// are run again for their cause.
+    pub fn checkpoint(self, path: impl Into<PathBuf>) -> Self {
+        Ensemble { checkpoint: Some(path.into()), ..self }
+    }
+
+    /// With a function that is told, on the thread of the caller, which part of the members is done.
+    pub fn progress(self, tell: impl Fn(f64) + 'a) -> Self {
+        Ensemble { progress: Some(Box::new(tell)), ..self }
+    }
+
+    /// Only with these instructions.
+    #[cfg(test)]
+    fn only(self, instructions: Instructions) -> Self {
+        Ensemble { instructions, ..self }
+    }
+
     /// Runs it, and hands each member at its end to a fold, in the order of the index, on this thread.
     ///
     /// # Errors
-    /// [`EnsembleError`].
+    /// [`EnsembleError`]: no members or threads; what every member's run is refused for, or a false claim of the Lagrangian's structure, found at some
+    /// of them; a checkpoint of another ensemble, a damaged one, or one that cannot be written. A member that cannot begin by itself, or
+    /// whose motion fails, is handed to the fold with the cause, and the others go on.
     pub fn run(&self, until: Until, mut fold: impl FnMut(&Member<N>)) -> Result<Tally, EnsembleError> {
         let task = self.task(until)?;
         let threads = match self.threads {
@@ -118,23 +180,47 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             Some(threads) => threads,
             None => std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
         };
+        let shards = self.count.div_ceil(SHARD);
         let mut tally = Tally::default();
-        shards::in_order(
-            threads,
-            0,
-            self.count.div_ceil(SHARD),
-            || (),
-            |(), shard| task.shard(shard),
-            |_, Shard { members, in_lanes }| {
-                tally.in_lanes += in_lanes;
-                for member in &members {
-                    tally.add(member);
-                    fold(member);
-                }
-                ControlFlow::Continue(())
-            },
-        );
-        Ok(tally)
+        let mut hand_on = |shard: usize, Shard { members, in_lanes }: &Shard<N>| {
+            tally.in_lanes += in_lanes;
+            for member in members {
+                tally.add(member);
+                fold(member);
+            }
+            if let Some(tell) = &self.progress {
+                tell((shard + 1) as f64 / shards as f64);
+            }
+        };
+        let mut done = 0;
+        let mut file = None;
+        if let Some(path) = &self.checkpoint {
+            let mut stored = Shards::open(path, task.fingerprint())?;
+            while done < shards
+                && let Some(mut shard) = stored.next(done, done * SHARD)?
+            {
+                task.run_again(&mut shard);
+                hand_on(done, &shard);
+                done += 1;
+            }
+            file = Some(stored);
+        }
+        let mut error = None;
+        shards::in_order(threads, done, shards, |shard| task.shard(shard), |index, shard| {
+            if let Some(Err(cause)) = file.as_mut().map(|file| file.write(index, &shard)) {
+                error = Some(cause);
+                return ControlFlow::Break(());
+            }
+            hand_on(index, &shard);
+            ControlFlow::Continue(())
+        });
+        error.map_or(Ok(tally), Err)
+    }
+
+    /// Members spread over the ensemble, the first and the last among them.
+    fn sample(&self) -> impl Iterator<Item = usize> + use<L, N> {
+        let (count, sample) = (self.count, self.count.min(SAMPLE));
+        (0..sample).map(move |i| i * (count - 1) / (sample - 1).max(1))
     }
 
     /// Checks what all members have in common, and some of them wholly.
@@ -147,10 +233,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         let Some(steps) = self.steps else { return Err(refused(InputError::NoSteps)) };
         let course = Course { t0: self.t0, steps, until, action: self.action };
         let (mut planned, mut refused) = (None, None);
-        let sample = self.count.min(SAMPLE);
-        for i in 0..sample {
-            // The first and the last among them.
-            let index = i * (self.count - 1) / (sample - 1).max(1);
+        for index in self.sample() {
             let (lagrangian, start) = (self.members)(index);
             match course.plan(integrator, lagrangian, start) {
                 Ok(plan) => planned = planned.or(Some((index, plan))),
@@ -159,9 +242,11 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             }
         }
         let Some((index, plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
-        let mut task = Task { ensemble: self, integrator, course, plan, kernel: None };
+        let (members, count, instructions) = (&*self.members, self.count, self.instructions);
+        let mut task = Task { members, count, instructions, integrator, course, plan, kernel: None, fingerprint: 0 };
+        task.fingerprint = task.fingerprint_of(self.sample());
         if self.shared {
-            let (lagrangian, start) = (self.members)(index);
+            let (lagrangian, start) = members(index);
             task.kernel = Some(task.kernel_of(lagrangian, start.state(lagrangian, self.t0).as_ref()));
         }
         Ok(task)
@@ -177,13 +262,16 @@ enum Kernel<'a, L, const N: usize> {
 
 /// A run of an ensemble after its checks.
 struct Task<'e, 'a, L, const N: usize> {
-    ensemble: &'e Ensemble<'a, L, N>,
+    members: &'e (dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a),
+    count: usize,
+    instructions: Instructions,
     integrator: &'e (dyn Integrator<'a, L, N> + Sync + 'a),
     course: Course,
     /// The step, and how many.
     plan: (f64, usize),
     /// That of all members, where they have one Lagrangian.
     kernel: Option<Kernel<'a, L, N>>,
+    fingerprint: u64,
 }
 
 /// The members of a shard at their ends.
@@ -209,13 +297,45 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         kernel.unwrap_or(Kernel::OneByOne)
     }
 
+    /// What the ensemble is, by some of its members: of the integrator, the steps, starts, and of L there.
+    fn fingerprint_of(&self, sample: impl Iterator<Item = usize>) -> u64 {
+        let Course { t0, action, .. } = self.course;
+        let mut words = vec![N as u64, self.count as u64, t0.to_bits(), action.into(), self.plan.0.to_bits()];
+        words.push(self.plan.1 as u64);
+        words.extend(self.integrator.facts().name.bytes().map(u64::from));
+        for index in sample {
+            let (lagrangian, start) = (self.members)(index);
+            let (q, y, z) = match start {
+                Start::Velocity(x) => (x.q, x.v, x.z),
+                Start::Momentum(x, _) => (x.q, x.p, x.z),
+            };
+            let (value, slope) = lagrangian.with_gradient(t0, &VelocityPoint { q, v: y, z });
+            let vectors = [&q, &y, &slope.x, &slope.y];
+            let numbers = vectors.into_iter().flat_map(|x| x.iter().copied()).chain([z, value, slope.z]);
+            words.extend(numbers.map(f64::to_bits));
+        }
+        digest(&words)
+    }
+
+    fn fingerprint(&self) -> u64 {
+        self.fingerprint
+    }
+
+    /// Runs members again that have not completed.
+    fn run_again(&self, shard: &mut Shard<N>) {
+        for member in shard.members.iter_mut().filter(|member| member.ending.is_err()) {
+            let (lagrangian, start) = (self.members)(member.index);
+            member.ending = self.course.run(self.integrator, lagrangian, start);
+        }
+    }
+
     /// Runs the members of a shard.
     fn shard(&self, shard: usize) -> Shard<N> {
-        let range = shard * SHARD..self.ensemble.count.min((shard + 1) * SHARD);
+        let range = shard * SHARD..self.count.min((shard + 1) * SHARD);
         let mut members: Vec<Member<N>> = Vec::with_capacity(range.len());
         let mut starts = Vec::with_capacity(range.len());
         for index in range {
-            starts.push((self.ensemble.members)(index));
+            starts.push((self.members)(index));
             members.push(Member { index, ending: Err(InputError::NoSteps) });
         }
         let mut in_lanes = 0;
@@ -251,8 +371,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         forget_branches();
         match kernel {
             Kernel::OneByOne => {}
-            Kernel::Splitting(packs) => packs.run(self.ensemble.instructions, &mut states, self.course.action),
-            Kernel::Gauss(packs) => packs.run(self.ensemble.instructions, &mut states, self.course.action),
+            Kernel::Splitting(packs) => packs.run(self.instructions, &mut states, self.course.action),
+            Kernel::Gauss(packs) => packs.run(self.instructions, &mut states, self.course.action),
         }
         if !branched() {
             for (place, state) in places.iter().zip(&states) {

@@ -50,20 +50,18 @@ impl<R> Drop for AtTheEnd<'_, R> {
     }
 }
 
-/// Does the shards `first..count` by so many threads, each with a worker of its own, and hands each result on, in the order of the shards, on the
+/// Does the shards `first..count` by so many threads, and hands each result on, in the order of the shards, on the
 /// thread of the caller, until that breaks. At most [`WINDOW_OF_A_THREAD`] results a thread are kept at a time.
-pub(super) fn in_order<W, R: Send>(
+pub(super) fn in_order<R: Send>(
     threads: usize,
     first: usize,
     count: usize,
-    worker: impl Fn() -> W + Sync,
-    work: impl Fn(&mut W, usize) -> R + Sync,
+    work: impl Fn(usize) -> R + Sync,
     mut hand_on: impl FnMut(usize, R) -> ControlFlow<()>,
 ) {
     if threads < 2 || count - first < 2 {
-        let mut own = worker();
         for shard in first..count {
-            if hand_on(shard, work(&mut own, shard)).is_break() {
+            if hand_on(shard, work(shard)).is_break() {
                 return;
             }
         }
@@ -77,7 +75,6 @@ pub(super) fn in_order<W, R: Send>(
         for _ in 0..threads {
             scope.spawn(|| {
                 let _guard = AtTheEnd(&shared, false);
-                let mut own = worker();
                 loop {
                     let mut window = shared.wait_while(|w| !w.over && w.next < count && w.next - w.handed_on >= most);
                     if window.over || window.next >= count {
@@ -86,7 +83,7 @@ pub(super) fn in_order<W, R: Send>(
                     let shard = window.next;
                     window.next += 1;
                     drop(window);
-                    let result = work(&mut own, shard);
+                    let result = work(shard);
                     shared.change(|window| {
                         window.done.insert(shard, result);
                     });
