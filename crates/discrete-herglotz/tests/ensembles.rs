@@ -3,9 +3,10 @@
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Duffing, HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+use discrete_herglotz::rules::MidpointRule;
 use discrete_herglotz::{
-    AnyIntegrator, CheckpointError, Ensemble, EnsembleError, GaussCollocation, InputError, Integrator, Member, Problem,
-    SplittingScheme, Status, StepError, Steps, Until,
+    ByRule, CheckpointError, Ending, Ensemble, EnsembleError, Facts, GaussCollocation, InLanes, InputError, Integrator,
+    Member, Problem, SplittingScheme, Status, StepError, Stepper, Steps, Until, Wants,
 };
 use proptest::prelude::*;
 
@@ -83,13 +84,13 @@ fn numbers<const N: usize>(member: &Member<N>) -> Vec<f64> {
 }
 
 /// The largest distance of some members of an ensemble in lanes from single runs, in units of the larger of their size and one.
-fn distance<const N: usize>(
-    lagrangian: &(impl Lagrangian<N> + Sync),
-    start: impl Fn(usize) -> VelocityPoint<N> + Sync + Copy,
-    integrator: AnyIntegrator,
+fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy + 'a, const N: usize>(
+    lagrangian: &'a L,
+    start: impl Fn(usize) -> VelocityPoint<N> + Sync + Copy + 'a,
+    integrator: I,
     steps: usize,
 ) -> f64 {
-    let (count, end) = (70, Until::Time(5.0));
+    let (count, end, name) = (70, Until::Time(5.0), integrator.facts().name);
     let ensemble = Ensemble::new(lagrangian, 0.0, count, start).by(integrator).steps(Steps::Count(steps)).threads(1);
     let mut farthest = 0.0f64;
     let tally = ensemble
@@ -98,10 +99,12 @@ fn distance<const N: usize>(
                 return;
             }
             let problem = Problem::new(lagrangian, 0.0, start(member.index)).unwrap();
-            let own = problem.by(integrator).steps(Steps::Count(steps)).run(end).unwrap();
+            let h = 5.0 / steps as f64;
+            let mut own = integrator.stepper(&problem, h, Wants { action: true, watched: false }).unwrap();
+            own.advance(steps).unwrap();
             let ending = member.ending.unwrap();
-            assert_eq!((ending.status, ending.steps, ending.t), (own.status, own.steps, own.t), "{integrator}");
-            let own = Member { index: 0, ending: Ok(discrete_herglotz::Ending { state: own.state(), ..ending }) };
+            assert_eq!((ending.status, ending.steps, ending.t), (Status::Completed, steps, own.time()), "{name}");
+            let own = Member { index: 0, ending: Ok(Ending { state: own.state(), ..ending }) };
             for (a, b) in numbers(member).iter().zip(numbers(&own)) {
                 // Not by `max`, which would lose a NaN.
                 let apart = (a - b).abs() / b.abs().max(1.0);
@@ -109,28 +112,28 @@ fn distance<const N: usize>(
             }
         })
         .unwrap();
-    assert_eq!((tally.in_lanes, tally.completed), (count, count), "{integrator}");
+    assert_eq!((tally.in_lanes, tally.completed), (count, count), "{name}");
     farthest
 }
 
 #[test]
 fn by_splittings_members_are_single_runs_to_the_last_bit() {
     for scheme in SplittingScheme::ALL {
-        let by = AnyIntegrator::Splitting(scheme);
+        let (by, name) = (scheme, scheme.name());
         // Sums, products, quotients and roots are rounded alike in all instruction sets; one mass matrix is not diagonal.
-        assert_eq!(distance(&Kepler::<2>::default(), orbit_start, by, 50), 0.0, "{by}");
-        assert_eq!(distance(&HenonHeiles, plane_start, by, 50), 0.0, "{by}");
-        assert_eq!(distance(&HarmonicOscillator { gamma: -0.1 }, pendulum_start, by, 50), 0.0, "{by}");
+        assert_eq!(distance(&Kepler::<2>::default(), orbit_start, by, 50), 0.0, "{name}");
+        assert_eq!(distance(&HenonHeiles, plane_start, by, 50), 0.0, "{name}");
+        assert_eq!(distance(&HarmonicOscillator { gamma: -0.1 }, pendulum_start, by, 50), 0.0, "{name}");
         // The sine is within 2 units in the last place, each of at most 35 in a step acts with a part of the step, and five units of time
         // let a difference grow by e^5 at the most, beside the upper equilibrium; the motions here stay below it.
         let apart = distance(&Pendulum { gamma: -0.01 }, pendulum_start, by, 50);
-        assert!(apart <= 64.0 * f64::EPSILON, "{by}: {apart:e}");
+        assert!(apart <= 64.0 * f64::EPSILON, "{name}: {apart:e}");
     }
 }
 
 #[test]
 fn a_drag_that_depends_on_time_and_forces_that_do_are_those_of_single_runs() {
-    let by = AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_4);
+    let by = SplittingScheme::BLANES_MOAN_4;
     // The sine of the forcing is that of a lane.
     let apart = distance(&Duffing::forced(), pendulum_start, by, 50);
     assert!(apart <= 64.0 * f64::EPSILON, "{apart:e}");
@@ -139,7 +142,7 @@ fn a_drag_that_depends_on_time_and_forces_that_do_are_those_of_single_runs() {
 #[test]
 fn by_collocation_members_are_single_runs_but_for_rounding() {
     for stages in 1..=16 {
-        let by = AnyIntegrator::Gauss { stages };
+        let by = GaussCollocation { stages };
         let systems = [
             distance(&Kepler::<2>::default(), orbit_start, by, 40),
             distance(&HenonHeiles, plane_start, by, 40),
@@ -147,26 +150,68 @@ fn by_collocation_members_are_single_runs_but_for_rounding() {
             distance(&Pendulum { gamma: -0.01 }, pendulum_start, by, 40),
         ];
         // Both solve the stages to round-off; what is left of it in 40 steps is a few units, that an orbit multiplies by 3/2 of its phase.
-        assert!(systems.iter().all(|apart| *apart <= 64.0 * f64::EPSILON), "{by}: {systems:?}");
+        assert!(systems.iter().all(|apart| *apart <= 64.0 * f64::EPSILON), "{stages} stages: {systems:?}");
     }
 }
 
-/// Both kernels and a rule, which has none.
-fn integrators() -> Vec<AnyIntegrator> {
-    ["blanes_moan_6", "gauss_5", "midpoint"].map(|name| name.parse().unwrap()).into()
+/// One of each kernel, and a rule, which has none.
+#[derive(Clone, Copy, Debug)]
+enum By {
+    Splitting(SplittingScheme),
+    Gauss(GaussCollocation),
+    Rule(ByRule<MidpointRule>),
+}
+
+impl<'a, L: Lagrangian<1> + 'a> Integrator<'a, L, 1> for By {
+    fn facts(&self) -> Facts {
+        match self {
+            By::Splitting(by) => Integrator::<'a, L, 1>::facts(by),
+            By::Gauss(by) => Integrator::<'a, L, 1>::facts(by),
+            By::Rule(by) => Integrator::<'a, L, 1>::facts(by),
+        }
+    }
+    fn check(&self, _: &L) -> Result<(), InputError> {
+        Ok(())
+    }
+    fn stepper(&self, of: &Problem<'a, L, 1>, h: f64, wants: Wants) -> Result<Box<dyn Stepper<1> + 'a>, InputError> {
+        match self {
+            By::Splitting(by) => by.stepper(of, h, wants),
+            By::Gauss(by) => by.stepper(of, h, wants),
+            By::Rule(by) => by.stepper(of, h, wants),
+        }
+    }
+    fn in_lanes(&self) -> Option<InLanes> {
+        match self {
+            By::Splitting(by) => Integrator::<'a, L, 1>::in_lanes(by),
+            By::Gauss(by) => Integrator::<'a, L, 1>::in_lanes(by),
+            By::Rule(by) => Integrator::<'a, L, 1>::in_lanes(by),
+        }
+    }
+}
+
+fn splitting(scheme: SplittingScheme) -> By {
+    By::Splitting(scheme)
+}
+
+fn gauss(stages: usize) -> By {
+    By::Gauss(GaussCollocation { stages })
+}
+
+fn integrators() -> [By; 3] {
+    [splitting(SplittingScheme::BLANES_MOAN_6), gauss(5), By::Rule(ByRule::default())]
 }
 
 #[test]
 fn threads_do_not_change_a_bit() {
     for by in integrators() {
-        let count = if by.to_string() == "midpoint" { 600 } else { 1500 };
+        let count = if let By::Rule(_) = by { 600 } else { 1500 };
         let run = |threads: usize| {
             let ensemble = Ensemble::new(&Pendulum { gamma: -0.1 }, 0.0, count, pendulum_start);
             members(&ensemble.by(by).steps(Steps::Count(7)).threads(threads), Until::Time(2.0))
         };
         let alone = run(1);
         for threads in [2, 5] {
-            assert!(run(threads) == alone, "{by}, {threads} threads");
+            assert!(run(threads) == alone, "{by:?}, {threads} threads");
         }
     }
 }
@@ -201,7 +246,7 @@ proptest! {
                 if own.q[0].is_nan() {
                     prop_assert!(matches!(member.ending, Err(InputError::Geometry(_))));
                 } else if own.q[0] < 1e5 {
-                    prop_assert_eq!(member.ending, plain[(i + shift) % count].ending, "{}, {}", by, i);
+                    prop_assert_eq!(member.ending, plain[(i + shift) % count].ending, "{:?}, {}", by, i);
                 }
             }
         }
@@ -218,21 +263,21 @@ fn a_member_that_fails_says_why_and_the_others_go_on() {
         _ => VelocityPoint::new([0.001 * i as f64], [0.1], 0.0),
     };
     let good = |i: usize| VelocityPoint::new([0.001 * i as f64], [0.1], 0.0);
-    for by in ["kahan_li_6", "gauss_4", "trapezoidal"].map(|name| name.parse::<AnyIntegrator>().unwrap()) {
+    for by in [splitting(SplittingScheme::KAHAN_LI_6), gauss(4), By::Rule(ByRule::default())] {
         let all = |start: &(dyn Fn(usize) -> VelocityPoint<1> + Sync)| {
             let ensemble = Ensemble::new(&Bowl, 0.0, 40, start).by(by).steps(Steps::Count(20)).threads(1);
             let mut all = Vec::new();
             (ensemble.run(Until::Time(2.0), |member| all.push(*member)).unwrap(), all)
         };
         let ((tally, mixed), (_, plain)) = (all(&start), all(&good));
-        assert_eq!((tally.completed, tally.failed, tally.first_failed), (37, 3, Some(3)), "{by}");
-        let Ok(failed) = mixed[3].ending else { unreachable!("{by}: {:?}", mixed[3]) };
-        assert!(matches!(failed.status, Status::Failed { .. }), "{by}: {failed:?}");
-        assert!(failed.t < 2.0 && failed.state.q[0].is_finite(), "{by}: {failed:?}");
-        assert_eq!(mixed[20].ending, Err(InputError::Undefined), "{by}");
-        assert!(matches!(mixed[21].ending, Err(InputError::Geometry(_))), "{by}: {:?}", mixed[21].ending);
+        assert_eq!((tally.completed, tally.failed, tally.first_failed), (37, 3, Some(3)), "{by:?}");
+        let Ok(failed) = mixed[3].ending else { unreachable!("{by:?}: {:?}", mixed[3]) };
+        assert!(matches!(failed.status, Status::Failed { .. }), "{by:?}: {failed:?}");
+        assert!(failed.t < 2.0 && failed.state.q[0].is_finite(), "{by:?}: {failed:?}");
+        assert_eq!(mixed[20].ending, Err(InputError::Undefined), "{by:?}");
+        assert!(matches!(mixed[21].ending, Err(InputError::Geometry(_))), "{by:?}: {:?}", mixed[21].ending);
         for i in (0..40).filter(|i| ![3, 20, 21].contains(i)) {
-            assert_eq!(mixed[i], plain[i], "{by}");
+            assert_eq!(mixed[i], plain[i], "{by:?}");
         }
     }
 }
@@ -240,13 +285,13 @@ fn a_member_that_fails_says_why_and_the_others_go_on() {
 #[test]
 fn a_formula_that_branches_is_run_one_by_one() {
     let start = |i: usize| VelocityPoint::new([if i % 2 == 0 { 1.0 } else { -1.0 }], [0.0], 0.0);
-    let run = |by: AnyIntegrator| {
+    let run = |by: SplittingScheme| {
         let ensemble = Ensemble::new(&Branching, 0.0, 20, start).by(by).steps(Steps::Count(10));
         let mut ends = Vec::new();
         let tally = ensemble.run(Until::Time(1.0), |member| ends.push(numbers(member)[0])).unwrap();
         (tally.in_lanes, ends)
     };
-    let (in_lanes, ends) = run("kahan_li_8".parse().unwrap());
+    let (in_lanes, ends) = run(SplittingScheme::KAHAN_LI_8);
     assert_eq!(in_lanes, 0);
     for (i, end) in ends.into_iter().enumerate() {
         let frequency = if i % 2 == 0 { 1.5f64.sqrt() } else { 1.0 };
@@ -264,29 +309,30 @@ fn parameters_of_each_member() {
         let all = members(&ensemble.by(by).steps(Steps::Count(10)), Until::After(1.0));
         for i in [0, 19, 123, 299] {
             let one = Ensemble::new(&pendula[i / 10], 0.0, 1, |_| pendulum_start(i % 10)).by(by).steps(Steps::Count(10));
-            assert_eq!(members(&one, Until::After(1.0))[0].ending, all[i].ending, "{by}");
+            assert_eq!(members(&one, Until::After(1.0))[0].ending, all[i].ending, "{by:?}");
         }
-        assert_ne!(all[0].ending, all[290].ending, "{by}");
+        assert_ne!(all[0].ending, all[290].ending, "{by:?}");
     }
 }
 
 #[test]
 fn orders_are_those_of_the_schemes() {
     let pendulum = Pendulum { gamma: -0.1 };
-    let ends = |by: AnyIntegrator, steps: usize| {
+    let ends = |by: By, steps: usize| {
         let ensemble = Ensemble::new(&pendulum, 0.0, 32, pendulum_start).by(by).steps(Steps::Count(steps));
         members(&ensemble, Until::Time(4.0))
     };
-    let exact = ends(AnyIntegrator::Gauss { stages: 16 }, 16);
-    for (name, steps) in [("strang", 64), ("blanes_moan_4", 12), ("blanes_moan_6", 8), ("gauss_2", 16), ("gauss_3", 8)] {
-        let by: AnyIntegrator = name.parse().unwrap();
+    let exact = ends(gauss(16), 16);
+    let schemes = [(SplittingScheme::STRANG, 64), (SplittingScheme::BLANES_MOAN_4, 12), (SplittingScheme::BLANES_MOAN_6, 8)];
+    let schemes = schemes.map(|(scheme, steps)| (splitting(scheme), steps));
+    for (by, steps) in schemes.into_iter().chain([(gauss(2), 16), (gauss(3), 8)]) {
         let error = |steps: usize| {
             let far = ends(by, steps).iter().zip(&exact).map(|(a, b)| (numbers(a)[0] - numbers(b)[0]).powi(2)).sum::<f64>();
             far.sqrt().log2()
         };
         // Three halvings; the order is the mean slope, off by the next term of the error, which is below a tenth of the first.
         let slope = (error(steps) - error(8 * steps)) / 3.0;
-        assert!((slope - f64::from(by.order())).abs() < 0.15, "{name}: {slope}");
+        assert!((slope - f64::from(Integrator::<Pendulum, 1>::facts(&by).order)).abs() < 0.15, "{by:?}: {slope}");
     }
 }
 
@@ -298,11 +344,11 @@ fn without_the_action_nothing_else_changes() {
         let with = members(&ensemble(), Until::Time(1.0));
         let without = members(&ensemble().without_action(), Until::Time(1.0));
         for (a, b) in with.iter().zip(&without) {
-            assert_eq!(numbers(a)[..2], numbers(b)[..2], "{by}");
+            assert_eq!(numbers(a)[..2], numbers(b)[..2], "{by:?}");
             assert_ne!(numbers(a)[2], 0.1);
         }
-        if by.to_string() != "midpoint" {
-            assert_eq!(numbers(&without[7])[2], 0.1, "{by}");
+        if !matches!(by, By::Rule(_)) {
+            assert_eq!(numbers(&without[7])[2], 0.1, "{by:?}");
         }
     }
 }
