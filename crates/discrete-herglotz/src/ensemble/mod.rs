@@ -19,8 +19,8 @@ use crate::gauss::lanes::{branched, forget_branches};
 use crate::run::digest;
 use crate::run::watch::size;
 use crate::{GaussCollocation, InputError, Integrator, SplittingScheme, Start, Status, Steps, Until};
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
 use checkpoint::Shards;
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
 use gauss::GaussPacks;
 use single::Course;
 use splitting::SplittingPacks;
@@ -37,11 +37,11 @@ pub enum InLanes {
     Gauss(GaussCollocation),
 }
 
-/// The members that are computed, kept and handed on together.
-const SHARD: usize = 256;
+/// The members that are computed, kept and handed on together: whole packs of one, two or three registers of at most eight lanes.
+const SHARD: usize = 384;
 
 /// The members of an ensemble that get all checks of a run before it begins.
-const SAMPLE: usize = 16;
+const SAMPLE: usize = 4;
 
 /// A member by its index: its Lagrangian and its start.
 type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a>;
@@ -206,14 +206,20 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             file = Some(stored);
         }
         let mut error = None;
-        shards::in_order(threads, done, shards, |shard| task.shard(shard), |index, shard| {
-            if let Some(Err(cause)) = file.as_mut().map(|file| file.write(index, &shard)) {
-                error = Some(cause);
-                return ControlFlow::Break(());
-            }
-            hand_on(index, &shard);
-            ControlFlow::Continue(())
-        });
+        shards::in_order(
+            threads,
+            done,
+            shards,
+            |shard| task.shard(shard),
+            |index, shard| {
+                if let Some(Err(cause)) = file.as_mut().map(|file| file.write(index, &shard)) {
+                    error = Some(cause);
+                    return ControlFlow::Break(());
+                }
+                hand_on(index, &shard);
+                ControlFlow::Continue(())
+            },
+        );
         error.map_or(Ok(tally), Err)
     }
 
@@ -288,7 +294,9 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
             Some(InLanes::Splitting(scheme)) if structure.separable && structure.is_affine_in_z() => {
                 SplittingPacks::new(lagrangian, &scheme, self.plan, self.course.t0, state).map(Kernel::Splitting)
             }
-            Some(InLanes::Gauss(GaussCollocation { stages })) if structure.separable && structure.has_constant_rate() => {
+            Some(InLanes::Gauss(GaussCollocation { stages }))
+                if structure.separable && structure.has_constant_rate() =>
+            {
                 GaussPacks::new(lagrangian, stages, self.plan, self.course.t0, state).map(Kernel::Gauss)
             }
             _ => Ok(Kernel::OneByOne),
@@ -360,7 +368,9 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         });
         if !matches!(kernel, Kernel::OneByOne) {
             for (place, (_, start)) in starts.iter().enumerate() {
-                if let Some(state) = start.state(lagrangian, t0) && !tiny(&state, h) {
+                if let Some(state) = start.state(lagrangian, t0)
+                    && !tiny(&state, h)
+                {
                     places.push(place);
                     states.push(state);
                 }
@@ -385,8 +395,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
                 }
             }
         }
-        for ((_, start), (member, _)) in
-            starts.iter().zip(members.iter_mut().zip(done)).filter(|(_, (_, done))| !done)
+        for ((_, start), (member, _)) in starts.iter().zip(members.iter_mut().zip(done)).filter(|(_, (_, done))| !done)
         {
             member.ending = self.course.run(self.integrator, lagrangian, *start);
         }

@@ -8,8 +8,7 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 
 /// `K` registers of the instruction set `S`: while one of them waits for its last operation, the others keep the processor busy.
 ///
-/// A lane's bits depend on that lane alone, and are the same in all instruction sets: products that are fused are so in all of them, and where a
-/// function has a range, each lane is treated by its own argument. A formula that asks for one value of the lanes
+/// A lane's bits depend on that lane alone, and are the same in all instruction sets: products that are fused are so in all of them. A formula that asks for one value of the lanes
 /// (`re`, `extent`, `==`) gets none, whether they agree or not: see [`branched`](crate::gauss::lanes::branched).
 #[derive(Clone, Copy)]
 pub(super) struct Pack<S: Simd, const K: usize>(pub [S::f64s; K]);
@@ -82,29 +81,17 @@ impl<S: Simd, const K: usize> Pack<S, K> {
         self.lanes().iter().any(|x| *x != 0.0)
     }
 
-    /// Whether a lane is beyond the range of the argument reduction.
+    /// A function of an argument that is within the range of the reduction; not a number where the argument is beyond it.
+    ///
+    /// A lane that gets there leaves the pack, and is run by itself. A branch to the function of the standard library would have all registers
+    /// wait in memory for it.
     #[inline(always)]
-    fn beyond(self) -> bool {
+    fn within_range(self, argument: Self) -> Self {
         let set = token::<S>();
-        let range = set.splat_f64s(super::sine::REDUCIBLE);
-        let beyond = |x: S::f64s| set.greater_than_or_equal_f64s(set.abs_f64s(x), range);
-        let mut any = beyond(self.0[0]);
-        for x in &self.0[1..] {
-            any = set.or_m64s(any, beyond(*x));
-        }
-        set.first_true_m64s(any) < S::F64_LANES
-    }
-
-    /// The function of each lane that is beyond the range, for those lanes alone.
-    #[cold]
-    #[inline(never)]
-    fn mended(mut self, argument: Self, f: impl Fn(f64) -> f64) -> Self {
-        for (y, x) in self.lanes_mut().iter_mut().zip(argument.lanes()) {
-            if x.abs() >= super::sine::REDUCIBLE {
-                *y = f(*x);
-            }
-        }
-        self
+        let (range, none) = (set.splat_f64s(super::sine::REDUCIBLE), set.splat_f64s(f64::NAN));
+        Pack(std::array::from_fn(|k| {
+            set.select_f64s(set.less_than_f64s(set.abs_f64s(argument.0[k]), range), self.0[k], none)
+        }))
     }
 }
 
@@ -255,13 +242,11 @@ impl<S: Simd, const K: usize> Scalar for Pack<S, K> {
     }
     #[inline(always)]
     fn sin(self) -> Self {
-        let sine = super::sine::sine(self);
-        if self.beyond() { sine.mended(self, f64::sin) } else { sine }
+        super::sine::sine(self).within_range(self)
     }
     #[inline(always)]
     fn cos(self) -> Self {
-        let cosine = super::sine::cosine(self);
-        if self.beyond() { cosine.mended(self, f64::cos) } else { cosine }
+        super::sine::cosine(self).within_range(self)
     }
     #[inline(always)]
     fn sin_versine(self) -> (Self, Self) {

@@ -9,6 +9,7 @@ use crate::{InputError, SplittingScheme};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 use pulp::{Simd, WithSimd};
+use std::borrow::Cow;
 
 /// The steps of a [`Splitting`](crate::Splitting), for many motions of one Lagrangian.
 pub(super) struct SplittingPacks<'a, L, const N: usize> {
@@ -48,7 +49,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 /// The registers of a pack: as many as hide the latency of a sum of products, and leave room for what else a step holds.
 const fn registers(n: usize) -> usize {
     match n {
-        1 => 4,
+        1 => 3,
         2 => 2,
         _ => 1,
     }
@@ -67,7 +68,7 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, 
     fn with_simd<S: Simd>(self, _simd: S) {
         let All { packs, states } = self;
         match const { registers(N) } {
-            4 => packs.all::<S, 4, ACTION>(states),
+            3 => packs.all::<S, 3, ACTION>(states),
             2 => packs.all::<S, 2, ACTION>(states),
             _ => packs.all::<S, 1, ACTION>(states),
         }
@@ -112,18 +113,18 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
     /// The operations of a single run, in its order.
     #[inline(always)]
     fn take_steps<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>) {
-        let SplittingPacks { table, t0, h, steps, .. } = self;
+        let SplittingPacks { t0, h, steps, .. } = self;
+        let mut table = Cow::Borrowed(&self.table);
         self.take_force(m, *t0);
-        for (stages, range) in [(&table.first, 0..1), (&table.joined, 1..*steps)] {
-            for k in range {
-                let t = t0 + k as f64 * h;
-                for stage in stages {
-                    self.kick_and_drift::<S, K, ACTION>(m, t, stage);
-                    self.take_force(m, t + stage.time);
-                }
+        for k in 0..*steps {
+            let t = t0 + k as f64 * h;
+            self.set_time(&mut table, t);
+            for stage in if k == 0 { &table.first } else { &table.joined } {
+                self.kick_and_drift::<S, K, ACTION>(m, stage);
+                self.take_force(m, t + stage.time);
             }
         }
-        self.kick_and_drift::<S, K, ACTION>(m, t0 + (steps - 1) as f64 * h, &table.closing);
+        self.kick_and_drift::<S, K, ACTION>(m, &table.closing);
     }
 
     #[inline(always)]
@@ -134,12 +135,7 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
     }
 
     #[inline(always)]
-    fn kick_and_drift<S: Simd, const K: usize, const ACTION: bool>(
-        &self,
-        m: &mut Moving<S, K, N>,
-        t: f64,
-        stage: &Stage,
-    ) {
+    fn kick_and_drift<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, stage: &Stage) {
         let kick = Pack::splat(stage.kick);
         if ACTION {
             m.z += kick * m.value;
@@ -147,7 +143,7 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
         for d in 0..N {
             m.p[d] += kick * m.force[d];
         }
-        let Drift { length, damping, lift } = self.drift_of(t, stage);
+        let Drift { length, damping, lift } = stage.drift;
         let v = velocity(&self.form, &m.p);
         if ACTION {
             m.z = m.z + (Pack::splat(damping) * m.z + Pack::splat(lift) * m.p.dot(&v));
@@ -161,12 +157,13 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
         }
     }
 
-    /// The drift of a stage of the step from the time t.
-    #[inline(always)]
-    fn drift_of(&self, t: f64, stage: &Stage) -> Drift {
-        match self.drag {
-            Drag::Constant(_) => stage.drift,
-            Drag::Timed { .. } => self.drag.drift(&self.form.lagrangian, t + (stage.time - stage.span), stage.span),
+    /// The drifts of the step from the time t, where they depend on it.
+    fn set_time(&self, table: &mut Cow<'_, SubstepTable>, t: f64) {
+        if let Drag::Timed { .. } = self.drag {
+            let SubstepTable { first, joined, closing } = table.to_mut();
+            for stage in first.iter_mut().chain(joined).chain([closing]) {
+                stage.drift = self.drag.drift(&self.form.lagrangian, t + (stage.time - stage.span), stage.span);
+            }
         }
     }
 }

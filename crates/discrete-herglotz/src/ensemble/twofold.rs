@@ -46,10 +46,7 @@ impl<S: Simd, const K: usize> Summed<S, K> {
     /// With one more product: the parts each for themselves.
     #[inline(always)]
     pub fn plus(self, [head, tail]: Pair, x: Pack<S, K>) -> Self {
-        Summed {
-            value: Pack::splat(head).mul_add(x, self.value),
-            rest: Pack::splat(tail).mul_add(x, self.rest),
-        }
+        Summed { value: Pack::splat(head).mul_add(x, self.value), rest: Pack::splat(tail).mul_add(x, self.rest) }
     }
 
     /// The sum of the parts, each for itself.

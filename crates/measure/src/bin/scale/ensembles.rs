@@ -4,9 +4,7 @@ use crate::report::Report;
 use contact_examples::Failure;
 use contact_geom::VelocityPoint;
 use contact_geom::systems::Pendulum;
-use discrete_herglotz::{
-    AnyIntegrator, Ensemble, EnsembleError, InputError, SplittingScheme, Steps, Until,
-};
+use discrete_herglotz::{AnyIntegrator, Ensemble, EnsembleError, InputError, SplittingScheme, Steps, Until};
 use std::time::Instant;
 
 const CASE: &str = "ensembles";
@@ -94,7 +92,11 @@ fn candidates() -> Vec<AnyIntegrator> {
 }
 
 /// The fewest steps, within about a tenth, by which an integrator is within an error.
-fn steps_for(error: &dyn Fn(usize) -> Result<f64, Failure>, wanted: f64, most: usize) -> Result<Option<usize>, Failure> {
+fn steps_for(
+    error: &dyn Fn(usize) -> Result<f64, Failure>,
+    wanted: f64,
+    most: usize,
+) -> Result<Option<usize>, Failure> {
     let mut steps = 1;
     while steps <= most {
         if error(steps)? <= wanted {
@@ -123,11 +125,16 @@ fn pendula(report: &mut Report) -> Result<(), Failure> {
             let most = if wanted < 1e-6 && integrator.order() < 6 { 0 } else { 400 };
             let Some(mut steps) = steps_for(&error, wanted, most)? else { continue };
             loop {
-                let (ends, seconds) =
-                    shortest(3, || timed(count, grid, integrator, (steps, end), 1))?;
+                let (ends, seconds) = shortest(3, || timed(count, grid, integrator, (steps, end), 1))?;
                 let error = distance(&ends, &exact, false);
                 if error <= wanted {
-                    report.row(CASE, &format!("pendula, {integrator}, {steps} steps, error {error:.1e}"), count, seconds, None);
+                    report.row(
+                        CASE,
+                        &format!("pendula, {integrator}, {steps} steps, error {error:.1e}"),
+                        count,
+                        seconds,
+                        None,
+                    );
                     if best.is_none_or(|(fastest, ..)| seconds < fastest) {
                         best = Some((seconds, integrator, steps));
                     }
@@ -162,7 +169,13 @@ fn neighbours(report: &mut Report) -> Result<(), Failure> {
             let (ends, seconds) = timed(50, part, integrator, (steps, end), 1)?;
             let error = distance(&ends, &exact, true);
             if error <= wanted {
-                report.row(CASE, &format!("neighbours, {integrator}, {steps} steps, error {error:.1e}"), 50, seconds, None);
+                report.row(
+                    CASE,
+                    &format!("neighbours, {integrator}, {steps} steps, error {error:.1e}"),
+                    50,
+                    seconds,
+                    None,
+                );
                 if best.is_none_or(|(fastest, ..)| seconds < fastest) {
                     best = Some((seconds, integrator, steps));
                 }
@@ -203,9 +216,7 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
             .map_err(failure)?;
         Ok(clock.elapsed().as_secs_f64())
     };
-    for integrator in
-        [AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6), AnyIntegrator::Gauss { stages: 4 }]
-    {
+    for integrator in [AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6), AnyIntegrator::Gauss { stages: 4 }] {
         let mut peaks = Vec::new();
         let mut count = 100;
         while count <= largest {
@@ -217,7 +228,12 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
             count *= 10;
         }
         if let [first, .., last] = peaks[..] {
-            report.verdict(CASE, &format!("{integrator}: growth of the memory with the count"), last as f64 / first as f64, 1.1);
+            report.verdict(
+                CASE,
+                &format!("{integrator}: growth of the memory with the count"),
+                last as f64 / first as f64,
+                1.1,
+            );
         }
         // In turn, so that others on the machine disturb both.
         let count = largest / 5;
@@ -227,7 +243,12 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
                 seconds[threads - 1] = seconds[threads - 1].min(run(count, integrator, threads)?);
             }
         }
-        report.verdict(CASE, &format!("{integrator}: two threads, of the time of one"), seconds[1] / seconds[0], 1.0 / 1.8);
+        report.verdict(
+            CASE,
+            &format!("{integrator}: two threads, of the time of one"),
+            seconds[1] / seconds[0],
+            1.0 / 1.8,
+        );
     }
     Ok(())
 }
