@@ -1,6 +1,8 @@
 //! Attacks on discrete-herglotz. What starts a motion refuses what is not finite, and what it hands out is finite; formulas hand
 //! on what is not a number, or refuse it.
 
+#[path = "discrete/ensembles.rs"]
+mod ensembles;
 #[path = "discrete/integrators.rs"]
 mod integrators;
 #[path = "discrete/lagrangians.rs"]
@@ -35,7 +37,7 @@ pub const EXCEPTIONS: Exceptions = &[
 ];
 
 pub const ATTACKS: &[&[Attack]] =
-    &[integrators::ATTACKS, lagrangians::ATTACKS, observers::ATTACKS, runs::ATTACKS, steppers::ATTACKS];
+    &[ensembles::ATTACKS, integrators::ATTACKS, lagrangians::ATTACKS, observers::ATTACKS, runs::ATTACKS, steppers::ATTACKS];
 
 /// Times and states to start from, and whether they are finite.
 fn starts() -> Vec<(f64, PhasePoint<1>)> {

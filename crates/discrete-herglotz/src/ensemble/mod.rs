@@ -22,7 +22,7 @@ use crate::{GaussCollocation, InputError, Integrator, SplittingScheme, Start, St
 use checkpoint::Shards;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
 use gauss::GaussPacks;
-use single::Course;
+use single::Common;
 use splitting::SplittingPacks;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -237,11 +237,11 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         let refused = |cause| EnsembleError::Member { index: 0, cause };
         let Some(integrator) = self.integrator.as_deref() else { return Err(refused(InputError::NoIntegrator)) };
         let Some(steps) = self.steps else { return Err(refused(InputError::NoSteps)) };
-        let course = Course { t0: self.t0, steps, until, action: self.action };
+        let common = Common { t0: self.t0, steps, until, action: self.action };
         let (mut planned, mut refused) = (None, None);
         for index in self.sample() {
             let (lagrangian, start) = (self.members)(index);
-            match course.plan(integrator, lagrangian, start) {
+            match common.plan(integrator, lagrangian, start) {
                 Ok(plan) => planned = planned.or(Some((index, plan))),
                 Err(cause @ InputError::FalseClaim { .. }) => return Err(EnsembleError::Member { index, cause }),
                 Err(cause) => refused = refused.or(Some(EnsembleError::Member { index, cause })),
@@ -249,7 +249,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         }
         let Some((index, plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
         let (members, count, instructions) = (&*self.members, self.count, self.instructions);
-        let mut task = Task { members, count, instructions, integrator, course, plan, kernel: None, fingerprint: 0 };
+        let mut task = Task { members, count, instructions, integrator, common, plan, kernel: None, fingerprint: 0 };
         task.fingerprint = task.fingerprint_of(self.sample());
         if self.shared {
             let (lagrangian, start) = members(index);
@@ -272,7 +272,7 @@ struct Task<'e, 'a, L, const N: usize> {
     count: usize,
     instructions: Instructions,
     integrator: &'e (dyn Integrator<'a, L, N> + Sync + 'a),
-    course: Course,
+    common: Common,
     /// The step, and how many.
     plan: (f64, usize),
     /// That of all members, where they have one Lagrangian.
@@ -292,12 +292,12 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let (structure, Some(state)) = (lagrangian.structure(), state) else { return Kernel::OneByOne };
         let kernel = match self.integrator.in_lanes() {
             Some(InLanes::Splitting(scheme)) if structure.separable && structure.is_affine_in_z() => {
-                SplittingPacks::new(lagrangian, &scheme, self.plan, self.course.t0, state).map(Kernel::Splitting)
+                SplittingPacks::new(lagrangian, &scheme, self.plan, self.common.t0, state).map(Kernel::Splitting)
             }
             Some(InLanes::Gauss(GaussCollocation { stages }))
                 if structure.separable && structure.has_constant_rate() =>
             {
-                GaussPacks::new(lagrangian, stages, self.plan, self.course.t0, state).map(Kernel::Gauss)
+                GaussPacks::new(lagrangian, stages, self.plan, self.common.t0, state).map(Kernel::Gauss)
             }
             _ => Ok(Kernel::OneByOne),
         };
@@ -307,7 +307,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
 
     /// What the ensemble is, by some of its members: of the integrator, the steps, starts, and of L there.
     fn fingerprint_of(&self, sample: impl Iterator<Item = usize>) -> u64 {
-        let Course { t0, action, .. } = self.course;
+        let Common { t0, action, .. } = self.common;
         let mut words = vec![N as u64, self.count as u64, t0.to_bits(), action.into(), self.plan.0.to_bits()];
         words.push(self.plan.1 as u64);
         words.extend(self.integrator.facts().name.bytes().map(u64::from));
@@ -333,7 +333,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     fn run_again(&self, shard: &mut Shard<N>) {
         for member in shard.members.iter_mut().filter(|member| member.ending.is_err()) {
             let (lagrangian, start) = (self.members)(member.index);
-            member.ending = self.course.run(self.integrator, lagrangian, start);
+            member.ending = self.common.run(self.integrator, lagrangian, start);
         }
     }
 
@@ -359,7 +359,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     /// Runs members of one Lagrangian; returns how many of them in lanes.
     fn group(&self, starts: &[(&'a L, Start<N>)], members: &mut [Member<N>]) -> usize {
         let Some(lagrangian) = starts.first().map(|start| start.0) else { return 0 };
-        let (t0, (h, steps)) = (self.course.t0, self.plan);
+        let (t0, (h, steps)) = (self.common.t0, self.plan);
         let (mut places, mut states) = (Vec::with_capacity(starts.len()), Vec::with_capacity(starts.len()));
         let mut own = None;
         let kernel = self.kernel.as_ref().unwrap_or_else(|| {
@@ -381,8 +381,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         forget_branches();
         match kernel {
             Kernel::OneByOne => {}
-            Kernel::Splitting(packs) => packs.run(self.instructions, &mut states, self.course.action),
-            Kernel::Gauss(packs) => packs.run(self.instructions, &mut states, self.course.action),
+            Kernel::Splitting(packs) => packs.run(self.instructions, &mut states, self.common.action),
+            Kernel::Gauss(packs) => packs.run(self.instructions, &mut states, self.common.action),
         }
         if !branched() {
             for (place, state) in places.iter().zip(&states) {
@@ -397,7 +397,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         }
         for ((_, start), (member, _)) in starts.iter().zip(members.iter_mut().zip(done)).filter(|(_, (_, done))| !done)
         {
-            member.ending = self.course.run(self.integrator, lagrangian, *start);
+            member.ending = self.common.run(self.integrator, lagrangian, *start);
         }
         in_lanes
     }

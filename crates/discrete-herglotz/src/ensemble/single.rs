@@ -36,14 +36,14 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
 
 /// What all members have in common.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Course {
+pub(super) struct Common {
     pub t0: f64,
     pub steps: Steps,
     pub until: Until,
     pub action: bool,
 }
 
-impl Course {
+impl Common {
     /// Does something with the run of a member.
     pub fn with<'a, L: Lagrangian<N>, R, const N: usize>(
         &self,
