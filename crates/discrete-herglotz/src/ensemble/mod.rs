@@ -9,6 +9,8 @@ mod shards;
 mod sine;
 mod single;
 mod splitting;
+#[cfg(test)]
+mod tests;
 mod twofold;
 
 pub use error::EnsembleError;
