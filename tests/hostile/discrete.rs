@@ -3,6 +3,8 @@
 
 #[path = "discrete/boundary.rs"]
 mod boundary;
+#[path = "discrete/ensembles.rs"]
+mod ensembles;
 #[path = "discrete/integrators.rs"]
 mod integrators;
 #[path = "discrete/lagrangians.rs"]
@@ -40,6 +42,7 @@ pub const EXCEPTIONS: Exceptions = &[
 
 pub const ATTACKS: &[&[Attack]] = &[
     boundary::ATTACKS,
+    ensembles::ATTACKS,
     integrators::ATTACKS,
     lagrangians::ATTACKS,
     observers::ATTACKS,

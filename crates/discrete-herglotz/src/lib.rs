@@ -24,6 +24,7 @@
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
 mod boundary;
+mod ensemble;
 mod error;
 mod gauss;
 pub mod rules;
@@ -33,6 +34,7 @@ mod splitting;
 mod theory;
 
 pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus, continuation};
+pub use ensemble::{Ending, Ensemble, EnsembleError, InLanes, Member, Tally};
 pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
 pub use gauss::{ClockedGauss, ClockedStepper, DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper};
 pub use rules::*;

@@ -18,7 +18,7 @@ use std::array::from_fn;
 /// `rho_i` of the integrating factor, which depend on `gamma h` only,
 /// `Q = q0 + u v0 + B a`, `V_i = v0 / rho_i + (D a)_i`, and at the end `q1 = q0 + end_u v0 + end_b.a`,
 /// `v1 = v0 + grow v0 + end_v.a`, `z1 = z0 + grow z0 + end_v.(L - gamma z)`, `sigma_d = 1 + grow`.
-pub(super) struct Condensed {
+pub(crate) struct Condensed {
     pub s: usize,
     pub h: f64,
     pub gamma: f64,
@@ -45,7 +45,7 @@ pub(super) struct Condensed {
 }
 
 /// The coefficients of a [`Condensed`] step that its linear case takes in double-double precision.
-pub(super) struct ExactEnd {
+pub(crate) struct ExactEnd {
     pub d: [Exact; MOST],
     pub inverse_rho: Exact,
     pub end_u: Quad,
@@ -256,7 +256,7 @@ type Rows = [[f64; MOST + 2]; MOST];
 
 /// The matrices of [`Condensed::preconditioned`], or what their rounding leaves out.
 #[repr(C)] // See `SeparableStages`: the matrix last.
-pub(super) struct Left {
+pub(crate) struct Left {
     pub q: Stages,
     pub u: Stages,
     pub b: StageMap,
@@ -271,7 +271,7 @@ impl Left {
 
 /// See [`Condensed::preconditioned`].
 #[repr(C)] // See `SeparableStages`: the head last.
-pub(super) struct Preconditioned {
+pub(crate) struct Preconditioned {
     pub kappa: f64,
     /// What the rounding of the head leaves out, found by [`refine`](Self::refine).
     pub tail: Option<Left>,

@@ -16,7 +16,7 @@ pub(crate) struct Lanes<S: Simd>(pub S::f64s);
 /// The token of an instruction set, out of nothing.
 #[allow(unsafe_code)] // The trait has no other way to a token; why it is sound is said below.
 #[inline(always)]
-fn token<S: Simd>() -> S {
+pub(crate) fn token<S: Simd>() -> S {
     const { assert!(size_of::<S>() == 0, "a token carries nothing") };
     // SAFETY: a token is a proof, of size 0, that the processor has the instructions. `Lanes<S>` is private to this crate, which
     // makes them only below `Instructions::dispatch`, which has handed out a token of the same type there.
@@ -33,6 +33,12 @@ thread_local! {
 #[inline(always)]
 pub(crate) fn branched() -> bool {
     ASKED.get()
+}
+
+/// Notes that a formula has branched.
+#[cold]
+pub(crate) fn note_branch() {
+    ASKED.set(true);
 }
 
 /// Begins anew to watch for branches.

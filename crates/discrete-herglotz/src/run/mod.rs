@@ -27,6 +27,7 @@ pub(crate) mod verified;
 pub(crate) mod watch;
 
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
+pub(crate) use checkpoint::digest;
 pub use checkpoint::{Checkpoint, CheckpointError, Interrupted};
 #[cfg(feature = "csv")]
 pub use csv_rows::CsvRows;

@@ -46,24 +46,24 @@ pub struct Splitting<'a, L, const N: usize> {
 
 /// The stages of a step, in the lengths of this step and this drag.
 #[derive(Clone, Debug)]
-struct SubstepTable {
+pub(crate) struct SubstepTable {
     /// Those of the first step.
-    first: Vec<Stage>,
+    pub(crate) first: Vec<Stage>,
     /// Those of a later one: its first kick, or its first drift, is one with the last of the step before.
-    joined: Vec<Stage>,
+    pub(crate) joined: Vec<Stage>,
     /// What completes a step: the last kick, and the last drift of a scheme that begins with one.
-    closing: Stage,
+    pub(crate) closing: Stage,
 }
 
 /// A kick, with the force that the motion holds, and the drift that follows; there the force is taken anew.
 #[derive(Clone, Copy, Debug)]
-struct Stage {
-    kick: f64,
-    drift: Drift,
+pub(crate) struct Stage {
+    pub(crate) kick: f64,
+    pub(crate) drift: Drift,
     /// The length of the drift in time.
-    span: f64,
+    pub(crate) span: f64,
     /// The time of its end after the step's start.
-    time: f64,
+    pub(crate) time: f64,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
@@ -108,7 +108,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
 
 impl SubstepTable {
     /// Of a drag that depends on time the drifts are those from `t0`; each step makes its own.
-    fn new(scheme: &SplittingScheme, h: f64, drift: impl Fn(f64) -> Drift) -> Self {
+    pub(crate) fn new(scheme: &SplittingScheme, h: f64, drift: impl Fn(f64) -> Drift) -> Self {
         let (drifts, kicks) = scheme.coefficients();
         let stages = scheme.stages();
         let stage =

@@ -11,6 +11,7 @@
 //! is unknown or the output cannot be written.
 
 mod chain;
+mod ensembles;
 mod lattice;
 mod memory;
 mod path;
@@ -41,7 +42,13 @@ struct Arguments {
 /// A case: its name, and what it does.
 type Case = (&'static str, fn(&mut Report) -> Result<(), Failure>);
 
-const CASES: &[Case] = &[("path", path::run), ("chain", chain::run), ("lattice", lattice::run), ("solar", solar::run)];
+const CASES: &[Case] = &[
+    ("path", path::run),
+    ("chain", chain::run),
+    ("lattice", lattice::run),
+    ("solar", solar::run),
+    ("ensembles", ensembles::run),
+];
 
 fn main() -> ExitCode {
     finish(run(&Arguments::parse()))
