@@ -36,8 +36,14 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Observer::*", "the implementor's; what a run makes of odd ones is in the attack on Run::observe"),
 ];
 
-pub const ATTACKS: &[&[Attack]] =
-    &[ensembles::ATTACKS, integrators::ATTACKS, lagrangians::ATTACKS, observers::ATTACKS, runs::ATTACKS, steppers::ATTACKS];
+pub const ATTACKS: &[&[Attack]] = &[
+    ensembles::ATTACKS,
+    integrators::ATTACKS,
+    lagrangians::ATTACKS,
+    observers::ATTACKS,
+    runs::ATTACKS,
+    steppers::ATTACKS,
+];
 
 /// Times and states to start from, and whether they are finite.
 fn starts() -> Vec<(f64, PhasePoint<1>)> {
