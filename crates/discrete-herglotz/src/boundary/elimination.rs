@@ -36,12 +36,6 @@ impl<const N: usize> Rows<N> {
         let zero = SMatrix::zeros();
         Rows { here: zero, next: zero, after: zero, first: zero, rhs: SVector::zeros() }
     }
-
-    /// The same equations one point later, with `here` used up.
-    #[inline(always)]
-    fn advanced(self) -> Self {
-        Rows { here: self.next, next: self.after, after: SMatrix::zeros(), ..self }
-    }
 }
 
 impl<const N: usize> ActionRow<N> {
@@ -74,6 +68,8 @@ pub(super) struct Panel<const N: usize> {
     pub action: ActionRow<N>,
     /// The equation that closes a periodic path.
     pub closing: Option<Rows<N>>,
+    /// The inverses of the pivots of `top`.
+    pub inverses: SVector<f64, N>,
 }
 
 /// A pivot vanishes or is not finite.
@@ -82,17 +78,22 @@ pub(super) struct NoPivot;
 impl<const N: usize> Panel<N> {
     pub fn new(periodic: bool) -> Self {
         let closing = periodic.then(Rows::zero);
-        Panel { top: Rows::zero(), bottom: Rows::zero(), action: ActionRow::zero(), closing }
+        let inverses = SVector::zeros();
+        Panel { top: Rows::zero(), bottom: Rows::zero(), action: ActionRow::zero(), closing, inverses }
     }
 
     /// Goes on to the next point.
     #[inline(always)]
-    pub fn advance(&mut self) {
-        self.top = self.bottom.advanced();
+    pub fn advance<const PERIODIC: bool>(&mut self) {
+        let (top, bottom) = (&mut self.top, &self.bottom);
+        (top.here, top.next, top.after, top.rhs) = (bottom.next, bottom.after, SMatrix::zeros(), bottom.rhs);
+        if PERIODIC {
+            top.first = bottom.first;
+        }
         let action = &self.action;
         self.action = ActionRow { here: action.next, next: action.after, after: SVector::zeros(), ..*action };
-        if let Some(rows) = &mut self.closing {
-            *rows = rows.advanced();
+        if PERIODIC && let Some(rows) = &mut self.closing {
+            *rows = Rows { here: rows.next, next: rows.after, after: SMatrix::zeros(), ..*rows };
         }
     }
 
@@ -123,12 +124,13 @@ impl<const N: usize> Panel<N> {
     /// is regular, which is so where the path's beginning ends at a conjugate point. Afterwards `top` is triangular in `here`.
     /// Tells whether rows of both points were exchanged, without which `top.after` vanishes.
     #[inline(always)]
-    pub fn eliminate(&mut self) -> Result<bool, NoPivot> {
+    pub fn eliminate<const PERIODIC: bool>(&mut self) -> Result<bool, NoPivot> {
         let mut crossed = false;
         for j in 0..N {
             crossed |= self.choose_pivot(j)?;
             let pivot = self.top.here[(j, j)];
             let inverse = 1.0 / pivot;
+            self.inverses[j] = inverse;
             // The multipliers of the rows of `top` below the pivot; zero above it.
             let mut above = self.top.here.column(j).into_owned() * inverse;
             for i in 0..=j {
@@ -136,7 +138,10 @@ impl<const N: usize> Panel<N> {
             }
             let below = self.bottom.here.column(j).into_owned() * inverse;
             let action = self.action.here[j] * inverse;
-            let closing = self.closing.as_ref().map(|rows| rows.here.column(j).into_owned() * inverse);
+            let closing = match &self.closing {
+                Some(rows) if PERIODIC => Some(rows.here.column(j).into_owned() * inverse),
+                _ => None,
+            };
             for c in j + 1..N {
                 let entry = self.top.here[(j, c)];
                 subtract(&mut self.top.here, c, &above, entry);
@@ -236,13 +241,16 @@ fn exchange<const N: usize>(a: &mut Rows<N>, i: usize, b: &mut Rows<N>, j: usize
     std::mem::swap(&mut a.rhs[i], &mut b.rhs[j]);
 }
 
-/// Solves `u x = b` for each column of b, by the upper triangle of u.
+/// Solves `u x = b` for each column of b, by the upper triangle of u and the inverses of its diagonal.
 #[inline(always)]
-pub(super) fn back_substitute<const N: usize, const C: usize>(u: &SMatrix<f64, N, N>, b: &mut SMatrix<f64, N, C>) {
+pub(super) fn back_substitute<const N: usize, const C: usize>(
+    u: &SMatrix<f64, N, N>,
+    inverses: &SVector<f64, N>,
+    b: &mut SMatrix<f64, N, C>,
+) {
     for j in (0..N).rev() {
-        let inverse = 1.0 / u[(j, j)];
         for c in 0..C {
-            b[(j, c)] *= inverse;
+            b[(j, c)] *= inverses[j];
             let x = b[(j, c)];
             for i in 0..j {
                 b[(i, c)] -= u[(i, j)] * x;

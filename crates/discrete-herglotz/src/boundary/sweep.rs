@@ -45,6 +45,8 @@ pub(super) struct Measured<const N: usize> {
     pub sizes: SVector<f64, N>,
     /// The logarithm of the product of the sigma_d, not a number where one is negative.
     pub log_factor: f64,
+    /// The product of the sigma_d whose logarithm is not yet in it.
+    factors: f64,
     /// The first step with a sigma_d that is not positive, and its value.
     pub not_contact: Option<(usize, f64)>,
     /// The smallest pivot of the last block relative to what it was before the elimination; 0 where a pivot vanishes.
@@ -139,16 +141,15 @@ impl<const N: usize> Herglotz<N> {
     /// The linearised equation of point k+1 in the corrections of positions: those of both actions are expressed by them. `before`
     /// is the jet of the step k, `sigma` the factor of p.
     #[inline(always)]
-    fn rows(
+    fn rows<const PERIODIC: bool>(
         &self,
         before: &SecondDiscreteJet<N>,
         sigma: f64,
         action: &ActionRow<N>,
         next_action: &ActionRow<N>,
-        periodic: bool,
     ) -> Rows<N> {
         let by_action = before.d2z * sigma;
-        let first = if periodic {
+        let first = if PERIODIC {
             -by_action * action.first.transpose() - self.action * next_action.first.transpose()
         } else {
             SMatrix::zeros()
@@ -175,6 +176,7 @@ impl<const N: usize> Measured<N> {
             squares: SVector::zeros(),
             sizes: SVector::zeros(),
             log_factor: 0.0,
+            factors: 1.0,
             not_contact: None,
             regularity: 0.0,
         }
@@ -187,7 +189,8 @@ impl<const N: usize> Measured<N> {
             self.residual = larger(self.residual, off);
             self.squares[i] += off * off;
             self.sizes[i] = larger(self.sizes[i], at.size[i]);
-            if off > 0.0 {
+            // A quotient at each point would cost as much as the rest; one that is not a number stays.
+            if off > self.relative * at.size[i] || off.is_nan() || at.size[i].is_nan() {
                 self.relative = larger(self.relative, off / at.size[i]);
             }
         }
@@ -198,7 +201,15 @@ impl<const N: usize> Measured<N> {
         if sigma <= 0.0 && self.not_contact.is_none() {
             self.not_contact = Some((step, sigma));
         }
-        self.log_factor += sigma.ln();
+        if sigma < 0.0 {
+            self.log_factor = f64::NAN;
+        }
+        // The logarithm of many factors at once.
+        self.factors *= sigma;
+        if !(1e-100..1e100).contains(&self.factors) {
+            self.log_factor += self.factors.ln();
+            self.factors = 1.0;
+        }
     }
 }
 
@@ -223,12 +234,21 @@ impl<const N: usize> Sweep<N> {
         of: &Equations<'_, D, N>,
         x: &mut Nodes<N>,
     ) -> Result<Measured<N>, Undefined> {
-        let (steps, periodic) = (of.steps, of.conditions.is_periodic());
+        // What a periodic path has more is compiled out of the others.
+        if of.conditions.is_periodic() { self.forward_of::<D, true>(of, x) } else { self.forward_of::<D, false>(of, x) }
+    }
+
+    fn forward_of<D: DiscreteLagrangian<N>, const PERIODIC: bool>(
+        &mut self,
+        of: &Equations<'_, D, N>,
+        x: &mut Nodes<N>,
+    ) -> Result<Measured<N>, Undefined> {
+        let steps = of.steps;
         self.after.clear();
         let mut measured = Measured::new();
         let mut now = of.jet(0, &x.q[0], &x.q[1], x.z[0])?;
         let (start, end) = of.conditions.momenta();
-        let mut panel = Panel::new(periodic);
+        let mut panel = Panel::new(PERIODIC);
         if let Some(p) = &start {
             let at = Herglotz::new(p, &now, &x.q[1]);
             measured.take(&at);
@@ -251,7 +271,7 @@ impl<const N: usize> Sweep<N> {
                 }
                 (None, Some(p)) => Some((Herglotz::at_end(p, &now, &x.q[k]), 1.0)),
                 // The momentum at the end of a periodic path is that of its start.
-                (None, None) if periodic => {
+                (None, None) if PERIODIC => {
                     let at = Herglotz::new(&now.first.d2, &opening, &x.q[1]);
                     // Its derivatives in the first two positions have waited since the start.
                     let (here, next) = (SMatrix::zeros(), SMatrix::zeros());
@@ -264,30 +284,31 @@ impl<const N: usize> Sweep<N> {
                 break;
             };
             measured.take(&at);
-            panel.bottom = at.rows(&now, sigma, &action, &panel.action, periodic);
+            panel.bottom = at.rows::<PERIODIC>(&now, sigma, &action, &panel.action);
             diagonal = panel.bottom.next.diagonal().abs();
             if k == 0 && start.is_none() {
                 // The first position is given, or is the last unknown of a periodic path.
-                if periodic {
+                if PERIODIC {
                     panel.open(&opening, &of.last_momentum(x)?);
                 }
             } else {
-                if k + 1 == steps && periodic {
+                if PERIODIC && k + 1 == steps {
                     panel.close();
                 }
                 if regular {
-                    match panel.eliminate() {
+                    match panel.eliminate::<PERIODIC>() {
                         Ok(exchanged) => self.keep(k, &panel, exchanged),
                         Err(_) => regular = false,
                     }
                 }
             }
-            panel.advance();
+            panel.advance::<PERIODIC>();
             action = panel.action;
             if let Some(ahead) = ahead {
                 now = ahead;
             }
         }
+        measured.log_factor += measured.factors.ln();
         if regular {
             measured.regularity = self.finish(&panel.top, &diagonal);
         }
@@ -297,16 +318,17 @@ impl<const N: usize> Sweep<N> {
     #[inline(always)]
     fn keep(&mut self, k: usize, panel: &Panel<N>, exchanged: bool) {
         let (mut next, mut rhs) = (panel.top.next, panel.top.rhs);
-        back_substitute(&panel.top.here, &mut next);
-        back_substitute(&panel.top.here, &mut rhs);
+        let (u, inverses) = (&panel.top.here, &panel.inverses);
+        back_substitute(u, inverses, &mut next);
+        back_substitute(u, inverses, &mut rhs);
         if exchanged {
             let mut after = panel.top.after;
-            back_substitute(&panel.top.here, &mut after);
+            back_substitute(u, inverses, &mut after);
             self.after.push((k, after));
         }
         if let Some(kept) = self.first.get_mut(k) {
             let mut first = panel.top.first;
-            back_substitute(&panel.top.here, &mut first);
+            back_substitute(u, inverses, &mut first);
             *kept = first;
         }
         self.points[k] = Eliminated { next, rhs };
