@@ -132,10 +132,7 @@ impl<const N: usize> Panel<N> {
             let inverse = 1.0 / pivot;
             self.inverses[j] = inverse;
             // The multipliers of the rows of `top` below the pivot; zero above it.
-            let mut above = self.top.here.column(j).into_owned() * inverse;
-            for i in 0..=j {
-                above[i] = 0.0;
-            }
+            let above = SVector::<f64, N>::from_fn(|i, _| if i > j { self.top.here[(i, j)] * inverse } else { 0.0 });
             let below = self.bottom.here.column(j).into_owned() * inverse;
             let action = self.action.here[j] * inverse;
             let closing = match &self.closing {
@@ -248,13 +245,16 @@ pub(super) fn back_substitute<const N: usize, const C: usize>(
     inverses: &SVector<f64, N>,
     b: &mut SMatrix<f64, N, C>,
 ) {
-    for j in (0..N).rev() {
-        for c in 0..C {
-            b[(j, c)] *= inverses[j];
-            let x = b[(j, c)];
-            for i in 0..j {
-                b[(i, c)] -= u[(i, j)] * x;
+    // Column by column in registers: rows of b would be read before they are written.
+    for c in 0..C {
+        let mut x = b.column(c).into_owned();
+        for j in (0..N).rev() {
+            let solved = x[j] * inverses[j];
+            for i in 0..N {
+                x[i] -= if i < j { u[(i, j)] } else { 0.0 } * solved;
             }
+            x[j] = solved;
         }
+        b.set_column(c, &x);
     }
 }
