@@ -18,6 +18,7 @@ mod path;
 mod report;
 mod seconds;
 mod solar;
+mod sparse_path;
 
 use clap::Parser;
 use contact_examples::{Directory, Failure, finish};

@@ -1,10 +1,11 @@
 //! Boundary-value paths: time against the number of nodes, beside a Newton's method written by hand for the one system.
 
 use crate::report::Report;
+use crate::sparse_path;
 use contact_examples::Failure;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::Chain;
-use contact_geom::{Hessian, Lagrangian, Scalar, Triple, VelocityPoint};
+use contact_geom::{Hessian, Lagrangian, Scalar, Triple, VelocityPoint, largest};
 use discrete_herglotz::{BoundaryPath, DiscreteLagrangian, End, LeftMidpoint};
 use std::hint::black_box;
 use std::time::Instant;
@@ -26,7 +27,9 @@ fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str;
     }
     let mut times = Vec::new();
     for &steps in &sizes {
-        let (mut best, mut best_by_hand, mut agreed) = (f64::INFINITY, f64::INFINITY, 0.0);
+        let [mut best, mut best_by_hand, mut best_sparse] = [f64::INFINITY; 3];
+        // Not a number where a rival finds no path.
+        let mut differences = [f64::NAN; 2];
         // In turns, so that what disturbs one disturbs the other.
         for _ in 0..(200_000 / steps).clamp(3, 50) {
             let ld = LeftMidpoint::new(Springs::<N>, SPAN / steps as f64)?;
@@ -39,18 +42,28 @@ fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str;
             let start = Instant::now();
             let (points, sweeps) = black_box(by_hand_newton::<N>(steps, ld.step_size()));
             best_by_hand = best_by_hand.min(start.elapsed().as_secs_f64() / f64::from(sweeps));
-            agreed = points.iter().zip(&found.points).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max);
+            let start = Instant::now();
+            let sparse = black_box(sparse_path::newton::<N>(&ld, steps, ends()));
+            let seconds = start.elapsed().as_secs_f64();
+            let off = |points: &[SVector<f64, N>]| {
+                largest(points.iter().zip(&found.points).flat_map(|(a, b)| (a - b).data.0[0]))
+            };
+            differences[0] = off(&points);
+            if let Some((points, corrections)) = sparse {
+                best_sparse = best_sparse.min(seconds / f64::from(corrections));
+                differences[1] = off(&points);
+            }
         }
         report.row("path", name, steps, best, None);
         report.row("path", by_hand, steps, best_by_hand, None);
-        // Both solve the same equations: a reference that does not would measure nothing. The round-off of positions, eps q / h
+        report.row("path", &format!("{name} by faer's sparse LU"), steps, best_sparse, None);
+        // All solve the same equations: a reference that does not would measure nothing. The round-off of positions, eps q / h
         // in each equation, gathers over the path.
-        report.verdict(
-            "path",
-            &format!("{name} difference of the two paths at N={steps}"),
-            agreed,
-            1e-15 * (steps as f64).powf(1.5),
-        );
+        for (rival, off) in ["the loop by hand", "faer's sparse LU"].into_iter().zip(differences) {
+            let what = format!("{name} difference from the path by {rival} at N={steps}");
+            report.verdict("path", &what, off, 1e-15 * (steps as f64).powf(1.5));
+        }
+        report.verdict("path", &format!("{name} ratio to faer's sparse LU at N={steps}"), best / best_sparse, 1.0);
         report.verdict("path", &format!("{ratio} at N={steps}"), best / best_by_hand, 1.5);
         times.push(best);
     }
@@ -64,13 +77,12 @@ fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str;
         let start = Instant::now();
         let found = BoundaryPath::new(&ld, 100_000, ends().map(End::Position))?.search();
         let seconds = start.elapsed().as_secs_f64();
-        let bound = if N == 2 && found.is_found() { 2.0 } else { f64::INFINITY };
-        report.verdict(
-            "path",
-            &format!("{name} seconds of a search at N=1e5 with derived derivatives"),
-            seconds,
-            bound,
-        );
+        let what = format!("{name} search with derived derivatives");
+        report.row("path", &what, 100_000, seconds, None);
+        if N == 2 {
+            let figure = if found.is_found() { seconds } else { f64::NAN };
+            report.verdict("path", &format!("{what}: seconds at N=1e5"), figure, 2.0);
+        }
     }
     Ok(())
 }
