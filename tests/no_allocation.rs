@@ -159,7 +159,12 @@ fn corrections_of_paths() {
     let again = problem.from_path(far.path().unwrap()).unwrap();
     let few = allocations(|| near = Some(again.search()));
     let near = near.unwrap();
-    assert!(far.is_found() && near.is_found() && far.iterations > near.iterations + 1, "{} and {}", far.status, near.status);
+    assert!(
+        far.is_found() && near.is_found() && far.iterations > near.iterations + 1,
+        "{} and {}",
+        far.status,
+        near.status
+    );
     assert_eq!(many, few);
 }
 

@@ -12,7 +12,7 @@ const THRESHOLD: f64 = 16.0;
 /// N equations in the corrections of the positions of three consecutive points, and of the first point of a periodic path:
 /// `here dq_k + next dq_{k+1} + after dq_{k+2} + first dq_0 = rhs`.
 #[derive(Clone, Copy)]
-pub(super) struct Rows<const N: usize> {
+pub(super) struct BlockRows<const N: usize> {
     pub here: SMatrix<f64, N, N>,
     pub next: SMatrix<f64, N, N>,
     pub after: SMatrix<f64, N, N>,
@@ -31,10 +31,10 @@ pub(super) struct ActionRow<const N: usize> {
     pub rhs: f64,
 }
 
-impl<const N: usize> Rows<N> {
+impl<const N: usize> BlockRows<N> {
     pub fn zero() -> Self {
         let zero = SMatrix::zeros();
-        Rows { here: zero, next: zero, after: zero, first: zero, rhs: SVector::zeros() }
+        BlockRows { here: zero, next: zero, after: zero, first: zero, rhs: SVector::zeros() }
     }
 }
 
@@ -61,13 +61,13 @@ impl<const N: usize> ActionRow<N> {
 /// All equations that hold the correction of one point.
 pub(super) struct Panel<const N: usize> {
     /// What is left of the equations of the point.
-    pub top: Rows<N>,
+    pub top: BlockRows<N>,
     /// The discrete Herglotz equation of the next point.
-    pub bottom: Rows<N>,
+    pub bottom: BlockRows<N>,
     /// The recursion of the next point's action.
     pub action: ActionRow<N>,
     /// The equation that closes a periodic path.
-    pub closing: Option<Rows<N>>,
+    pub closing: Option<BlockRows<N>>,
     /// The inverses of the pivots of `top`.
     pub inverses: SVector<f64, N>,
 }
@@ -77,9 +77,9 @@ pub(super) struct NoPivot;
 
 impl<const N: usize> Panel<N> {
     pub fn new(periodic: bool) -> Self {
-        let closing = periodic.then(Rows::zero);
+        let closing = periodic.then(BlockRows::zero);
         let inverses = SVector::zeros();
-        Panel { top: Rows::zero(), bottom: Rows::zero(), action: ActionRow::zero(), closing, inverses }
+        Panel { top: BlockRows::zero(), bottom: BlockRows::zero(), action: ActionRow::zero(), closing, inverses }
     }
 
     /// Goes on to the next point.
@@ -93,7 +93,7 @@ impl<const N: usize> Panel<N> {
         let action = &self.action;
         self.action = ActionRow { here: action.next, next: action.after, after: SVector::zeros(), ..*action };
         if PERIODIC && let Some(rows) = &mut self.closing {
-            *rows = Rows { here: rows.next, next: rows.after, after: SMatrix::zeros(), ..*rows };
+            *rows = BlockRows { here: rows.next, next: rows.after, after: SMatrix::zeros(), ..*rows };
         }
     }
 
@@ -104,7 +104,7 @@ impl<const N: usize> Panel<N> {
         self.action.first += self.action.here;
         let at = Herglotz::new(p, opening, &SVector::zeros());
         // `next` becomes `here` of the second point.
-        self.closing = Some(Rows { next: at.next, first: at.here, ..Rows::zero() });
+        self.closing = Some(BlockRows { next: at.next, first: at.here, ..BlockRows::zero() });
     }
 
     /// At the last step of a periodic path: the last position is the first, and the equation that waited joins.
@@ -228,7 +228,7 @@ fn subtract<const N: usize>(block: &mut SMatrix<f64, N, N>, c: usize, multiplier
     }
 }
 
-fn exchange<const N: usize>(a: &mut Rows<N>, i: usize, b: &mut Rows<N>, j: usize) {
+fn exchange<const N: usize>(a: &mut BlockRows<N>, i: usize, b: &mut BlockRows<N>, j: usize) {
     for c in 0..N {
         std::mem::swap(&mut a.here[(i, c)], &mut b.here[(j, c)]);
         std::mem::swap(&mut a.next[(i, c)], &mut b.next[(j, c)]);

@@ -1,6 +1,6 @@
 //! The discrete Herglotz equations along a path: their residuals, and Newton's correction from one sweep through the path and back.
 
-use super::elimination::{ActionRow, Panel, Rows, back_substitute};
+use super::elimination::{ActionRow, BlockRows, Panel, back_substitute};
 use super::end::Conditions;
 use crate::{DiscreteLagrangian, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
@@ -147,14 +147,14 @@ impl<const N: usize> Herglotz<N> {
         sigma: f64,
         action: &ActionRow<N>,
         next_action: &ActionRow<N>,
-    ) -> Rows<N> {
+    ) -> BlockRows<N> {
         let by_action = before.d2z * sigma;
         let first = if PERIODIC {
             -by_action * action.first.transpose() - self.action * next_action.first.transpose()
         } else {
             SMatrix::zeros()
         };
-        Rows {
+        BlockRows {
             here: before.d12.transpose() * sigma
                 - by_action * action.here.transpose()
                 - self.action * next_action.here.transpose(),
@@ -252,7 +252,7 @@ impl<const N: usize> Sweep<N> {
         if let Some(p) = &start {
             let at = Herglotz::new(p, &now, &x.q[1]);
             measured.take(&at);
-            panel.top = Rows { here: at.here, next: at.next, rhs: -at.value, ..Rows::zero() };
+            panel.top = BlockRows { here: at.here, next: at.next, rhs: -at.value, ..BlockRows::zero() };
         }
         // Of a periodic path the jet of the first step, and where the path is regular to round-off so far.
         let (opening, mut regular) = (now, true);
@@ -335,7 +335,7 @@ impl<const N: usize> Sweep<N> {
     }
 
     /// Solves for the last unknown position; the smallest pivot relative to the diagonal before the elimination.
-    fn finish(&mut self, top: &Rows<N>, diagonal: &SVector<f64, N>) -> f64 {
+    fn finish(&mut self, top: &BlockRows<N>, diagonal: &SVector<f64, N>) -> f64 {
         // In units in which the diagonal was 1, so that pivots can be compared.
         let unit = diagonal.map(|size| if size > 0.0 { size.sqrt().recip() } else { 1.0 });
         let mut here = SMatrix::<f64, N, N>::from_fn(|i, j| top.here[(i, j)] * unit[i] * unit[j]);
