@@ -401,14 +401,14 @@ mod tests {
     }
 
     /// Choices of numbers by pairs, as many as there are lanes at a time.
-    struct Choose<'a>(&'a [f64], &'a [f64]);
+    struct ChooseLanes<'a>(&'a [f64], &'a [f64]);
 
     /// `if_less` of a, b and 10, 20; the larger, the smaller, the size and the sign of a.
     fn choices<T: Scalar>(a: T, b: T) -> [T; 5] {
         [a.if_less(b, 10.0.into(), 20.0.into()), Scalar::max(a, b), Scalar::min(a, b), Scalar::abs(a), a.signum()]
     }
 
-    impl WithSimd for Choose<'_> {
+    impl WithSimd for ChooseLanes<'_> {
         type Output = Vec<[f64; 5]>;
 
         #[inline(always)]
@@ -427,11 +427,11 @@ mod tests {
         let values = [0.0, -0.0, 1.0, -1.0, 2.5, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
         let pairs = values.iter().flat_map(|a| values.iter().map(move |b| (*a, *b)));
         let (a, b): (Vec<_>, Vec<_>) = pairs.unzip();
-        let mut sets = vec![pulp::Scalar::new().vectorize(Choose(&a, &b))];
+        let mut sets = vec![pulp::Scalar::new().vectorize(ChooseLanes(&a, &b))];
         #[cfg(target_arch = "x86_64")]
         {
-            sets.extend(pulp::x86::V3::try_new().map(|set| Simd::vectorize(set, Choose(&a, &b))));
-            sets.extend(pulp::x86::V4::try_new().map(|set| Simd::vectorize(set, Choose(&a, &b))));
+            sets.extend(pulp::x86::V3::try_new().map(|set| Simd::vectorize(set, ChooseLanes(&a, &b))));
+            sets.extend(pulp::x86::V4::try_new().map(|set| Simd::vectorize(set, ChooseLanes(&a, &b))));
         }
         for set in sets {
             assert_eq!(set.len(), a.len());

@@ -43,6 +43,11 @@ impl DenseLu {
                 self.factors[(i, j)] = entry(i, j);
             }
         }
+        self.factorise_entries()
+    }
+
+    /// Apart from what is generic, so that faer's code is compiled with this crate and not with each program.
+    fn factorise_entries(&mut self) -> Result<(), StepError> {
         factor::lu_in_place(
             self.factors.as_mut(),
             &mut self.forward,
@@ -51,7 +56,7 @@ impl DenseLu {
             MemStack::new(&mut self.scratch),
             Default::default(),
         );
-        self.least = (0..n).fold(f64::INFINITY, |least, i| {
+        self.least = (0..self.factors.nrows()).fold(f64::INFINITY, |least, i| {
             let pivot = self.factors[(i, i)].abs();
             if pivot < least || !pivot.is_finite() { pivot } else { least }
         });

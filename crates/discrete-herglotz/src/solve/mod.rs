@@ -2,6 +2,7 @@
 
 #[cfg(feature = "faer")]
 mod faer_lu;
+pub(crate) mod inverse;
 #[cfg(not(feature = "faer"))]
 mod nalgebra_lu;
 pub(crate) mod newton;

@@ -1,7 +1,7 @@
 //! Splittings where the drag is linear.
 
 use super::drag::{Drag, Drift};
-use super::motion::{Advance, Motion, Reached};
+use super::motion::{CompensatedState, Reached, SplittingRun};
 use super::separable::SeparableForm;
 use crate::run::DECOUPLED;
 use crate::run::saved::Saved;
@@ -38,7 +38,7 @@ pub struct Splitting<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
     drag: Drag<N>,
     table: SubstepTable,
-    progress: Advance<N>,
+    progress: SplittingRun<N>,
     action: bool,
     compensated: bool,
     watched: bool,
@@ -84,7 +84,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         let drag = Drag::of(&form, t0, &state)?;
         let kick = form.first_kick(t0, &state.q, 0.0)?;
         let table = SubstepTable::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
-        let progress = Advance::new(h, t0, scheme.stages(), state, kick);
+        let progress = SplittingRun::new(h, t0, scheme.stages(), state, kick);
         Ok(Splitting { form, drag, table, progress, action: true, compensated: false, watched: false })
     }
 
@@ -131,7 +131,7 @@ impl SubstepTable {
 impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
         let Splitting { form, drag, table, progress, action, compensated, watched } = self;
-        let maps = Maps { form, drag, table };
+        let maps = StepMaps { form, drag, table };
         match (*action, *compensated) {
             (false, false) => maps.advance::<false, false>(progress, steps, *watched),
             (false, true) => maps.advance::<false, true>(progress, steps, *watched),
@@ -149,9 +149,9 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     }
 
     fn sigma(&self) -> f64 {
-        let Advance { taken, t0, h, .. } = self.progress;
+        let SplittingRun { taken, t0, h, .. } = self.progress;
         let Some(before) = taken.checked_sub(1) else { return 1.0 };
-        Maps { form: &self.form, drag: &self.drag, table: &self.table }.sigma(t0 + before as f64 * h, h)
+        StepMaps { form: &self.form, drag: &self.drag, table: &self.table }.sigma(t0 + before as f64 * h, h)
     }
 
     fn evaluations(&self) -> u64 {
@@ -186,16 +186,16 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
 }
 
 /// What a step consists of.
-struct Maps<'s, 'a, L, const N: usize> {
+struct StepMaps<'s, 'a, L, const N: usize> {
     form: &'s SeparableForm<&'a L, N>,
     drag: &'s Drag<N>,
     table: &'s SubstepTable,
 }
 
-impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
+impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
     fn advance<const ACTION: bool, const COMPENSATED: bool>(
         &self,
-        progress: &mut Advance<N>,
+        progress: &mut SplittingRun<N>,
         steps: usize,
         watched: bool,
     ) -> Result<(), Halt> {
@@ -219,10 +219,10 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
     #[inline(never)]
     fn run<const ACTION: bool, const COMPENSATED: bool, const TIMED: bool, const WATCHED: bool>(
         &self,
-        from: &Advance<N>,
+        from: &SplittingRun<N>,
         steps: usize,
     ) -> Reached<N> {
-        let Maps { form, table, .. } = self;
+        let StepMaps { form, table, .. } = self;
         let (mut m, mut seen) = (from.motion, from.seen());
         let first = usize::from(from.taken == 0);
         for (stages, range) in [(&table.first, 0..first), (&table.joined, first..steps)] {
@@ -265,7 +265,7 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
     #[inline(always)]
     fn kick_and_drift<const ACTION: bool, const COMPENSATED: bool, const TIMED: bool>(
         &self,
-        m: &mut Motion<N>,
+        m: &mut CompensatedState<N>,
         t: f64,
         stage: &Stage,
     ) {

@@ -2,7 +2,7 @@
 
 use crate::run::accuracy::choose_with;
 use crate::run::pilot::{BUDGET, Pilots};
-use crate::run::{Needs, Problem, Shared, Task, Until, run_to};
+use crate::run::{Needs, Problem, Request, Shared, Until, run_to};
 use crate::{AnyIntegrator, InputError, Obstacle, Status};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
@@ -105,8 +105,8 @@ fn search<L: Lagrangian<N>, const N: usize>(
     wanted: f64,
 ) -> (Cow<'static, str>, usize, u64) {
     let integrator = integrator.map(|by| Arc::new(by) as Shared<'_, L, N>);
-    let task = Task { problem, t_end: span, span, integrator, needs: Needs::default() };
-    let mut pilots = Pilots { task: &task, left: BUDGET, wanted, watches_clock: false };
+    let request = Request { problem, t_end: span, span, integrator, needs: Needs::default() };
+    let mut pilots = Pilots { request: &request, left: BUDGET, wanted, watches_clock: false };
     let choice = choose_with(&mut pilots).unwrap();
     (choice.integrator.facts().name, choice.count, BUDGET - pilots.left)
 }
