@@ -4,7 +4,7 @@ use super::member::{Ending, Member};
 use super::{EnsembleError, Shard};
 use crate::run::digest;
 use crate::run::saved::{Saved, load_option, save_option, word};
-use crate::{CheckpointError, InputError, Status, Suspicion};
+use crate::{CheckpointError, InputError, Row, Status, Suspicion};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use std::fs::{File, OpenOptions};
@@ -13,13 +13,13 @@ use std::path::{Path, PathBuf};
 
 /// What a file begins with, and the version of what follows.
 const MAGIC: u64 = u64::from_le_bytes(*b"ensemble");
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 /// The words before the shards: those two, the fingerprint, and their digest.
 const HEAD: usize = 4;
 
 /// The words that a shard has at the most: what says more is damaged.
-const LONGEST: u64 = 1 << 24;
+const LONGEST: u64 = 1 << 31;
 
 /// The shards that are done, in their order, each whole or not there: it is written at once, behind those before it, with its length in front and a
 /// digest at its end. What was cut off in the middle of it is the last of the file, and is done again.
@@ -131,6 +131,7 @@ impl Shards {
                 steps.save(&mut words);
                 t.save(&mut words);
                 state.save(&mut words);
+                save_rows(&member.rows, &mut words);
             }
         }
         let count = words.len() as u64 - 1;
@@ -155,7 +156,7 @@ fn read<const N: usize>(mut from: &[u64], shard: usize, first: usize) -> Option<
     }
     let mut members = Vec::with_capacity(count);
     for place in 0..count {
-        let mut completed = false;
+        let (mut completed, mut rows) = (false, Vec::new());
         completed.load(from)?;
         let ending = if completed {
             let suspicion = load_option(from, || Suspicion { step: 0, misfit: 0.0 })?;
@@ -164,11 +165,36 @@ fn read<const N: usize>(mut from: &[u64], shard: usize, first: usize) -> Option<
             steps.load(from)?;
             t.load(from)?;
             state.load(from)?;
+            rows = load_rows(from)?;
             Ok(Ending { status: Status::Completed, suspicion, steps, t, state })
         } else {
             Err(InputError::NoSteps)
         };
-        members.push(Member { index: first + place, ending });
+        members.push(Member { index: first + place, ending, rows });
     }
     from.is_empty().then_some(Shard { members, in_lanes })
+}
+
+fn save_rows<const N: usize>(rows: &[Row<N>], to: &mut Vec<u64>) {
+    rows.len().save(to);
+    for Row { t, q, p, z, .. } in rows {
+        t.save(to);
+        [*q, *p].save(to);
+        save_option(z.as_ref(), to);
+    }
+}
+
+fn load_rows<const N: usize>(from: &mut &[u64]) -> Option<Vec<Row<N>>> {
+    let mut count = 0;
+    count.load(from)?;
+    // A row has a word at the least.
+    let mut rows = Vec::with_capacity(from.len().min(count));
+    for _ in 0..count {
+        let (mut t, mut x) = (0.0, [SVector::zeros(); 2]);
+        t.load(from)?;
+        x.load(from)?;
+        let ([q, p], z) = (x, load_option(from, || 0.0)?);
+        rows.push(Row { t, q, v: None, p, z, energy: None, log_factor: None, columns: Vec::new() });
+    }
+    Some(rows)
 }

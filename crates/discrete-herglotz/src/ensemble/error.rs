@@ -23,6 +23,11 @@ pub enum EnsembleError {
         /// Why.
         cause: InputError,
     },
+    /// Its members are observed, and what observers see is in no checkpoint.
+    #[error(
+        "an ensemble under the eyes of observers has no checkpoint; leave it out, or take `rows_every` for the states on the way"
+    )]
+    Observed,
     /// The file of its shards cannot be read or written.
     #[error("{}: {cause}", .path.display())]
     Checkpoint {

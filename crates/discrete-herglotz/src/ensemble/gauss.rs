@@ -3,6 +3,7 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
+use super::lane::Lane;
 use super::pack::Pack;
 use super::twofold::{Pair, Summed};
 use crate::gauss::coefficients::MOST;
@@ -85,12 +86,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         Ok(GaussPacks { form, table, t0, h, steps })
     }
 
-    /// Takes all steps of some motions, in place. One whose steps could not be solved, or that is not finite, is not finite then.
-    pub fn run(&self, instructions: Instructions, states: &mut [PhasePoint<N>], action: bool) {
+    /// Takes all steps of some motions, in place, with a state recorded after each `rows` of them. One whose steps could not be solved, or
+    /// that is not finite, is not finite then.
+    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, rows: Option<usize>) {
+        let stride = rows.unwrap_or(self.steps);
         if action {
-            instructions.dispatch(All::<_, N, true> { packs: self, states });
+            instructions.dispatch(All::<_, N, true> { packs: self, lanes, stride });
         } else {
-            instructions.dispatch(All::<_, N, false> { packs: self, states });
+            instructions.dispatch(All::<_, N, false> { packs: self, lanes, stride });
         }
     }
 }
@@ -98,7 +101,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 /// All motions of a slice in the lanes of one instruction set.
 struct All<'s, 'a, L, const N: usize, const ACTION: bool> {
     packs: &'s GaussPacks<'a, L, N>,
-    states: &'s mut [PhasePoint<N>],
+    lanes: &'s mut [Lane<N>],
+    /// The steps from one state that is recorded to the next.
+    stride: usize,
 }
 
 impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, '_, L, N, ACTION> {
@@ -106,11 +111,11 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, 
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
-        let All { packs, states } = self;
+        let All { packs, lanes, stride } = self;
         if const { N == 1 } {
-            packs.all::<S, 2, ACTION>(states);
+            packs.all::<S, 2, ACTION>(lanes, stride);
         } else {
-            packs.all::<S, 1, ACTION>(states);
+            packs.all::<S, 1, ACTION>(lanes, stride);
         }
     }
 }
@@ -183,18 +188,16 @@ impl<S: Simd, const K: usize> Judge<S, K> {
 
 impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
     #[inline(always)]
-    fn all<S: Simd, const K: usize, const ACTION: bool>(&self, states: &mut [PhasePoint<N>]) {
+    fn all<S: Simd, const K: usize, const ACTION: bool>(&self, lanes: &mut [Lane<N>], stride: usize) {
         let zero = Pack::<S, K>::zero();
-        for some in states.chunks_mut(Pack::<S, K>::COUNT) {
+        for some in lanes.chunks_mut(Pack::<S, K>::COUNT) {
             // What is beyond the last repeats it.
             let last = some.len() - 1;
-            for state in some.iter_mut() {
-                state.p = self.form.velocity(&state.p);
-            }
-            let lane = |f: &dyn Fn(&PhasePoint<N>) -> f64| Summed::from(Pack::from_lanes(|i| f(&some[i.min(last)])));
+            let lane =
+                |f: &dyn Fn(&PhasePoint<N>) -> f64| Summed::from(Pack::from_lanes(|i| f(&some[i.min(last)].state)));
             let mut m = Moving {
                 q: std::array::from_fn(|d| lane(&|state| state.q[d])),
-                v: std::array::from_fn(|d| lane(&|state| state.p[d])),
+                v: std::array::from_fn(|d| lane(&|state| self.form.velocity(&state.p)[d])),
                 z: lane(&|state| state.z),
                 a: [[zero; N]; MOST],
                 x: [[zero; N]; MOST],
@@ -204,13 +207,23 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
             };
             for k in 0..self.steps {
                 self.step::<S, K, ACTION>(&mut m, self.t0 + k as f64 * self.h, k > 0);
+                let taken = k + 1;
+                if taken % stride == 0 || taken == self.steps {
+                    for (i, lane) in some.iter_mut().enumerate() {
+                        lane.reach(self.t0 + taken as f64 * self.h, self.state(&m, i));
+                    }
+                }
             }
-            for (i, state) in some.iter_mut().enumerate() {
-                let v = SVector::from_fn(|d, _| m.v[d].value.lanes()[i]);
-                state.q = SVector::from_fn(|d, _| m.q[d].value.lanes()[i]);
-                state.p = self.form.momentum(&v);
-                state.z = if m.failed.lanes()[i] == 0.0 { m.z.value.lanes()[i] } else { f64::NAN };
-            }
+        }
+    }
+
+    /// The state in a lane; one that has failed is not finite.
+    fn state<S: Simd, const K: usize>(&self, m: &Moving<S, K, N>, i: usize) -> PhasePoint<N> {
+        let v = SVector::from_fn(|d, _| m.v[d].value.lanes()[i]);
+        PhasePoint {
+            q: SVector::from_fn(|d, _| m.q[d].value.lanes()[i]),
+            p: self.form.momentum(&v),
+            z: if m.failed.lanes()[i] == 0.0 { m.z.value.lanes()[i] } else { f64::NAN },
         }
     }
 

@@ -1,15 +1,17 @@
 //! What becomes of a member of an ensemble.
 
-use crate::{InputError, Status, Suspicion};
+use crate::{InputError, Outcome, Row, Status, Suspicion};
 use contact_geom::PhasePoint;
 
 /// One motion of an ensemble, at its end.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Member<const N: usize> {
     /// Which one, counted from 0.
     pub index: usize,
     /// Where its motion has led to; an error where it could not begin, as that of a single run.
     pub ending: Result<Ending<N>, InputError>,
+    /// Its states on the way, where [rows](crate::Ensemble::rows_every) are recorded.
+    pub rows: Vec<Row<N>>,
 }
 
 /// Where the motion of a member has led to. Where it was ended before its time, that is what was computed before.
@@ -25,6 +27,13 @@ pub struct Ending<const N: usize> {
     pub t: f64,
     /// The state `(q, p, z)`; the action is the start's where it was not asked for.
     pub state: PhasePoint<N>,
+}
+
+impl<const N: usize> From<Outcome<N>> for Ending<N> {
+    fn from(outcome: Outcome<N>) -> Self {
+        let Outcome { status, suspicion, steps, t, .. } = outcome;
+        Ending { status, suspicion, steps, t, state: outcome.state() }
+    }
 }
 
 /// How many members have ended in which way.

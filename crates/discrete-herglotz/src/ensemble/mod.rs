@@ -3,7 +3,9 @@
 mod checkpoint;
 mod error;
 mod gauss;
+mod lane;
 mod member;
+mod observed;
 mod pack;
 mod shards;
 mod sine;
@@ -15,15 +17,17 @@ mod twofold;
 
 pub use error::EnsembleError;
 pub use member::{Ending, Member, Tally};
+pub use observed::ObservedEnsemble;
 
 use crate::gauss::instructions::Instructions;
 use crate::gauss::lanes::{branched, forget_branches};
-use crate::run::digest;
 use crate::run::watch::size;
-use crate::{GaussCollocation, InputError, Integrator, SplittingScheme, Start, Status, Steps, Until};
+use crate::run::{digest, rows};
+use crate::{GaussCollocation, InputError, Integrator, Observer, Rows, SplittingScheme, Start, Status, Steps, Until};
 use checkpoint::Shards;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
 use gauss::GaussPacks;
+use lane::Lane;
 use single::Common;
 use splitting::SplittingPacks;
 use std::num::NonZeroUsize;
@@ -91,6 +95,8 @@ pub struct Ensemble<'a, L, const N: usize> {
     integrator: Option<Box<dyn Integrator<'a, L, N> + Sync + 'a>>,
     steps: Option<Steps>,
     action: bool,
+    /// The steps from one recorded row to the next.
+    rows: Option<usize>,
     threads: Option<usize>,
     instructions: Instructions,
     checkpoint: Option<PathBuf>,
@@ -124,6 +130,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             integrator: None,
             steps: None,
             action: true,
+            rows: None,
             threads: None,
             instructions: Instructions::new(),
             checkpoint: None,
@@ -151,6 +158,13 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         Ensemble { action: false, ..self }
     }
 
+    /// With the states of each member in its [rows](Member::rows): the start, the state after every so many steps, and the end, as by
+    /// [`Rows::every`]. They are recorded in lanes too; at a time there are those of the members under way alone, of eight shards of 384
+    /// for each thread.
+    pub fn rows_every(self, steps: usize) -> Self {
+        Ensemble { rows: Some(steps), ..self }
+    }
+
     /// With a file of the shards that are done. Where it is there already, the ensemble goes on behind them: the fold is given their members
     /// again, to the last bit, and the rest is computed. A process that is killed loses the shards under way. Members that have failed
     /// are run again for their cause.
@@ -176,12 +190,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// of them; a checkpoint of another ensemble, a damaged one, or one that cannot be written. A member that cannot begin by itself, or
     /// whose motion fails, is handed to the fold with the cause, and the others go on.
     pub fn run(&self, until: Until, mut fold: impl FnMut(&Member<N>)) -> Result<Tally, EnsembleError> {
+        let threads = self.some_threads()?;
         let task = self.task(until)?;
-        let threads = match self.threads {
-            Some(0) => return Err(EnsembleError::Threads),
-            Some(threads) => threads,
-            None => std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
-        };
         let shards = self.count.div_ceil(SHARD);
         let mut tally = Tally::default();
         let mut hand_on = |shard: usize, Shard { members, in_lanes }: &Shard<N>| {
@@ -190,9 +200,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
                 tally.add(member);
                 fold(member);
             }
-            if let Some(tell) = &self.progress {
-                tell((shard + 1) as f64 / shards as f64);
-            }
+            self.tell(shard + 1, shards);
         };
         let mut done = 0;
         let mut file = None;
@@ -225,6 +233,22 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         error.map_or(Ok(tally), Err)
     }
 
+    /// Tells how many of the shards are done.
+    fn tell(&self, done: usize, shards: usize) {
+        if let Some(tell) = &self.progress {
+            tell(done as f64 / shards as f64);
+        }
+    }
+
+    /// The threads, one at least.
+    fn some_threads(&self) -> Result<usize, EnsembleError> {
+        let processors = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        match self.threads.unwrap_or_else(processors) {
+            0 => Err(EnsembleError::Threads),
+            threads => Ok(threads),
+        }
+    }
+
     /// Members spread over the ensemble, the first and the last among them.
     fn sample(&self) -> impl Iterator<Item = usize> + use<L, N> {
         let (count, sample) = (self.count, self.count.min(SAMPLE));
@@ -239,7 +263,10 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         let refused = |cause| EnsembleError::Member { index: 0, cause };
         let Some(integrator) = self.integrator.as_deref() else { return Err(refused(InputError::NoIntegrator)) };
         let Some(steps) = self.steps else { return Err(refused(InputError::NoSteps)) };
-        let common = Common { t0: self.t0, steps, until, action: self.action };
+        let common = Common { t0: self.t0, steps, until, action: self.action, rows: self.rows };
+        if let Some(stride) = self.rows {
+            Rows::<N>::every(stride).map_err(refused)?;
+        }
         let (mut planned, mut refused) = (None, None);
         for index in self.sample() {
             let (lagrangian, start) = (self.members)(index);
@@ -250,6 +277,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             }
         }
         let Some((index, plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
+        rows::check(common.rows_of(plan.1).saturating_mul(self.count.min(SHARD)))
+            .map_err(|cause| EnsembleError::Member { index, cause })?;
         let (members, count, instructions) = (&*self.members, self.count, self.instructions);
         let mut task = Task { members, count, instructions, integrator, common, plan, kernel: None, fingerprint: 0 };
         task.fingerprint = task.fingerprint_of(self.sample());
@@ -311,7 +340,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     fn fingerprint_of(&self, sample: impl Iterator<Item = usize>) -> u64 {
         let Common { t0, action, .. } = self.common;
         let mut words = vec![N as u64, self.count as u64, t0.to_bits(), action.into(), self.plan.0.to_bits()];
-        words.push(self.plan.1 as u64);
+        words.extend([self.plan.1, self.common.rows.unwrap_or(0)].map(|x| x as u64));
         words.extend(self.integrator.facts().name.bytes().map(u64::from));
         for index in sample {
             let (lagrangian, start) = (self.members)(index);
@@ -334,9 +363,14 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     /// Runs members again that have not completed.
     fn run_again(&self, shard: &mut Shard<N>) {
         for member in shard.members.iter_mut().filter(|member| member.ending.is_err()) {
-            let (lagrangian, start) = (self.members)(member.index);
-            member.ending = self.common.run(self.integrator, lagrangian, start);
+            *member = self.by_itself(member.index, None::<&mut Rows<'_, N>>);
         }
+    }
+
+    /// Runs a member by itself, under the eyes of an observer.
+    fn by_itself(&self, index: usize, observer: Option<&mut impl Observer<N>>) -> Member<N> {
+        let (lagrangian, start) = (self.members)(index);
+        self.common.run(self.integrator, lagrangian, (index, start), observer)
     }
 
     /// Runs the members of a shard.
@@ -346,7 +380,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let mut starts = Vec::with_capacity(range.len());
         for index in range {
             starts.push((self.members)(index));
-            members.push(Member { index, ending: Err(InputError::NoSteps) });
+            members.push(Member { index, ending: Err(InputError::NoSteps), rows: Vec::new() });
         }
         let mut in_lanes = 0;
         let mut from = 0;
@@ -361,8 +395,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     /// Runs members of one Lagrangian; returns how many of them in lanes.
     fn group(&self, starts: &[(&'a L, Start<N>)], members: &mut [Member<N>]) -> usize {
         let Some(lagrangian) = starts.first().map(|start| start.0) else { return 0 };
-        let (t0, (h, steps)) = (self.common.t0, self.plan);
-        let (mut places, mut states) = (Vec::with_capacity(starts.len()), Vec::with_capacity(starts.len()));
+        let (Common { t0, action, rows, .. }, (h, steps)) = (self.common, self.plan);
+        let (mut places, mut lanes) = (Vec::with_capacity(starts.len()), Vec::with_capacity(starts.len()));
         let mut own = None;
         let kernel = self.kernel.as_ref().unwrap_or_else(|| {
             let state = starts.iter().find_map(|(_, start)| start.state(lagrangian, t0));
@@ -374,7 +408,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
                     && !tiny(&state, h)
                 {
                     places.push(place);
-                    states.push(state);
+                    lanes.push(Lane::new(t0, state, rows.map(|_| self.common.rows_of(steps)), action));
                 }
             }
         }
@@ -383,23 +417,25 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         forget_branches();
         match kernel {
             Kernel::OneByOne => {}
-            Kernel::Splitting(packs) => packs.run(self.instructions, &mut states, self.common.action),
-            Kernel::Gauss(packs) => packs.run(self.instructions, &mut states, self.common.action),
+            Kernel::Splitting(packs) => packs.run(self.instructions, &mut lanes, action, rows),
+            Kernel::Gauss(packs) => packs.run(self.instructions, &mut lanes, action, rows),
         }
         if !branched() {
-            for (place, state) in places.iter().zip(&states) {
-                if Triple::from(*state).is_finite() {
+            for (place, Lane { state, rows, .. }) in places.into_iter().zip(lanes) {
+                if Triple::from(state).is_finite() {
                     let t = t0 + steps as f64 * h;
-                    members[*place].ending =
-                        Ok(Ending { status: Status::Completed, suspicion: None, steps, t, state: *state });
-                    done[*place] = true;
+                    let member = &mut members[place];
+                    member.ending = Ok(Ending { status: Status::Completed, suspicion: None, steps, t, state });
+                    member.rows = rows.unwrap_or_default();
+                    done[place] = true;
                     in_lanes += 1;
                 }
             }
         }
         for ((_, start), (member, _)) in starts.iter().zip(members.iter_mut().zip(done)).filter(|(_, (_, done))| !done)
         {
-            member.ending = self.common.run(self.integrator, lagrangian, *start);
+            let of = (member.index, *start);
+            *member = self.common.run(self.integrator, lagrangian, of, None::<&mut Rows<'_, N>>);
         }
         in_lanes
     }

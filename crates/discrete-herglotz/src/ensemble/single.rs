@@ -1,7 +1,9 @@
 //! A member by a run of its own.
 
-use super::member::Ending;
-use crate::{Facts, InLanes, InputError, Integrator, Plan, Problem, Run, Start, Stepper, Steps, Until, Wants};
+use super::member::{Ending, Member};
+use crate::{
+    Facts, InLanes, InputError, Integrator, Observer, Plan, Problem, Rows, Run, Start, Stepper, Steps, Until, Wants,
+};
 use contact_geom::Lagrangian;
 
 /// The integrator of an ensemble, for as long as a run of one member lasts.
@@ -41,6 +43,8 @@ pub(super) struct Common {
     pub steps: Steps,
     pub until: Until,
     pub action: bool,
+    /// The steps from one recorded row to the next.
+    pub rows: Option<usize>,
 }
 
 impl Common {
@@ -57,21 +61,35 @@ impl Common {
         then(if self.action { run } else { run.without_action() })
     }
 
-    /// Runs a member, with all checks of a run.
+    /// Runs a member, with all checks of a run, under the eyes of an observer.
     pub fn run<'a, L: Lagrangian<N>, const N: usize>(
         &self,
         integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
         lagrangian: &'a L,
-        start: Start<N>,
-    ) -> Result<Ending<N>, InputError> {
-        let outcome = self.with(integrator, lagrangian, start, |run| run.run(self.until))?;
-        Ok(Ending {
-            status: outcome.status,
-            suspicion: outcome.suspicion,
-            steps: outcome.steps,
-            t: outcome.t,
-            state: outcome.state(),
-        })
+        (index, start): (usize, Start<N>),
+        observer: Option<&mut impl Observer<N>>,
+    ) -> Member<N> {
+        let mut rows = Vec::new();
+        let outcome = self.with(integrator, lagrangian, start, |run| {
+            let recorded = self.rows.map(Rows::every).transpose()?;
+            let mut recorded = recorded.map(|rows| if self.action { rows } else { rows.without_action() });
+            let run = match observer {
+                Some(observer) => run.observe(observer),
+                None => run,
+            };
+            let outcome = match &mut recorded {
+                Some(rows) => run.observe(rows).run(self.until),
+                None => run.run(self.until),
+            };
+            rows = recorded.map_or_else(Vec::new, |recorded| recorded.rows);
+            outcome
+        });
+        Member { index, ending: outcome.map(Ending::from), rows }
+    }
+
+    /// The rows of so many steps, where they are recorded: the start, every stride, and the end.
+    pub fn rows_of(&self, steps: usize) -> usize {
+        self.rows.map_or(0, |stride| steps / stride.max(1) + 2)
     }
 
     /// The step and the number of steps of a member's run, after all checks of a plan.

@@ -1,5 +1,6 @@
 //! Splittings with trajectories in lanes.
 
+use super::lane::Lane;
 use super::pack::Pack;
 use crate::gauss::instructions::Instructions;
 use crate::splitting::drag::{Drag, Drift};
@@ -36,12 +37,14 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         Ok(SplittingPacks { form, drag, table, h, t0, steps })
     }
 
-    /// Takes all steps of some motions, in place. One that is not finite at its start or its end is not finite then.
-    pub fn run(&self, instructions: Instructions, states: &mut [PhasePoint<N>], action: bool) {
+    /// Takes all steps of some motions, in place, with a state recorded after each `rows` of them. One that is not finite at its start or
+    /// its end is not finite then.
+    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, rows: Option<usize>) {
+        let stride = rows.unwrap_or(self.steps);
         if action {
-            instructions.dispatch(All::<_, N, true> { packs: self, states });
+            instructions.dispatch(All::<_, N, true> { packs: self, lanes, stride });
         } else {
-            instructions.dispatch(All::<_, N, false> { packs: self, states });
+            instructions.dispatch(All::<_, N, false> { packs: self, lanes, stride });
         }
     }
 }
@@ -58,7 +61,9 @@ const fn registers(n: usize) -> usize {
 /// All motions of a slice in the lanes of one instruction set.
 struct All<'s, 'a, L, const N: usize, const ACTION: bool> {
     packs: &'s SplittingPacks<'a, L, N>,
-    states: &'s mut [PhasePoint<N>],
+    lanes: &'s mut [Lane<N>],
+    /// The steps from one state that is recorded to the next.
+    stride: usize,
 }
 
 impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, '_, L, N, ACTION> {
@@ -66,11 +71,11 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, 
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
-        let All { packs, states } = self;
+        let All { packs, lanes, stride } = self;
         match const { registers(N) } {
-            3 => packs.all::<S, 3, ACTION>(states),
-            2 => packs.all::<S, 2, ACTION>(states),
-            _ => packs.all::<S, 1, ACTION>(states),
+            3 => packs.all::<S, 3, ACTION>(lanes, stride),
+            2 => packs.all::<S, 2, ACTION>(lanes, stride),
+            _ => packs.all::<S, 1, ACTION>(lanes, stride),
         }
     }
 }
@@ -87,44 +92,63 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     value: Pack<S, K>,
 }
 
+impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
+    /// The state in a lane.
+    fn state(&self, i: usize) -> PhasePoint<N> {
+        let of = |x: &SVector<Pack<S, K>, N>| SVector::from_fn(|d, _| x[d].lanes()[i]);
+        PhasePoint { q: of(&self.q), p: of(&self.p), z: self.z.lanes()[i] }
+    }
+}
+
 impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
     #[inline(always)]
-    fn all<S: Simd, const K: usize, const ACTION: bool>(&self, states: &mut [PhasePoint<N>]) {
+    fn all<S: Simd, const K: usize, const ACTION: bool>(&self, lanes: &mut [Lane<N>], stride: usize) {
         let zero = Pack::<S, K>::splat(0.0);
-        for some in states.chunks_mut(Pack::<S, K>::COUNT) {
+        for some in lanes.chunks_mut(Pack::<S, K>::COUNT) {
             // What is beyond the last repeats it.
             let last = some.len() - 1;
             let (q, p) = (
-                SVector::from_fn(|d, _| Pack::from_lanes(|i| some[i.min(last)].q[d])),
-                SVector::from_fn(|d, _| Pack::from_lanes(|i| some[i.min(last)].p[d])),
+                SVector::from_fn(|d, _| Pack::from_lanes(|i| some[i.min(last)].state.q[d])),
+                SVector::from_fn(|d, _| Pack::from_lanes(|i| some[i.min(last)].state.p[d])),
             );
-            let z = Pack::from_lanes(|i| some[i.min(last)].z);
+            let z = Pack::from_lanes(|i| some[i.min(last)].state.z);
             let mut m = Moving { q, p, carry: SVector::from_element(zero), z, force: q, value: zero };
-            self.take_steps::<S, K, ACTION>(&mut m);
-            for (i, state) in some.iter_mut().enumerate() {
-                for d in 0..N {
-                    (state.q[d], state.p[d]) = (m.q[d].lanes()[i], m.p[d].lanes()[i]);
+            self.take_steps::<S, K, ACTION>(&mut m, stride, |t, at| {
+                for (i, lane) in some.iter_mut().enumerate() {
+                    lane.reach(t, at.state(i));
                 }
-                state.z = m.z.lanes()[i];
-            }
+            });
         }
     }
 
-    /// The operations of a single run, in its order.
+    /// The operations of a single run, in its order. What is reached after each stride, and at the end, is handed on.
     #[inline(always)]
-    fn take_steps<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>) {
+    fn take_steps<S: Simd, const K: usize, const ACTION: bool>(
+        &self,
+        m: &mut Moving<S, K, N>,
+        stride: usize,
+        mut reach: impl FnMut(f64, &Moving<S, K, N>),
+    ) {
         let SplittingPacks { t0, h, steps, .. } = self;
         let mut table = Cow::Borrowed(&self.table);
         self.take_force(m, *t0);
-        for k in 0..*steps {
-            let t = t0 + k as f64 * h;
-            self.set_time(&mut table, t);
-            for stage in if k == 0 { &table.first } else { &table.joined } {
-                self.kick_and_drift::<S, K, ACTION>(m, stage);
-                self.take_force(m, t + stage.time);
+        let mut taken = 0;
+        while taken < *steps {
+            let next = taken.saturating_add(stride).min(*steps);
+            for k in taken..next {
+                let t = t0 + k as f64 * h;
+                self.set_time(&mut table, t);
+                for stage in if k == 0 { &table.first } else { &table.joined } {
+                    self.kick_and_drift::<S, K, ACTION>(m, stage);
+                    self.take_force(m, t + stage.time);
+                }
             }
+            taken = next;
+            // Completed on a copy: what the next step has in common with the last goes on.
+            let mut at = *m;
+            self.kick_and_drift::<S, K, ACTION>(&mut at, &table.closing);
+            reach(t0 + taken as f64 * h, &at);
         }
-        self.kick_and_drift::<S, K, ACTION>(m, &table.closing);
     }
 
     #[inline(always)]

@@ -78,7 +78,7 @@ fn ends<const N: usize>(
         InLanes::Gauss(gauss) => of.by(gauss),
     };
     let mut all = Vec::new();
-    let tally = of.run(Until::Time(3.0), |member| all.push(*member)).unwrap();
+    let tally = of.run(Until::Time(3.0), |member| all.push(member.clone())).unwrap();
     assert_eq!((tally.in_lanes, tally.completed), (61, 61));
     all
 }

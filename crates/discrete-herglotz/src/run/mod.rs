@@ -18,7 +18,7 @@ mod plan;
 mod problem;
 mod progress;
 mod quotient;
-mod rows;
+pub(crate) mod rows;
 pub(crate) mod saved;
 mod stepper;
 #[cfg(test)]

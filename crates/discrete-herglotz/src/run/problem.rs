@@ -3,7 +3,8 @@
 use super::{Integrator, Run, Steps};
 use crate::run::verified::verified;
 use crate::{
-    DiscreteLagrangian, GaussCollocation, InputError, StepError, discrete_regularity, legendre_inverse, legendre_minus,
+    DiscreteLagrangian, Ensemble, GaussCollocation, InputError, StepError, discrete_regularity, legendre_inverse,
+    legendre_minus,
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
@@ -121,6 +122,18 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
     /// A run of it to a relative error of (q, p), by an integrator that is chosen for it; see [`Run::accuracy`].
     pub fn accuracy<'o>(&self, wanted: f64) -> Run<'_, 'o, L, N> {
         Run::of(self).accuracy(wanted)
+    }
+
+    /// So many motions of it from other starts, at the same time: each a function of its index.
+    pub fn ensemble<X: Into<Start<N>>>(
+        &self,
+        count: usize,
+        start: impl Fn(usize) -> X + Sync + 'a,
+    ) -> Ensemble<'a, L, N>
+    where
+        L: Sync,
+    {
+        Ensemble::new(self.lagrangian, self.t0, count, start)
     }
 
     /// The Lagrangian.

@@ -205,10 +205,8 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
                 times.len()
             }
         };
-        if rows > MOST || self.rows.try_reserve_exact(rows).is_err() {
-            return Err(too_many(rows));
-        }
-        Ok(())
+        check(rows)?;
+        self.rows.try_reserve_exact(rows).map_err(|_| too_many(rows))
     }
 
     fn next(&self, taken: usize) -> usize {
@@ -237,6 +235,11 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
             Err(cause) => ControlFlow::Break(Stop::failed(cause)),
         }
     }
+}
+
+/// Refuses more rows at a time than are kept.
+pub(crate) fn check(rows: usize) -> Result<(), InputError> {
+    if rows > MOST { Err(too_many(rows)) } else { Ok(()) }
 }
 
 fn too_many(count: usize) -> InputError {

@@ -1,0 +1,34 @@
+//! Members on their way in lanes.
+
+use crate::Row;
+use contact_geom::PhasePoint;
+
+/// A member on its way in a lane.
+#[derive(Clone, Debug)]
+pub(super) struct Lane<const N: usize> {
+    /// How far it has come.
+    pub state: PhasePoint<N>,
+    /// Its rows, where they are recorded.
+    pub rows: Option<Vec<Row<N>>>,
+    /// Whether its rows have the action.
+    action: bool,
+}
+
+impl<const N: usize> Lane<N> {
+    /// At its start, with room for so many rows where they are recorded.
+    pub fn new(t0: f64, state: PhasePoint<N>, rows: Option<usize>, action: bool) -> Self {
+        let mut lane = Lane { state, rows: rows.map(Vec::with_capacity), action };
+        lane.reach(t0, state);
+        lane
+    }
+
+    /// Takes in a state of which a row is recorded, where any are.
+    pub fn reach(&mut self, t: f64, state: PhasePoint<N>) {
+        self.state = state;
+        if let Some(rows) = &mut self.rows {
+            let PhasePoint { q, p, z } = state;
+            let z = self.action.then_some(z);
+            rows.push(Row { t, q, v: None, p, z, energy: None, log_factor: None, columns: Vec::new() });
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Ensembles of which each member has an observer of its own.
+
+use super::{Ensemble, EnsembleError, Member, Tally, shards};
+use crate::{InputError, Observer, Until};
+use contact_geom::Lagrangian;
+use std::ops::ControlFlow;
+
+/// The members that are computed and handed on together.
+const SHARD: usize = 16;
+
+/// An [`Ensemble`] of which each member is observed: made by [`Ensemble::observe`].
+///
+/// ```
+/// use contact_geom::{PhasePoint, VelocityPoint, systems::Pendulum};
+/// use discrete_herglotz::{Event, Events, Problem, SplittingScheme, Steps, Until};
+///
+/// let pendulum = Pendulum { gamma: -0.01 };
+/// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([0.5], [0.0], 0.0))?;
+/// let ensemble = problem.ensemble(10, |i| VelocityPoint::new([0.1 + 0.1 * i as f64], [0.0], 0.0));
+/// let ensemble = ensemble.by(SplittingScheme::BLANES_MOAN_6).steps(Steps::Size(0.25));
+/// // When each pendulum hangs down.
+/// let downward = |_: usize| Ok(Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0])]));
+/// let times = |events: Events<'_, 1>| events.crossings.iter().map(|crossing| crossing.t).collect::<Vec<f64>>();
+/// ensemble.observe(downward, times).run(Until::Time(10.0), |member, times| println!("{}: {times:?}", member.index))?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct ObservedEnsemble<'a, L, F, T, const N: usize> {
+    of: Ensemble<'a, L, N>,
+    observer: F,
+    seen: T,
+}
+
+impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
+    /// The same under the eyes of an [`Observer`] for each member, a function of its index. What `seen` makes of it at the end comes to the
+    /// fold: the observer itself stays on the thread of the run.
+    ///
+    /// Members have a run of their own each, over the threads: what an observer may ask of a run (the velocity, the energy, the last step
+    /// with the motion inside) no lane has. For states after every so many steps there is [`rows_every`](Self::rows_every), in lanes.
+    pub fn observe<O: Observer<N>, S: Send, F, T>(self, observer: F, seen: T) -> ObservedEnsemble<'a, L, F, T, N>
+    where
+        F: Fn(usize) -> Result<O, InputError> + Sync,
+        T: Fn(O) -> S + Sync,
+    {
+        ObservedEnsemble { of: self, observer, seen }
+    }
+}
+
+impl<L: Lagrangian<N> + Sync, F, T, const N: usize> ObservedEnsemble<'_, L, F, T, N> {
+    /// Runs it, and hands each member at its end to a fold with what its observer has seen, in the order of the index, on this thread.
+    /// That is `None` where the member could not begin.
+    ///
+    /// # Errors
+    /// Those of [`Ensemble::run`]; [`EnsembleError::Observed`] with a checkpoint. A member whose run its observer refuses is handed to the
+    /// fold with the cause.
+    pub fn run<O: Observer<N>, S: Send>(
+        &self,
+        until: Until,
+        mut fold: impl FnMut(&Member<N>, Option<S>),
+    ) -> Result<Tally, EnsembleError>
+    where
+        F: Fn(usize) -> Result<O, InputError> + Sync,
+        T: Fn(O) -> S + Sync,
+    {
+        if self.of.checkpoint.is_some() {
+            return Err(EnsembleError::Observed);
+        }
+        let threads = self.of.some_threads()?;
+        let task = self.of.task(until)?;
+        let count = self.of.count;
+        let shards = count.div_ceil(SHARD);
+        let (observer, seen) = (&self.observer, &self.seen);
+        let work = |shard: usize| -> Vec<(Member<N>, Option<S>)> {
+            let range = shard * SHARD..count.min((shard + 1) * SHARD);
+            let member = |index: usize| match observer(index) {
+                Err(cause) => (Member { index, ending: Err(cause), rows: Vec::new() }, None),
+                Ok(mut observer) => {
+                    let member = task.by_itself(index, Some(&mut observer));
+                    let seen = member.ending.is_ok().then(|| seen(observer));
+                    (member, seen)
+                }
+            };
+            range.map(member).collect()
+        };
+        let mut tally = Tally::default();
+        shards::in_order(threads, 0, shards, work, |shard, members| {
+            for (member, seen) in members {
+                tally.add(&member);
+                fold(&member, seen);
+            }
+            self.of.tell(shard + 1, shards);
+            ControlFlow::Continue(())
+        });
+        Ok(tally)
+    }
+}
