@@ -429,8 +429,8 @@ fn a_checkpoint_goes_on_to_the_last_bit() {
     }
     assert!(matches!(cause(b"a letter to a friend, of no use here"), CheckpointError::Foreign));
     let mut later = whole.clone();
-    later[8] = 2;
-    assert!(matches!(cause(&later), CheckpointError::Version { found: 2 }));
+    later[8] = 3;
+    assert!(matches!(cause(&later), CheckpointError::Version { found: 3 }));
     std::fs::write(&path, &whole).unwrap();
     let other = of(6).checkpoint(&path).run(until, |_| {});
     assert!(matches!(other, Err(EnsembleError::AnotherEnsemble { .. })), "{other:?}");
