@@ -34,7 +34,7 @@ mod splitting;
 mod theory;
 
 pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus, continuation};
-pub use ensemble::{Ending, Ensemble, EnsembleError, InLanes, Member, ObservedEnsemble, Tally};
+pub use ensemble::{Ending, Ensemble, EnsembleError, InLanes, Member, Merge, ObservedEnsemble, ShardedEnsemble, Tally};
 pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
 pub use gauss::{ClockedGauss, ClockedStepper, DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper};
 pub use rules::*;

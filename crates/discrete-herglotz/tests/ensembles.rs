@@ -435,6 +435,8 @@ fn a_checkpoint_goes_on_to_the_last_bit() {
     std::fs::write(&path, &whole).unwrap();
     let other = of(6).checkpoint(&path).run(until, |_| {});
     assert!(matches!(other, Err(EnsembleError::AnotherEnsemble { .. })), "{other:?}");
+    let other = of(5).by(GaussCollocation { stages: 4 }).checkpoint(&path).run(until, |_| {});
+    assert!(matches!(other, Err(EnsembleError::AnotherEnsemble { .. })), "another integrator: {other:?}");
     let nowhere = of(5).checkpoint(folder.join("missing").join("shards")).run(until, |_| {});
     assert!(matches!(nowhere, Err(EnsembleError::Checkpoint { cause: CheckpointError::Unreadable(_), .. })));
     std::fs::remove_dir_all(folder).unwrap();

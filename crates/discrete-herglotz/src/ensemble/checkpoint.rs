@@ -1,12 +1,13 @@
 //! A file of the shards that are done.
 
 use super::member::{Ending, Member};
-use super::{EnsembleError, Shard};
+use super::{EnsembleError, SHARD, Shard};
 use crate::run::digest;
-use crate::run::saved::{Saved, load_option, save_option, word};
+use crate::run::saved::{Saved, load_option, save_option};
 use crate::{CheckpointError, InputError, Row, Status, Suspicion};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
+use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -21,7 +22,7 @@ const HEAD: usize = 4;
 /// The words that a shard has at the most: what says more is damaged.
 const LONGEST: u64 = 1 << 31;
 
-/// The shards that are done, in their order, each whole or not there: it is written at once, behind those before it, with its length in front and a
+/// The shards that are done, in any order, each whole or not there: it is written at once, behind those before it, with its length in front and a
 /// digest at its end. What was cut off in the middle of it is the last of the file, and is done again.
 pub(super) struct Shards {
     path: PathBuf,
@@ -29,15 +30,18 @@ pub(super) struct Shards {
     /// How much of the file is whole.
     whole: u64,
     length: u64,
+    /// Where each shard is: the byte behind its length, and the words before its digest.
+    places: BTreeMap<usize, (u64, usize)>,
 }
 
 impl Shards {
-    /// Opens the file of an ensemble with this fingerprint, or begins it.
-    pub fn open(path: &Path, fingerprint: u64) -> Result<Self, EnsembleError> {
+    /// Opens the file of an ensemble with this fingerprint and so many shards, or begins it.
+    pub fn open(path: &Path, fingerprint: u64, count: usize) -> Result<Self, EnsembleError> {
         let shards = || -> Result<Self, CheckpointError> {
             let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
             let length = file.metadata()?.len();
-            Ok(Shards { path: path.into(), file: BufReader::new(file), whole: 0, length })
+            let (path, file) = (path.into(), BufReader::new(file));
+            Ok(Shards { path, file, whole: 0, length, places: BTreeMap::new() })
         };
         let mut shards = shards().map_err(|cause| EnsembleError::checkpoint(path, cause))?;
         let head = [MAGIC, VERSION, fingerprint];
@@ -50,6 +54,7 @@ impl Shards {
             [MAGIC, VERSION, other, sum] if *sum == digest(&[MAGIC, VERSION, *other]) => {
                 if *other == fingerprint {
                     shards.whole = 8 * HEAD as u64;
+                    shards.find(count).map_err(|cause| shards.error(cause))?;
                     return Ok(shards);
                 }
                 return Err(EnsembleError::AnotherEnsemble { path: path.into() });
@@ -59,6 +64,24 @@ impl Shards {
             _ => CheckpointError::Foreign,
         };
         Err(shards.error(cause))
+    }
+
+    /// Finds all shards behind the head, and cuts off what is left of one that was not written to its end.
+    fn find(&mut self, count: usize) -> Result<(), CheckpointError> {
+        while let Some(words) = self.next_words()? {
+            let Some(shard) = words.first().and_then(|word| usize::try_from(*word).ok()).filter(|s| *s < count) else {
+                return Err(CheckpointError::Damaged);
+            };
+            // The digest is behind the words.
+            let place = self.whole - 8 * (words.len() as u64 + 1);
+            self.places.insert(shard, (place, words.len()));
+        }
+        Ok(self.file.get_mut().set_len(self.whole)?)
+    }
+
+    /// Whether a shard is there.
+    pub fn has(&self, shard: usize) -> bool {
+        self.places.contains_key(&shard)
     }
 
     fn error(&self, cause: CheckpointError) -> EnsembleError {
@@ -87,16 +110,18 @@ impl Shards {
         Ok(())
     }
 
-    /// The next shard that is done; `None` after the last, behind which others may then be written.
-    pub fn next<const N: usize>(&mut self, shard: usize, first: usize) -> Result<Option<Shard<N>>, EnsembleError> {
-        let next = self.next_words().map_err(|cause| self.error(cause))?;
-        let Some(words) = next else {
-            // What is left of a shard that was not written to its end.
-            let cut = self.file.get_mut().set_len(self.whole);
-            return cut.map(|()| None).map_err(|cause| self.error(cause.into()));
+    /// A shard of so many members, where it is there.
+    pub fn read<const N: usize>(&mut self, shard: usize, members: usize) -> Result<Option<Shard<N>>, EnsembleError> {
+        let Some((place, count)) = self.places.get(&shard).copied() else { return Ok(None) };
+        let words = match self.file.seek(SeekFrom::Start(place)) {
+            Ok(_) => self.words(count),
+            Err(cause) => Err(cause.into()),
         };
-        let shard = read(&words, shard, first).ok_or_else(|| self.error(CheckpointError::Damaged))?;
-        Ok(Some(shard))
+        let words = words.map_err(|cause| self.error(cause))?;
+        match shard_of(&words) {
+            Some((found, of)) if found == shard && of.members.len() == members => Ok(Some(of)),
+            _ => Err(self.error(CheckpointError::Damaged)),
+        }
     }
 
     /// The words of the next shard; `None` where it is not there, or not to its end.
@@ -120,38 +145,43 @@ impl Shards {
 
     /// Writes a shard behind the others.
     pub fn write<const N: usize>(&mut self, shard: usize, of: &Shard<N>) -> Result<(), EnsembleError> {
-        let mut words = vec![0, shard as u64];
-        of.in_lanes.save(&mut words);
-        of.members.len().save(&mut words);
-        for member in &of.members {
-            let completed = member.ending.ok().filter(|ending| ending.status == Status::Completed);
-            completed.is_some().save(&mut words);
-            if let Some(Ending { suspicion, steps, t, state, .. }) = completed {
-                save_option(suspicion.as_ref(), &mut words);
-                steps.save(&mut words);
-                t.save(&mut words);
-                state.save(&mut words);
-                save_rows(&member.rows, &mut words);
-            }
-        }
-        let count = words.len() as u64 - 1;
-        if let Some(first) = words.first_mut() {
-            *first = count;
-        }
-        self.append(&words)
+        let mut words = words_of(shard, of);
+        let (place, count) = (self.whole + 8, words.len());
+        words.insert(0, count as u64);
+        self.append(&words)?;
+        self.places.insert(shard, (place, count));
+        Ok(())
     }
 }
 
-/// A shard from its words; members that have not completed are those which [`Task`](super::Task) runs again.
-fn read<const N: usize>(mut from: &[u64], shard: usize, first: usize) -> Option<Shard<N>> {
-    let from = &mut from;
-    let (mut in_lanes, mut count) = (0, 0);
-    if word(from)? != shard as u64 {
-        return None;
+/// A shard as words, its number first. Of a member that has not completed they say no more than that.
+pub(super) fn words_of<const N: usize>(shard: usize, of: &Shard<N>) -> Vec<u64> {
+    let mut words = vec![shard as u64];
+    of.in_lanes.save(&mut words);
+    of.members.len().save(&mut words);
+    for member in &of.members {
+        let completed = member.ending.ok().filter(|ending| ending.status == Status::Completed);
+        completed.is_some().save(&mut words);
+        if let Some(Ending { suspicion, steps, t, state, .. }) = completed {
+            save_option(suspicion.as_ref(), &mut words);
+            steps.save(&mut words);
+            t.save(&mut words);
+            state.save(&mut words);
+            save_rows(&member.rows, &mut words);
+        }
     }
+    words
+}
+
+/// A shard from its words, and its number; members that have not completed are those which [`Task`](super::Task) runs again.
+pub(super) fn shard_of<const N: usize>(mut from: &[u64]) -> Option<(usize, Shard<N>)> {
+    let from = &mut from;
+    let (mut shard, mut in_lanes, mut count) = (0usize, 0, 0);
+    shard.load(from)?;
     in_lanes.load(from)?;
     count.load(from)?;
-    if count > super::SHARD {
+    let first = shard.checked_mul(SHARD)?;
+    if count > SHARD {
         return None;
     }
     let mut members = Vec::with_capacity(count);
@@ -170,9 +200,9 @@ fn read<const N: usize>(mut from: &[u64], shard: usize, first: usize) -> Option<
         } else {
             Err(InputError::NoSteps)
         };
-        members.push(Member { index: first + place, ending, rows });
+        members.push(Member { index: first.checked_add(place)?, ending, rows });
     }
-    from.is_empty().then_some(Shard { members, in_lanes })
+    from.is_empty().then_some((shard, Shard { members, in_lanes, with_causes: false }))
 }
 
 fn save_rows<const N: usize>(rows: &[Row<N>], to: &mut Vec<u64>) {

@@ -45,6 +45,11 @@ pub enum EnsembleError {
         /// The file.
         path: PathBuf,
     },
+    /// What came as a shard computed elsewhere is none of this ensemble.
+    #[error(
+        "a shard that was computed elsewhere is none of this ensemble; compare the fingerprints of all who compute"
+    )]
+    ForeignShard,
 }
 
 impl EnsembleError {

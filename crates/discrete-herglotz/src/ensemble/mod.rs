@@ -7,6 +7,7 @@ mod lane;
 mod member;
 mod observed;
 mod pack;
+mod sharded;
 mod shards;
 mod sine;
 mod single;
@@ -18,20 +19,20 @@ mod twofold;
 pub use error::EnsembleError;
 pub use member::{Ending, Member, Tally};
 pub use observed::ObservedEnsemble;
+pub use sharded::{Merge, ShardedEnsemble};
 
 use crate::gauss::instructions::Instructions;
 use crate::gauss::lanes::{branched, forget_branches};
 use crate::run::watch::size;
 use crate::run::{digest, rows};
 use crate::{GaussCollocation, InputError, Integrator, Observer, Rows, SplittingScheme, Start, Status, Steps, Until};
-use checkpoint::Shards;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
 use gauss::GaussPacks;
 use lane::Lane;
 use single::Common;
 use splitting::SplittingPacks;
 use std::num::NonZeroUsize;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::path::PathBuf;
 
 /// What an [`Integrator`] has a kernel for that takes a step of many motions at once.
@@ -165,7 +166,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         Ensemble { rows: Some(steps), ..self }
     }
 
-    /// With a file of the shards that are done. Where it is there already, the ensemble goes on behind them: the fold is given their members
+    /// With a file of the shards that are done. Where it is there already, the ensemble goes on with the others: the fold is given the members of those
     /// again, to the last bit, and the rest is computed. A process that is killed loses the shards under way. Members that have failed
     /// are run again for their cause.
     pub fn checkpoint(self, path: impl Into<PathBuf>) -> Self {
@@ -190,47 +191,26 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// of them; a checkpoint of another ensemble, a damaged one, or one that cannot be written. A member that cannot begin by itself, or
     /// whose motion fails, is handed to the fold with the cause, and the others go on.
     pub fn run(&self, until: Until, mut fold: impl FnMut(&Member<N>)) -> Result<Tally, EnsembleError> {
+        let sharded = self.in_shards(until)?;
         let threads = self.some_threads()?;
-        let task = self.task(until)?;
-        let shards = self.count.div_ceil(SHARD);
-        let mut tally = Tally::default();
-        let mut hand_on = |shard: usize, Shard { members, in_lanes }: &Shard<N>| {
-            tally.in_lanes += in_lanes;
-            for member in members {
-                tally.add(member);
-                fold(member);
-            }
-            self.tell(shard + 1, shards);
-        };
-        let mut done = 0;
-        let mut file = None;
-        if let Some(path) = &self.checkpoint {
-            let mut stored = Shards::open(path, task.fingerprint())?;
-            while done < shards
-                && let Some(mut shard) = stored.next(done, done * SHARD)?
-            {
-                task.run_again(&mut shard);
-                hand_on(done, &shard);
-                done += 1;
-            }
-            file = Some(stored);
-        }
+        let mut merge = self.merge(&sharded)?;
+        merge.resume(&mut fold)?;
+        // Processes that shared the work may have left gaps in a checkpoint.
+        let missing: Vec<usize> = (merge.handed_on()..sharded.count()).filter(|shard| !merge.has(*shard)).collect();
         let mut error = None;
         shards::in_order(
             threads,
-            done,
-            shards,
-            |shard| task.shard(shard),
-            |index, shard| {
-                if let Some(Err(cause)) = file.as_mut().map(|file| file.write(index, &shard)) {
+            missing.len(),
+            |i| (missing[i], sharded.task.shard(missing[i])),
+            |(index, shard)| match merge.add_shard(index, shard, &mut fold) {
+                Ok(()) => ControlFlow::Continue(()),
+                Err(cause) => {
                     error = Some(cause);
-                    return ControlFlow::Break(());
+                    ControlFlow::Break(())
                 }
-                hand_on(index, &shard);
-                ControlFlow::Continue(())
             },
         );
-        error.map_or(Ok(tally), Err)
+        error.map_or(Ok(merge.tally()), Err)
     }
 
     /// Tells how many of the shards are done.
@@ -315,6 +295,8 @@ struct Task<'e, 'a, L, const N: usize> {
 struct Shard<const N: usize> {
     members: Vec<Member<N>>,
     in_lanes: usize,
+    /// Whether members that have not completed say why; those that were read from words do not.
+    with_causes: bool,
 }
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
@@ -356,8 +338,10 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         digest(&words)
     }
 
-    fn fingerprint(&self) -> u64 {
-        self.fingerprint
+    /// The indices of the members of a shard; none where there is no such shard.
+    fn members_of(&self, shard: usize) -> Range<usize> {
+        let first = shard.saturating_mul(SHARD).min(self.count);
+        first..self.count.min(first.saturating_add(SHARD))
     }
 
     /// Runs members again that have not completed.
@@ -375,7 +359,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
 
     /// Runs the members of a shard.
     fn shard(&self, shard: usize) -> Shard<N> {
-        let range = shard * SHARD..self.count.min((shard + 1) * SHARD);
+        let range = self.members_of(shard);
         let mut members: Vec<Member<N>> = Vec::with_capacity(range.len());
         let mut starts = Vec::with_capacity(range.len());
         for index in range {
@@ -389,7 +373,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
             in_lanes += self.group(group, &mut members[from..from + group.len()]);
             from += group.len();
         }
-        Shard { members, in_lanes }
+        Shard { members, in_lanes, with_causes: true }
     }
 
     /// Runs members of one Lagrangian; returns how many of them in lanes.

@@ -82,12 +82,14 @@ impl<L: Lagrangian<N> + Sync, F, T, const N: usize> ObservedEnsemble<'_, L, F, T
             range.map(member).collect()
         };
         let mut tally = Tally::default();
-        shards::in_order(threads, 0, shards, work, |shard, members| {
+        let mut done = 0;
+        shards::in_order(threads, shards, work, |members| {
             for (member, seen) in members {
                 tally.add(&member);
                 fold(&member, seen);
             }
-            self.of.tell(shard + 1, shards);
+            done += 1;
+            self.of.tell(done, shards);
             ControlFlow::Continue(())
         });
         Ok(tally)

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// The shards that may be done, or under way, before one of them that is not: what a slow one holds up.
-const WINDOW_OF_A_THREAD: usize = 8;
+pub(super) const WINDOW_OF_A_THREAD: usize = 8;
 
 /// What the threads share.
 struct Window<R> {
@@ -50,26 +50,25 @@ impl<R> Drop for AtTheEnd<'_, R> {
     }
 }
 
-/// Does the shards `first..count` by so many threads, and hands each result on, in the order of the shards, on the
+/// Does so many shards by so many threads, and hands each result on, in the order of the shards, on the
 /// thread of the caller, until that breaks. At most [`WINDOW_OF_A_THREAD`] results a thread are kept at a time.
 pub(super) fn in_order<R: Send>(
     threads: usize,
-    first: usize,
     count: usize,
     work: impl Fn(usize) -> R + Sync,
-    mut hand_on: impl FnMut(usize, R) -> ControlFlow<()>,
+    mut hand_on: impl FnMut(R) -> ControlFlow<()>,
 ) {
-    if threads < 2 || count - first < 2 {
-        for shard in first..count {
-            if hand_on(shard, work(shard)).is_break() {
+    if threads < 2 || count < 2 {
+        for shard in 0..count {
+            if hand_on(work(shard)).is_break() {
                 return;
             }
         }
         return;
     }
-    let window = Window { next: first, handed_on: first, done: BTreeMap::new(), over: false };
+    let window = Window { next: 0, handed_on: 0, done: BTreeMap::new(), over: false };
     let shared = Shared { window: Mutex::new(window), changed: Condvar::new() };
-    let threads = threads.min(count - first);
+    let threads = threads.min(count);
     let most = WINDOW_OF_A_THREAD * threads;
     std::thread::scope(|scope| {
         for _ in 0..threads {
@@ -91,11 +90,11 @@ pub(super) fn in_order<R: Send>(
             });
         }
         let _guard = AtTheEnd(&shared, true);
-        for shard in first..count {
+        for shard in 0..count {
             let mut window = shared.wait_while(|w| !w.over && !w.done.contains_key(&shard));
             let Some(result) = window.done.remove(&shard) else { return };
             drop(window);
-            if hand_on(shard, result).is_break() {
+            if hand_on(result).is_break() {
                 return;
             }
             shared.change(|window| window.handed_on = shard + 1);

@@ -1,0 +1,145 @@
+//! Ensembles in shards: merged in any order they have the bits of one run, and checkpoints with gaps are gone on from.
+
+// What a test cannot go on without is a failure of it.
+#![allow(clippy::unwrap_used)]
+
+use contact_geom::VelocityPoint;
+use contact_geom::systems::Pendulum;
+use discrete_herglotz::{CheckpointError, Ensemble, EnsembleError, SplittingScheme, Steps, Tally, Until};
+
+const PENDULUM: Pendulum = Pendulum { gamma: -0.1 };
+const UNTIL: Until = Until::Time(2.0);
+
+/// Six shards, the last not full; a member of the third cannot begin.
+const COUNT: usize = 2000;
+
+fn ensemble(steps: usize) -> Ensemble<'static, Pendulum, 1> {
+    let start = |i: usize| {
+        let angle = if i == 900 { f64::NAN } else { 0.001 * i as f64 };
+        VelocityPoint::new([angle], [0.5], 0.1)
+    };
+    Ensemble::new(&PENDULUM, 0.0, COUNT, start).by(SplittingScheme::STRANG).steps(Steps::Count(steps)).threads(2)
+}
+
+/// All members in words, and how they ended.
+fn plain(of: &Ensemble<'_, Pendulum, 1>) -> (Vec<String>, Tally) {
+    let mut all = Vec::new();
+    let tally = of.run(UNTIL, |member| all.push(format!("{member:?}"))).unwrap();
+    (all, tally)
+}
+
+/// The same from shards that come in some order.
+fn merged(of: &Ensemble<'_, Pendulum, 1>, order: &[usize]) -> (Vec<String>, Tally) {
+    let (sharded, mut all) = (of.in_shards(UNTIL).unwrap(), Vec::new());
+    let mut merge = of.merge(&sharded).unwrap();
+    let fold = &mut |member: &_| all.push(format!("{member:?}"));
+    merge.resume(fold).unwrap();
+    for shard in order {
+        merge.add(&sharded.compute(*shard), fold).unwrap();
+        assert!(merge.has(*shard));
+    }
+    let tally = merge.tally();
+    (all, tally)
+}
+
+#[test]
+fn shards_in_any_order_are_one_run() {
+    let of = ensemble(20);
+    let expected = plain(&of);
+    assert_eq!((expected.1.members, expected.1.failed, expected.1.first_failed), (COUNT, 1, Some(900)));
+    // The last has each shard twice.
+    for order in [[0, 1, 2, 3, 4, 5].as_slice(), &[5, 4, 3, 2, 1, 0], &[2, 2, 0, 5, 0, 1, 4, 3, 3, 1]] {
+        assert_eq!(merged(&of, order), expected, "{order:?}");
+    }
+    // What waits for the first shard is not handed on.
+    let (all, tally) = merged(&of, &[1, 2, 3, 4, 5]);
+    assert!(all.is_empty() && tally.members == 0);
+}
+
+#[test]
+fn a_checkpoint_with_gaps_is_gone_on_from() {
+    let folder = std::env::temp_dir().join(format!("sharded-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("shards");
+    let of = ensemble(20).checkpoint(&path);
+    let expected = plain(&ensemble(20));
+    let begin_anew = |shards: &[usize]| {
+        let _ = std::fs::remove_file(&path);
+        merged(&of, shards)
+    };
+    for there in [[4, 1].as_slice(), &[5, 0, 3], &[3, 2, 1, 5, 4]] {
+        // One process goes on, and several do.
+        begin_anew(there);
+        assert_eq!(plain(&of), expected, "{there:?}");
+        assert_eq!(plain(&of), expected, "{there:?}, from a whole file");
+        begin_anew(there);
+        let missing: Vec<usize> = (0..6).rev().filter(|shard| !there.contains(shard)).collect();
+        assert_eq!(merged(&of, &missing), expected, "{there:?}");
+        // What was cut off is done again.
+        begin_anew(there);
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
+        assert_eq!(plain(&of), expected, "{there:?}, cut off");
+    }
+    // A bit of a shard's number.
+    begin_anew(&[4]);
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes[40] ^= 64;
+    std::fs::write(&path, &bytes).unwrap();
+    let damaged = of.run(UNTIL, |_| {});
+    assert!(matches!(damaged, Err(EnsembleError::Checkpoint { cause: CheckpointError::Damaged, .. })), "{damaged:?}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn what_is_no_shard_is_refused() {
+    let of = ensemble(20);
+    let sharded = of.in_shards(UNTIL).unwrap();
+    let mut merge = of.merge(&sharded).unwrap();
+    let good = sharded.compute(5);
+    let mut no_such_shard = good.clone();
+    no_such_shard[0] = 6;
+    // A full shard under the number of the last, which is not.
+    let mut too_long = sharded.compute(1);
+    too_long[0] = 5;
+    let mut longer = good.clone();
+    longer.push(0);
+    let mut no_bool = good.clone();
+    no_bool[3] = 2;
+    let of_none = sharded.compute(6);
+    for words in [&[][..], &good[..9], &no_such_shard, &too_long, &longer, &no_bool, &of_none, &[u64::MAX; 3]] {
+        let refused = merge.add(words, &mut |_| {});
+        assert!(matches!(refused, Err(EnsembleError::ForeignShard)), "{refused:?}");
+    }
+    merge.add(&good, &mut |_| {}).unwrap();
+    assert!(merge.has(5) && !merge.has(4) && !merge.is_complete());
+}
+
+/// Results that wait need memory, but in a checkpoint.
+#[test]
+fn the_window_is_bounded_without_a_checkpoint() {
+    let of = ensemble(2);
+    let sharded = of.in_shards(UNTIL).unwrap();
+    let mut merge = of.merge(&sharded).unwrap();
+    assert_eq!((merge.bound(2), merge.bound(10_000)), (16, 80_000));
+    merge.add(&sharded.compute(0), &mut |_| {}).unwrap();
+    assert_eq!((merge.handed_on(), merge.bound(2)), (1, 17));
+    let path = std::env::temp_dir().join(format!("sharded-window-{}", std::process::id()));
+    let kept = ensemble(2).checkpoint(&path);
+    assert_eq!(kept.merge(&sharded).unwrap().bound(2), usize::MAX);
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn fingerprints_tell_ensembles_apart() {
+    let fingerprint = |of: Ensemble<'_, Pendulum, 1>, until| of.in_shards(until).unwrap().fingerprint();
+    let first = fingerprint(ensemble(20), UNTIL);
+    assert_eq!(fingerprint(ensemble(20).threads(1), UNTIL), first);
+    let others = [
+        fingerprint(ensemble(21), UNTIL),
+        fingerprint(ensemble(20), Until::Time(3.0)),
+        fingerprint(ensemble(20).without_action(), UNTIL),
+        fingerprint(ensemble(20).by(SplittingScheme::YOSHIDA_4), UNTIL),
+    ];
+    assert!(others.iter().all(|other| *other != first), "{others:?}");
+}

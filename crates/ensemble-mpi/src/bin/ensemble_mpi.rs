@@ -1,0 +1,181 @@
+//! An ensemble of damped pendula over MPI ranks.
+//!
+//! ```text
+//! mpirun -np 2 ensemble_mpi [--members N --time T --steps K --method NAME --checkpoint FILE --out FILE --patience S --seed I --rates]
+//! ```
+//!
+//! `L = v^2/2 - (1 - cos q) - z/100`; angle and velocity of each member are random numbers seeded with its index. Writes a CSV file with the
+//! members' ends, 17 digits each: the same bytes for any number of ranks, and for runs that were killed and went on from the checkpoint. Ends
+//! with 2 where the input is refused, a checkpoint cannot be used or a rank is lost, with 1 where the CSV file cannot be written.
+
+use clap::Parser;
+use contact_geom::{VelocityPoint, systems::Pendulum};
+use discrete_herglotz::{AnyIntegrator, Ensemble, Member, Steps, Until};
+use ensemble_mpi::{Merged, MpiError, Options, run};
+use mpi::topology::Communicator;
+use std::cell::Cell;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+/// Runs an ensemble of damped pendula over MPI ranks.
+#[derive(Parser)]
+struct Arguments {
+    /// How many pendula.
+    #[arg(long, default_value_t = 100_000)]
+    members: usize,
+    /// The time at their end.
+    #[arg(long, default_value_t = 100.0)]
+    time: f64,
+    /// The steps of each.
+    #[arg(long, default_value_t = 400)]
+    steps: usize,
+    /// The integrator.
+    #[arg(long, default_value = "blanes_moan_6")]
+    method: AnyIntegrator,
+    /// What the starts are drawn from, beside the index.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// A file of the shards that are done, to go on from.
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+    /// The members' ends.
+    #[arg(long, value_name = "FILE", default_value = "ensemble_mpi.csv")]
+    out: PathBuf,
+    /// How many seconds to wait for a rank's next shard; for ever where nothing is said.
+    #[arg(long, value_name = "SECONDS")]
+    patience: Option<f64>,
+    /// Print what rank 0 has handed out and received.
+    #[arg(long)]
+    rates: bool,
+}
+
+/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014) at a place: a number of `[-1, 1)`.
+fn random(seed: u64, place: u64) -> f64 {
+    let mixed = |x: u64| {
+        let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        x ^ (x >> 31)
+    };
+    let word = mixed(mixed(seed).wrapping_add((place + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15)));
+    (word >> 11) as f64 * f64::EPSILON - 1.0
+}
+
+/// The ends of members as lines of a file that gets its name when it is whole.
+struct Table {
+    path: PathBuf,
+    file: BufWriter<File>,
+}
+
+impl Table {
+    fn partial(path: &std::path::Path) -> PathBuf {
+        let mut name = path.as_os_str().to_owned();
+        name.push(".part");
+        name.into()
+    }
+
+    fn create(path: PathBuf) -> std::io::Result<Self> {
+        let mut file = BufWriter::new(File::create(Self::partial(&path))?);
+        writeln!(file, "index,status,t,q,p,z")?;
+        Ok(Table { path, file })
+    }
+
+    fn row(&mut self, member: &Member<1>) -> std::io::Result<()> {
+        match member.ending {
+            Ok(end) => {
+                let (index, [t, q, p, z]) = (member.index, [end.t, end.state.q[0], end.state.p[0], end.state.z]);
+                writeln!(self.file, "{index},\"{}\",{t:.16e},{q:.16e},{p:.16e},{z:.16e}", end.status)
+            }
+            Err(cause) => writeln!(self.file, "{},\"{cause}\",,,,", member.index),
+        }
+    }
+
+    fn finish(mut self) -> std::io::Result<()> {
+        self.file.flush()?;
+        std::fs::rename(Self::partial(&self.path), self.path)
+    }
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let Some(universe) = mpi::initialize() else {
+        eprintln!("error: the MPI library is in use already");
+        return ExitCode::from(2);
+    };
+    let world = universe.world();
+    let is_root = world.rank() == 0;
+    let fail = |message: &dyn std::fmt::Display, code: u8| {
+        if is_root {
+            eprintln!("error: {message}");
+        }
+        ExitCode::from(code)
+    };
+    let patience = match arguments.patience.map(Duration::try_from_secs_f64).transpose() {
+        Ok(patience) => patience,
+        Err(cause) => return fail(&format!("--patience: {cause}; give a number of seconds"), 2),
+    };
+
+    let pendulum = Pendulum { gamma: -0.01 };
+    let start = |index: usize| {
+        let number = |k: u64| random(arguments.seed, 2 * index as u64 + k);
+        VelocityPoint::new([2.0 * number(0)], [number(1)], 0.0)
+    };
+    let tenths = Cell::new(0);
+    let mut ensemble = Ensemble::new(&pendulum, 0.0, arguments.members, start)
+        .by(arguments.method)
+        .steps(Steps::Count(arguments.steps))
+        .progress(|part| {
+            if (10.0 * part) as u32 > tenths.replace((10.0 * part) as u32) {
+                eprintln!("{:3.0} %", 100.0 * part);
+            }
+        });
+    if let Some(path) = &arguments.checkpoint {
+        ensemble = ensemble.checkpoint(path);
+    }
+    // Made at the first member: where the ensemble is refused no file is left.
+    let mut table: Option<std::io::Result<Table>> = None;
+    let clock = Instant::now();
+    let merged = run(&world, &ensemble, Until::Time(arguments.time), Options { patience }, |member| {
+        let open = table.get_or_insert_with(|| Table::create(arguments.out.clone()));
+        if let Ok(rows) = open
+            && let Err(cause) = rows.row(member)
+        {
+            *open = Err(cause);
+        }
+    });
+    let merged = match merged {
+        Ok(Some(merged)) => merged,
+        Ok(None) => return ExitCode::SUCCESS,
+        Err(lost @ MpiError::RankLost { .. }) => {
+            eprintln!("error: {lost}");
+            world.abort(2);
+        }
+        Err(cause) => return fail(&cause, 2),
+    };
+    if let Some(Err(cause)) = table.map(|table| table.and_then(Table::finish)) {
+        return fail(&format!("{}: {cause}", arguments.out.display()), 1);
+    }
+    report(&merged, clock.elapsed(), arguments.rates);
+    ExitCode::SUCCESS
+}
+
+fn report(Merged { tally, resumed, traffic }: &Merged, elapsed: Duration, rates: bool) {
+    println!("{} members: {} completed, {} failed", tally.members, tally.completed, tally.failed);
+    println!("{resumed} shards from the checkpoint");
+    if !rates {
+        return;
+    }
+    println!("{:.3} s in all", elapsed.as_secs_f64());
+    println!("shards by rank: {:?}", traffic.shards);
+    let all: usize = traffic.shards.iter().sum();
+    let received: usize = traffic.shards.iter().skip(1).sum();
+    let micro = |time: Duration, count: usize| 1e6 * time.as_secs_f64() / count.max(1) as f64;
+    println!("bytes of a shard received: {}", traffic.bytes / received.max(1));
+    println!(
+        "microseconds of rank 0 to receive a shard and hand out the next: {:.1}",
+        micro(traffic.messages, received)
+    );
+    println!("microseconds of rank 0 to merge a shard: {:.1}", micro(traffic.merging, all));
+}
