@@ -33,7 +33,7 @@ mod solve;
 mod splitting;
 mod theory;
 
-pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus, continuation};
+pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus, branch, continuation};
 pub use ensemble::{Ending, Ensemble, EnsembleError, InLanes, Member, Merge, ObservedEnsemble, ShardedEnsemble, Tally};
 pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
 pub use gauss::{ClockedGauss, ClockedStepper, DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper};

@@ -6,7 +6,8 @@ use crate::{DiscreteLagrangian, DiscretePath, InputError};
 use contact_geom::nalgebra::SVector;
 
 /// Solves problems one after another, each from the path of the one before: continuation in a parameter of the Lagrangian, in the
-/// step, the number of steps or the ends, whatever changes along the sequence. The first starts as it is told to.
+/// step, the number of steps or the ends, whatever changes along the sequence. The first starts as it is told to. Where the paths end in
+/// a fold, [`branch`](crate::branch) goes around it.
 ///
 /// The paths that were found, in the order of the problems; the last one has another status where the search ended without
 /// a path, and the problems after it are not tried.

@@ -11,7 +11,8 @@ pub enum PathStatus {
     Found,
     /// The iterations were used up.
     NotConverged,
-    /// No correction lessens the residual: there may be no critical path near.
+    /// No correction lessens the residual: there may be no critical path near, as beyond a fold, where two paths have met and vanished;
+    /// [`branch`](crate::branch) finds it.
     Stalled,
     /// The ends are conjugate along the path, to round-off: the linearised equations have no unique solution.
     Conjugate {
@@ -73,7 +74,7 @@ pub struct CriticalPath<const N: usize> {
     pub relative_residual: f64,
     /// `ln(sigma_1 ... sigma_N)`, the logarithm of the conformal factor of the whole path; not a number unless all are positive.
     pub log_factor: f64,
-    /// The corrections that were made.
+    /// The corrections that were made, from all starts.
     pub iterations: u32,
 }
 

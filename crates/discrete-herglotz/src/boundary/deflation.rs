@@ -18,13 +18,13 @@ impl<const N: usize> Deflation<'_, N> {
         self.known.iter().map(|known| 1.0 + self.length.powi(2) / square(q, known)).product()
     }
 
-    /// `M`, and the multiple of Newton's correction that is the correction of the residuals times M: by the formula of Sherman and
+    /// `M`, and the multiple of Newton's correction, which leads to a path, that is the correction of the residuals times M: by the formula of Sherman and
     /// Morrison it is along the same line.
-    pub fn of(&self, q: &[SVector<f64, N>], change: &[SVector<f64, N>]) -> (f64, f64) {
+    pub fn of(&self, q: &[SVector<f64, N>], to: &[SVector<f64, N>]) -> (f64, f64) {
         let mut slope = 0.0;
         for known in self.known {
             let distance = square(q, known);
-            let along: f64 = q.iter().zip(known).zip(change).map(|((a, b), dq)| (a - b).dot(dq)).sum();
+            let along: f64 = q.iter().zip(known).zip(to).map(|((a, b), to)| (a - b).dot(&(to - a))).sum();
             // The derivative of ln(1 + l^2/d^2) along the correction.
             let by = 2.0 * along / q.len() as f64;
             slope -= self.length.powi(2) * by / (distance * (distance + self.length.powi(2)));
@@ -36,6 +36,6 @@ impl<const N: usize> Deflation<'_, N> {
 }
 
 /// The mean square distance of two paths.
-fn square<const N: usize>(a: &[SVector<f64, N>], b: &[SVector<f64, N>]) -> f64 {
+pub(super) fn square<const N: usize>(a: &[SVector<f64, N>], b: &[SVector<f64, N>]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / a.len() as f64
 }

@@ -1,5 +1,6 @@
 //! The discrete Herglotz principle as a boundary-value problem.
 
+mod branch;
 mod continuation;
 mod critical_path;
 mod deflation;
@@ -9,7 +10,9 @@ mod index;
 mod newton;
 mod problem;
 mod sweep;
+mod thomas;
 
+pub use branch::branch;
 pub use continuation::continuation;
 pub use critical_path::{CriticalPath, PathStatus};
 pub use end::End;

@@ -4,7 +4,6 @@ use super::critical_path::{CriticalPath, PathStatus};
 use super::deflation::Deflation;
 use super::sweep::{Equations, Measured, Nodes, Sweep};
 use crate::{DiscreteLagrangian, last_correction};
-use contact_geom::larger;
 use contact_geom::nalgebra::SVector;
 
 /// The corrections that a search may make.
@@ -23,16 +22,13 @@ fn merit<const N: usize>(at: &Measured<N>, sizes: &SVector<f64, N>) -> f64 {
     (0..N).filter(|&i| at.squares[i] != 0.0).map(|i| at.squares[i] / sizes[i].powi(2)).sum()
 }
 
-/// The largest part of its coordinate's size, along this path or the first, that a correction changes.
-fn relative<const N: usize>(change: &[SVector<f64, N>], x: &[SVector<f64, N>], first: &SVector<f64, N>) -> f64 {
-    let (mut off, mut size) = (SVector::<f64, N>::zeros(), *first);
-    for (dq, q) in change.iter().zip(x) {
-        for i in 0..N {
-            off[i] = larger(off[i], dq[i].abs());
-            size[i] = larger(size[i], q[i].abs() + dq[i].abs());
+/// Makes the way to a path this part of what it was.
+fn shorten<const N: usize>(from: &[SVector<f64, N>], to: &mut [SVector<f64, N>], part: f64) {
+    if part != 1.0 {
+        for (to, from) in to.iter_mut().zip(from) {
+            *to = from + (*to - from) * part;
         }
     }
-    (0..N).filter(|&i| off[i] != 0.0).fold(0.0, |worst, i| larger(worst, off[i] / size[i]))
 }
 
 /// Searches from a path, away from known ones.
@@ -47,7 +43,7 @@ pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
 ) -> CriticalPath<N> {
     let mut sweep = Sweep::new(of);
     let first = x.q.iter().fold(SVector::zeros(), |most: SVector<f64, N>, q| most.sup(&q.abs()));
-    let (mut change, mut trial) = (x.q.clone(), x.clone());
+    let mut trial = x.clone();
     let mut at = match sweep.forward(of, &mut x) {
         Ok(at) => at,
         Err(e) => return CriticalPath::ended(PathStatus::Undefined { step: e.step, cause: e.cause }, x, 0),
@@ -62,13 +58,11 @@ pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
             let status = PathStatus::Conjugate { regularity: at.regularity };
             return CriticalPath::ended(status, x, iterations - 1).measured(&at);
         }
-        sweep.backward(of, &mut change);
-        let (repulsion, stretch) = deflation.of(&x.q, &change);
+        let extent = sweep.backward(of, &x.q, &mut trial.q);
+        let (repulsion, stretch) = deflation.of(&x.q, &trial.q);
+        shorten(&x.q, &mut trial.q, stretch);
         let (mut part, mut halvings, mut leap) = (1.0, 0, false);
         let next = loop {
-            for ((to, from), dq) in trial.q.iter_mut().zip(&x.q).zip(&change) {
-                *to = from + dq * (part * stretch);
-            }
             if let Ok(next) = sweep.forward(of, &mut trial) {
                 let sizes = at.sizes.sup(&next.sizes);
                 let now = merit(&at, &sizes) * repulsion.powi(2);
@@ -79,13 +73,17 @@ pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
             }
             part *= 0.5;
             halvings += 1;
-            if halvings > HALVINGS {
+            if halvings <= HALVINGS {
+                shorten(&x.q, &mut trial.q, 0.5);
+            } else {
                 if leap || leaps == LEAPS {
                     break None;
                 }
                 if best.as_ref().is_none_or(|(_, best)| at.residual < best.residual) {
                     best = Some((x.clone(), at));
                 }
+                // The whole correction again.
+                shorten(&x.q, &mut trial.q, f64::from(1 << HALVINGS));
                 (part, halvings, leap) = (1.0, 0, true);
                 leaps += 1;
             }
@@ -94,7 +92,7 @@ pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
             let (x, at) = best.filter(|(_, best)| best.residual <= at.residual).unwrap_or((x, at));
             return CriticalPath::ended(PathStatus::Stalled, x, iterations).measured(&at);
         };
-        let size = relative(&change, &x.q, &first) * part * stretch.abs();
+        let size = extent.relative(&first) * part * stretch.abs();
         std::mem::swap(&mut x, &mut trial);
         at = next;
         let predicted = part == 1.0 && last_correction(size, before, f64::EPSILON);

@@ -1,7 +1,7 @@
 //! The boundary-value problem of the discrete Herglotz principle.
 
 use super::critical_path::CriticalPath;
-use super::deflation::Deflation;
+use super::deflation::{Deflation, square};
 use super::end::{Conditions, End};
 use super::index::inertia;
 use super::newton::search;
@@ -42,6 +42,9 @@ pub struct BoundaryPath<D, const N: usize> {
     length: f64,
 }
 
+/// The starts beside known paths that a search tries.
+const RESTARTS: usize = 8;
+
 fn finite<const N: usize>(what: &'static str, x: &SVector<f64, N>) -> Result<(), InputError> {
     match x.iter().enumerate().find(|(_, c)| !c.is_finite()) {
         Some((index, &value)) => Err(GeometryError::NonFinite { what, index, value }.into()),
@@ -54,7 +57,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
     ///
     /// # Errors
     /// [`InputError::Count`] for fewer than two steps, [`GeometryError::NonFinite`] where an end is not finite,
-    /// [`InputError::Dimension`] for `N = 0`.
+    /// [`InputError::Dimension`] for `N = 0`, [`InputError::TooMany`] for more steps than there is memory for.
     pub fn new(ld: D, steps: usize, ends: [End<N>; 2]) -> Result<Self, InputError> {
         for (end, what) in ends.iter().zip(["the condition at the start", "the condition at the end"]) {
             match end {
@@ -83,6 +86,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         if steps < 2 {
             return Err(InputError::Count { what: "the number of steps of the path", least: 2, found: steps });
         }
+        check_memory::<N>(steps, conditions.is_periodic())?;
         Ok(BoundaryPath { ld, steps, conditions, t0: 0.0, z0: 0.0, from: None, known: Vec::new(), length: 1.0 })
     }
 
@@ -107,7 +111,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
     }
 
     /// Keeps the search away from known paths, so that it finds another, if it finds one: by deflation, within about `length` (a
-    /// root mean square of coordinates) of each. A search that starts at a known path starts beside it.
+    /// root mean square of coordinates) of each. A search that starts at a known path starts beside it, by an arc of this height.
     ///
     /// # Errors
     /// [`InputError::PathLength`] unless each has as many steps as the problem, [`InputError::Tolerance`] unless the length is
@@ -124,9 +128,30 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
     }
 
     /// Searches for a critical path; the status says how that ended.
+    ///
+    /// Away from known paths it searches from its start, and where that finds none from starts on both sides of the known ones.
     pub fn search(&self) -> CriticalPath<N> {
-        let nodes = Nodes { q: self.start(), z: vec![self.z0; self.steps + 1] };
-        search(&self.equations(), nodes, &Deflation { known: &self.known, length: self.length })
+        let deflation = Deflation { known: &self.known, length: self.length };
+        let from = |q| search(&self.equations(), self.nodes(q), &deflation);
+        let first = from(self.start());
+        if first.is_found() {
+            return first;
+        }
+        let mut iterations = first.iterations;
+        let beside = self.known.iter().rev().flat_map(|known| self.arcs().map(move |arc| self.beside(known, &arc)));
+        for start in beside.take(RESTARTS) {
+            let next = from(start);
+            iterations += next.iterations;
+            if next.is_found() {
+                return CriticalPath { iterations, ..next };
+            }
+        }
+        CriticalPath { iterations, ..first }
+    }
+
+    /// The positions of a path, with the action of the start.
+    pub(super) fn nodes(&self, q: Vec<SVector<f64, N>>) -> Nodes<N> {
+        Nodes { q, z: vec![self.z0; self.steps + 1] }
     }
 
     /// The number of steps.
@@ -156,50 +181,66 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         Ok(found.and_then(|(negative, vanishing)| (vanishing == 0).then_some(negative)))
     }
 
-    fn equations(&self) -> Equations<'_, D, N> {
+    pub(super) fn equations(&self) -> Equations<'_, D, N> {
         Equations { ld: &self.ld, conditions: &self.conditions, t0: self.t0, steps: self.steps }
     }
 
     /// The path from which the search starts: not a known one, from which nothing leads away.
     fn start(&self) -> Vec<SVector<f64, N>> {
-        let mut points = self.undisturbed();
-        let near = |known: &Vec<SVector<f64, N>>| {
-            let square =
-                points.iter().zip(known).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / points.len() as f64;
-            square <= (1e-3 * self.length).powi(2)
+        let points = match &self.from {
+            Some(path) => self.moved(path.points().to_vec()),
+            None => self.straight(),
         };
-        if self.known.iter().any(near) {
-            // An arc that leaves the ends where they are.
-            for (k, q) in points.iter_mut().enumerate() {
-                let arc = (std::f64::consts::PI * k as f64 / self.steps as f64).sin() * self.length;
-                if k > 0 && k < self.steps {
-                    *q += SVector::from_element(arc);
-                }
-            }
+        if self.known.iter().any(|known| square(&points, known) <= (1e-3 * self.length).powi(2)) {
+            self.beside(&points, &SVector::from_element(self.length))
+        } else {
+            points
+        }
+    }
+
+    /// The heights of arcs to both sides: in all coordinates together, and in each.
+    fn arcs(&self) -> impl Iterator<Item = SVector<f64, N>> {
+        let together = SVector::from_element(self.length);
+        let alone =
+            (0..if N > 1 { N } else { 0 }).map(|i| SVector::from_fn(|j, _| if i == j { self.length } else { 0.0 }));
+        std::iter::once(together).chain(alone).flat_map(|arc| [arc, -arc])
+    }
+
+    /// A path with an arc beside it that leaves the ends where they are.
+    fn beside(&self, points: &[SVector<f64, N>], arc: &SVector<f64, N>) -> Vec<SVector<f64, N>> {
+        let at = |k: usize| {
+            let inside = k > 0 && k < self.steps;
+            if inside { (std::f64::consts::PI * k as f64 / self.steps as f64).sin() } else { 0.0 }
+        };
+        points.iter().enumerate().map(|(k, q)| q + arc * at(k)).collect()
+    }
+
+    /// A path with its ends moved to where they are given.
+    pub(super) fn moved(&self, mut points: Vec<SVector<f64, N>>) -> Vec<SVector<f64, N>> {
+        let (first, mut last) = self.given();
+        if let (Some(q), Some(given)) = (points.first_mut(), first) {
+            *q = given;
+        }
+        if let (Conditions::Periodic(shift), Some(q)) = (&self.conditions, points.first()) {
+            last = Some(q + shift);
+        }
+        if let (Some(q), Some(given)) = (points.last_mut(), last) {
+            *q = given;
         }
         points
     }
 
-    /// The user's path, or the straight line.
-    fn undisturbed(&self) -> Vec<SVector<f64, N>> {
-        let (first, last) = match &self.conditions {
+    /// The positions that are given at the ends.
+    fn given(&self) -> (Option<SVector<f64, N>>, Option<SVector<f64, N>>) {
+        match &self.conditions {
             Conditions::Ends(start, end) => (start.position().copied(), end.position().copied()),
             Conditions::Periodic(_) => (None, None),
-        };
-        if let Some(path) = &self.from {
-            let mut points = path.points().to_vec();
-            if let (Some(q), Some(given)) = (points.first_mut(), first) {
-                *q = given;
-            }
-            let last = match (&self.conditions, points.first()) {
-                (Conditions::Periodic(shift), Some(q)) => Some(q + shift),
-                _ => last,
-            };
-            if let (Some(q), Some(given)) = (points.last_mut(), last) {
-                *q = given;
-            }
-            return points;
         }
+    }
+
+    /// The straight line between the ends.
+    fn straight(&self) -> Vec<SVector<f64, N>> {
+        let (first, last) = self.given();
         let from = first.or(last).unwrap_or_else(SVector::zeros);
         let to = match &self.conditions {
             Conditions::Periodic(shift) => *shift,
@@ -209,4 +250,33 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
         // Of this form the ends are exact.
         (0..=self.steps).map(|k| from * (1.0 - at(k)) + to * at(k)).collect()
     }
+}
+
+/// Refuses a path whose search needs more memory than there is: what is available, where the system tells, and what the allocator
+/// gives.
+fn check_memory<const N: usize>(steps: usize, periodic: bool) -> Result<(), InputError> {
+    // Positions of the path, of the correction, of the trial, of the best so far and of the start; actions; the eliminated blocks.
+    let blocks = if periodic { 2 } else { 1 };
+    let reals = 5 * N + 3 + N + blocks * N * N;
+    let bytes = reals.saturating_mul(size_of::<f64>());
+    // Not worth a question to the system.
+    if steps <= (1 << 26) / bytes {
+        return Ok(());
+    }
+    let most = available_memory() / bytes;
+    if steps >= most || Vec::<u8>::new().try_reserve_exact(steps.saturating_mul(bytes)).is_err() {
+        let (what, remedy) = ("the number of steps of the path", "take longer steps, or a machine with more memory");
+        return Err(InputError::TooMany { what, found: steps as f64, most: most.min(steps - 1) as f64, remedy });
+    }
+    Ok(())
+}
+
+/// The bytes that the system can give without swapping; what an address can count where it does not tell.
+fn available_memory() -> usize {
+    let told = || {
+        let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+        let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+        line.trim().strip_suffix("kB")?.trim().parse::<usize>().ok()?.checked_mul(1024)
+    };
+    told().unwrap_or(isize::MAX as usize)
 }

@@ -16,20 +16,22 @@ pub(super) struct Nodes<const N: usize> {
 /// What is left of the equations at a point: `dq_k + next dq_{k+1} = rhs`, with one more term on the left where the [`Sweep`] has
 /// one of this point.
 #[derive(Clone, Copy)]
-struct Eliminated<const N: usize> {
-    next: SMatrix<f64, N, N>,
-    rhs: SVector<f64, N>,
+pub(super) struct Eliminated<const N: usize> {
+    pub next: SMatrix<f64, N, N>,
+    pub rhs: SVector<f64, N>,
 }
 
 /// The workspace of a sweep, of a length proportional to that of the path.
 pub(super) struct Sweep<const N: usize> {
-    points: Vec<Eliminated<N>>,
+    pub points: Vec<Eliminated<N>>,
     /// The matrices of `dq_{k+2}`, of the points k where rows were exchanged with the next point's.
-    after: Vec<(usize, SMatrix<f64, N, N>)>,
+    pub after: Vec<(usize, SMatrix<f64, N, N>)>,
     /// The matrices of `dq_0`, of a periodic path.
     first: Vec<SMatrix<f64, N, N>>,
     /// The correction of the last unknown position, `q_0` of a periodic path.
     last: SVector<f64, N>,
+    /// Whether a second derivative of the discrete Lagrangian in the action has been seen not to vanish.
+    pub coupled: bool,
 }
 
 /// What a path satisfies.
@@ -46,7 +48,7 @@ pub(super) struct Measured<const N: usize> {
     /// The logarithm of the product of the sigma_d, not a number where one is negative.
     pub log_factor: f64,
     /// The product of the sigma_d whose logarithm is not yet in it.
-    factors: f64,
+    pub factors: f64,
     /// The first step with a sigma_d that is not positive, and its value.
     pub not_contact: Option<(usize, f64)>,
     /// The smallest pivot of the last block relative to what it was before the elimination; 0 where a pivot vanishes.
@@ -169,7 +171,7 @@ impl<const N: usize> Herglotz<N> {
 }
 
 impl<const N: usize> Measured<N> {
-    fn new() -> Self {
+    pub fn new() -> Self {
         Measured {
             residual: 0.0,
             relative: 0.0,
@@ -182,22 +184,23 @@ impl<const N: usize> Measured<N> {
         }
     }
 
+    /// Takes a residual in, with the sizes of its terms.
     #[inline(always)]
-    fn take(&mut self, at: &Herglotz<N>) {
+    pub fn take(&mut self, value: &SVector<f64, N>, size: &SVector<f64, N>) {
         for i in 0..N {
-            let off = at.value[i].abs();
+            let off = value[i].abs();
             self.residual = larger(self.residual, off);
             self.squares[i] += off * off;
-            self.sizes[i] = larger(self.sizes[i], at.size[i]);
+            self.sizes[i] = larger(self.sizes[i], size[i]);
             // A quotient at each point would cost as much as the rest; one that is not a number stays.
-            if off > self.relative * at.size[i] || off.is_nan() || at.size[i].is_nan() {
-                self.relative = larger(self.relative, off / at.size[i]);
+            if off > self.relative * size[i] || off.is_nan() || size[i].is_nan() {
+                self.relative = larger(self.relative, off / size[i]);
             }
         }
     }
 
     #[inline(always)]
-    fn factor(&mut self, step: usize, sigma: f64) {
+    pub fn factor(&mut self, step: usize, sigma: f64) {
         if sigma <= 0.0 && self.not_contact.is_none() {
             self.not_contact = Some((step, sigma));
         }
@@ -222,18 +225,25 @@ impl<const N: usize> Sweep<N> {
             after: Vec::new(),
             first: vec![zero; closed],
             last: SVector::zeros(),
+            coupled: false,
         }
     }
 
     /// Sets the actions of a path by their recursion, measures it, and eliminates its linearised equations.
     ///
     /// The correction of an action is an affine function of those of positions, carried along, so that the blocks that are
-    /// factorised have N rows, not N + 1.
+    /// factorised have N rows, not N + 1. Rows of neighbouring points are exchanged only where the elimination
+    /// [without](Self::without_exchanges) is not stable, and of periodic paths.
     pub fn forward<D: DiscreteLagrangian<N>>(
         &mut self,
         of: &Equations<'_, D, N>,
         x: &mut Nodes<N>,
     ) -> Result<Measured<N>, Undefined> {
+        if !of.conditions.is_periodic()
+            && let Some(measured) = self.without_exchanges(of, x)?
+        {
+            return Ok(measured);
+        }
         // What a periodic path has more is compiled out of the others.
         if of.conditions.is_periodic() { self.forward_of::<D, true>(of, x) } else { self.forward_of::<D, false>(of, x) }
     }
@@ -251,7 +261,7 @@ impl<const N: usize> Sweep<N> {
         let mut panel = Panel::new(PERIODIC);
         if let Some(p) = &start {
             let at = Herglotz::new(p, &now, &x.q[1]);
-            measured.take(&at);
+            measured.take(&at.value, &at.size);
             panel.top = BlockRows { here: at.here, next: at.next, rhs: -at.value, ..BlockRows::zero() };
         }
         // Of a periodic path the jet of the first step, and where the path is regular to round-off so far.
@@ -283,7 +293,7 @@ impl<const N: usize> Sweep<N> {
                 // The last position is given: what is left is the equation of the point before.
                 break;
             };
-            measured.take(&at);
+            measured.take(&at.value, &at.size);
             panel.bottom = at.rows::<PERIODIC>(&now, sigma, &action, &panel.action);
             diagonal = panel.bottom.next.diagonal().abs();
             if k == 0 && start.is_none() {
@@ -310,7 +320,7 @@ impl<const N: usize> Sweep<N> {
         }
         measured.log_factor += measured.factors.ln();
         if regular {
-            measured.regularity = self.finish(&panel.top, &diagonal);
+            measured.regularity = self.finish(&panel.top.here, &panel.top.rhs, &diagonal);
         }
         Ok(measured)
     }
@@ -335,21 +345,26 @@ impl<const N: usize> Sweep<N> {
     }
 
     /// Solves for the last unknown position; the smallest pivot relative to the diagonal before the elimination.
-    fn finish(&mut self, top: &BlockRows<N>, diagonal: &SVector<f64, N>) -> f64 {
+    pub fn finish(&mut self, here: &SMatrix<f64, N, N>, rhs: &SVector<f64, N>, diagonal: &SVector<f64, N>) -> f64 {
         // In units in which the diagonal was 1, so that pivots can be compared.
         let unit = diagonal.map(|size| if size > 0.0 { size.sqrt().recip() } else { 1.0 });
-        let mut here = SMatrix::<f64, N, N>::from_fn(|i, j| top.here[(i, j)] * unit[i] * unit[j]);
-        self.last = top.rhs.component_mul(&unit);
-        let regularity = match linear::solve(&mut here, &mut self.last) {
-            Ok(_) => (0..N).fold(1.0, |least: f64, i| least.min(here[(i, i)].abs())),
+        let mut scaled = SMatrix::<f64, N, N>::from_fn(|i, j| here[(i, j)] * unit[i] * unit[j]);
+        self.last = rhs.component_mul(&unit);
+        let regularity = match linear::solve(&mut scaled, &mut self.last) {
+            Ok(_) => (0..N).fold(1.0, |least: f64, i| least.min(scaled[(i, i)].abs())),
             Err(_) => 0.0,
         };
         self.last.component_mul_assign(&unit);
         regularity
     }
 
-    /// The corrections of the positions, from the last point back to the first.
-    pub fn backward<D>(&self, of: &Equations<'_, D, N>, change: &mut [SVector<f64, N>]) {
+    /// The path to which the corrections of the positions lead, from the last point back to the first.
+    pub fn backward<D>(
+        &self,
+        of: &Equations<'_, D, N>,
+        from: &[SVector<f64, N>],
+        to: &mut [SVector<f64, N>],
+    ) -> Extent<N> {
         let steps = of.steps;
         let mut exchanged = self.after.iter().rev().peekable();
         let zero = SVector::<f64, N>::zeros();
@@ -358,13 +373,19 @@ impl<const N: usize> Sweep<N> {
             Conditions::Ends(..) => (steps, zero),
             Conditions::Periodic(_) => (steps, self.last),
         };
+        let mut extent = Extent { change: zero, positions: zero };
         let (mut next, mut after) = (zero, zero);
         for k in (0..=steps).rev() {
             let mut dq = zero;
             if k == last {
                 dq = self.last;
             } else if let Some(point) = self.points.get(k) {
-                dq = point.rhs - point.next * next;
+                dq = point.rhs;
+                for c in 0..N {
+                    for i in 0..N {
+                        dq[i] -= point.next[(i, c)] * next[c];
+                    }
+                }
                 if let Some((_, by)) = exchanged.next_if(|(at, _)| *at == k) {
                     dq -= by * after;
                 }
@@ -372,12 +393,40 @@ impl<const N: usize> Sweep<N> {
                     dq -= by * closed;
                 }
             }
-            change[k] = dq;
+            // Of a periodic path the first point is the last, but for the shift.
+            if k == 0 && of.conditions.is_periodic() {
+                dq = closed;
+            }
+            to[k] = from[k] + dq;
+            extent.take(&from[k], &dq);
             (after, next) = (next, dq);
         }
-        // Of a periodic path the first point is the last, but for the shift.
-        if of.conditions.is_periodic() || of.conditions.momenta().0.is_none() {
-            change[0] = closed;
+        extent
+    }
+}
+
+/// The sizes of corrections and of the path that is corrected.
+pub(super) struct Extent<const N: usize> {
+    /// The largest correction of each coordinate.
+    pub change: SVector<f64, N>,
+    /// The largest absolute value of each coordinate.
+    pub positions: SVector<f64, N>,
+}
+
+impl<const N: usize> Extent<N> {
+    #[inline(always)]
+    fn take(&mut self, q: &SVector<f64, N>, dq: &SVector<f64, N>) {
+        // A NaN is lost here, not in the equations of the path that is led to.
+        for i in 0..N {
+            let (off, size) = (dq[i].abs(), q[i].abs() + dq[i].abs());
+            self.change[i] = if off > self.change[i] { off } else { self.change[i] };
+            self.positions[i] = if size > self.positions[i] { size } else { self.positions[i] };
         }
+    }
+
+    /// The largest part of its coordinate's size, along this path or the `first`, that a correction changes.
+    pub fn relative(&self, first: &SVector<f64, N>) -> f64 {
+        let size = self.positions.sup(first);
+        (0..N).filter(|&i| self.change[i] != 0.0).fold(0.0, |worst, i| larger(worst, self.change[i] / size[i]))
     }
 }

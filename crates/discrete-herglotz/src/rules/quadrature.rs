@@ -6,8 +6,8 @@ use crate::solve::newton::{Linearised, NewtonStart, largest, newton};
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
-    Border, Derivatives, DiscreteJet, DiscretePoint, Dual, GeometryError, Hessian, Lagrangian, Module, PhasePoint,
-    Regularity, Scalar, SecondDiscreteJet, Triple, VelocityPoint,
+    Border, Derivatives, DiscreteJet, DiscretePoint, Dual, GeometryError, Lagrangian, Module, PhasePoint, Regularity,
+    Scalar, SecondDiscreteJet, Triple, VelocityPoint,
 };
 use std::marker::PhantomData;
 
@@ -101,6 +101,7 @@ impl<L, R: Rule> Quadrature<L, R> {
     }
 
     /// `S` and its partial derivatives at a point of `Q x Q x R^2`; paper, section 6.
+    #[inline(always)]
     pub fn extended_jet<const N: usize>(&self, t: f64, x: &DiscretePoint<N>, z1: f64) -> ExtendedJet<N>
     where
         L: Lagrangian<N>,
@@ -111,8 +112,10 @@ impl<L, R: Rule> Quadrature<L, R> {
             let (at, w) = (place(node, h, x, z1), h * node.weight);
             let (value, g) = self.value_and_gradient(t + node.place * h, &at);
             jet.value += w * value;
-            jet.s1 += (g.x * (1.0 - node.place) - g.y / h) * w;
-            jet.s2 += (g.x * node.place + g.y / h) * w;
+            // The velocity moves by `1/h` of the positions' difference.
+            let slope = g.y * node.weight;
+            jet.s1 += g.x * (w * (1.0 - node.place)) - slope;
+            jet.s2 += g.x * (w * node.place) + slope;
             jet.z0 += w * (1.0 - node.action) * g.z;
             jet.z1 += w * node.action * g.z;
         }
@@ -342,7 +345,14 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         factor_misfit(sigma).or_else(|| misfit(velocities, &to.q, self.h, 0.0))
     }
 
+    // A part of the second jet, which shares what it computes.
+    #[inline(always)]
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
+        if !Self::implicit(false) {
+            let s = self.extended_jet(t, x, x.z0);
+            let jet = DiscreteJet::new(s.value, s.s1, s.s2, s.z0);
+            return if s.value.is_finite() { Ok(jet) } else { Err(StepError::NonFinite) };
+        }
         let z1 = self.end_action(t, x)?;
         let s = self.extended_jet(t, x, z1);
         let pivot = 1.0 - s.z1;
@@ -351,6 +361,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
 
     /// By the chain rule from the Hessian of L at the nodes, along the total directions of `(q0, q1, z0)`:
     /// `z1` moves with them by `(D1, D2, sigma_d)`.
+    #[inline]
     fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
         let first = self.jet(t, x)?;
         let (h, z1) = (self.h, x.z0 + first.value);
@@ -366,27 +377,49 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         let mut slope = 0.0;
         for node in R::NODES {
             let (at, time, w) = (place(node, h, x, z1), t + node.place * h, h * node.weight);
-            let hessian = self.lagrangian.hessian(time, &at);
+            let l = self.lagrangian.hessian(time, &at);
+            // The positions move by these parts of `dq0` and `dq1`, the velocities by `1/h` of their difference.
+            let (start, end) = (1.0 - node.place, node.place);
+            let (qq, qv, vv) = ([start * start * w, start * end * w, end * end * w], node.weight, node.weight / h);
+            for j in 0..N {
+                for i in 0..N {
+                    let (mixed, transposed) = (l.qv[(i, j)], l.qv[(j, i)]);
+                    let (both, kinetic) = ((mixed + transposed) * qv, l.vv[(i, j)] * vv);
+                    jet.d11[(i, j)] += l.qq[(i, j)] * qq[0] - both * start + kinetic;
+                    jet.d12[(i, j)] += l.qq[(i, j)] * qq[1] + (mixed * start - transposed * end) * qv - kinetic;
+                    jet.d22[(i, j)] += l.qq[(i, j)] * qq[2] + both * end + kinetic;
+                }
+            }
+            let z = (1.0 - node.action) + node.action * first.sigma();
+            let moving = l.vz * (1.0 / h);
+            let (start, end) = (l.qz * start - moving, l.qz * end + moving);
+            jet.d1z += start * (w * z);
+            jet.d2z += end * (w * z);
+            jet.dzz += l.zz * (w * z * z);
             if node.action != 0.0 {
                 slope += w * node.action * self.lagrangian.gradient(time, &at).z;
+                // The action at the node moves with `q0` and `q1` by these covectors.
+                let (of_start, of_end) = (first.d1 * node.action, first.d2 * node.action);
+                let form =
+                    |a: &SVector<f64, N>, of_a: &SVector<f64, N>, b: &SVector<f64, N>, of_b: &SVector<f64, N>| {
+                        a * of_b.transpose() + of_a * (b + of_b * l.zz).transpose()
+                    };
+                jet.d11 += form(&start, &of_start, &start, &of_start) * w;
+                jet.d12 += form(&start, &of_start, &end, &of_end) * w;
+                jet.d22 += form(&end, &of_end, &end, &of_end) * w;
+                jet.d1z += of_start * (l.zz * w * z);
+                jet.d2z += of_end * (l.zz * w * z);
             }
-            let start = Total { q: 1.0 - node.place, v: -1.0 / h, z: first.d1 * node.action };
-            let end = Total { q: node.place, v: 1.0 / h, z: first.d2 * node.action };
-            let z = (1.0 - node.action) + node.action * first.sigma();
-            jet.d11 += start.form(&hessian, &start) * w;
-            jet.d12 += start.form(&hessian, &end) * w;
-            jet.d22 += end.form(&hessian, &end) * w;
-            jet.d1z += start.with_action(&hessian) * (w * z);
-            jet.d2z += end.with_action(&hessian) * (w * z);
-            jet.dzz += hessian.zz * (w * z * z);
         }
-        let pivot = 1.0 - slope;
-        jet.d11 /= pivot;
-        jet.d12 /= pivot;
-        jet.d22 /= pivot;
-        jet.d1z /= pivot;
-        jet.d2z /= pivot;
-        jet.dzz /= pivot;
+        if Self::implicit(false) {
+            let factor = 1.0 / (1.0 - slope);
+            jet.d11 *= factor;
+            jet.d12 *= factor;
+            jet.d22 *= factor;
+            jet.d1z *= factor;
+            jet.d2z *= factor;
+            jet.dzz *= factor;
+        }
         Ok(jet)
     }
 
@@ -417,31 +450,5 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
     ) -> Result<Transition<N>, StepError> {
         let back = self.step::<N, true>(t + self.h, -self.h, from, guess, solver)?;
         Transition { sigma: 1.0 / back.sigma, ..back }.checked()
-    }
-}
-
-/// The total derivative of a node's point in `q0` or `q1`: multiples of the identity in position and velocity, and the
-/// covector by which the node's action moves.
-struct Total<const N: usize> {
-    q: f64,
-    v: f64,
-    z: SVector<f64, N>,
-}
-
-impl<const N: usize> Total<N> {
-    /// `d2L` on two sets of total directions.
-    fn form(&self, l: &Hessian<N>, other: &Self) -> SMatrix<f64, N, N> {
-        l.qq * (self.q * other.q)
-            + l.qv * (self.q * other.v)
-            + l.qv.transpose() * (self.v * other.q)
-            + l.vv * (self.v * other.v)
-            + (l.qz * self.q + l.vz * self.v) * other.z.transpose()
-            + self.z * (l.qz * other.q + l.vz * other.v).transpose()
-            + self.z * other.z.transpose() * l.zz
-    }
-
-    /// `d2L` on these total directions and the direction of the action.
-    fn with_action(&self, l: &Hessian<N>) -> SVector<f64, N> {
-        l.qz * self.q + l.vz * self.v + self.z * l.zz
     }
 }

@@ -1,0 +1,213 @@
+//! Block elimination without exchanges of rows: the block Thomas algorithm, for paths whose beginnings end away from conjugate points.
+
+use super::sweep::{Eliminated, Equations, Measured, Nodes, Sweep, Undefined};
+use crate::DiscreteLagrangian;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{DiscretePoint, SecondDiscreteJet};
+
+/// The least part of its diagonal entry before the elimination that a pivot may be: so much is lost of the digits of a correction,
+/// never of the equations that the path is measured by.
+const LEAST_PIVOT: f64 = 1.0 / 8192.0;
+/// The regularity of the last block above which digits lost on the way cannot hide that the ends are conjugate.
+const REGULAR: f64 = 1e-6;
+
+/// Why a path needs another route.
+enum Obstacle {
+    /// Second derivatives of the discrete Lagrangian in the action do not vanish.
+    Coupled,
+    /// A pivot is too small, or a number is not finite.
+    Pivot,
+}
+
+/// What the equations up to a point leave to those of the next, the corrections of all positions before it eliminated.
+struct Carried<const N: usize> {
+    /// `D2 L_d` of the step before, the momentum at the point.
+    p: SVector<f64, N>,
+    /// `dp = schur dq + rhs`.
+    schur: SMatrix<f64, N, N>,
+    rhs: SVector<f64, N>,
+    /// The diagonal of `D22` of the step before: what `schur` was before the elimination.
+    diagonal: SVector<f64, N>,
+    /// `dz = slope . dq + change`.
+    slope: SVector<f64, N>,
+    change: f64,
+}
+
+impl<const N: usize> Sweep<N> {
+    /// Like [`forward`](Sweep::forward), where the path is regular enough for it; `None` elsewhere.
+    ///
+    /// With `dq_k = r_k - X_k dq_{k+1}` of the points before, the momentum at point k varies by `S dq_k + s`, where
+    /// `S = D22 - D12^T X` and `s = D12^T r` of the step before, and the action by `a . dq_k + c`: the discrete Herglotz equation
+    /// `D1 + sigma p = 0` has the blocks `D11 + sigma S` and `D12`, and some of rank one where second derivatives in the action
+    /// do not vanish. Where they do no action is corrected.
+    #[inline(always)]
+    pub fn without_exchanges<D: DiscreteLagrangian<N>>(
+        &mut self,
+        of: &Equations<'_, D, N>,
+        x: &mut Nodes<N>,
+    ) -> Result<Option<Measured<N>>, Undefined> {
+        if !self.coupled {
+            match self.thomas::<D, false>(of, x)? {
+                Ok(measured) => return Ok(Some(measured)),
+                Err(Obstacle::Coupled) => self.coupled = true,
+                Err(Obstacle::Pivot) => return Ok(None),
+            }
+        }
+        Ok(self.thomas::<D, true>(of, x)?.ok())
+    }
+
+    fn thomas<D: DiscreteLagrangian<N>, const COUPLED: bool>(
+        &mut self,
+        of: &Equations<'_, D, N>,
+        x: &mut Nodes<N>,
+    ) -> Result<Result<Measured<N>, Obstacle>, Undefined> {
+        let (start, end) = of.conditions.momenta();
+        let (zero, h) = (SVector::<f64, N>::zeros(), of.ld.step_size());
+        let mut measured = Measured::new();
+        let mut carried = Carried {
+            p: start.unwrap_or(zero),
+            schur: SMatrix::zeros(),
+            rhs: zero,
+            diagonal: zero,
+            slope: zero,
+            change: 0.0,
+        };
+        self.after.clear();
+        for k in 0..of.steps {
+            let (q0, q1) = (&x.q[k], &x.q[k + 1]);
+            let jet = of.ld.second_jet(of.t0 + k as f64 * h, &DiscretePoint { q0: *q0, q1: *q1, z0: x.z[k] });
+            let jet = match &jet {
+                Ok(jet) => jet,
+                Err(cause) => return Err(Undefined { step: k, cause: *cause }),
+            };
+            if !COUPLED && is_coupled(jet) {
+                return Ok(Err(Obstacle::Coupled));
+            }
+            let sigma = jet.first.sigma();
+            measured.factor(k, sigma);
+            x.z[k + 1] = x.z[k] + jet.first.value;
+            let mut point = Eliminated { next: SMatrix::zeros(), rhs: zero };
+            if k > 0 || start.is_some() {
+                let p = &carried.p;
+                let (mut here, mut next) = (jet.d11 + carried.schur * sigma, jet.d12);
+                let value = jet.first.d1 + p * sigma;
+                let mut rhs = -value - carried.rhs * sigma;
+                if COUPLED {
+                    let by_action = jet.d1z + p * jet.dzz;
+                    here += p * jet.d1z.transpose() + by_action * carried.slope.transpose();
+                    next += p * jet.d2z.transpose();
+                    rhs -= by_action * carried.change;
+                }
+                // The three positions of the equation are rounded, and move it by as much.
+                let rounding = magnitudes(&next, q1) * 4.0;
+                measured.take(&value, &(jet.first.d1.abs() + p.abs() * sigma.abs() + rounding));
+                let diagonal = (jet.d11.diagonal() + carried.diagonal * sigma).abs();
+                if k + 1 == of.steps && end.is_none() {
+                    // The last position is given.
+                    measured.regularity = self.finish(&here, &rhs, &diagonal);
+                } else if !reduce(&mut here, &diagonal, &mut next, &mut rhs) {
+                    return Ok(Err(Obstacle::Pivot));
+                }
+                point = Eliminated { next, rhs };
+            }
+            let mut before = jet.d12.transpose();
+            if COUPLED {
+                before += jet.d2z * carried.slope.transpose();
+                let by_before = carried.slope * sigma + jet.first.d1;
+                carried.rhs = jet.d2z * carried.change;
+                carried.change = by_before.dot(&point.rhs) + sigma * carried.change;
+                carried.slope = jet.first.d2 - point.next.tr_mul(&by_before);
+            } else {
+                carried.rhs = zero;
+            }
+            (carried.p, carried.schur, carried.diagonal) = (jet.first.d2, jet.d22, jet.d22.diagonal());
+            for m in 0..N {
+                let column = before.column(m);
+                carried.rhs += column * point.rhs[m];
+                for c in 0..N {
+                    let entry = point.next[(m, c)];
+                    for i in 0..N {
+                        carried.schur[(i, c)] -= column[i] * entry;
+                    }
+                }
+            }
+            self.points[k] = point;
+            if k + 1 == of.steps
+                && let Some(p) = &end
+            {
+                let value = carried.p - p;
+                let rounding = magnitudes(&jet.d12.transpose(), q0) * 2.0;
+                measured.take(&value, &(carried.p.abs() + p.abs() + rounding));
+                measured.regularity = self.finish(&carried.schur, &(-value - carried.rhs), &carried.diagonal.abs());
+            }
+        }
+        measured.log_factor += measured.factors.ln();
+        // What is not finite, or small, is looked at more closely.
+        let sound = measured.squares.sum().is_finite() && x.z[of.steps].is_finite() && measured.regularity >= REGULAR;
+        Ok(if sound { Ok(measured) } else { Err(Obstacle::Pivot) })
+    }
+}
+
+/// Whether a second derivative in the action does not vanish, or is not a number.
+#[inline(always)]
+fn is_coupled<const N: usize>(jet: &SecondDiscreteJet<N>) -> bool {
+    let mut size = jet.dzz.abs();
+    for i in 0..N {
+        size += jet.d1z[i].abs() + jet.d2z[i].abs();
+    }
+    // Not `size > 0.0`: that would let a NaN pass.
+    size != 0.0
+}
+
+/// `|m| |x|`, entry by entry.
+#[inline(always)]
+fn magnitudes<const N: usize>(m: &SMatrix<f64, N, N>, x: &SVector<f64, N>) -> SVector<f64, N> {
+    let mut sum = SVector::zeros();
+    for c in 0..N {
+        let size = x[c].abs();
+        for i in 0..N {
+            sum[i] += m[(i, c)].abs() * size;
+        }
+    }
+    sum
+}
+
+/// Multiplies `next` and `rhs` by the inverse of a block, by the elimination of Gauss and Jordan with pivots on the diagonal; false
+/// where one of them is too small, or not finite.
+#[inline(always)]
+fn reduce<const N: usize>(
+    block: &mut SMatrix<f64, N, N>,
+    diagonal: &SVector<f64, N>,
+    next: &mut SMatrix<f64, N, N>,
+    rhs: &mut SVector<f64, N>,
+) -> bool {
+    let mut sound = true;
+    for j in 0..N {
+        let pivot = block[(j, j)];
+        let size = pivot.abs();
+        sound &= size >= LEAST_PIVOT * diagonal[j] && size > 0.0 && size < f64::INFINITY;
+        let inverse = 1.0 / pivot;
+        let mut others = block.column(j).into_owned();
+        others[j] = 0.0;
+        for c in j + 1..N {
+            let entry = block[(j, c)] * inverse;
+            for i in 0..N {
+                block[(i, c)] -= others[i] * entry;
+            }
+            block[(j, c)] = entry;
+        }
+        for c in 0..N {
+            let entry = next[(j, c)] * inverse;
+            for i in 0..N {
+                next[(i, c)] -= others[i] * entry;
+            }
+            next[(j, c)] = entry;
+        }
+        let entry = rhs[j] * inverse;
+        for i in 0..N {
+            rhs[i] -= others[i] * entry;
+        }
+        rhs[j] = entry;
+    }
+    sound
+}
