@@ -57,10 +57,10 @@ impl Border {
                 }
             }
         }
-        for i in 0..s {
-            self.corner[(i, j)] -= a[i][j] * first.z;
-            self.corner[(MOST + i, j)] += a[i][j] * rho * second.zz;
-            self.corner[(MOST + i, of_factor)] += a[i][j] * first.z;
+        for (i, row) in a.iter().enumerate().take(s) {
+            self.corner[(i, j)] -= row[j] * first.z;
+            self.corner[(MOST + i, j)] += row[j] * rho * second.zz;
+            self.corner[(MOST + i, of_factor)] += row[j] * first.z;
         }
     }
 
