@@ -86,17 +86,20 @@ pub enum AssemblyError {
     },
     /// A method for separable systems is asked of one with general local terms.
     #[error(
-        "the system has terms in the velocity or the action; splittings take potentials only: use the midpoint rule"
+        "the system has general local terms; splittings and `AssembledMidpoint` take potentials only: use `AssembledGauss`"
     )]
     NotSeparable,
+    /// The matrix `L_vv` is singular at the start.
+    #[error("the matrix L_vv is singular at the start: the Lagrangian is not regular; give each unknown a mass")]
+    SingularMass,
     /// The factors of the step's matrix need more memory than the limit.
     #[error(
-        "the factors of the step's matrix need {needed} bytes, and the limit is {limit}; raise it, or take an explicit method"
+        "the factors of the step's matrix need {needed} bytes, and the limit is {limit}; raise it if it was set, or take an explicit method"
     )]
     Memory {
         /// The estimate from the symbolic analysis.
         needed: usize,
-        /// The limit that was set.
+        /// The limit that was set, or the memory that is available.
         limit: usize,
     },
     /// A catalogue system has bad dimensions or parameters.

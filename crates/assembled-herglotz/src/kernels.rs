@@ -64,12 +64,16 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> PotentialList for Kind<
             let Some(run) = self.elements.runs.get(span.run as usize) else { continue };
             let mut e = span.from;
             while e + LANES <= span.to {
-                sum += self.term.energy(t, &unknowns(q, run, e), &self.parameters(run, e));
+                sum += self.term.energy(t, &unknowns(q, run, e), &self.elements.parameters(run, e));
                 e += LANES;
             }
             if e < span.to {
                 let count = span.to - e;
-                let part = self.term.energy(t, &unknowns_part(q, run, e, count), &self.parameters_part(run, e, count));
+                let part = self.term.energy(
+                    t,
+                    &unknowns_part(q, run, e, count),
+                    &self.elements.parameters_part(run, e, count),
+                );
                 rest += part.to_array()[..count].iter().sum::<f64>();
             }
         }
@@ -77,7 +81,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> PotentialList for Kind<
         let (mut e, end) = (loose * block / blocks, loose * (block + 1) / blocks);
         while e < end {
             let count = LANES.min(end - e);
-            let (x, c) = self.gathered(q, count, |lane| e + lane);
+            let (x, c) = self.elements.gathered(q, count, |lane| e + lane);
             rest += self.term.energy(t, &x, &c).to_array()[..count].iter().sum::<f64>();
             e += count;
         }
@@ -85,10 +89,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> PotentialList for Kind<
     }
 
     fn visit(&self, f: &mut dyn FnMut(&[usize])) {
-        for run in &self.elements.runs {
-            (0..run.len).for_each(|e| f(&run.start.map(|s| s + e)));
-        }
-        self.elements.loose.iter().for_each(|places| f(&places.map(|p| p as usize)));
+        self.elements.visit(|places| f(&places));
     }
 
     fn entries(&self, pattern: &Pattern) -> Vec<u32> {
@@ -119,16 +120,6 @@ pub(crate) fn unknowns_part<const K: usize>(q: &[f64], run: &Run<K>, e: usize, c
 }
 
 impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
-    #[inline(always)]
-    pub(crate) fn parameters(&self, run: &Run<K>, e: usize) -> [Lanes; P] {
-        std::array::from_fn(|p| Lanes::load(&self.elements.run_parameters[p], run.first + e))
-    }
-
-    #[inline(always)]
-    pub(crate) fn parameters_part(&self, run: &Run<K>, e: usize, count: usize) -> [Lanes; P] {
-        std::array::from_fn(|p| Lanes::load_part(&self.elements.run_parameters[p], run.first + e, count))
-    }
-
     /// The kick of the unknowns of a piece: each is gone to once, and has its forces from all elements of the run there. An element is
     /// evaluated once for each of its unknowns, which costs less than to write its forces and to read them again.
     #[inline(always)]
@@ -189,7 +180,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         for k in 0..K {
             if acts(k) {
                 let e = place + done - run.start[k];
-                let (x, c) = (unknowns_part(q, run, e, count), self.parameters_part(run, e, count));
+                let (x, c) = (unknowns_part(q, run, e, count), self.elements.parameters_part(run, e, count));
                 force -= self.term.gradient(t, &x, &c)[k];
             }
         }
@@ -205,7 +196,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         let t = Lanes::splat(t);
         let first = block * BLOCK + 1;
         for group in self.elements.loose_of.of(block).chunks(LANES) {
-            let (x, c) = self.gathered(q, group.len(), |lane| group[lane] as usize);
+            let (x, c) = self.elements.gathered(q, group.len(), |lane| group[lane] as usize);
             let gradient = self.term.gradient(t, &x, &c);
             for k in 0..K {
                 for (e, g) in group.iter().zip(gradient[k].to_array()) {
@@ -224,6 +215,28 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
             }
         }
     }
+}
+
+impl<const K: usize, const P: usize> Elements<K, P> {
+    /// Calls a function with the places of each element: those of runs first.
+    pub(crate) fn visit(&self, mut f: impl FnMut([usize; K])) {
+        for run in &self.runs {
+            (0..run.len).for_each(|e| f(run.start.map(|s| s + e)));
+        }
+        self.loose.iter().for_each(|places| f(places.map(|p| p as usize)));
+    }
+
+    /// The parameters of eight elements of a run.
+    #[inline(always)]
+    pub(crate) fn parameters(&self, run: &Run<K>, e: usize) -> [Lanes; P] {
+        std::array::from_fn(|p| Lanes::load(&self.run_parameters[p], run.first + e))
+    }
+
+    /// Those of fewer.
+    #[inline(always)]
+    pub(crate) fn parameters_part(&self, run: &Run<K>, e: usize, count: usize) -> [Lanes; P] {
+        std::array::from_fn(|p| Lanes::load_part(&self.run_parameters[p], run.first + e, count))
+    }
 
     /// Unknowns and parameters of elements that are in no run; the first stands in the lanes that are left.
     #[inline(always)]
@@ -236,12 +249,12 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         let of = |lane: usize| element(if lane < count { lane } else { 0 });
         let elements: [usize; LANES] = std::array::from_fn(of);
         let nan = f64::NAN;
-        let places = elements.map(|e| self.elements.loose.get(e).copied().unwrap_or([0; K]));
+        let places = elements.map(|e| self.loose.get(e).copied().unwrap_or([0; K]));
         let x = std::array::from_fn(|i| {
             Lanes::new(std::array::from_fn(|lane| q.get(places[lane][i] as usize).copied().unwrap_or(nan)))
         });
         let c = std::array::from_fn(|p| {
-            Lanes::new(elements.map(|e| self.elements.loose_parameters[p].get(e).copied().unwrap_or(nan)))
+            Lanes::new(elements.map(|e| self.loose_parameters[p].get(e).copied().unwrap_or(nan)))
         });
         (column(x), c)
     }

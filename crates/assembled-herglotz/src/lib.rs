@@ -26,6 +26,8 @@ mod error;
 mod implicit;
 mod kernels;
 mod lanes;
+mod local;
+mod memory;
 mod splitting;
 mod system;
 pub mod systems;
@@ -33,7 +35,8 @@ mod term;
 
 pub use elements::{ElementData, FIXED};
 pub use error::AssemblyError;
-pub use implicit::AssembledMidpoint;
+pub use implicit::{AssembledGauss, AssembledMidpoint};
+pub use local::LocalLagrangian;
 pub use splitting::AssembledSplitting;
 pub use system::{AssembledSystem, State};
 pub use term::{Difference, Potential};

@@ -119,7 +119,7 @@ impl<'a> AssembledSplitting<'a> {
     /// # Errors
     /// [`AssemblyError::Input`] with [`InputError::Step`] unless h is finite and not 0 (negative goes back);
     /// [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state; [`AssemblyError::Mass`] where an unknown has
-    /// none; [`AssemblyError::Undefined`] where a force is not finite.
+    /// none; [`AssemblyError::NotSeparable`] of general terms; [`AssemblyError::Undefined`] where a force is not finite.
     pub fn new(
         system: &'a AssembledSystem,
         scheme: &SplittingScheme,
@@ -130,7 +130,8 @@ impl<'a> AssembledSplitting<'a> {
             return Err(InputError::Step { h }.into());
         }
         start.check(system)?;
-        system.check_masses()?;
+        system.check_separable()?;
+        system.check_masses(false)?;
         AssembledSystem::check_number("gamma", system.gamma())?;
         let n = system.unknowns();
         let q = Aligned::between_fixed(start.q);

@@ -1,16 +1,18 @@
 //! A Lagrangian as a sum of local terms.
 
-use crate::blocks;
+use crate::blocks::{self, BLOCK};
 use crate::elements::{ElementData, Elements};
-use crate::kernels::{Kind, PotentialList};
-use crate::{AssemblyError, Potential};
+use crate::kernels::{Kind, PotentialList, Weight};
+use crate::local::{First, LocalKind, LocalList, Place};
+use crate::{AssemblyError, LocalLagrangian, Potential};
 
 /// The most unknowns that a system can have: places are counted in 32 bits, with a fixed one at each end.
 const MOST: usize = u32::MAX as usize - 2;
 
-/// A system of any size, `L = sum_i m_i v_i^2/2 - sum_e V_e(t, q_e; c_e) + gamma z`.
+/// A system of any size, `L = sum_i m_i v_i^2/2 - sum_e V_e(t, q_e; c_e) + gamma z + sum_e l_e(t, q_e, v_e, z; c_e)`.
 ///
-/// Its dimension is known at run time. Each potential is a [`Potential`] with its list of elements.
+/// Its dimension is known at run time. Each potential is a [`Potential`] with its list of elements, each general term a
+/// [`LocalLagrangian`] with its own. Without general terms all integrators take the system; with them, [`AssembledGauss`](crate::AssembledGauss).
 ///
 /// ```
 /// use assembled_herglotz::{AssembledSystem, Difference, FIXED, Potential};
@@ -36,6 +38,7 @@ pub struct AssembledSystem {
     pub(crate) masses: Masses,
     gamma: f64,
     pub(crate) potentials: Vec<Box<dyn PotentialList>>,
+    pub(crate) locals: Vec<Box<dyn LocalList>>,
 }
 
 /// The diagonal of the mass matrix.
@@ -56,7 +59,13 @@ impl AssembledSystem {
         if unknowns == 0 || unknowns > MOST {
             return Err(AssemblyError::Unknowns { found: unknowns, most: MOST });
         }
-        Ok(AssembledSystem { unknowns, masses: Masses::Same(0.0), gamma: 0.0, potentials: Vec::new() })
+        Ok(AssembledSystem {
+            unknowns,
+            masses: Masses::Same(0.0),
+            gamma: 0.0,
+            potentials: Vec::new(),
+            locals: Vec::new(),
+        })
     }
 
     /// With the same mass for all unknowns.
@@ -89,9 +98,31 @@ impl AssembledSystem {
     where
         V: Potential<K, P>,
     {
-        let elements = Elements::new(self.potentials.len(), self.unknowns, elements)?;
+        let elements = Elements::new(self.lists(), self.unknowns, elements)?;
         self.potentials.push(Box::new(Kind { term, elements }));
         Ok(self)
+    }
+
+    /// With a general term for each of a list of elements.
+    ///
+    /// # Errors
+    /// Those of [`with_potential`](Self::with_potential).
+    pub fn with_term<V, const K: usize, const P: usize>(
+        mut self,
+        term: V,
+        elements: impl IntoIterator<Item = impl Into<ElementData<K, P>>>,
+    ) -> Result<Self, AssemblyError>
+    where
+        V: LocalLagrangian<K, P>,
+    {
+        let elements = Elements::new(self.lists(), self.unknowns, elements)?;
+        self.locals.push(Box::new(LocalKind { term, elements }));
+        Ok(self)
+    }
+
+    /// The lists of elements so far.
+    fn lists(&self) -> usize {
+        self.potentials.len() + self.locals.len()
     }
 
     /// The number of unknowns.
@@ -104,16 +135,43 @@ impl AssembledSystem {
         self.gamma
     }
 
-    /// The energy `E_L = sum m_i v_i^2/2 + V - gamma z`, which decays as `e^(gamma t)` where V does not depend on time.
+    /// The energy `E_L = v.L_v - L`; without general terms `sum m_i v_i^2/2 + V - gamma z`, which decays as `e^(gamma t)` where V does not
+    /// depend on time.
     ///
     /// # Errors
     /// [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state.
     pub fn energy(&self, state: State) -> Result<f64, AssemblyError> {
         state.check(self)?;
-        let mut q = vec![0.0; self.unknowns + 2];
-        q[1..=self.unknowns].copy_from_slice(state.q);
-        let kinetic: f64 = state.v.iter().enumerate().map(|(i, v)| 0.5 * self.mass(i) * v * v).sum();
-        Ok(kinetic + self.potential(state.t, &q) - self.gamma * state.z)
+        let between = |x: &[f64]| [&[0.0], x, &[0.0]].concat();
+        let (q, v) = (between(state.q), between(state.v));
+        let mut first = First::zeros(self.unknowns);
+        self.first(Place { t: state.t, q: &q, v: &v, z: state.z }, true, &mut first);
+        let twice_kinetic: f64 = first.v.iter().zip(state.v).map(|(p, v)| p * v).sum();
+        Ok(twice_kinetic - first.l)
+    }
+
+    /// L and its first derivatives; without general terms the value of L only where it is asked for.
+    pub(crate) fn first(&self, at: Place, value: bool, sums: &mut First) {
+        let First { l, q, v, z } = sums;
+        (*l, *z) = (0.0, self.gamma);
+        for (block, force) in q.chunks_mut(BLOCK).enumerate() {
+            force.fill(0.0);
+            for list in &self.potentials {
+                list.kick(block, at.t, at.q, Weight::Same(1.0), force);
+            }
+        }
+        let velocities = at.v.iter().skip(1);
+        for (i, (p, v)) in v.iter_mut().zip(velocities).enumerate() {
+            *p = self.mass(i) * v;
+        }
+        if value || !self.locals.is_empty() {
+            let velocities = at.v.iter().skip(1);
+            let twice_kinetic: f64 = v.iter().zip(velocities).map(|(p, v)| p * v).sum();
+            *l = 0.5 * twice_kinetic - self.potential(at.t, at.q) + self.gamma * at.z;
+        }
+        for list in &self.locals {
+            list.first(at, sums);
+        }
     }
 
     /// The potential energy, of positions between fixed places.
@@ -136,10 +194,16 @@ impl AssembledSystem {
         }
     }
 
-    /// Checks that each unknown has a mass.
-    pub(crate) fn check_masses(&self) -> Result<(), AssemblyError> {
+    /// Checks that there are no general terms.
+    pub(crate) fn check_separable(&self) -> Result<(), AssemblyError> {
+        if self.locals.is_empty() { Ok(()) } else { Err(AssemblyError::NotSeparable) }
+    }
+
+    /// Checks that each unknown has a mass; with general terms these may give it, and 0 is accepted.
+    pub(crate) fn check_masses(&self, general: bool) -> Result<(), AssemblyError> {
+        let accepted = |mass: f64| mass > 0.0 || general && mass == 0.0;
         let check = |unknown: usize, mass: f64| {
-            if mass > 0.0 && mass.is_finite() { Ok(()) } else { Err(AssemblyError::Mass { unknown, mass }) }
+            if accepted(mass) && mass.is_finite() { Ok(()) } else { Err(AssemblyError::Mass { unknown, mass }) }
         };
         match &self.masses {
             Masses::Same(mass) => check(0, *mass),

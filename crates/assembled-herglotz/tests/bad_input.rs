@@ -20,7 +20,7 @@ fn of(system: AssembledSystem, elements: &[[usize; 2]]) -> Option<AssemblyError>
 /// The error of an explicit and of an implicit method, which are the same.
 fn refused(system: &AssembledSystem, h: f64, start: State) -> AssemblyError {
     let explicit = AssembledSplitting::new(system, &SplittingScheme::STRANG, h, start).err().unwrap();
-    let implicit = AssembledMidpoint::new(system, h, start, usize::MAX).err().unwrap();
+    let implicit = AssembledMidpoint::new(system, h, start, None).err().unwrap();
     // As text: a NaN in an error is not equal to itself.
     assert_eq!(explicit.to_string(), implicit.to_string());
     explicit
@@ -89,7 +89,7 @@ fn starts_and_steps() {
         AssemblyError::Undefined { unknown: 0 }
     );
     // sigma_d = (1 + gamma h/2)/(1 - gamma h/2) is not positive.
-    let long = AssembledMidpoint::new(&system, 30.0, start, usize::MAX).err();
+    let long = AssembledMidpoint::new(&system, 30.0, start, None).err();
     assert!(matches!(long, Some(AssemblyError::Input(InputError::Sigma { sigma })) if sigma < 0.0));
 }
 
@@ -99,14 +99,15 @@ fn too_little_memory() {
     let system = lattice([30, 30], SineGordon { omega_squared: 1.0 }, 1.0, 0.0).unwrap();
     let zeros = vec![0.0; 900];
     let start = State { t: 0.0, q: &zeros, v: &zeros, z: 0.0 };
-    let Some(AssemblyError::Memory { needed, limit: 1000 }) = AssembledMidpoint::new(&system, 0.1, start, 1000).err()
+    let Some(AssemblyError::Memory { needed, limit: 1000 }) =
+        AssembledMidpoint::new(&system, 0.1, start, Some(1000)).err()
     else {
         panic!("1000 bytes are not enough");
     };
     // At least the matrix itself, 900 + 1740 entries of 8 bytes.
     assert!(needed > 2640 * 8, "{needed}");
-    assert!(AssembledMidpoint::new(&system, 0.1, start, needed).is_ok());
-    assert!(AssembledMidpoint::new(&system, 0.1, start, needed - 1).is_err());
+    assert!(AssembledMidpoint::new(&system, 0.1, start, Some(needed)).is_ok());
+    assert!(AssembledMidpoint::new(&system, 0.1, start, Some(needed - 1)).is_err());
 }
 
 /// A motion without bound ends with a status; that of the implicit rule leaves the state before the step.
@@ -120,7 +121,7 @@ fn motions_that_end() {
     let mut explicit = AssembledSplitting::new(&unbound, &SplittingScheme::STRANG, 0.1, start).unwrap();
     let halt = explicit.advance(1000).unwrap_err();
     assert_eq!((halt.cause, halt.taken), (StepError::NonFinite, 0));
-    let mut implicit = AssembledMidpoint::new(&unbound, 0.01, start, usize::MAX).unwrap();
+    let mut implicit = AssembledMidpoint::new(&unbound, 0.01, start, None).unwrap();
     let halt = implicit.advance(1000).unwrap_err();
     assert!(halt.taken > 0 && halt.taken < 1000, "{halt:?}");
     let state = implicit.state();

@@ -3,8 +3,8 @@
 // What a test cannot go on without is a failure of it.
 #![allow(clippy::unwrap_used)]
 
-use assembled_herglotz::systems::{FputBond, fput_chain};
-use assembled_herglotz::{AssembledMidpoint, AssembledSplitting, State};
+use assembled_herglotz::systems::{FputBond, SineGordon, fput_chain, lattice};
+use assembled_herglotz::{AssembledGauss, AssembledMidpoint, AssembledSplitting, AssemblyError, State};
 use discrete_herglotz::SplittingScheme;
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
@@ -62,7 +62,7 @@ fn steps() {
         explicit.state();
     });
     assert_eq!(found, 0);
-    let mut implicit = AssembledMidpoint::new(&chain, 0.05, start, usize::MAX).unwrap();
+    let mut implicit = AssembledMidpoint::new(&chain, 0.05, start, None).unwrap();
     implicit.advance(5).unwrap();
     let before = implicit.factorisations();
     assert_eq!(allocations(|| implicit.advance(50).unwrap()), 0);
@@ -88,4 +88,31 @@ fn memory_of_a_chain() {
     let most = MOST.with(Cell::get) - before;
     // And 64 kB for the lists of blocks.
     assert!(most <= 6 * 8 * n as isize + 65_536, "{most} bytes, {} vectors", most as f64 / (8 * n) as f64);
+}
+
+/// Steps of Gauss collocation with kept factors allocate nothing, and what it holds is within the estimate that a limit is compared with.
+#[test]
+fn memory_of_gauss() {
+    let side = 40;
+    let n = side * side;
+    let system = lattice([side, side], SineGordon { omega_squared: 1.0 }, 1.0, -0.01).unwrap();
+    let q: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).sin()).collect();
+    let v = vec![0.0; n];
+    let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let Some(AssemblyError::Memory { needed, limit: 1 }) = AssembledGauss::new(&system, 2, 0.05, start, Some(1)).err()
+    else {
+        panic!("a byte is not enough");
+    };
+    assert!(AssembledGauss::new(&system, 2, 0.05, start, Some(needed - 1)).is_err());
+    let before = HELD.with(Cell::get);
+    let mut motion = AssembledGauss::new(&system, 2, 0.05, start, Some(needed)).unwrap();
+    motion.advance(5).unwrap();
+    let held = HELD.with(Cell::get) - before;
+    // The vectors, the pattern and the lists of places are not in the estimate: some 30 and 60 numbers for each unknown.
+    assert!(held <= needed as isize + 100 * 8 * n as isize, "{held} bytes are held, {needed} were estimated");
+    // And it is no idle bound.
+    assert!(held >= needed as isize / 20, "{held} bytes are held, {needed} were estimated");
+    let factorisations = motion.factorisations();
+    let found = allocations(|| motion.advance(10).unwrap());
+    assert!(motion.factorisations() > factorisations || found == 0, "{found} allocations");
 }

@@ -22,7 +22,7 @@ fn explicit(system: &AssembledSystem, scheme: &SplittingScheme, start: State, ti
 }
 
 fn implicit(system: &AssembledSystem, start: State, time: f64, steps: usize) -> Vec<f64> {
-    let mut motion = AssembledMidpoint::new(system, time / steps as f64, start, usize::MAX).unwrap().with_action();
+    let mut motion = AssembledMidpoint::new(system, time / steps as f64, start, None).unwrap().with_action();
     motion.advance(steps).unwrap();
     let end = motion.state();
     [end.q, end.v, &[end.z]].concat()
@@ -88,7 +88,7 @@ fn momenta_decay_with_the_conformal_factor() {
         let expected = before * (-0.3 * h * steps as f64).exp();
         assert!((after - expected).abs() <= tolerance(scheme.stages()), "{}: {after} {expected}", scheme.name());
     }
-    let mut motion = AssembledMidpoint::new(&system, h, from, usize::MAX).unwrap();
+    let mut motion = AssembledMidpoint::new(&system, h, from, None).unwrap();
     motion.advance(steps).unwrap();
     let after: f64 = motion.state().v.iter().sum();
     let expected = before * motion.sigma().powi(steps as i32);

@@ -1,16 +1,15 @@
 //! The implicit midpoint rule for assembled systems.
 
+use super::corrections::{Corrections, Verdict};
 use super::factors::Factors;
 use super::largest;
 use super::pattern::Pattern;
 use crate::AssemblyError;
 use crate::blocks::BLOCK;
 use crate::kernels::Weight;
+use crate::memory::limit;
 use crate::system::{AssembledSystem, Masses, State};
 use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError};
-
-/// The most iterations with kept factors that are worth one factorisation.
-const PATIENCE: f64 = 6.0;
 
 /// The symmetric midpoint rule on `L = sum m_i v_i^2/2 - V(t, q) + gamma z`: the discrete Herglotz equations of
 /// [`Midpoint`](discrete_herglotz::Midpoint), for systems of any size.
@@ -48,17 +47,24 @@ pub struct AssembledMidpoint<'a> {
 }
 
 impl<'a> AssembledMidpoint<'a> {
-    /// From a state, without the action; factors and workspace of more than `memory` bytes are refused.
+    /// From a state, without the action. Factors and workspace of more than `memory` bytes are refused; with `None` of more than the system
+    /// has available (Linux' `MemAvailable`; elsewhere there is no limit then).
     ///
     /// # Errors
-    /// As [`AssembledSplitting`](crate::AssembledSplitting::new); [`InputError::Sigma`] unless `|gamma h| < 2`;
+    /// As [`AssembledSplitting`](crate::AssembledSplitting::new), [`AssemblyError::NotSeparable`] among them; [`InputError::Sigma`] unless `|gamma h| < 2`;
     /// [`AssemblyError::Memory`] with the estimate.
-    pub fn new(system: &'a AssembledSystem, h: f64, start: State, memory: usize) -> Result<Self, AssemblyError> {
+    pub fn new(
+        system: &'a AssembledSystem,
+        h: f64,
+        start: State,
+        memory: Option<usize>,
+    ) -> Result<Self, AssemblyError> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h }.into());
         }
         start.check(system)?;
-        system.check_masses()?;
+        system.check_separable()?;
+        system.check_masses(false)?;
         AssembledSystem::check_number("gamma", system.gamma())?;
         let half = 0.5 * system.gamma() * h;
         if half.abs() >= 1.0 {
@@ -69,7 +75,7 @@ impl<'a> AssembledMidpoint<'a> {
         let places = system.potentials.iter().map(|list| list.entries(&pattern)).collect();
         let diagonal = (1..=n).map(|i| pattern.entry(i, i)).collect();
         let entries = vec![0.0; pattern.rows.len()];
-        let factors = Factors::new(pattern, memory)?;
+        let factors = Factors::new(pattern, limit(memory))?;
         let mut q = vec![0.0; n + 2];
         q[1..=n].copy_from_slice(start.q);
         let zeros = vec![0.0; n];
@@ -179,7 +185,7 @@ impl<'a> AssembledMidpoint<'a> {
     fn solve(&mut self, t: f64, half: f64) -> Result<(), StepError> {
         let (h, n) = (self.h, self.system.unknowns());
         let resolution = largest(&self.q) / h.abs();
-        let mut last = f64::INFINITY;
+        let mut corrections = Corrections::new();
         let mut size = f64::INFINITY;
         for _ in 0..ITERATION_LIMIT {
             for i in 0..n {
@@ -199,7 +205,7 @@ impl<'a> AssembledMidpoint<'a> {
             let fresh = !self.factorised;
             if fresh {
                 self.factorise(t)?;
-                last = f64::INFINITY;
+                corrections.forget();
             }
             self.change.copy_from_slice(&self.residual);
             self.factors.solve(&mut self.change)?;
@@ -216,24 +222,11 @@ impl<'a> AssembledMidpoint<'a> {
             }
             // Below this a correction does not move the position or the velocity.
             let round_off = f64::EPSILON * (speed + resolution);
-            if now <= round_off * f64::EPSILON {
-                return Ok(());
+            match corrections.judge(now, round_off) {
+                Verdict::Done => return Ok(()),
+                Verdict::Further => {}
+                Verdict::Factorise => self.factorised = false,
             }
-            // The first correction tells nothing of the next.
-            if last.is_finite() {
-                let rate = now / last;
-                let next = if rate < 1.0 { now * rate / (1.0 - rate) } else { f64::INFINITY };
-                // What round-off leaves of the residual comes back at each solve.
-                if next <= round_off || rate >= 0.5 && now <= 8.0 * round_off {
-                    return Ok(());
-                }
-                // The solves that are left at this rate; new factors are worth their price where those are many.
-                let left = (round_off / now).ln() / rate.min(1.0).ln();
-                if left.is_nan() || left > PATIENCE {
-                    self.factorised = false;
-                }
-            }
-            last = now;
         }
         self.factorised = false;
         Err(StepError::NotConverged { residual: size, iterations: ITERATION_LIMIT })

@@ -1,14 +1,20 @@
 //! Implicit steps: sparse equations, solved with faer.
 
+mod border;
+mod corrections;
 mod factors;
+mod gauss;
+mod lu;
 mod midpoint;
 mod pattern;
 mod second;
+mod stages;
 #[cfg(test)]
 mod tests;
 
+pub use gauss::AssembledGauss;
 pub use midpoint::AssembledMidpoint;
-pub(crate) use pattern::Pattern;
+pub(crate) use pattern::{FullPattern, Pattern};
 
 /// The largest absolute component; infinite where one is not a number.
 fn largest(x: &[f64]) -> f64 {

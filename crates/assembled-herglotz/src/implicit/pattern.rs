@@ -65,3 +65,105 @@ impl Pattern {
         rows.binary_search(&row).map_or(NOWHERE, |at| begin + at as u32)
     }
 }
+
+/// The pattern of a whole matrix that has both triangles.
+#[derive(Clone, Debug)]
+pub(crate) struct FullPattern {
+    /// Where the entries of each column begin, and the end.
+    pub begins: Vec<u32>,
+    /// The row of each entry, sorted in each column.
+    pub rows: Vec<u32>,
+    /// Where each entry, or the one across the diagonal, stands in the lower triangle.
+    pub lower: Vec<u32>,
+}
+
+impl FullPattern {
+    /// Of a lower triangle.
+    ///
+    /// # Errors
+    /// [`AssemblyError::Unknowns`] where there are more entries than 32 bits count.
+    pub fn new(triangle: &Pattern) -> Result<Self, AssemblyError> {
+        let n = triangle.unknowns();
+        let total = 2 * triangle.rows.len() - n;
+        if total >= NOWHERE as usize {
+            return Err(AssemblyError::Unknowns { found: n, most: NOWHERE as usize });
+        }
+        let columns =
+            || triangle.begins.windows(2).enumerate().map(|(c, ends)| (c, ends[0] as usize..ends[1] as usize));
+        let mut begins = vec![0u32; n + 1];
+        for (column, range) in columns() {
+            begins[column + 1] += range.len() as u32;
+            for row in &triangle.rows[range] {
+                if *row as usize != column {
+                    begins[*row as usize + 1] += 1;
+                }
+            }
+        }
+        for column in 0..n {
+            begins[column + 1] += begins[column];
+        }
+        let (mut rows, mut lower) = (vec![0; total], vec![0; total]);
+        let mut next = begins.clone();
+        let mut put = |column: usize, row: u32, at: usize| {
+            let place = next[column] as usize;
+            (rows[place], lower[place]) = (row, at as u32);
+            next[column] += 1;
+        };
+        // When a column's turn comes the rows above its diagonal are there, in order: they came with the columns before.
+        for (column, range) in columns() {
+            for at in range {
+                let row = triangle.rows[at];
+                put(column, row, at);
+                if row as usize != column {
+                    put(row as usize, column as u32, at);
+                }
+            }
+        }
+        Ok(FullPattern { begins, rows, lower })
+    }
+
+    /// The number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.begins.len() - 1
+    }
+
+    /// Where the entry in the row of one place and the column of another stands; [`NOWHERE`] where one is fixed.
+    pub fn entry(&self, a: usize, b: usize) -> u32 {
+        let n = self.unknowns();
+        if !(1..=n).contains(&a) || !(1..=n).contains(&b) {
+            return NOWHERE;
+        }
+        let (begin, end) = (self.begins[b - 1], self.begins[b]);
+        let rows = &self.rows[begin as usize..end as usize];
+        rows.binary_search(&(a as u32 - 1)).map_or(NOWHERE, |at| begin + at as u32)
+    }
+
+    /// The columns with their entries.
+    pub fn columns(&self) -> impl Iterator<Item = (usize, std::ops::Range<usize>)> {
+        self.begins.windows(2).enumerate().map(|(c, ends)| (c, ends[0] as usize..ends[1] as usize))
+    }
+
+    /// With a block of `size` times `size` in the place of each entry; the unknowns of a block follow each other.
+    ///
+    /// # Errors
+    /// [`AssemblyError::Unknowns`] where there are more entries than faer's 32 bits count.
+    pub fn blocks(&self, size: usize) -> Result<(Vec<u32>, Vec<u32>), AssemblyError> {
+        let n = self.unknowns();
+        let most = i32::MAX as usize;
+        if self.rows.len().saturating_mul(size * size) > most {
+            return Err(AssemblyError::Unknowns { found: n, most: most / (size * size) });
+        }
+        let mut begins = Vec::with_capacity(n * size + 1);
+        let mut rows = Vec::with_capacity(self.rows.len() * size * size);
+        begins.push(0);
+        for (_, range) in self.columns() {
+            for _ in 0..size {
+                for row in &self.rows[range.clone()] {
+                    rows.extend((0..size as u32).map(|i| row * size as u32 + i));
+                }
+                begins.push(rows.len() as u32);
+            }
+        }
+        Ok((begins, rows))
+    }
+}

@@ -17,9 +17,9 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
             for e in (0..run.len).step_by(LANES) {
                 let count = LANES.min(run.len - e);
                 let (x, c) = if count == LANES {
-                    (unknowns(q, run, e), self.parameters(run, e))
+                    (unknowns(q, run, e), self.elements.parameters(run, e))
                 } else {
-                    (unknowns_part(q, run, e, count), self.parameters_part(run, e, count))
+                    (unknowns_part(q, run, e, count), self.elements.parameters_part(run, e, count))
                 };
                 add(self.second(t, &x, &c), count, factor, &mut places, entries);
             }
@@ -27,7 +27,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         let loose = self.elements.loose.len();
         for e in (0..loose).step_by(LANES) {
             let count = LANES.min(loose - e);
-            let (x, c) = self.gathered(q, count, |lane| e + lane);
+            let (x, c) = self.elements.gathered(q, count, |lane| e + lane);
             add(self.second(t, &x, &c), count, factor, &mut places, entries);
         }
     }

@@ -10,4 +10,4 @@ pub use chain::{FputBond, fput_chain};
 pub use cloth::{LengthSpring, Weight, cloth};
 pub use lattice::{KleinGordon, SineGordon, Spring, lattice};
 pub use solar::{Gravitation, OuterSolarSystem, bodies};
-pub use wave::{Membrane, Mesh, membrane};
+pub use wave::{ConsistentMass, Membrane, Mesh, consistent_membrane, membrane};

@@ -1,6 +1,6 @@
 //! The damped wave equation by finite elements.
 
-use crate::{AssembledSystem, AssemblyError, FIXED, Potential};
+use crate::{AssembledSystem, AssemblyError, FIXED, LocalLagrangian, Potential};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 
@@ -34,6 +34,19 @@ pub struct Mesh<'a> {
     pub held: &'a [bool],
 }
 
+/// The kinetic energy of a linear triangle with its consistent masses, `A/12 (v_0^2 + v_1^2 + v_2^2 + v_0 v_1 + v_1 v_2 + v_2 v_0)`: its parameter is
+/// the area A.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConsistentMass;
+
+impl LocalLagrangian<3, 1> for ConsistentMass {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 3>, v: &SVector<T, 3>, _z: T, area: &[T; 1]) -> T {
+        let sum = v[0] + v[1] + v[2];
+        (sum * sum + v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) * area[0] * (1.0 / 24.0)
+    }
+}
+
 /// The damped wave equation `q_tt = c^2 Laplace q + gamma q_t` on a triangulated domain, by linear finite elements with lumped masses; free
 /// edges unless their nodes are held.
 ///
@@ -42,47 +55,78 @@ pub struct Mesh<'a> {
 /// none of; [`AssemblyError::Parameters`] for a triangle without area; [`AssemblyError::Unknowns`] where all nodes are held.
 /// A free node of no triangle has no mass, which the integrators refuse.
 pub fn membrane(mesh: Mesh, speed: f64, gamma: f64) -> Result<AssembledSystem, AssemblyError> {
-    let nodes = mesh.nodes.len();
-    if mesh.held.len() != nodes {
-        return Err(AssemblyError::Length { what: "held", found: mesh.held.len(), expected: nodes });
-    }
-    let mut unknowns = 0;
-    let number: Vec<usize> = mesh
-        .held
-        .iter()
-        .map(|held| {
-            if *held {
-                return FIXED;
-            }
-            unknowns += 1;
-            unknowns - 1
-        })
-        .collect();
-    let mut masses = vec![0.0; unknowns];
-    let mut elements = Vec::with_capacity(mesh.triangles.len());
-    for (element, triangle) in mesh.triangles.iter().enumerate() {
-        if let Some(&unknown) = triangle.iter().find(|i| **i >= nodes) {
-            return Err(AssemblyError::OutOfRange { list: 0, element, unknown, last: nodes.saturating_sub(1) });
-        }
-        let [a, b, c] = triangle.map(|i| mesh.nodes[i]);
-        let side = |from: [f64; 2], to: [f64; 2]| [to[0] - from[0], to[1] - from[1]];
-        let (ab, bc, ca) = (side(a, b), side(b, c), side(c, a));
-        let area = 0.5 * (ab[0] * bc[1] - ab[1] * bc[0]).abs();
-        if !(area > 0.0 && area.is_finite()) {
-            return Err(AssemblyError::Parameters {
-                what: "the area of a triangle",
-                value: area,
-                remedy: "mend the mesh",
-            });
-        }
-        // The product of the gradients of two hat functions is that of the sides opposite to their nodes, by (2A)^2; times A.
-        let entry = |x: [f64; 2], y: [f64; 2]| speed * speed * (x[0] * y[0] + x[1] * y[1]) / (4.0 * area);
-        elements.push((triangle.map(|i| number[i]), [entry(bc, ca), entry(ca, ab), entry(ab, bc)]));
-        for i in *triangle {
-            if let Some(mass) = masses.get_mut(number[i]) {
+    let triangles = Triangles::new(mesh, speed)?;
+    let mut masses = vec![0.0; triangles.unknowns];
+    for ((nodes, _), area) in triangles.elements.iter().zip(&triangles.areas) {
+        for i in nodes {
+            if let Some(mass) = masses.get_mut(*i) {
                 *mass += area / 3.0;
             }
         }
     }
-    AssembledSystem::new(unknowns)?.with_masses(masses).with_drag(gamma).with_potential(Membrane, elements)
+    let system = AssembledSystem::new(triangles.unknowns)?.with_masses(masses).with_drag(gamma);
+    system.with_potential(Membrane, triangles.elements)
+}
+
+/// The same equation with consistent masses, those of the finite elements themselves: the error of frequencies has the other sign, and the
+/// mass matrix is sparse, so that the motion is one for [`AssembledGauss`](crate::AssembledGauss).
+///
+/// # Errors
+/// Those of [`membrane`].
+pub fn consistent_membrane(mesh: Mesh, speed: f64, gamma: f64) -> Result<AssembledSystem, AssemblyError> {
+    let Triangles { unknowns, elements, areas } = Triangles::new(mesh, speed)?;
+    let masses: Vec<_> = elements.iter().zip(areas).map(|((nodes, _), area)| (*nodes, [area])).collect();
+    let system = AssembledSystem::new(unknowns)?.with_drag(gamma).with_potential(Membrane, elements)?;
+    system.with_term(ConsistentMass, masses)
+}
+
+/// The triangles of a mesh.
+struct Triangles {
+    unknowns: usize,
+    /// The unknowns of each, and its parameters as a [`Membrane`].
+    elements: Vec<([usize; 3], [f64; 3])>,
+    areas: Vec<f64>,
+}
+
+impl Triangles {
+    fn new(mesh: Mesh, speed: f64) -> Result<Self, AssemblyError> {
+        let nodes = mesh.nodes.len();
+        if mesh.held.len() != nodes {
+            return Err(AssemblyError::Length { what: "held", found: mesh.held.len(), expected: nodes });
+        }
+        let mut unknowns = 0;
+        let number: Vec<usize> = mesh
+            .held
+            .iter()
+            .map(|held| {
+                if *held {
+                    return FIXED;
+                }
+                unknowns += 1;
+                unknowns - 1
+            })
+            .collect();
+        let (mut elements, mut areas) = (Vec::with_capacity(mesh.triangles.len()), Vec::new());
+        for (element, triangle) in mesh.triangles.iter().enumerate() {
+            if let Some(&unknown) = triangle.iter().find(|i| **i >= nodes) {
+                return Err(AssemblyError::OutOfRange { list: 0, element, unknown, last: nodes.saturating_sub(1) });
+            }
+            let [a, b, c] = triangle.map(|i| mesh.nodes[i]);
+            let side = |from: [f64; 2], to: [f64; 2]| [to[0] - from[0], to[1] - from[1]];
+            let (ab, bc, ca) = (side(a, b), side(b, c), side(c, a));
+            let area = 0.5 * (ab[0] * bc[1] - ab[1] * bc[0]).abs();
+            if !(area > 0.0 && area.is_finite()) {
+                return Err(AssemblyError::Parameters {
+                    what: "the area of a triangle",
+                    value: area,
+                    remedy: "mend the mesh",
+                });
+            }
+            // The product of the gradients of two hat functions is that of the sides opposite to their nodes, by (2A)^2; times A.
+            let entry = |x: [f64; 2], y: [f64; 2]| speed * speed * (x[0] * y[0] + x[1] * y[1]) / (4.0 * area);
+            elements.push((triangle.map(|i| number[i]), [entry(bc, ca), entry(ca, ab), entry(ab, bc)]));
+            areas.push(area);
+        }
+        Ok(Triangles { unknowns, elements, areas })
+    }
 }

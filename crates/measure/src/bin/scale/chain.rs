@@ -5,7 +5,7 @@ use crate::memory::peak;
 use crate::report::Report;
 use crate::seconds::{best, done, together};
 use assembled_herglotz::systems::{FputBond, fput_chain};
-use assembled_herglotz::{AssembledMidpoint, AssembledSplitting, AssembledSystem, AssemblyError, State};
+use assembled_herglotz::{AssembledGauss, AssembledMidpoint, AssembledSplitting, AssembledSystem, AssemblyError, State};
 use contact_examples::Failure;
 use discrete_herglotz::SplittingScheme;
 use faer::prelude::Solve;
@@ -153,10 +153,16 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
         }
         let (seconds, bytes) = peak(|| {
             let system = chain(n)?;
-            let mut motion = AssembledMidpoint::new(&system, 0.1, from, usize::MAX).map_err(refused)?;
+            let mut motion = AssembledMidpoint::new(&system, 0.1, from, None).map_err(refused)?;
             Ok::<f64, Failure>(best(3, || done(motion.advance(3))) / 3.0)
         });
         report.row(CASE, "a step by the midpoint rule", n, seconds?, Some(bytes));
+        let (seconds, bytes) = peak(|| {
+            let system = chain(n)?;
+            let mut motion = AssembledGauss::new(&system, 2, 0.1, from, None).map_err(refused)?;
+            Ok::<f64, Failure>(best(3, || done(motion.advance(3))) / 3.0)
+        });
+        report.row(CASE, "a step by Gauss collocation, s = 2", n, seconds?, Some(bytes));
     }
     Ok(())
 }
@@ -190,7 +196,7 @@ fn factorisation(report: &mut Report, n: usize) -> Result<(), Failure> {
     let (q, v) = start(n);
     let h = 0.1;
     let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
-    let mut motion = AssembledMidpoint::new(&system, h, from, usize::MAX).map_err(refused)?;
+    let mut motion = AssembledMidpoint::new(&system, h, from, None).map_err(refused)?;
     // M + (h^2/4) V_qq at the start.
     let place = |i: usize| if i == 0 || i > n { 0.0 } else { q[i - 1] };
     let slope = |i: usize| 0.25 * h * h * (1.0 + 3.0 * BOND.beta * (place(i + 1) - place(i)).powi(2));

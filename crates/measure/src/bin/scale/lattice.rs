@@ -25,7 +25,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         let site = SineGordon { omega_squared: 1.0 };
         let (seconds, bytes) = peak(|| {
             let system = lattice([side, side], site, 4.0, -0.01).map_err(refused)?;
-            let mut motion = AssembledMidpoint::new(&system, 0.2, from, MEMORY).map_err(refused)?;
+            let mut motion = AssembledMidpoint::new(&system, 0.2, from, Some(MEMORY)).map_err(refused)?;
             let first = best(1, || done(motion.advance(1)));
             Ok::<_, Failure>((first, best(3, || done(motion.advance(2))) / 2.0))
         });

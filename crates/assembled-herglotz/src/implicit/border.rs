@@ -1,0 +1,99 @@
+//! The coupling of all unknowns through the global action: a border of the sparse matrix, eliminated.
+
+use super::lu::LuFactors;
+use super::stages::{MOST, Table};
+use crate::local::{First, Second};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use discrete_herglotz::StepError;
+
+/// The unknowns of the border: the actions and the integrating factors of the stages.
+const WIDTH: usize = 2 * MOST;
+
+/// The action and the integrating factor of each stage: first the actions, then, from [`MOST`] on, the factors.
+pub(crate) type Scalars = SVector<f64, WIDTH>;
+
+/// The system `J x + B w = R`, `C x + D w = r` of a sparse J with factors of its own, solved by the Schur complement `D - C J^-1 B`: nothing
+/// dense enters J.
+pub(crate) struct Border {
+    /// B; `J^-1 B` when it is reduced.
+    columns: Vec<Vec<f64>>,
+    /// C.
+    rows: Vec<Vec<f64>>,
+    corner: SMatrix<f64, WIDTH, WIDTH>,
+    /// The inverse of the Schur complement.
+    inverse: SMatrix<f64, WIDTH, WIDTH>,
+    work: Vec<f64>,
+}
+
+impl Border {
+    /// For so many stage velocities.
+    pub fn new(len: usize) -> Self {
+        let all = vec![vec![0.0; len]; WIDTH];
+        let identity = SMatrix::identity();
+        Border { columns: all.clone(), rows: all, corner: identity, inverse: identity, work: vec![0.0; len] }
+    }
+
+    /// Begins anew. The rows and columns of stages that there are none of keep a one in the corner.
+    pub fn clear(&mut self) {
+        self.columns.iter_mut().chain(&mut self.rows).for_each(|x| x.fill(0.0));
+        self.corner = SMatrix::identity();
+    }
+
+    /// Adds what the stage j contributes, with the equations of the actions, `Z_i = z0 + h sum a_ij L_j`, and of the factors,
+    /// `rho_i = 1 - h sum a_ij rho_j (L_z)_j`.
+    pub fn add_stage(&mut self, table: &Table, j: usize, rho: f64, first: &First, second: &Second) {
+        let (s, a) = (table.s, &table.a);
+        let of_factor = MOST + j;
+        for (u, (((qz, vz), q), v)) in second.qz.iter().zip(&second.vz).zip(&first.q).zip(&first.v).enumerate() {
+            for i in 0..s {
+                let own = if i == j { 1.0 } else { 0.0 };
+                self.columns[j][u * s + i] = rho * (own * vz - a[i][j] * qz);
+                self.columns[of_factor][u * s + i] = own * v - a[i][j] * q;
+                self.rows[i][u * s + j] -= a[i][j] * v;
+                self.rows[MOST + i][u * s + j] += a[i][j] * rho * vz;
+                for k in 0..s {
+                    self.rows[i][u * s + k] -= a[i][j] * a[j][k] * q;
+                    self.rows[MOST + i][u * s + k] += a[i][j] * a[j][k] * rho * qz;
+                }
+            }
+        }
+        for (i, row) in a.iter().enumerate().take(s) {
+            self.corner[(i, j)] -= row[j] * first.z;
+            self.corner[(MOST + i, j)] += row[j] * rho * second.zz;
+            self.corner[(MOST + i, of_factor)] += row[j] * first.z;
+        }
+    }
+
+    /// Eliminates the border with fresh factors of J.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] where J or the Schur complement is singular.
+    pub fn reduce(&mut self, s: usize, factors: &mut LuFactors) -> Result<(), StepError> {
+        let Border { columns, rows, corner, inverse, work } = self;
+        let used = |i: usize| i % MOST < s;
+        for (_, column) in columns.iter_mut().enumerate().filter(|(i, _)| used(*i)) {
+            work.copy_from_slice(column);
+            factors.solve(column)?;
+            factors.check(column, work)?;
+        }
+        let complement = SMatrix::<f64, WIDTH, WIDTH>::from_fn(|i, j| corner[(i, j)] - dot(&rows[i], &columns[j]));
+        let failed = StepError::Singular { pivot: 0.0 };
+        *inverse = complement.try_inverse().ok_or(failed)?;
+        if inverse.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(failed) }
+    }
+
+    /// From `J^-1 R` in x and r the solution, x in its place.
+    pub fn solve(&self, x: &mut [f64], r: &Scalars) -> Scalars {
+        let w = self.inverse * Scalars::from_fn(|i, _| r[i] - dot(&self.rows[i], x));
+        for (column, w) in self.columns.iter().zip(w.iter()) {
+            if *w != 0.0 {
+                x.iter_mut().zip(column).for_each(|(x, c)| *x -= c * w);
+            }
+        }
+        w
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,458 @@
+//! Contact Gauss collocation for assembled systems.
+
+use super::border::{Border, Scalars};
+use super::corrections::{Corrections, Verdict};
+use super::largest;
+use super::lu::LuFactors;
+use super::stages::{Assembly, MOST, Table};
+use crate::AssemblyError;
+use crate::local::{First, Place};
+use crate::memory::limit;
+use crate::system::{AssembledSystem, State};
+use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError};
+
+/// Contact Gauss collocation with one or two stages, of order 2 or 4, for systems of any size and any local terms: the stage equations of
+/// [`Gauss`](discrete_herglotz::Gauss),
+///
+/// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`,
+///
+/// whose sums with `hb` end the step: `q1 = q0 + hb.V`, `z1 = z0 + hb.L`, `p1 = (p0 + hb.(rho L_q))/rho1`, `sigma_d = 1/rho1`. With one stage it is
+/// the midpoint rule.
+///
+/// Newton's method in the velocities of the stages, with faer's sparse LU: analysed once, and factorised anew only where the corrections shrink
+/// slowly. All unknowns are coupled through Z and rho; these are a border of at most four columns and rows, eliminated by its Schur complement, so
+/// that the matrix stays sparse. Without general terms rho is known in advance, and there is no border.
+///
+/// ```
+/// use assembled_herglotz::systems::{FputBond, fput_chain};
+/// use assembled_herglotz::{AssembledGauss, State};
+/// let chain = fput_chain(100, FputBond { alpha: 0.0, beta: 1.0 }, -0.01)?;
+/// let q: Vec<f64> = (1..=100).map(|i| (0.03 * i as f64).sin()).collect();
+/// let start = State { t: 0.0, q: &q, v: &[0.0; 100], z: 0.0 };
+/// let mut motion = AssembledGauss::new(&chain, 2, 0.1, start, None)?;
+/// assert!(motion.advance(100).is_ok());
+/// println!("{:?}", motion.q()[50]);
+/// # Ok::<(), assembled_herglotz::AssemblyError>(())
+/// ```
+pub struct AssembledGauss<'a> {
+    system: &'a AssembledSystem,
+    table: Table,
+    assembly: Assembly,
+    factors: LuFactors,
+    /// With general terms only, as the factors of `L_vv`.
+    border: Option<Border>,
+    mass: Option<LuFactors>,
+    h: f64,
+    t0: f64,
+    taken: usize,
+    factorisations: u64,
+    iterations: u64,
+    action: bool,
+    /// Positions between fixed places.
+    q: Vec<f64>,
+    p: Vec<f64>,
+    z: f64,
+    sigma: f64,
+    /// The velocities of the last step's stages, those of one unknown after the other; of the next; and the work of a correction.
+    v: Vec<f64>,
+    next: Vec<f64>,
+    change: Vec<f64>,
+    residual: Vec<f64>,
+    /// `Z_i - z0` and rho of the stages.
+    actions: [f64; MOST],
+    rho: [f64; MOST],
+    stages: Vec<First>,
+    /// A stage's position and velocity between fixed places.
+    place_q: Vec<f64>,
+    place_v: Vec<f64>,
+    /// The velocity of a state that is asked for.
+    end: Vec<f64>,
+}
+
+impl<'a> AssembledGauss<'a> {
+    /// From a state, with 1 or 2 stages. The matrix, its factors and the workspace are refused where they may need more than `memory` bytes; with
+    /// `None` more than the system has available (Linux' `MemAvailable`; elsewhere there is no limit then).
+    ///
+    /// # Errors
+    /// [`InputError::Stages`], [`InputError::Step`]; [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state and the masses;
+    /// [`AssemblyError::Mass`] where an unknown has no mass, be it of its own or in a general term; [`AssemblyError::SingularMass`];
+    /// [`AssemblyError::Undefined`] where a derivative of L is not finite at the start; [`AssemblyError::Memory`] with the estimate.
+    pub fn new(
+        system: &'a AssembledSystem,
+        stages: usize,
+        h: f64,
+        start: State,
+        memory: Option<usize>,
+    ) -> Result<Self, AssemblyError> {
+        if !(1..=MOST).contains(&stages) {
+            return Err(InputError::Stages { found: stages }.into());
+        }
+        if !(h != 0.0 && h.is_finite()) {
+            return Err(InputError::Step { h }.into());
+        }
+        start.check(system)?;
+        let general = !system.locals.is_empty();
+        system.check_masses(general)?;
+        AssembledSystem::check_number("gamma", system.gamma())?;
+        let (n, limit) = (system.unknowns(), limit(memory));
+        let len = n.checked_mul(stages).ok_or(AssemblyError::Unknowns { found: n, most: usize::MAX / stages })?;
+        let assembly = Assembly::new(system)?;
+        let (begins, rows) = assembly.pattern.blocks(stages)?;
+        let factors = LuFactors::new(begins, rows, limit)?;
+        let between = |x: &[f64]| [&[0.0], x, &[0.0]].concat();
+        let (q, place_v) = (between(start.q), between(start.v));
+        let mut first = First::zeros(n);
+        system.first(Place { t: start.t, q: &q, v: &place_v, z: start.z }, true, &mut first);
+        let defined = |unknown: usize| first.q[unknown].is_finite() && first.v[unknown].is_finite();
+        if let Some(unknown) = (0..n).find(|i| !defined(*i)) {
+            return Err(AssemblyError::Undefined { unknown });
+        }
+        let v: Vec<f64> = start.v.iter().flat_map(|v| std::iter::repeat_n(*v, stages)).collect();
+        let zeros = vec![0.0; len];
+        let mut gauss = AssembledGauss {
+            system,
+            table: Table::new(stages, h),
+            assembly,
+            factors,
+            border: general.then(|| Border::new(len)),
+            mass: None,
+            h,
+            t0: start.t,
+            taken: 0,
+            factorisations: 0,
+            iterations: 0,
+            action: false,
+            place_q: q.clone(),
+            q,
+            p: first.v.clone(),
+            z: start.z,
+            sigma: 1.0,
+            next: v.clone(),
+            v,
+            change: zeros.clone(),
+            residual: zeros,
+            actions: [0.0; MOST],
+            rho: [1.0; MOST],
+            stages: vec![first; stages],
+            place_v,
+            end: start.v.to_vec(),
+        };
+        if general {
+            gauss.check_regular(limit)?;
+        }
+        Ok(gauss)
+    }
+
+    /// With the action z also where L has no general terms; it costs the energies once a step there.
+    pub fn with_action(self) -> Self {
+        AssembledGauss { action: true, ..self }
+    }
+
+    /// Takes steps.
+    ///
+    /// # Errors
+    /// [`Halt`] with the steps taken before and the cause: [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`],
+    /// [`StepError::StageFactor`] or [`StepError::SigmaVanished`]. The state is that before the step which failed.
+    pub fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        for taken in 0..steps {
+            self.step().map_err(|cause| Halt { taken, cause })?;
+        }
+        Ok(())
+    }
+
+    /// The time.
+    pub fn time(&self) -> f64 {
+        self.t0 + self.taken as f64 * self.h
+    }
+
+    /// The positions.
+    pub fn q(&self) -> &[f64] {
+        &self.q[1..=self.system.unknowns()]
+    }
+
+    /// The momenta `p = L_v`.
+    pub fn p(&self) -> &[f64] {
+        &self.p
+    }
+
+    /// The action; that of the start where it is not followed.
+    pub fn z(&self) -> f64 {
+        self.z
+    }
+
+    /// `sigma_d` of the last step; 1 before the first.
+    pub fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    /// The numeric factorisations made, those for a state's velocity included.
+    pub fn factorisations(&self) -> u64 {
+        self.factorisations
+    }
+
+    /// The iterations made, each a solve and the derivatives of L at each stage.
+    pub fn iterations(&self) -> u64 {
+        self.iterations
+    }
+
+    /// The state. With general terms the velocity is that which `p = L_v` gives, by Newton's method.
+    ///
+    /// # Errors
+    /// [`StepError`] where no velocity is found. The motion can go on: it does not use it.
+    pub fn state(&mut self) -> Result<State<'_>, StepError> {
+        let n = self.system.unknowns();
+        match self.mass.take() {
+            None => {
+                for (i, (v, p)) in self.end.iter_mut().zip(&self.p).enumerate() {
+                    *v = p / self.system.mass(i);
+                }
+            }
+            Some(mut mass) => {
+                let found = self.velocity(&mut mass);
+                self.mass = Some(mass);
+                found?;
+            }
+        }
+        Ok(State { t: self.time(), q: &self.q[1..=n], v: &self.end, z: self.z })
+    }
+
+    /// Solves `L_v = p` for the velocity, from that of the last state, into `end`.
+    fn velocity(&mut self, mass: &mut LuFactors) -> Result<(), StepError> {
+        let (n, t) = (self.system.unknowns(), self.time());
+        let mut corrections = Corrections::new();
+        let mut size = f64::INFINITY;
+        mass.discard();
+        for _ in 0..ITERATION_LIMIT {
+            self.place_v[1..=n].copy_from_slice(&self.end);
+            let at = Place { t, q: &self.q, v: &self.place_v, z: self.z };
+            let Some(first) = self.stages.first_mut() else { break };
+            self.system.first(at, true, first);
+            if !mass.ready() {
+                self.assembly.mass_matrix(self.system, at, &mut mass.entries);
+                mass.factorise()?;
+                self.factorisations += 1;
+                corrections.forget();
+            }
+            let change = &mut self.change[..n];
+            for (change, (l_v, p)) in change.iter_mut().zip(first.v.iter().zip(&self.p)) {
+                *change = l_v - p;
+            }
+            size = largest(change);
+            mass.solve(change)?;
+            self.end.iter_mut().zip(&*change).for_each(|(v, change)| *v -= change);
+            let (now, speed) = (largest(change), largest(&self.end));
+            match corrections.judge(now, f64::EPSILON * speed) {
+                Verdict::Done => return Ok(()),
+                Verdict::Further => {}
+                Verdict::Factorise => mass.discard(),
+            }
+        }
+        Err(StepError::NotConverged { residual: size, iterations: ITERATION_LIMIT })
+    }
+
+    /// Checks that `L_vv` is regular at the start, and keeps its factors for the velocities of states.
+    fn check_regular(&mut self, limit: usize) -> Result<(), AssemblyError> {
+        let (begins, rows) = self.assembly.pattern.blocks(1)?;
+        let mut mass = LuFactors::new(begins, rows, limit)?;
+        let at = Place { t: self.t0, q: &self.q, v: &self.place_v, z: self.z };
+        self.assembly.mass_matrix(self.system, at, &mut mass.entries);
+        if let Some((unknown, _)) =
+            self.assembly.pattern.columns().find(|(_, range)| mass.entries[range.clone()].iter().all(|m| *m == 0.0))
+        {
+            return Err(AssemblyError::Mass { unknown, mass: 0.0 });
+        }
+        let n = self.system.unknowns();
+        // What no kernel that a user thinks of is orthogonal to.
+        let b: Vec<f64> = (0..n).map(|i| 1.0 + 0.5 * (1.7 * i as f64).sin()).collect();
+        let mut x = b.clone();
+        let regular = mass.factorise().and_then(|()| mass.solve(&mut x)).and_then(|()| mass.check(&x, &b));
+        regular.map_err(|_| AssemblyError::SingularMass)?;
+        self.mass = Some(mass);
+        Ok(())
+    }
+
+    fn step(&mut self) -> Result<(), StepError> {
+        let Table { s, ahead, .. } = self.table;
+        // The guess continues the stages of the last step; with one stage those of the last two.
+        for (next, v) in self.next.chunks_exact_mut(s).zip(self.v.chunks_exact(s)) {
+            match (self.taken, s) {
+                (0, _) => next.copy_from_slice(v),
+                (_, 1) => next[0] = 2.0 * v[0] - next[0],
+                _ => {
+                    for (next, ahead) in next.iter_mut().zip(&ahead) {
+                        *next = ahead.iter().zip(v).map(|(a, v)| a * v).sum();
+                    }
+                }
+            }
+        }
+        let (actions, rho) = (self.actions, self.rho);
+        let done = self.solve().and_then(|()| self.finish());
+        if done.is_err() {
+            // What was known before the step, for another try.
+            self.next.copy_from_slice(&self.v);
+            (self.actions, self.rho) = (actions, rho);
+            self.factors.discard();
+        }
+        done
+    }
+
+    /// The sums that end the step.
+    fn finish(&mut self) -> Result<(), StepError> {
+        let Table { s, b, .. } = self.table;
+        self.evaluate(self.action);
+        let least = self.rho[..s].iter().copied().fold(f64::INFINITY, f64::min);
+        if least.is_nan() || least <= 0.0 {
+            return Err(StepError::StageFactor { rho: least });
+        }
+        if self.action && self.border.is_none() {
+            // What is affine in z is solved for the stages' actions now; the stages were evaluated with that of the start.
+            let of = |f: fn(&First) -> f64| std::array::from_fn(|j| self.stages.get(j).map_or(0.0, f));
+            let actions = self.table.actions(of(|l| l.z), of(|l| l.l));
+            self.stages.iter_mut().zip(actions).for_each(|(stage, action)| stage.l += stage.z * action);
+        }
+        let stages = || self.stages.iter().zip(b).zip(self.rho);
+        let rho = stages().fold(1.0, |sum, ((l, b), rho)| sum - b * rho * l.z);
+        if rho.is_nan() || rho <= 0.0 {
+            return Err(StepError::SigmaVanished { sigma: 1.0 / rho });
+        }
+        let action = stages().map(|((l, b), _)| b * l.l).sum::<f64>();
+        for (i, p) in self.p.iter_mut().enumerate() {
+            let force: f64 = self.stages.iter().zip(b).zip(self.rho).map(|((l, b), rho)| b * rho * l.q[i]).sum();
+            *p = (*p + force) / rho;
+        }
+        for (q, v) in self.q.iter_mut().skip(1).zip(self.next.chunks_exact(s)) {
+            *q += v.iter().zip(b).map(|(v, b)| b * v).sum::<f64>();
+        }
+        if self.action || self.border.is_some() {
+            self.z += action;
+        }
+        self.sigma = 1.0 / rho;
+        std::mem::swap(&mut self.v, &mut self.next);
+        self.taken += 1;
+        Ok(())
+    }
+
+    /// The position and the velocity of a stage.
+    fn place(&mut self, j: usize) -> f64 {
+        let Table { s, a, c, .. } = self.table;
+        let row = a[j];
+        let places = self.place_q.iter_mut().zip(&mut self.place_v).zip(&self.q).skip(1);
+        for (((q, v), q0), stages) in places.zip(self.next.chunks_exact(s)) {
+            *q = q0 + stages.iter().zip(row).map(|(v, a)| a * v).sum::<f64>();
+            *v = stages[j];
+        }
+        self.time() + c[j]
+    }
+
+    /// L and its first derivatives at the stages; without general terms the value only where it is asked for.
+    fn evaluate(&mut self, value: bool) {
+        for j in 0..self.table.s {
+            let t = self.place(j);
+            let at = Place { t, q: &self.place_q, v: &self.place_v, z: self.z + self.actions[j] };
+            self.system.first(at, value, &mut self.stages[j]);
+        }
+        if self.border.is_none() {
+            // Z enters by L = .. + gamma z alone, and rho not at all.
+            let mut rates = [0.0; MOST];
+            rates.iter_mut().zip(&self.stages).for_each(|(rate, l)| *rate = l.z);
+            self.rho = self.table.factors(rates);
+        }
+    }
+
+    /// Solves for the velocities, from the guess in `next` and into it.
+    fn solve(&mut self) -> Result<(), StepError> {
+        let Table { s, a, .. } = self.table;
+        // Below this times eps a correction does not move the position.
+        let resolution = largest(&self.q) / self.h.abs();
+        let mut corrections = Corrections::new();
+        let mut size = f64::INFINITY;
+        for _ in 0..ITERATION_LIMIT {
+            self.evaluate(false);
+            for (i, residual) in self.residual.chunks_exact_mut(s).enumerate() {
+                for (k, residual) in residual.iter_mut().enumerate() {
+                    let force: f64 = (0..s).map(|j| a[k][j] * self.rho[j] * self.stages[j].q[i]).sum();
+                    *residual = self.rho[k] * self.stages[k].v[i] - self.p[i] - force;
+                }
+            }
+            size = largest(&self.residual);
+            if !size.is_finite() {
+                return Err(StepError::NonFinite);
+            }
+            let fresh = !self.factors.ready();
+            if fresh {
+                self.factorise()?;
+                corrections.forget();
+            }
+            self.change.copy_from_slice(&self.residual);
+            self.factors.solve(&mut self.change)?;
+            if fresh {
+                self.factors.check(&self.change, &self.residual)?;
+            }
+            let moved = self.border_change()?;
+            self.next.iter_mut().zip(&self.change).for_each(|(v, change)| *v -= change);
+            self.iterations += 1;
+            let (now, speed) = (largest(&self.change), largest(&self.next));
+            let scale = speed + resolution;
+            let now = if scale > 0.0 { (now / scale).max(moved) } else { moved };
+            if !now.is_finite() {
+                return Err(StepError::NonFinite);
+            }
+            match corrections.judge(now, f64::EPSILON) {
+                Verdict::Done => return Ok(()),
+                Verdict::Further => {}
+                Verdict::Factorise => self.factors.discard(),
+            }
+        }
+        self.factors.discard();
+        Err(StepError::NotConverged { residual: size, iterations: ITERATION_LIMIT })
+    }
+
+    /// Corrects Z and rho, and the correction of the velocities for what these change; how much they moved, each in units of its size.
+    fn border_change(&mut self) -> Result<f64, StepError> {
+        let Some(border) = &self.border else { return Ok(0.0) };
+        let Table { s, a, .. } = self.table;
+        let mut r = Scalars::zeros();
+        let mut size = self.z.abs();
+        for i in 0..s {
+            let sum = |of: &dyn Fn(usize) -> f64| (0..s).map(|j| a[i][j] * of(j)).sum::<f64>();
+            r[i] = self.actions[i] - sum(&|j| self.stages[j].l);
+            r[MOST + i] = self.rho[i] - 1.0 + sum(&|j| self.rho[j] * self.stages[j].z);
+            size += (self.h * self.stages[i].l).abs();
+        }
+        let w = border.solve(&mut self.change, &r);
+        let mut moved = 0.0f64;
+        for i in 0..s {
+            self.actions[i] -= w[i];
+            self.rho[i] -= w[MOST + i];
+            let relative = if w[i] == 0.0 { 0.0 } else { w[i].abs() / size };
+            // `max` would hide a NaN.
+            for relative in [relative, (w[MOST + i] / self.rho[i]).abs()] {
+                if relative.is_nan() {
+                    return Err(StepError::NonFinite);
+                }
+                moved = moved.max(relative);
+            }
+        }
+        Ok(moved)
+    }
+
+    /// Factorises the Jacobian at the present stages.
+    fn factorise(&mut self) -> Result<(), StepError> {
+        self.factors.entries.fill(0.0);
+        if let Some(border) = &mut self.border {
+            border.clear();
+        }
+        for j in 0..self.table.s {
+            let t = self.place(j);
+            let at = Place { t, q: &self.place_q, v: &self.place_v, z: self.z + self.actions[j] };
+            let AssembledGauss { system, table, assembly, factors, border, rho, stages, .. } = self;
+            assembly.add_stage(system, table, at, j, rho[j], &stages[j], &mut factors.entries, border.as_mut());
+        }
+        self.factors.factorise()?;
+        self.factorisations += 1;
+        match &mut self.border {
+            Some(border) => border.reduce(self.table.s, &mut self.factors),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! faer's factors of a sparse matrix without symmetry.
+
+use super::largest;
+use crate::AssemblyError;
+use discrete_herglotz::StepError;
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::sparse::linalg::LuError;
+use faer::sparse::linalg::lu::{LuRef, LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
+use faer::sparse::linalg::qr::{
+    col_etree, col_etree_scratch, column_counts_aat_scratch, column_counts_ata, postorder, postorder_scratch,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Par};
+
+/// The factors `P A Q = L U` of one matrix after another of the same pattern. The symbolic analysis is made once.
+pub(crate) struct LuFactors {
+    begins: Vec<u32>,
+    rows: Vec<u32>,
+    /// The entries of the matrix, by columns.
+    pub entries: Vec<f64>,
+    symbolic: SymbolicLu<u32>,
+    numeric: NumericLu<u32, f64>,
+    scratch: MemBuffer,
+    residual: Vec<f64>,
+    ready: bool,
+}
+
+impl LuFactors {
+    /// Analyses a pattern, given by the beginnings of its columns and the row of each entry.
+    ///
+    /// # Errors
+    /// [`AssemblyError::Memory`] where the matrix, its factors and the workspace may need more than a limit, in bytes. The estimate for the
+    /// factors is a bound for any choice of pivots: that of the Cholesky factor of `A^T A` (George and Ng 1985), once for L and once for U.
+    pub fn new(begins: Vec<u32>, rows: Vec<u32>, limit: usize) -> Result<Self, AssemblyError> {
+        let n = begins.len() - 1;
+        let own = 12 * rows.len() + 8 * n;
+        let too_much = |needed: usize| AssemblyError::Memory { needed, limit };
+        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &begins, None, &rows);
+        // faer has no other cause to fail here than memory.
+        let symbolic = factorize_symbolic_lu(pattern, LuSymbolicParams::default()).map_err(|_| too_much(2 * own))?;
+        let request = StackReq::any_of(&[
+            symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Default::default()),
+            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
+        ]);
+        let count = count_of_ata(pattern, &symbolic).ok_or(too_much(2 * own))?;
+        // A value and an index each, in L and in U, in vectors that faer grows by doubling them.
+        let needed = own.saturating_add(count.saturating_mul(2 * 2 * 12)).saturating_add(request.size_bytes());
+        if needed > limit {
+            return Err(too_much(needed));
+        }
+        let scratch = MemBuffer::try_new(request).map_err(|_| too_much(needed))?;
+        let entries = vec![0.0; rows.len()];
+        let numeric = NumericLu::new();
+        Ok(LuFactors { begins, rows, entries, symbolic, numeric, scratch, residual: vec![0.0; n], ready: false })
+    }
+
+    /// Whether there are factors.
+    pub fn ready(&self) -> bool {
+        self.ready
+    }
+
+    /// Asks for new factors before the next solve.
+    pub fn discard(&mut self) {
+        self.ready = false;
+    }
+
+    /// Factorises the matrix with the present entries.
+    ///
+    /// # Errors
+    /// [`StepError::NonFinite`] where an entry is not finite, [`StepError::Singular`] where no pivot is found.
+    pub fn factorise(&mut self) -> Result<(), StepError> {
+        self.ready = false;
+        // faer would be silent on it.
+        if !self.entries.iter().sum::<f64>().is_finite() {
+            return Err(StepError::NonFinite);
+        }
+        let LuFactors { begins, rows, entries, symbolic, numeric, scratch, .. } = self;
+        let n = begins.len() - 1;
+        let pattern = SymbolicSparseColMatRef::new_checked(n, n, begins, None, rows);
+        let matrix = SparseColMatRef::new(pattern, entries.as_slice());
+        let stack = MemStack::new(scratch);
+        match symbolic.factorize_numeric_lu(numeric, matrix, Par::Seq, stack, Default::default()) {
+            Ok(_) => {
+                self.ready = true;
+                Ok(())
+            }
+            Err(LuError::SymbolicSingular { .. } | LuError::Generic(_)) => Err(StepError::Singular { pivot: 0.0 }),
+        }
+    }
+
+    /// Solves with the last factors; `b` becomes the solution.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] without factors, or where the solution is not finite.
+    pub fn solve(&mut self, b: &mut [f64]) -> Result<(), StepError> {
+        if !self.ready {
+            return Err(StepError::Singular { pivot: 0.0 });
+        }
+        let n = b.len();
+        let factors = LuRef::new_unchecked(&self.symbolic, &self.numeric);
+        let rhs = MatMut::from_column_major_slice_mut(b, n, 1);
+        factors.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(&mut self.scratch));
+        if b.iter().sum::<f64>().is_finite() {
+            return Ok(());
+        }
+        self.ready = false;
+        Err(StepError::Singular { pivot: 0.0 })
+    }
+
+    /// Whether x solves `A x = b`, to half of the digits: faer does not say where factors are singular, and Newton's method makes up for
+    /// the other half.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] where it does not.
+    pub fn check(&mut self, x: &[f64], b: &[f64]) -> Result<(), StepError> {
+        self.residual.copy_from_slice(b);
+        let mut size = largest(b);
+        for (column, ends) in self.begins.windows(2).enumerate() {
+            let range = ends[0] as usize..ends[1] as usize;
+            for (row, a) in self.rows[range.clone()].iter().zip(&self.entries[range]) {
+                let term = a * x[column];
+                self.residual[*row as usize] -= term;
+                size = size.max(term.abs());
+            }
+        }
+        if largest(&self.residual) <= f64::EPSILON.sqrt() * size {
+            return Ok(());
+        }
+        self.ready = false;
+        Err(StepError::Singular { pivot: 0.0 })
+    }
+}
+
+/// The entries of the Cholesky factor of `A^T A` in faer's order of the columns; `None` where there is no memory to count them.
+fn count_of_ata(pattern: SymbolicSparseColMatRef<u32>, symbolic: &SymbolicLu<u32>) -> Option<usize> {
+    let n = pattern.ncols();
+    let mut memory = MemBuffer::try_new(StackReq::any_of(&[
+        col_etree_scratch::<u32>(n, n),
+        postorder_scratch::<u32>(n),
+        column_counts_aat_scratch::<u32>(n, n),
+    ]))
+    .ok()?;
+    let (mut tree, mut post) = (vec![0u32; n], vec![0u32; n]);
+    let (mut counts, mut least) = (vec![0u32; n], vec![0u32; n]);
+    let order = Some(symbolic.col_perm());
+    let tree = col_etree(pattern, order, &mut tree, MemStack::new(&mut memory));
+    postorder(&mut post, tree, MemStack::new(&mut memory));
+    // The pattern is symmetric: it is its own transpose.
+    column_counts_ata(&mut counts, &mut least, pattern, order, tree, &post, MemStack::new(&mut memory));
+    Some(counts.iter().map(|c| *c as usize).sum())
+}

@@ -1,0 +1,243 @@
+//! Contact Gauss collocation of assembled systems: the same maps as the library for small systems, its orders, its momenta, and what is refused.
+
+// What a test cannot go on without is a failure of it.
+#![allow(clippy::unwrap_used)]
+
+use assembled_herglotz::systems::{FputBond, fput_chain};
+use assembled_herglotz::{
+    AssembledGauss, AssembledMidpoint, AssembledSplitting, AssembledSystem, AssemblyError, FIXED, LocalLagrangian,
+    Potential, State,
+};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use discrete_herglotz::{Gauss, InputError, SplittingScheme, StepError, Stepper};
+
+const N: usize = 5;
+const H: f64 = 0.1;
+const STEPS: usize = 20;
+
+/// A linear finite element of a string with consistent masses, a gyroscopic and a time-dependent part, all of it coupled to z nonlinearly.
+struct Piece;
+
+impl LocalLagrangian<2, 1> for Piece {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T, c: &[T; 1]) -> T {
+        let stretch = q[1] - q[0];
+        let kinetic = (v[0] * v[0] + v[0] * v[1] + v[1] * v[1]) * c[0] * (q[0].sin() * 0.1 + 1.0);
+        let gyroscopic = (q[0] * v[1] - q[1] * v[0]) * stretch * 0.2;
+        let drag = (z.sin() + (v[0] + q[1]) * z * 0.3) * 0.05;
+        kinetic + gyroscopic - stretch * stretch * (t.sin() * 0.2 + 0.5) - drag
+    }
+}
+
+/// A site, in a potential.
+struct Site;
+
+impl Potential<1> for Site {
+    #[inline(always)]
+    fn energy<T: Scalar>(&self, t: T, q: &SVector<T, 1>, _c: &[T; 0]) -> T {
+        q[0].versine() * (t.cos() * 0.3 + 1.0)
+    }
+}
+
+const PIECES: [([usize; 2], [f64; 1]); 6] =
+    [([FIXED, 0], [0.5]), ([0, 1], [0.3]), ([1, 2], [0.4]), ([2, 3], [0.35]), ([3, 4], [0.45]), ([4, 1], [0.25])];
+
+/// The mass of the last unknown beyond that of its elements.
+const MASSES: [f64; N] = [0.0, 0.0, 0.0, 0.0, 0.7];
+
+fn large() -> AssembledSystem {
+    AssembledSystem::new(N)
+        .and_then(|s| s.with_masses(MASSES.to_vec()).with_drag(-0.15).with_potential(Site, (0..N).map(|i| [i])))
+        .and_then(|s| s.with_term(Piece, PIECES))
+        .unwrap()
+}
+
+/// The same in one.
+struct Whole;
+
+impl Lagrangian<N> for Whole {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        let mut l = z * -0.15;
+        for i in 0..N {
+            l += v[i] * v[i] * (0.5 * MASSES[i]);
+            l -= Site.energy(t, &SVector::from([q[i]]), &[]);
+        }
+        let at = |x: &SVector<T, N>, i: usize| if i == FIXED { T::zero() } else { x[i] };
+        for (unknowns, c) in PIECES {
+            let of = |x: &SVector<T, N>| SVector::from(unknowns.map(|i| at(x, i)));
+            l += Piece.value(t, &of(q), &of(v), z, &c.map(T::from));
+        }
+        l
+    }
+}
+
+/// Positions, velocities and the action of a start without symmetry, of size one.
+fn start() -> VelocityPoint<N> {
+    let of = |i: usize, shift: f64| (1.7 * i as f64 + shift).sin();
+    VelocityPoint { q: SVector::from_fn(|i, _| of(i, 0.3)), v: SVector::from_fn(|i, _| of(i, 1.1)), z: 0.4 }
+}
+
+/// General terms with consistent masses, gyroscopic, in time, and nonlinear in z: the map of the library for small systems, for one and two
+/// stages, both ways in time, and its conformal factor.
+#[test]
+fn general_terms_are_those_of_the_whole() {
+    let (system, x) = (large(), start());
+    let p = Whole.gradient(0.7, &x).y;
+    let from = State { t: 0.7, q: x.q.as_slice(), v: x.v.as_slice(), z: x.z };
+    for (stages, h) in [(1, H), (2, H), (1, -H), (2, -H)] {
+        let mut a = AssembledGauss::new(&system, stages, h, from, None).unwrap();
+        let gauss = Gauss::new(Whole, stages, h).unwrap();
+        let mut b = gauss.stepper(from.t, PhasePoint { q: x.q, p, z: x.z }, x.v).unwrap();
+        assert_eq!((a.advance(STEPS), b.advance(STEPS)), (Ok(()), Ok(())));
+        // Newton's methods end within the rounding of q/h; the motion separates by at most ten over the time of 2, and W has a condition of
+        // about ten.
+        let tolerance = 100.0 * f64::EPSILON * STEPS as f64 / H;
+        let expected = b.state();
+        for i in 0..N {
+            let (dq, dp) = (a.q()[i] - expected.q[i], a.p()[i] - expected.p[i]);
+            assert!(dq.abs() <= tolerance && dp.abs() <= tolerance, "{stages} stages, {i}: {dq:e}, {dp:e}");
+        }
+        assert!((a.z() - expected.z).abs() <= N as f64 * tolerance, "z differs by {:e}", a.z() - expected.z);
+        // The velocity of a state belongs to its momentum.
+        let (momenta, state) = (a.p().to_vec(), a.state().unwrap());
+        let end = VelocityPoint {
+            q: SVector::from_column_slice(state.q),
+            v: SVector::from_column_slice(state.v),
+            z: state.z,
+        };
+        let off = Whole.gradient(state.t, &end).y - SVector::<f64, N>::from_column_slice(&momenta);
+        assert!(off.amax() <= 100.0 * f64::EPSILON, "p - L_v = {:e}", off.amax());
+    }
+}
+
+/// A motion without symmetry.
+fn motion_of(n: usize) -> (Vec<f64>, Vec<f64>) {
+    let of = |shift: f64| (0..n).map(|i| 0.8 * (0.37 * i as f64 + shift).sin()).collect();
+    (of(0.2), of(1.4))
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+/// With one stage it is the midpoint rule, whose code is another.
+#[test]
+fn one_stage_is_the_midpoint_rule() {
+    let n = 50;
+    let chain = fput_chain(n, FputBond { alpha: 0.3, beta: 1.0 }, -0.1).unwrap();
+    let (q, v) = motion_of(n);
+    let from = State { t: 0.0, q: &q, v: &v, z: 0.2 };
+    let mut a = AssembledGauss::new(&chain, 1, H, from, None).unwrap().with_action();
+    let mut b = AssembledMidpoint::new(&chain, H, from, None).unwrap().with_action();
+    assert_eq!((a.advance(STEPS), b.advance(STEPS)), (Ok(()), Ok(())));
+    // One rounding of the product gamma h, and of each of the quotients.
+    assert!((a.sigma() - b.sigma()).abs() <= 8.0 * f64::EPSILON);
+    let (a, b) = (a.state().unwrap(), b.state());
+    // As in small_systems.rs: Newton's method ends within the rounding of q/h.
+    let tolerance = 200.0 * f64::EPSILON * STEPS as f64 / H;
+    assert!(distance(a.q, b.q) <= tolerance && distance(a.v, b.v) <= tolerance, "{:e}", distance(a.v, b.v));
+    assert!((a.z - b.z).abs() <= n as f64 * tolerance, "{:e}", a.z - b.z);
+}
+
+/// Two stages have order 4 on a nonlinear chain: the slope of the error, to 0.15.
+#[test]
+fn two_stages_have_order_four() {
+    let n = 50;
+    let chain = fput_chain(n, FputBond { alpha: 0.3, beta: 1.0 }, -0.1).unwrap();
+    let (q, v) = motion_of(n);
+    let from = State { t: 0.0, q: &q, v: &v, z: 0.2 };
+    let mut exact = AssembledSplitting::new(&chain, &SplittingScheme::SOFRONIOU_SPALETTA_10, 4.0 / 256.0, from)
+        .unwrap()
+        .with_action();
+    exact.advance(256).unwrap();
+    let end = exact.state();
+    let exact = [end.q, end.v, &[end.z]].concat();
+    let error = |steps: usize| {
+        let mut motion = AssembledGauss::new(&chain, 2, 4.0 / steps as f64, from, None).unwrap().with_action();
+        motion.advance(steps).unwrap();
+        let end = motion.state().unwrap();
+        distance(&[end.q, end.v, &[end.z]].concat(), &exact)
+    };
+    let points = [48, 64, 96, 128].map(|steps| ((4.0 / steps as f64).ln(), error(steps).ln()));
+    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / points.len() as f64;
+    let (mx, my) = (mean(|p| p.0), mean(|p| p.1));
+    let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
+        / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
+    assert!((slope - 4.0).abs() <= 0.15, "order {slope}: {points:?}");
+    // Above what rounding leaves.
+    assert!(points[3].1.exp() > 1e-11, "{points:?} is round-off");
+}
+
+/// What is refused before the first step.
+#[test]
+fn bad_input() {
+    let x = start();
+    let from = State { t: 0.0, q: x.q.as_slice(), v: x.v.as_slice(), z: x.z };
+    let refused =
+        |system: &AssembledSystem, stages, h, memory| AssembledGauss::new(system, stages, h, from, memory).err();
+    let system = large();
+    for stages in [0, 3] {
+        assert_eq!(refused(&system, stages, H, None), Some(InputError::Stages { found: stages }.into()));
+    }
+    assert_eq!(refused(&system, 2, 0.0, None), Some(InputError::Step { h: 0.0 }.into()));
+    let explicit = AssembledSplitting::new(&system, &SplittingScheme::STRANG, H, from).err();
+    let midpoint = AssembledMidpoint::new(&system, H, from, None).err();
+    assert_eq!((explicit, midpoint), (Some(AssemblyError::NotSeparable), Some(AssemblyError::NotSeparable)));
+    let list = |elements: &[[usize; 2]]| {
+        let elements = elements.iter().map(|e| (*e, [1.0]));
+        large().with_term(Piece, elements).err()
+    };
+    let out = AssemblyError::OutOfRange { list: 2, element: 1, unknown: 5, last: 4 };
+    assert_eq!(list(&[[0, 1], [1, 5]]), Some(out));
+    assert_eq!(list(&[[3, 3]]), Some(AssemblyError::Repeated { list: 2, element: 0, unknown: 3 }));
+    // Without a mass: an unknown of no element, and one whose element has no kinetic energy.
+    let some = || AssembledSystem::new(N).unwrap().with_masses(MASSES.to_vec());
+    let first = some().with_term(Piece, PIECES[2..].iter().copied()).unwrap();
+    assert_eq!(refused(&first, 1, H, None), Some(AssemblyError::Mass { unknown: 0, mass: 0.0 }));
+    let negative = large().with_mass(-1.0);
+    assert_eq!(refused(&negative, 1, H, None), Some(AssemblyError::Mass { unknown: 0, mass: -1.0 }));
+    // With the masses of the differences of velocities only.
+    let singular = AssembledSystem::new(N).unwrap().with_term(Relative, (1..N).map(|i| [i - 1, i])).unwrap();
+    assert_eq!(refused(&singular, 1, H, None), Some(AssemblyError::SingularMass));
+    let undefined = large().with_term(Inverse, [[2]]).unwrap();
+    let zero = [0.0; N];
+    let at_zero = AssembledGauss::new(&undefined, 2, H, State { q: &zero, ..from }, None).err();
+    assert_eq!(at_zero, Some(AssemblyError::Undefined { unknown: 2 }));
+    // A limit of memory.
+    let Some(AssemblyError::Memory { needed, limit: 100 }) = refused(&system, 2, H, Some(100)) else {
+        panic!("100 bytes are not enough");
+    };
+    assert!(needed > 100);
+}
+
+/// A kinetic energy of relative motion: singular.
+struct Relative;
+
+impl LocalLagrangian<2> for Relative {
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T, _c: &[T; 0]) -> T {
+        (v[1] - v[0]).powi(2)
+    }
+}
+
+/// Not defined at 0.
+struct Inverse;
+
+impl LocalLagrangian<1> for Inverse {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, _v: &SVector<T, 1>, _z: T, _c: &[T; 0]) -> T {
+        q[0].recip()
+    }
+}
+
+/// A drag so strong that a step has no positive factor: a status, and the state before the step.
+#[test]
+fn a_step_that_fails_keeps_the_state() {
+    let strong = large().with_drag(-60.0);
+    let x = start();
+    let from = State { t: 0.0, q: x.q.as_slice(), v: x.v.as_slice(), z: x.z };
+    let mut motion = AssembledGauss::new(&strong, 1, H, from, None).unwrap();
+    let halt = motion.advance(3).unwrap_err();
+    assert_eq!(halt.taken, 0);
+    assert!(!matches!(halt.cause, StepError::Singular { .. }), "{halt}");
+    assert_eq!((motion.q(), motion.time(), motion.z()), (x.q.as_slice(), 0.0, x.z));
+}
