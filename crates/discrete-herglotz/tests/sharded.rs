@@ -81,6 +81,11 @@ fn a_checkpoint_with_gaps_is_gone_on_from() {
         std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
         assert_eq!(plain(&of), expected, "{there:?}, cut off");
     }
+    // What comes twice is kept once.
+    begin_anew(&[4, 1]);
+    let once = std::fs::read(&path).unwrap();
+    begin_anew(&[4, 4, 1, 4]);
+    assert!(std::fs::read(&path).unwrap() == once);
     // A bit of a shard's number.
     begin_anew(&[4]);
     let mut bytes = std::fs::read(&path).unwrap();

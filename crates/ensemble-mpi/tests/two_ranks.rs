@@ -1,4 +1,4 @@
-//! `ensemble_mpi` by several ranks: the bytes of one process, also after a rank was killed; what is refused ends all ranks.
+//! `ensemble_mpi` by several ranks (`cargo test --release`): the bytes of one process, also after a rank was killed; what is refused ends all ranks.
 
 // What a test cannot go on without is a failure of it.
 #![allow(clippy::unwrap_used, clippy::panic)]
@@ -6,6 +6,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_ensemble_mpi");
@@ -13,14 +14,18 @@ const BINARY: &str = env!("CARGO_BIN_EXE_ensemble_mpi");
 /// What a run takes at most, on a machine with other things to do; a hang is a failure.
 const DEADLINE: Duration = Duration::from_secs(180);
 
-/// A directory for one test.
-struct Folder(PathBuf);
+/// One job at a time: each has work for two cores.
+static JOB: Mutex<()> = Mutex::new(());
+
+/// A directory for one test, and the right to start jobs.
+struct Folder(PathBuf, #[expect(dead_code, reason = "held until the test ends")] MutexGuard<'static, ()>);
 
 impl Folder {
     fn new(name: &str) -> Self {
         let path = std::env::temp_dir().join(format!("ensemble-mpi-{name}-{}", std::process::id()));
         fs::create_dir_all(&path).unwrap();
-        Folder(path)
+        // A test that has failed is no reason for others to fail.
+        Folder(path, JOB.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     fn file(&self, name: &str) -> String {
@@ -125,7 +130,7 @@ fn any_number_of_ranks_gives_the_bytes_of_one() {
 }
 
 /// Long enough to be interrupted: 79 shards.
-const LONG: &str = "--members 30000 --steps 20000";
+const LONG: &str = "--members 30000 --steps 4000";
 
 #[test]
 fn a_rank_that_is_killed_costs_its_open_shards_only() {
@@ -180,7 +185,7 @@ fn what_is_refused_ends_all_ranks() {
     refused(&[(2, "--members 0")], "the ensemble has no members");
     refused(&[(1, "--members 0")], "the ensemble has no members");
     refused(&[(2, "--time NaN")], "member 0: ");
-    refused(&[(2, "--patience -1")], "--patience: ");
+    refused(&[(2, "--patience=-1")], "--patience: ");
     // Ranks that disagree; one of them, not rank 0, that has nothing to run.
     refused(&[(1, "--seed 1"), (1, "--seed 2")], "rank 1 has another ensemble than rank 0");
     refused(&[(2, "--seed 1"), (1, "--time 7")], "rank 2 has another ensemble than rank 0");

@@ -1,16 +1,17 @@
 //! An ensemble of damped pendula over MPI ranks.
 //!
 //! ```text
-//! mpirun -np 2 ensemble_mpi [--members N --time T --steps K --method NAME --checkpoint FILE --out FILE --patience S --seed I --rates]
+//! mpirun -np 2 ensemble_mpi [--members N --time T --steps K --method NAME --seed I --checkpoint FILE --out FILE --means
+//!     --patience S --rates]
 //! ```
 //!
 //! `L = v^2/2 - (1 - cos q) - z/100`; angle and velocity of each member are random numbers seeded with its index. Writes a CSV file with the
-//! members' ends, 17 digits each: the same bytes for any number of ranks, and for runs that were killed and went on from the checkpoint. Ends
+//! members' ends or their means, 17 digits each: the same bytes for any number of ranks, and for runs that were killed and went on from the checkpoint. Ends
 //! with 2 where the input is refused, a checkpoint cannot be used or a rank is lost, with 1 where the CSV file cannot be written.
 
 use clap::Parser;
 use contact_geom::{VelocityPoint, systems::Pendulum};
-use discrete_herglotz::{AnyIntegrator, Ensemble, Member, Steps, Until};
+use discrete_herglotz::{AnyIntegrator, Ensemble, Member, Status, Steps, Until};
 use ensemble_mpi::{Merged, MpiError, Options, run};
 use mpi::topology::Communicator;
 use std::cell::Cell;
@@ -44,6 +45,9 @@ struct Arguments {
     /// The members' ends.
     #[arg(long, value_name = "FILE", default_value = "ensemble_mpi.csv")]
     out: PathBuf,
+    /// Only the means of the ends.
+    #[arg(long)]
+    means: bool,
     /// How many seconds to wait for a rank's next shard; for ever where nothing is said.
     #[arg(long, value_name = "SECONDS")]
     patience: Option<f64>,
@@ -63,10 +67,12 @@ fn random(seed: u64, place: u64) -> f64 {
     (word >> 11) as f64 * f64::EPSILON - 1.0
 }
 
-/// The ends of members as lines of a file that gets its name when it is whole.
+/// The ends of members, or their means, as lines of a file that gets its name when it is whole.
 struct Table {
     path: PathBuf,
     file: BufWriter<File>,
+    /// The members that completed and the sums of their q, p and z, where only the means are wanted.
+    sums: Option<(usize, [f64; 3])>,
 }
 
 impl Table {
@@ -76,13 +82,24 @@ impl Table {
         name.into()
     }
 
-    fn create(path: PathBuf) -> std::io::Result<Self> {
+    fn create(path: PathBuf, means: bool) -> std::io::Result<Self> {
         let mut file = BufWriter::new(File::create(Self::partial(&path))?);
-        writeln!(file, "index,status,t,q,p,z")?;
-        Ok(Table { path, file })
+        writeln!(file, "{}", if means { "members,q,p,z" } else { "index,status,t,q,p,z" })?;
+        Ok(Table { path, file, sums: means.then_some((0, [0.0; 3])) })
     }
 
     fn row(&mut self, member: &Member<1>) -> std::io::Result<()> {
+        if let Some((count, sums)) = &mut self.sums {
+            if let Ok(end) = member.ending
+                && end.status == Status::Completed
+            {
+                *count += 1;
+                for (sum, x) in sums.iter_mut().zip([end.state.q[0], end.state.p[0], end.state.z]) {
+                    *sum += x;
+                }
+            }
+            return Ok(());
+        }
         match member.ending {
             Ok(end) => {
                 let (index, [t, q, p, z]) = (member.index, [end.t, end.state.q[0], end.state.p[0], end.state.z]);
@@ -93,6 +110,15 @@ impl Table {
     }
 
     fn finish(mut self) -> std::io::Result<()> {
+        if let Some((count, sums)) = self.sums {
+            match count {
+                0 => writeln!(self.file, "0,,,")?,
+                _ => {
+                    let [q, p, z] = sums.map(|sum| sum / count as f64);
+                    writeln!(self.file, "{count},{q:.16e},{p:.16e},{z:.16e}")?;
+                }
+            }
+        }
         self.file.flush()?;
         std::fs::rename(Self::partial(&self.path), self.path)
     }
@@ -138,7 +164,7 @@ fn main() -> ExitCode {
     let mut table: Option<std::io::Result<Table>> = None;
     let clock = Instant::now();
     let merged = run(&world, &ensemble, Until::Time(arguments.time), Options { patience }, |member| {
-        let open = table.get_or_insert_with(|| Table::create(arguments.out.clone()));
+        let open = table.get_or_insert_with(|| Table::create(arguments.out.clone(), arguments.means));
         if let Ok(rows) = open
             && let Err(cause) = rows.row(member)
         {
