@@ -61,8 +61,9 @@ pub(super) fn refuse_beyond<const N: usize>(wanted: f64, lanes: &mut [Lane<N>], 
     let square = |x: &PhasePoint<N>| x.q.norm_squared() + x.p.norm_squared();
     for (Lane { state: x, .. }, Lane { state: fine, .. }) in lanes.iter_mut().zip(finer) {
         let apart = square(&PhasePoint { q: x.q - fine.q, p: x.p - fine.p, z: 0.0 });
-        // Not `>`: that would let a NaN pass.
-        if !(apart <= wanted * wanted * square(fine)) {
+        // What is not a number is not within either.
+        let within = apart <= wanted * wanted * square(fine);
+        if !within {
             x.z = f64::NAN;
         }
     }
