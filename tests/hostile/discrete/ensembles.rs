@@ -4,7 +4,7 @@ use super::runs::BY;
 use crate::Attack;
 use crate::numbers::{Claiming, HOSTILE, Report, places, triples};
 use contact_geom::VelocityPoint;
-use discrete_herglotz::{Ensemble, EnsembleError, Member, Status, Steps, Tally, Until};
+use discrete_herglotz::{Ensemble, EnsembleError, Member, Problem, Rows, Status, Steps, Tally, Until};
 
 pub const ATTACKS: &[Attack] = &[Attack {
     on: &[
@@ -17,6 +17,12 @@ pub const ATTACKS: &[Attack] = &[Attack {
         "Ensemble::checkpoint",
         "Ensemble::progress",
         "Ensemble::run",
+        "Ensemble::rows_every",
+        "Ensemble::accuracy",
+        "Ensemble::unwatched",
+        "Ensemble::observe",
+        "ObservedEnsemble::run",
+        "Problem::ensemble",
         "Integrator::in_lanes",
     ],
     run: ensembles,
@@ -25,7 +31,7 @@ pub const ATTACKS: &[Attack] = &[Attack {
 /// The members at their ends.
 fn ends(ensemble: &Ensemble<'_, Claiming, 1>, until: Until) -> Result<(Tally, Vec<Member<1>>), EnsembleError> {
     let mut all = Vec::new();
-    let tally = ensemble.run(until, |member| all.push(*member))?;
+    let tally = ensemble.run(until, |member| all.push(member.clone()))?;
     Ok((tally, all))
 }
 
@@ -69,6 +75,22 @@ fn ensembles(report: &mut Report) {
     let by = BY.into_iter().flatten().next();
     let of = |count| by.map_or(of(count), |by| of(count).by(by));
     report.check(matches!(ends(&of(1).threads(0), until), Err(EnsembleError::Threads)), || "no thread".into());
+    report.check(ends(&of(1).rows_every(0), until).is_err(), || "rows every 0 steps".into());
+    report.check(ends(&of(1).rows_every(usize::MAX).unwatched(), until).is_ok(), || "rows of the ends alone".into());
+    for wanted in HOSTILE {
+        // An error that cannot be had is refused; one above that of any steps may be had.
+        let ended = ends(&of(2).accuracy(wanted), until);
+        report.check(good(&ended, 2), || format!("accuracy {wanted}: {ended:?}"));
+        report.check(wanted > 0.0 || ended.is_err(), || format!("accuracy {wanted}: {ended:?}"));
+    }
+    let observed = of(2).observe(|i| Rows::every(i), |rows: Rows<'_, 1>| rows.rows.len());
+    let mut seen = Vec::new();
+    let tally = observed.run(until, |member, rows| seen.push((member.ending.is_ok(), rows.is_some())));
+    report.check(tally.is_ok() && seen == [(false, false), (true, true)], || format!("observers: {seen:?}"));
+    if let (Ok(problem), Some(by)) = (Problem::new(&Claiming, 0.4, tame), by) {
+        let ended = ends(&problem.ensemble(1, |_| tame).by(by).steps(Steps::Count(3)), until);
+        report.check(ended.is_ok(), || format!("of a problem: {ended:?}"));
+    }
     report.check(ends(&of(1).threads(usize::MAX), until).is_ok(), || "more threads than members".into());
     let folder = std::env::temp_dir();
     report.check(ends(&of(1).checkpoint(folder), until).is_err(), || "a folder for a checkpoint".into());

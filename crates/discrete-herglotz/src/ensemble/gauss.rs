@@ -6,9 +6,12 @@
 use super::lane::Lane;
 use super::pack::Pack;
 use super::twofold::{Pair, Summed};
-use crate::gauss::coefficients::MOST;
+use crate::gauss::FEW;
+use crate::gauss::coefficients::{Coefficients, MOST};
 use crate::gauss::condensed::Condensed;
 use crate::gauss::instructions::Instructions;
+use crate::gauss::resolution::{MOVED, of_sigma};
+use crate::run::watch::ROUNDED;
 use crate::splitting::separable::SeparableForm;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::SVector;
@@ -44,7 +47,20 @@ struct Table {
     end_b: [Pair; MOST],
     grow: Pair,
     end_v: [Pair; MOST],
+    /// What takes the last coefficient of the polynomial through the accelerations.
+    last: [f64; MOST],
 }
+
+/// The last coefficient of the accelerations in the Legendre polynomials, in units of the largest of them, that is a doubt. A run of its own marks steps from
+/// one half on, and looks between the nodes of the last one.
+const TAIL: f64 = 0.1;
+
+/// Of few stages, which have no such tail: the change of the acceleration from step to step, times the step, in units of the velocity. Two of them in
+/// sequence that make more than one together are marked by a run of its own, and motions do not turn evenly.
+const TURN: f64 = 0.4;
+
+/// What is left from one step to the next of the largest velocity, which that is compared with: a run of its own takes that of three steps.
+const KEPT: f64 = 0.5;
 
 impl Table {
     fn new(condensed: &Condensed) -> Self {
@@ -63,6 +79,7 @@ impl Table {
             end_b: exact.end_b.map(pair),
             grow: pair(exact.grow),
             end_v: exact.end_v.map(pair),
+            last: Coefficients::of(condensed.s).last[0],
         }
     }
 }
@@ -82,7 +99,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         if !gamma.is_finite() {
             return Err(InputError::FirstStep(StepError::NonFinite));
         }
-        let table = Box::new(Table::new(&Condensed::new(stages, h, gamma)?));
+        let condensed = Condensed::new(stages, h, gamma)?;
+        // A drag that no step resolves: each member says so by itself.
+        if of_sigma(1.0 + condensed.grow.head, gamma * h) > 1.0 {
+            return Err(InputError::Step { h });
+        }
+        let table = Box::new(Table::new(&condensed));
         Ok(GaussPacks { form, table, t0, h, steps })
     }
 
@@ -113,7 +135,7 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, 
     fn with_simd<S: Simd>(self, _simd: S) {
         let All { packs, lanes, stride } = self;
         if const { N == 1 } {
-            packs.all::<S, 2, ACTION>(lanes, stride);
+            packs.all::<S, 3, ACTION>(lanes, stride);
         } else {
             packs.all::<S, 1, ACTION>(lanes, stride);
         }
@@ -133,6 +155,9 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     /// 1 in lanes whose sweeps go on; and in those that have failed.
     going: Pack<S, K>,
     failed: Pack<S, K>,
+    /// The largest velocity of the last steps, and 1 in lanes with a step in doubt.
+    fast: Pack<S, K>,
+    doubt: Pack<S, K>,
 }
 
 /// The sweeps after which an iteration counts as not contracting.
@@ -204,6 +229,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
                 base: [[zero; N]; MOST],
                 going: zero,
                 failed: zero,
+                fast: zero,
+                doubt: zero,
             };
             for k in 0..self.steps {
                 self.step::<S, K, ACTION>(&mut m, self.t0 + k as f64 * self.h, k > 0);
@@ -211,6 +238,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
                 if taken % stride == 0 || taken == self.steps {
                     for (i, lane) in some.iter_mut().enumerate() {
                         lane.reach(self.t0 + taken as f64 * self.h, self.state(&m, i));
+                        lane.doubtful = m.doubt.lanes()[i] != 0.0;
                     }
                 }
             }
@@ -232,6 +260,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
         let Table { s, b, ahead, .. } = &*self.table;
         let s = (*s).min(MOST);
         let zero = Pack::<S, K>::zero();
+        let last = m.a[0];
         if warm {
             let before = m.a;
             for i in 0..s {
@@ -267,7 +296,42 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
                 self.begin(m, s);
             }
         }
+        self.look(m, warm.then_some(&last), s);
         self.finish::<S, K, ACTION>(m, t, s);
+    }
+
+    /// Looks whether a step resolves the motion, before it is taken: by its accelerations, and the first of the step before.
+    #[inline(always)]
+    fn look<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, last: Option<&[Pack<S, K>; N]>, s: usize) {
+        let (zero, one) = (Pack::<S, K>::zero(), Pack::splat(1.0));
+        let mut wide = zero;
+        for d in 0..N {
+            wide = wide.larger(m.q[d].value.abs());
+        }
+        let h = self.h.abs();
+        if s > FEW {
+            let tails = combined(&self.table.last, &m.a, s);
+            let (mut tail, mut size) = (zero, zero);
+            for d in 0..N {
+                tail = tail.larger(tails[d].abs());
+                for a in &m.a[..s] {
+                    size = size.larger(a[d].abs());
+                }
+            }
+            let moves = (tail * (h * h)).at_most(wide * MOVED, m.doubt, one);
+            m.doubt = tail.at_most(size * TAIL, m.doubt, moves);
+            return;
+        }
+        let (mut turn, mut fast) = (zero, m.fast * KEPT);
+        for d in 0..N {
+            fast = fast.larger(m.v[d].value.abs());
+            if let Some(last) = last {
+                turn = turn.larger((m.a[0][d] - last[d]).abs());
+            }
+        }
+        m.fast = fast;
+        let moves = (turn * (h * h)).at_most(wide * ROUNDED, m.doubt, one);
+        m.doubt = (turn * h).at_most(fast * TURN, m.doubt, moves);
     }
 
     /// What the sweeps of a step have in common.

@@ -10,6 +10,8 @@ pub(super) struct Lane<const N: usize> {
     pub state: PhasePoint<N>,
     /// Its rows, where they are recorded.
     pub rows: Option<Vec<Row<N>>>,
+    /// Whether a step may not have resolved its motion.
+    pub doubtful: bool,
     /// Whether its rows have the action.
     action: bool,
 }
@@ -17,7 +19,7 @@ pub(super) struct Lane<const N: usize> {
 impl<const N: usize> Lane<N> {
     /// At its start, with room for so many rows where they are recorded.
     pub fn new(t0: f64, state: PhasePoint<N>, rows: Option<usize>, action: bool) -> Self {
-        let mut lane = Lane { state, rows: rows.map(Vec::with_capacity), action };
+        let mut lane = Lane { state, rows: rows.map(Vec::with_capacity), doubtful: false, action };
         lane.reach(t0, state);
         lane
     }

@@ -1,5 +1,6 @@
 //! Ensembles: many motions at once, each in a lane of a vector register.
 
+mod accuracy;
 mod checkpoint;
 mod error;
 mod gauss;
@@ -26,6 +27,7 @@ use crate::gauss::lanes::{branched, forget_branches};
 use crate::run::watch::size;
 use crate::run::{digest, rows};
 use crate::{GaussCollocation, InputError, Integrator, Observer, Rows, SplittingScheme, Start, Status, Steps, Until};
+use accuracy::Length;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
 use gauss::GaussPacks;
 use lane::Lane;
@@ -68,8 +70,9 @@ type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + 
 /// its rounding makes of it. By collocation both are exact but for rounding.
 ///
 /// Of what a single run looks at: the claims of the structure are probed for some members, the first and the last among them, and not along
-/// all motions; a start must be finite, a motion must end finite; whether steps resolve the motion is not watched. A single run of a
-/// member that matters looks at all of it.
+/// all motions; a start must be finite, a motion must end finite. Whether steps resolve the motion is looked at in lanes at one drift of each
+/// step of a splitting, and at the accelerations of each step of collocation. A member with a step in doubt has a run of its own
+/// too, and the [`suspicion`](Ending::suspicion) of that; its state is that of the lane.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -94,10 +97,11 @@ pub struct Ensemble<'a, L, const N: usize> {
     count: usize,
     t0: f64,
     integrator: Option<Box<dyn Integrator<'a, L, N> + Sync + 'a>>,
-    steps: Option<Steps>,
+    length: Option<Length<L, N>>,
     action: bool,
     /// The steps from one recorded row to the next.
     rows: Option<usize>,
+    watched: bool,
     threads: Option<usize>,
     instructions: Instructions,
     checkpoint: Option<PathBuf>,
@@ -129,9 +133,10 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             count,
             t0,
             integrator: None,
-            steps: None,
+            length: None,
             action: true,
             rows: None,
+            watched: true,
             threads: None,
             instructions: Instructions::new(),
             checkpoint: None,
@@ -146,7 +151,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
 
     /// The same by steps of a given length or number.
     pub fn steps(self, steps: Steps) -> Self {
-        Ensemble { steps: Some(steps), ..self }
+        Ensemble { length: Some(Length::Given(steps)), ..self }
     }
 
     /// The same on so many threads; as many as there are processors where nothing is said.
@@ -157,6 +162,12 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// Without the action: where z does not act back on the motion it is not computed.
     pub fn without_action(self) -> Self {
         Ensemble { action: false, ..self }
+    }
+
+    /// Without a look in lanes whether the steps resolve the motion. Where they do not, as is known, each member would else have a run of its
+    /// own.
+    pub fn unwatched(self) -> Self {
+        Ensemble { watched: false, ..self }
     }
 
     /// With the states of each member in its [rows](Member::rows): the start, the state after every so many steps, and the end, as by
@@ -242,8 +253,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         }
         let refused = |cause| EnsembleError::Member { index: 0, cause };
         let Some(integrator) = self.integrator.as_deref() else { return Err(refused(InputError::NoIntegrator)) };
-        let Some(steps) = self.steps else { return Err(refused(InputError::NoSteps)) };
-        let common = Common { t0: self.t0, steps, until, action: self.action, rows: self.rows };
+        let Some(length) = self.length else { return Err(refused(InputError::NoSteps)) };
+        let common = Common { t0: self.t0, length, until, action: self.action, rows: self.rows };
         if let Some(stride) = self.rows {
             Rows::<N>::every(stride).map_err(refused)?;
         }
@@ -251,20 +262,28 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         for index in self.sample() {
             let (lagrangian, start) = (self.members)(index);
             match common.plan(integrator, lagrangian, start) {
-                Ok(plan) => planned = planned.or(Some((index, plan))),
+                Ok(plan) if planned.is_some_and(|(_, most): (usize, (f64, usize))| plan.1 <= most.1) => {}
+                Ok(plan) => planned = Some((index, plan)),
                 Err(cause @ InputError::FalseClaim { .. }) => return Err(EnsembleError::Member { index, cause }),
                 Err(cause) => refused = refused.or(Some(EnsembleError::Member { index, cause })),
             }
         }
-        let Some((index, plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
-        rows::check(common.rows_of(plan.1).saturating_mul(self.count.min(SHARD)))
-            .map_err(|cause| EnsembleError::Member { index, cause })?;
-        let (members, count, instructions) = (&*self.members, self.count, self.instructions);
-        let mut task = Task { members, count, instructions, integrator, common, plan, kernel: None, fingerprint: 0 };
+        let Some((index, mut plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
+        let refused = |cause| EnsembleError::Member { index, cause };
+        if length.wanted().is_some() && integrator.in_lanes().is_some() {
+            let length = Length::Given(Steps::Count(plan.1 + plan.1.div_ceil(8)));
+            let (lagrangian, start) = (self.members)(index);
+            plan = Common { length, ..common }.plan(integrator, lagrangian, start).map_err(refused)?;
+        }
+        rows::check(common.rows_of(plan.1).saturating_mul(self.count.min(SHARD))).map_err(refused)?;
+        let (members, count, instructions, watched) =
+            (&*self.members, self.count, self.instructions, self.watched && length.wanted().is_none());
+        let mut task =
+            Task { members, count, instructions, watched, integrator, common, plan, kernels: None, fingerprint: 0 };
         task.fingerprint = task.fingerprint_of(self.sample());
         if self.shared {
             let (lagrangian, start) = members(index);
-            task.kernel = Some(task.kernel_of(lagrangian, start.state(lagrangian, self.t0).as_ref()));
+            task.kernels = Some(task.kernels_of(lagrangian, start.state(lagrangian, self.t0).as_ref()));
         }
         Ok(task)
     }
@@ -277,17 +296,28 @@ enum Kernel<'a, L, const N: usize> {
     Gauss(GaussPacks<'a, L, N>),
 }
 
+impl<L: Lagrangian<N>, const N: usize> Kernel<'_, L, N> {
+    fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, rows: Option<usize>) {
+        match self {
+            Kernel::OneByOne => {}
+            Kernel::Splitting(packs) => packs.run(instructions, lanes, action, rows),
+            Kernel::Gauss(packs) => packs.run(instructions, lanes, action, rows),
+        }
+    }
+}
+
 /// A run of an ensemble after its checks.
 struct Task<'e, 'a, L, const N: usize> {
     members: &'e (dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a),
     count: usize,
     instructions: Instructions,
+    watched: bool,
     integrator: &'e (dyn Integrator<'a, L, N> + Sync + 'a),
-    common: Common,
+    common: Common<L, N>,
     /// The step, and how many.
     plan: (f64, usize),
-    /// That of all members, where they have one Lagrangian.
-    kernel: Option<Kernel<'a, L, N>>,
+    /// Those of all members, where they have one Lagrangian.
+    kernels: Option<[Kernel<'a, L, N>; 2]>,
     fingerprint: u64,
 }
 
@@ -300,17 +330,23 @@ struct Shard<const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
-    /// The kernel for a Lagrangian, by what is read of it at a state.
-    fn kernel_of(&self, lagrangian: &'a L, state: Option<&PhasePoint<N>>) -> Kernel<'a, L, N> {
+    /// The kernels for a Lagrangian, by what is read of it at a state: by the steps, and by twice as many where they are judged by those.
+    fn kernels_of(&self, lagrangian: &'a L, state: Option<&PhasePoint<N>>) -> [Kernel<'a, L, N>; 2] {
+        let (h, steps) = self.plan;
+        let finer = self.common.length.wanted().map(|_| self.kernel_of(lagrangian, state, (0.5 * h, 2 * steps)));
+        [self.kernel_of(lagrangian, state, self.plan), finer.unwrap_or(Kernel::OneByOne)]
+    }
+
+    fn kernel_of(&self, lagrangian: &'a L, state: Option<&PhasePoint<N>>, plan: (f64, usize)) -> Kernel<'a, L, N> {
         let (structure, Some(state)) = (lagrangian.structure(), state) else { return Kernel::OneByOne };
         let kernel = match self.integrator.in_lanes() {
             Some(InLanes::Splitting(scheme)) if structure.separable && structure.is_affine_in_z() => {
-                SplittingPacks::new(lagrangian, &scheme, self.plan, self.common.t0, state).map(Kernel::Splitting)
+                SplittingPacks::new(lagrangian, &scheme, plan, self.common.t0, state).map(Kernel::Splitting)
             }
             Some(InLanes::Gauss(GaussCollocation { stages }))
                 if structure.separable && structure.has_constant_rate() =>
             {
-                GaussPacks::new(lagrangian, stages, self.plan, self.common.t0, state).map(Kernel::Gauss)
+                GaussPacks::new(lagrangian, stages, plan, self.common.t0, state).map(Kernel::Gauss)
             }
             _ => Ok(Kernel::OneByOne),
         };
@@ -320,9 +356,10 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
 
     /// What the ensemble is, by some of its members: of the integrator, the steps, starts, and of L there.
     fn fingerprint_of(&self, sample: impl Iterator<Item = usize>) -> u64 {
-        let Common { t0, action, .. } = self.common;
+        let Common { t0, action, length, .. } = self.common;
         let mut words = vec![N as u64, self.count as u64, t0.to_bits(), action.into(), self.plan.0.to_bits()];
         words.extend([self.plan.1, self.common.rows.unwrap_or(0)].map(|x| x as u64));
+        words.push(length.wanted().unwrap_or(0.0).to_bits());
         words.extend(self.integrator.facts().name.bytes().map(u64::from));
         for index in sample {
             let (lagrangian, start) = (self.members)(index);
@@ -379,12 +416,12 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     /// Runs members of one Lagrangian; returns how many of them in lanes.
     fn group(&self, starts: &[(&'a L, Start<N>)], members: &mut [Member<N>]) -> usize {
         let Some(lagrangian) = starts.first().map(|start| start.0) else { return 0 };
-        let (Common { t0, action, rows, .. }, (h, steps)) = (self.common, self.plan);
+        let (Common { t0, action, rows, length, .. }, (h, steps)) = (self.common, self.plan);
         let (mut places, mut lanes) = (Vec::with_capacity(starts.len()), Vec::with_capacity(starts.len()));
         let mut own = None;
-        let kernel = self.kernel.as_ref().unwrap_or_else(|| {
+        let [kernel, finer] = self.kernels.as_ref().unwrap_or_else(|| {
             let state = starts.iter().find_map(|(_, start)| start.state(lagrangian, t0));
-            own.insert(self.kernel_of(lagrangian, state.as_ref()))
+            own.insert(self.kernels_of(lagrangian, state.as_ref()))
         });
         if !matches!(kernel, Kernel::OneByOne) {
             for (place, (_, start)) in starts.iter().enumerate() {
@@ -399,17 +436,32 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let mut done = [false; SHARD];
         let mut in_lanes = 0;
         forget_branches();
-        match kernel {
-            Kernel::OneByOne => {}
-            Kernel::Splitting(packs) => packs.run(self.instructions, &mut lanes, action, rows),
-            Kernel::Gauss(packs) => packs.run(self.instructions, &mut lanes, action, rows),
+        if let Some(wanted) = length.wanted() {
+            let at_start = lanes.iter().map(|lane: &Lane<N>| Lane::new(t0, lane.state, None, false));
+            let mut ends: Vec<Lane<N>> = at_start.collect();
+            finer.run(self.instructions, &mut ends, false, None);
+            kernel.run(self.instructions, &mut lanes, action, rows);
+            accuracy::refuse_beyond(wanted, &mut lanes, &ends);
+        } else {
+            kernel.run(self.instructions, &mut lanes, action, rows);
         }
         if !branched() {
-            for (place, Lane { state, rows, .. }) in places.into_iter().zip(lanes) {
+            for (place, Lane { state, rows, doubtful, .. }) in places.into_iter().zip(lanes) {
                 if Triple::from(state).is_finite() {
                     let t = t0 + steps as f64 * h;
                     let member = &mut members[place];
-                    member.ending = Ok(Ending { status: Status::Completed, suspicion: None, steps, t, state });
+                    let mut suspicion = None;
+                    if doubtful && self.watched {
+                        let own = self.by_itself(member.index, None::<&mut Rows<'_, N>>);
+                        match own.ending {
+                            Ok(ending) if ending.status == Status::Completed => suspicion = ending.suspicion,
+                            _ => {
+                                (*member, done[place]) = (own, true);
+                                continue;
+                            }
+                        }
+                    }
+                    member.ending = Ok(Ending { status: Status::Completed, suspicion, steps, t, state });
                     member.rows = rows.unwrap_or_default();
                     done[place] = true;
                     in_lanes += 1;

@@ -1,9 +1,8 @@
 //! A member by a run of its own.
 
+use super::accuracy::Length;
 use super::member::{Ending, Member};
-use crate::{
-    Facts, InLanes, InputError, Integrator, Observer, Plan, Problem, Rows, Run, Start, Stepper, Steps, Until, Wants,
-};
+use crate::{Facts, InLanes, InputError, Integrator, Observer, Plan, Problem, Rows, Run, Start, Stepper, Until, Wants};
 use contact_geom::Lagrangian;
 
 /// The integrator of an ensemble, for as long as a run of one member lasts.
@@ -37,19 +36,26 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
 }
 
 /// What all members have in common.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Common {
+pub(super) struct Common<L, const N: usize> {
     pub t0: f64,
-    pub steps: Steps,
+    pub length: Length<L, N>,
     pub until: Until,
     pub action: bool,
     /// The steps from one recorded row to the next.
     pub rows: Option<usize>,
 }
 
-impl Common {
+impl<L, const N: usize> Clone for Common<L, N> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<L, const N: usize> Copy for Common<L, N> {}
+
+impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
     /// Does something with the run of a member.
-    pub fn with<'a, L: Lagrangian<N>, R, const N: usize>(
+    pub fn with<'a, R>(
         &self,
         integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
         lagrangian: &'a L,
@@ -57,12 +63,12 @@ impl Common {
         then: impl FnOnce(Run<'_, '_, L, N>) -> Result<R, InputError>,
     ) -> Result<R, InputError> {
         let problem = Problem::new(lagrangian, self.t0, start)?;
-        let run = problem.by(OfMember { integrator, lagrangian }).steps(self.steps);
+        let run = self.length.of(problem.by(OfMember { integrator, lagrangian }));
         then(if self.action { run } else { run.without_action() })
     }
 
     /// Runs a member, with all checks of a run, under the eyes of an observer.
-    pub fn run<'a, L: Lagrangian<N>, const N: usize>(
+    pub fn run<'a>(
         &self,
         integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
         lagrangian: &'a L,
@@ -93,7 +99,7 @@ impl Common {
     }
 
     /// The step and the number of steps of a member's run, after all checks of a plan.
-    pub fn plan<'a, L: Lagrangian<N>, const N: usize>(
+    pub fn plan<'a>(
         &self,
         integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
         lagrangian: &'a L,

@@ -3,12 +3,13 @@
 use super::lane::Lane;
 use super::pack::Pack;
 use crate::gauss::instructions::Instructions;
+use crate::run::watch::ROUNDED;
 use crate::splitting::drag::{Drag, Drift};
 use crate::splitting::linear_drag::{Stage, SubstepTable};
 use crate::splitting::separable::SeparableForm;
 use crate::{InputError, SplittingScheme};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, largest};
 use pulp::{Simd, WithSimd};
 use std::borrow::Cow;
 
@@ -17,9 +18,46 @@ pub(super) struct SplittingPacks<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
     drag: Drag<N>,
     table: SubstepTable,
+    look: Look,
     h: f64,
     t0: f64,
     steps: usize,
+}
+
+/// A look at one drift of each step, the longest: whether it resolves the motion.
+///
+/// A run of its own watches all drifts, which takes a third of its time. Two drifts of lengths s1, s2 in sequence that it marks turn an oscillation of
+/// frequency omega by `omega^2 (s1^2 + s2^2) > 1` (see `run/watch.rs`), so that the longest of all, s, turns it by more than
+/// `s^2 / (s1^2 + s2^2)` of its momentum: the change of the force in the drift times s, against the momentum. What does so has the run of
+/// its own, which judges.
+struct Look {
+    /// Which drift, and its length.
+    stage: usize,
+    span: f64,
+    /// The square of the turn, in units of the momentum, that is a doubt.
+    turn: f64,
+}
+
+/// The part of a turn that is a doubt, for motions that do not turn evenly.
+const MARGIN: f64 = 0.8;
+
+/// What is left from one step to the next of the square of the largest momentum: a force that acts as the motion turns back is compared
+/// with the momenta of the steps around.
+const KEPT: f64 = 0.9;
+
+impl Look {
+    fn new(table: &SubstepTable) -> Self {
+        let squares = || table.joined.iter().map(|stage| stage.span * stage.span);
+        let (mut stage, mut longest) = (0, 0.0);
+        for (i, square) in squares().enumerate() {
+            if square > longest {
+                (stage, longest) = (i, square);
+            }
+        }
+        let pairs = squares().zip(squares().cycle().skip(1)).map(|(a, b)| a + b);
+        let turn = MARGIN * longest / largest(pairs);
+        Look { stage, span: longest.sqrt(), turn: turn * turn }
+    }
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
@@ -34,7 +72,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         let form = SeparableForm::read(lagrangian, h, t0, state)?;
         let drag = Drag::of(&form, t0, state)?;
         let table = SubstepTable::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
-        Ok(SplittingPacks { form, drag, table, h, t0, steps })
+        let look = Look::new(&table);
+        Ok(SplittingPacks { form, drag, table, look, h, t0, steps })
     }
 
     /// Takes all steps of some motions, in place, with a state recorded after each `rows` of them. One that is not finite at its start or
@@ -90,6 +129,9 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     z: Pack<S, K>,
     force: SVector<Pack<S, K>, N>,
     value: Pack<S, K>,
+    /// The square of the largest momentum of the last steps, and 1 in lanes with a step in doubt.
+    fast: Pack<S, K>,
+    doubt: Pack<S, K>,
 }
 
 impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
@@ -112,10 +154,12 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
                 SVector::from_fn(|d, _| Pack::from_lanes(|i| some[i.min(last)].state.p[d])),
             );
             let z = Pack::from_lanes(|i| some[i.min(last)].state.z);
-            let mut m = Moving { q, p, carry: SVector::from_element(zero), z, force: q, value: zero };
-            self.take_steps::<S, K, ACTION>(&mut m, stride, |t, at| {
+            let m =
+                Moving { q, p, carry: SVector::from_element(zero), z, force: q, value: zero, fast: zero, doubt: zero };
+            self.take_steps::<S, K, ACTION>(m, stride, |t, at| {
                 for (i, lane) in some.iter_mut().enumerate() {
                     lane.reach(t, at.state(i));
+                    lane.doubtful = at.doubt.lanes()[i] != 0.0;
                 }
             });
         }
@@ -125,30 +169,57 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
     #[inline(always)]
     fn take_steps<S: Simd, const K: usize, const ACTION: bool>(
         &self,
-        m: &mut Moving<S, K, N>,
+        mut m: Moving<S, K, N>,
         stride: usize,
         mut reach: impl FnMut(f64, &Moving<S, K, N>),
     ) {
         let SplittingPacks { t0, h, steps, .. } = self;
         let mut table = Cow::Borrowed(&self.table);
-        self.take_force(m, *t0);
+        self.take_force(&mut m, *t0);
         let mut taken = 0;
         while taken < *steps {
             let next = taken.saturating_add(stride).min(*steps);
             for k in taken..next {
                 let t = t0 + k as f64 * h;
                 self.set_time(&mut table, t);
-                for stage in if k == 0 { &table.first } else { &table.joined } {
-                    self.kick_and_drift::<S, K, ACTION>(m, stage);
-                    self.take_force(m, t + stage.time);
+                let stages = if k == 0 { &table.first } else { &table.joined };
+                // The drift that is looked at by itself: along the others no register is held for the look.
+                let (ahead, from) = stages.split_at(self.look.stage);
+                let (looked_at, after) = from.split_at(1);
+                for part in [ahead, looked_at, after] {
+                    let before = m.force;
+                    for stage in part {
+                        self.kick_and_drift::<S, K, ACTION>(&mut m, stage);
+                        self.take_force(&mut m, t + stage.time);
+                    }
+                    if std::ptr::eq(part, looked_at) {
+                        self.look_at(&mut m, &before, self.look.span);
+                    }
                 }
             }
             taken = next;
             // Completed on a copy: what the next step has in common with the last goes on.
-            let mut at = *m;
+            let mut at = m;
             self.kick_and_drift::<S, K, ACTION>(&mut at, &table.closing);
             reach(t0 + taken as f64 * h, &at);
         }
+    }
+
+    /// Looks at a drift of this length, by the force before it.
+    #[inline(always)]
+    fn look_at<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, before: &SVector<Pack<S, K>, N>, span: f64) {
+        let zero = Pack::splat(0.0);
+        let (mut turn, mut fast, mut wide) = (zero, zero, zero);
+        for d in 0..N {
+            let change = (m.force[d] - before[d]) * span;
+            turn = change.mul_add(change, turn);
+            fast = m.p[d].mul_add(m.p[d], fast);
+            wide = m.q[d].mul_add(m.q[d], wide);
+        }
+        m.fast = fast.larger(m.fast * KEPT);
+        // What moves the position by less than its rounding is none.
+        let moves = (turn * (self.h * self.h)).at_most(wide * (ROUNDED * ROUNDED), m.doubt, Pack::splat(1.0));
+        m.doubt = turn.at_most(m.fast * self.look.turn, m.doubt, moves);
     }
 
     #[inline(always)]

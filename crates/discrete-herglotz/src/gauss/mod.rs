@@ -20,7 +20,7 @@ mod look;
 mod mass;
 mod modes;
 mod position_newton;
-mod resolution;
+pub(crate) mod resolution;
 mod separable;
 mod simplified;
 mod stage_equations;

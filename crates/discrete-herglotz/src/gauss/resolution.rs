@@ -16,14 +16,14 @@ const SIGMA: f64 = 0.1;
 const TAIL: f64 = 0.5;
 
 /// What a tail must move of the positions to count: below it the stages are round-off.
-const MOVED: f64 = 1e-8;
+pub(crate) const MOVED: f64 = 1e-8;
 
 /// The change of a sweep, relative to the stages, from which on their tail is looked at: what the last step's polynomial has
 /// foretold to a tenth is resolved.
 pub(super) const FORETOLD: f64 = 0.1;
 
 /// The misfit of a conformal factor: `ln sigma_d` against the integral of `L_z`; above one where the step does not resolve it.
-pub(super) fn of_sigma(sigma: f64, integral: f64) -> f64 {
+pub(crate) fn of_sigma(sigma: f64, integral: f64) -> f64 {
     (sigma.ln() - integral).abs() / SIGMA
 }
 

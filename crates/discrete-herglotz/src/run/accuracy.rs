@@ -56,7 +56,7 @@ struct Converged<const N: usize> {
 
 /// The stages of Gauss collocation for an error, where no integrator is named: few steps of many stages cost their tables, many steps of
 /// few stages their number.
-fn stages_for(wanted: f64) -> usize {
+pub(crate) fn stages_for(wanted: f64) -> usize {
     if wanted < 1e-10 { 12 } else { 8 }
 }
 

@@ -50,6 +50,7 @@ pub use watch::Doubt;
 
 use crate::{InputError, StepError};
 use accuracy::Choice;
+pub(crate) use accuracy::stages_for;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
 use std::sync::Arc;

@@ -29,7 +29,7 @@ pub(crate) struct Watch<const N: usize> {
 const SHARP: f64 = 0.05;
 
 /// What moves a position by less than this part of it is its rounding.
-const ROUNDED: f64 = 1e-10;
+pub(crate) const ROUNDED: f64 = 1e-10;
 
 /// What rounding moves a motion from this start by, at most. Forces are rounded as they are at its size, so that this holds too where it has
 /// come to rest beside the origin.

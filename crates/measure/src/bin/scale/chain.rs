@@ -5,7 +5,9 @@ use crate::memory::peak;
 use crate::report::Report;
 use crate::seconds::{best, done, together};
 use assembled_herglotz::systems::{FputBond, fput_chain};
-use assembled_herglotz::{AssembledGauss, AssembledMidpoint, AssembledSplitting, AssembledSystem, AssemblyError, State};
+use assembled_herglotz::{
+    AssembledGauss, AssembledMidpoint, AssembledSplitting, AssembledSystem, AssemblyError, State,
+};
 use contact_examples::Failure;
 use discrete_herglotz::SplittingScheme;
 use faer::prelude::Solve;
