@@ -40,7 +40,7 @@ pub struct FormulaLagrangian<const N: usize> {
     smooth: bool,
     cyclic: [bool; N],
     /// `L_q`, `L_v` and `L_z`.
-    partials: Vec<Id>,
+    pub(crate) partials: Vec<Id>,
     value: Tape,
     force: Tape,
     gradient: Tape,

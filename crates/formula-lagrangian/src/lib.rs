@@ -10,6 +10,7 @@ mod graph;
 mod lagrangian;
 mod names;
 mod parser;
+mod rust_source;
 mod structure;
 mod tape;
 mod token;

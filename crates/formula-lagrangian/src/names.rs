@@ -58,7 +58,7 @@ impl Names {
     /// Checks that a new name is one, and is not taken.
     fn check(&self, name: &str) -> Result<(), FormulaError> {
         let first = name.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_');
-        if !(first && name.chars().all(|c| c.is_alphanumeric() || c == '_')) {
+        if !(first && name.chars().all(|c| c.is_alphabetic() || c.is_ascii_digit() || c == '_')) {
             return Err(bad(name, "is not a letter followed by letters, digits and `_`"));
         }
         if is_reserved(name) {

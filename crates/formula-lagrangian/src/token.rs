@@ -51,7 +51,7 @@ pub(crate) fn words(text: &str) -> Result<Vec<Word<'_>>, ParseError> {
                 continue;
             }
             c if c.is_alphabetic() || c == '_' => {
-                rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len())
+                rest.find(|c: char| !(c.is_alphabetic() || c.is_ascii_digit() || c == '_')).unwrap_or(rest.len())
             }
             c if c.is_ascii_digit() || c == '.' => number_length(rest),
             '*' if rest.starts_with("**") => 2,
