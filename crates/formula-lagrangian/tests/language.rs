@@ -56,8 +56,6 @@ fn values_are_those_of_the_same_operations() {
         ("versine(x)", 2.0 * (0.5 * x).sin().powi(2)),
         ("min(x, y, a)", -1.0),
         ("max(x, y, a)", 3.0),
-        ("x^2.5", x.sqrt().powi(5)),
-        ("x^-1.5", x.sqrt().powi(-3)),
         ("x^a", 8.0),
         ("y^a", -1.0),
         ("x^0.3", x.powf(0.3)),
@@ -75,9 +73,8 @@ fn values_are_those_of_the_same_operations() {
         ("L = x", 2.0),
         ("(x\n+\ny)", 1.0),
         ("pi*x", std::f64::consts::TAU),
-        ("t' = 3; t'", f64::NAN),
     ];
-    for (text, expected) in table.iter().filter(|(text, _)| !text.starts_with("t'")) {
+    for (text, expected) in table {
         assert_eq!(value(text), *expected, "{text}");
     }
     // Composed of others: some roundings.
@@ -91,6 +88,8 @@ fn values_are_those_of_the_same_operations() {
         ("asin(x/4)", 0.5f64.asin()),
         ("acos(y/3)", (-1.0 / 3.0f64).acos()),
         ("acos(x/4)", 0.5f64.acos()),
+        ("x^2.5", x.powf(2.5)),
+        ("x^-1.5", x.powf(-1.5)),
     ];
     for (text, expected) in composed {
         let found = value(text);
@@ -136,7 +135,7 @@ fn errors_show_the_place_and_the_remedy() {
         ("1/0 + x", 1, 2, "this is inf"),
         ("ln(0)", 1, 1, "this is -inf"),
         ("1e999", 1, 1, "too large"),
-        ("1.2.3", 1, 4, "`.3`"),
+        ("1.2.3", 1, 4, "the number 0.3 where an operator is expected"),
         ("x $ y", 1, 3, "'$' has no meaning"),
         ("r = x", 1, 6, "after the definition of `r` a value is expected"),
         ("x = 3; y", 1, 1, "the name `x` is taken"),
