@@ -106,10 +106,11 @@ impl Graph {
                     let part = self.mul(adjoint, inverse);
                     give(self, a, part);
                     if asked(b) {
-                        let steep = self.mul(part, a);
+                        // The sign goes to a constant, where it costs nothing.
+                        let minus = self.neg(a);
+                        let steep = self.mul(part, minus);
                         let steep = self.mul(steep, inverse);
-                        let part = self.neg(steep);
-                        give(self, b, part);
+                        give(self, b, steep);
                     }
                 }
                 Operation::Min | Operation::Max => {

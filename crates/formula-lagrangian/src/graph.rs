@@ -257,7 +257,7 @@ impl Graph {
         match (function, self.node(a)) {
             (Function::Neg, Node::Unary(Function::Neg, b)) => b,
             (Function::Neg, Node::Binary(Operation::Sub, b, c)) => self.sub(c, b),
-            (Function::Neg, Node::Binary(Operation::Mul, b, c)) if self.as_number(c).is_some() => {
+            (Function::Neg, Node::Binary(Operation::Mul, b, c)) if self.is_constant(c) => {
                 let c = self.unary(Function::Neg, c);
                 self.mul(b, c)
             }
@@ -377,7 +377,7 @@ impl Graph {
             _ => {}
         }
         for (first, second) in [(a, b), (b, a)] {
-            if let Some(first) = self.negated(first) {
+            if let Some(first) = self.negated(first).filter(|a| !self.is_constant(*a)) {
                 let product = self.mul(first, second);
                 return self.neg(product);
             }

@@ -167,6 +167,12 @@ impl Body<'_> {
         }
     }
 
+    /// A node on the right of an operator.
+    fn right_operand(&self, id: Id) -> String {
+        let operand = self.operand(id);
+        if operand.starts_with('-') { format!("({operand})") } else { operand }
+    }
+
     /// A node as a number over T.
     fn number(&self, id: Id) -> String {
         let operand = self.operand(id);
@@ -176,6 +182,7 @@ impl Body<'_> {
     /// The right side of the statement of a node; `None` for what is an operand by itself.
     fn right(&self, id: Id) -> Option<String> {
         let (o, n, constant) = (|id| self.operand(id), |id| self.number(id), |id| self.graph.is_constant(id));
+        let r = |id| self.right_operand(id);
         // Over T where one of the operands is.
         let all = |ids: [Id; 2]| if constant(id) { ids.map(o) } else { ids.map(n) };
         Some(match self.graph.node(id) {
@@ -190,14 +197,14 @@ impl Body<'_> {
             Node::Binary(operation, a, b) => {
                 let both = !constant(id) && constant(a);
                 match operation {
-                    Operation::Add if both => format!("{} + {}", o(b), o(a)),
-                    Operation::Add => format!("{} + {}", o(a), o(b)),
-                    Operation::Sub if both => format!("-{} + {}", o(b), o(a)),
-                    Operation::Sub => format!("{} - {}", o(a), o(b)),
-                    Operation::Mul if both => format!("{} * {}", o(b), o(a)),
-                    Operation::Mul => format!("{} * {}", o(a), o(b)),
-                    Operation::Div if both => format!("{} / {}", n(a), o(b)),
-                    Operation::Div => format!("{} / {}", o(a), o(b)),
+                    Operation::Add if both => format!("{} + {}", o(b), r(a)),
+                    Operation::Add => format!("{} + {}", o(a), r(b)),
+                    Operation::Sub if both => format!("-{} + {}", o(b), r(a)),
+                    Operation::Sub => format!("{} - {}", o(a), r(b)),
+                    Operation::Mul if both => format!("{} * {}", o(b), r(a)),
+                    Operation::Mul => format!("{} * {}", o(a), r(b)),
+                    Operation::Div if both => format!("{} / {}", n(a), r(b)),
+                    Operation::Div => format!("{} / {}", o(a), r(b)),
                     Operation::Power => format!("Scalar::powf({}, {})", o(a), o(b)),
                     Operation::Min | Operation::Max | Operation::Atan2 | Operation::Hypot => {
                         let [a, b] = all([a, b]);
@@ -234,7 +241,6 @@ fn literal(x: f64) -> String {
         _ if x.is_nan() => "f64::NAN".to_owned(),
         f64::INFINITY => "f64::INFINITY".to_owned(),
         f64::NEG_INFINITY => "f64::NEG_INFINITY".to_owned(),
-        _ if x < 0.0 => format!("({x:?})"),
         _ => format!("{x:?}"),
     }
 }

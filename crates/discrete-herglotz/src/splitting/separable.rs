@@ -79,6 +79,12 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         self.lagrangian.with_force(t, &rest)
     }
 
+    /// `L_q` alone, for what does not ask for the action.
+    #[inline(always)]
+    pub(crate) fn force(&self, t: f64, q: &SVector<f64, N>, z: f64) -> SVector<f64, N> {
+        self.lagrangian.force(t, &VelocityPoint { q: *q, v: SVector::zeros(), z })
+    }
+
     /// The kick at a start.
     ///
     /// # Errors
