@@ -37,23 +37,18 @@ impl Tape {
     fn evaluate_here<T: Scalar>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
         let zero = T::zero();
         let (mut small, mut middle, mut large, mut heap);
-        let registers: &mut [T] = match self.registers {
-            0..=SMALL => {
-                small = [zero; SMALL];
-                &mut small
-            }
-            0..=MIDDLE => {
-                middle = [zero; MIDDLE];
-                &mut middle
-            }
-            0..=LARGE => {
-                large = [zero; LARGE];
-                &mut large
-            }
-            many => {
-                heap = vec![zero; many];
-                &mut heap
-            }
+        let registers: &mut [T] = if self.registers <= SMALL {
+            small = [zero; SMALL];
+            &mut small
+        } else if self.registers <= MIDDLE {
+            middle = [zero; MIDDLE];
+            &mut middle
+        } else if self.registers <= LARGE {
+            large = [zero; LARGE];
+            &mut large
+        } else {
+            heap = vec![zero; self.registers];
+            &mut heap
         };
         let inputs = at.q.iter().chain(at.v).chain([&at.z, &at.t]);
         for (register, input) in registers.iter_mut().zip(inputs) {

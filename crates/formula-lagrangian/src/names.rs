@@ -90,9 +90,7 @@ impl Names {
 
 /// Whether a name has a meaning of its own everywhere.
 pub(crate) fn is_reserved(name: &str) -> bool {
-    RESERVED.contains(&name)
-        || FUNCTIONS.iter().any(|f| f.0 == name)
-        || OPERATIONS.iter().any(|o| o.0 == name)
+    RESERVED.contains(&name) || FUNCTIONS.iter().any(|f| f.0 == name) || OPERATIONS.iter().any(|o| o.0 == name)
 }
 
 fn bad(name: &str, why: &'static str) -> FormulaError {

@@ -107,11 +107,8 @@ impl<'a> Parser<'a> {
     fn word(&self, ahead: usize) -> Word<'a> {
         let end = (self.text.len(), self.text.len());
         let mut words = self.words.iter().skip(self.at);
-        let word = if self.brackets == 0 {
-            words.nth(ahead)
-        } else {
-            words.filter(|w| w.token != Token::Line).nth(ahead)
-        };
+        let word =
+            if self.brackets == 0 { words.nth(ahead) } else { words.filter(|w| w.token != Token::Line).nth(ahead) };
         word.copied().unwrap_or(Word { token: Token::End, span: end })
     }
 
@@ -155,7 +152,9 @@ impl<'a> Parser<'a> {
         let hint = match (before, word.token) {
             (Some(Token::Number(_) | Token::Name(_) | Token::Sign(')' | ']')), Token::Name(_) | Token::Number(_))
             | (Some(Token::Number(_) | Token::Sign(')' | ']')), Token::Sign('(')) => "; a product is written with `*`",
-            (Some(Token::Number(_)), Token::Sign(',')) if wanted == "an operator" => "; numbers have a point, not a comma",
+            (Some(Token::Number(_)), Token::Sign(',')) if wanted == "an operator" => {
+                "; numbers have a point, not a comma"
+            }
             _ => "",
         };
         self.error(word, format!("{} where {wanted} is expected{hint}", word.shown()))

@@ -7,10 +7,10 @@ use std::fmt::{Display, Formatter, Write};
 
 /// The words of Rust that cannot be names of fields.
 const KEYWORDS: [&str; 51] = [
-    "as", "async", "await", "break", "const", "continue", "crate", "dyn", "else", "enum", "extern", "false", "fn", "for",
-    "gen", "if", "impl", "in", "let", "loop", "match", "mod", "move", "mut", "pub", "ref", "return", "self", "Self",
-    "static", "struct", "super", "trait", "true", "type", "unsafe", "use", "where", "while", "abstract", "become", "box",
-    "do", "final", "macro", "override", "priv", "typeof", "unsized", "virtual", "yield",
+    "as", "async", "await", "break", "const", "continue", "crate", "dyn", "else", "enum", "extern", "false", "fn",
+    "for", "gen", "if", "impl", "in", "let", "loop", "match", "mod", "move", "mut", "pub", "ref", "return", "self",
+    "Self", "static", "struct", "super", "trait", "true", "type", "unsafe", "use", "where", "while", "abstract",
+    "become", "box", "do", "final", "macro", "override", "priv", "typeof", "unsized", "virtual", "yield",
 ];
 
 /// The functions that are not methods of numbers, as they are written where they are used.
@@ -31,7 +31,8 @@ impl<const N: usize> FormulaLagrangian<N> {
     /// # Errors
     /// [`FormulaError::Name`] where `name` cannot be that of a type.
     pub fn to_rust(&self, name: &str) -> Result<String, FormulaError> {
-        let letters = name.chars().all(|c| c.is_ascii_alphanumeric()) && name.starts_with(|c: char| c.is_ascii_uppercase());
+        let letters =
+            name.chars().all(|c| c.is_ascii_alphanumeric()) && name.starts_with(|c: char| c.is_ascii_uppercase());
         if !letters || KEYWORDS.contains(&name) {
             return Err(FormulaError::Name { name: name.to_owned(), why: "is not that of a type, such as `MySystem`" });
         }
@@ -45,7 +46,10 @@ impl<const N: usize> FormulaLagrangian<N> {
         let (graph, root) = (&self.formula().graph, self.formula().root);
         let fields: Vec<String> = self.formula().parameters().map(|(name, _)| field(name)).collect();
         let coordinates = self.formula().coordinates().join(", ");
-        writeln!(out, "//! A Lagrangian of the coordinates {coordinates}, made from its formula by formula-lagrangian.\n")?;
+        writeln!(
+            out,
+            "//! A Lagrangian of the coordinates {coordinates}, made from its formula by formula-lagrangian.\n"
+        )?;
         writeln!(out, "use contact_geom::nalgebra::SVector;")?;
         writeln!(out, "use contact_geom::{{Lagrangian, Scalar, Structure, Triple, VelocityPoint}};\n")?;
         writeln!(out, "/// The Lagrangian with its parameters.\n#[derive(Clone, Copy, Debug, PartialEq)]")?;
@@ -70,10 +74,7 @@ impl<const N: usize> FormulaLagrangian<N> {
         let [t, x, ..] = body.names(&["t", "x", "x", "x"]);
         writeln!(out, "    #[inline(always)]")?;
         let triple = format!("Option<Triple<{N}, T>>");
-        writeln!(
-            out,
-            "    fn closed_gradient<T: Scalar>(&self, {t}: T, {x}: &VelocityPoint<{N}, T>) -> {triple} {{"
-        )?;
+        writeln!(out, "    fn closed_gradient<T: Scalar>(&self, {t}: T, {x}: &VelocityPoint<{N}, T>) -> {triple} {{")?;
         write!(out, "{body}")?;
         let part = |from: usize| {
             let ids = self.partials.iter().skip(from).take(N);
@@ -83,7 +84,8 @@ impl<const N: usize> FormulaLagrangian<N> {
         writeln!(out, "        let (l_q, l_v) = (SVector::from([{}]), SVector::from([{}]));", part(0), part(N))?;
         writeln!(out, "        Some(Triple {{ x: l_q, y: l_v, z: {z} }})\n    }}\n")?;
 
-        let Structure { autonomous, z_affine, constant_rate, separable, quadratic, constant_mass, .. } = self.structure();
+        let Structure { autonomous, z_affine, constant_rate, separable, quadratic, constant_mass, .. } =
+            self.structure();
         // Not what the present value of a parameter gives: fields can be changed.
         let z_free = !graph.inputs(root).meets(Inputs::ACTION);
         writeln!(out, "    fn structure(&self) -> Structure {{\n        Structure {{")?;

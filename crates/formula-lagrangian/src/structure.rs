@@ -119,4 +119,3 @@ impl Graph {
         images.last().copied().unwrap_or(of)
     }
 }
-

@@ -228,10 +228,7 @@ impl Builder<'_> {
     fn release(&mut self, id: Id) {
         let uses = &mut self.uses[id.index()];
         *uses = uses.saturating_sub(1);
-        let is_input = matches!(
-            self.graph.node(id),
-            Node::Position(_) | Node::Velocity(_) | Node::Action | Node::Time
-        );
+        let is_input = matches!(self.graph.node(id), Node::Position(_) | Node::Velocity(_) | Node::Action | Node::Time);
         if *uses == 0
             && !is_input
             && let Some(place) = self.place[id.index()].take()

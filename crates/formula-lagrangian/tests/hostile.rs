@@ -1,5 +1,7 @@
 //! Random texts and random changes of good ones: an answer or an error, and nothing else.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
+
 use formula_lagrangian::Formula;
 
 /// Numbers without pattern (G. Marsaglia, "Xorshift RNGs", 2003).
@@ -15,9 +17,54 @@ impl Random {
 }
 
 const WORDS: [&str; 48] = [
-    "x", "y", "x'", "y'", "z", "t", "a", "gamma", "pi", "n", "q[", "v[", "]", "(", ")", "+", "-", "*", "/", "^", "**",
-    ",", "=", "<", ">", "'", ";", "\n", "#", "0", "1", "2", "0.5", "1e308", "1e-308", "3.5", "sum(i,0,3,", "sum(", "i",
-    "sin(", "sqrt(", "ln(", "atan2(", "if(", "min(", "\u{3b8}", "\u{1f600}", ".",
+    "x",
+    "y",
+    "x'",
+    "y'",
+    "z",
+    "t",
+    "a",
+    "gamma",
+    "pi",
+    "n",
+    "q[",
+    "v[",
+    "]",
+    "(",
+    ")",
+    "+",
+    "-",
+    "*",
+    "/",
+    "^",
+    "**",
+    ",",
+    "=",
+    "<",
+    ">",
+    "'",
+    ";",
+    "\n",
+    "#",
+    "0",
+    "1",
+    "2",
+    "0.5",
+    "1e308",
+    "1e-308",
+    "3.5",
+    "sum(i,0,3,",
+    "sum(",
+    "i",
+    "sin(",
+    "sqrt(",
+    "ln(",
+    "atan2(",
+    "if(",
+    "min(",
+    "\u{3b8}",
+    "\u{1f600}",
+    ".",
 ];
 
 const GOOD: [&str; 6] = [

@@ -1,5 +1,7 @@
 //! What texts mean, and what is said of those that mean nothing.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
+
 use formula_lagrangian::{Formula, FormulaError, ParseError};
 
 /// The value of a text over x, y with parameter a = 3, at x = 2, y = -1, x' = 0.5, y' = 4, z = 7, t = 0.25.
@@ -38,7 +40,7 @@ fn values_are_those_of_the_same_operations() {
         ("5.*x", 10.0),
         // A number to its last digit.
         ("0.1000000000000000055511151231257827021181583404541015625", 0.1),
-        ("2.2250738585072011e-308", 2.225_073_858_507_201_1e-308),
+        ("2.2250738585072011e-308", 2.225_073_858_507_201e-308),
         ("x*3.141592653589793238462643383279502884", x * std::f64::consts::PI),
         ("sqrt(x)", x.sqrt()),
         ("abs(y) + sign(y) + sign(x - 2)", 0.0),
@@ -157,7 +159,10 @@ fn errors_show_the_place_and_the_remedy() {
     assert_eq!(error("unheard_of").nearest, None);
     let shown = "line 1, column 8: unknown name `gama`; did you mean `gamma`?\n  x'^2 + gama*z\n         ^^^^";
     assert_eq!(error("x'^2 + gama*z").to_string(), shown);
-    assert_eq!(error("x'^2 + gama*z").moved_to(7, 13).to_string(), shown.replace("line 1, column 8", "line 7, column 20"));
+    assert_eq!(
+        error("x'^2 + gama*z").moved_to(7, 13).to_string(),
+        shown.replace("line 1, column 8", "line 7, column 20")
+    );
 }
 
 #[test]
@@ -205,5 +210,8 @@ fn texts_without_measure() {
     assert!(error("sum(i, 1, 100000000, sum(j, 1, 100000000, 0))").message.contains("more than 20000 parts"));
     // Exponentially many paths in a small graph.
     let doubled: String = (0..300).map(|i| format!("a{} = sin(a{i}) * (a{i} + 1)\n", i + 1)).collect();
-    Formula::parse(&format!("a0 = x\n{doubled}x'^2 + y'^2 + a300"), &["x", "y"], &[]).unwrap().lagrangian::<2>().unwrap();
+    Formula::parse(&format!("a0 = x\n{doubled}x'^2 + y'^2 + a300"), &["x", "y"], &[])
+        .unwrap()
+        .lagrangian::<2>()
+        .unwrap();
 }

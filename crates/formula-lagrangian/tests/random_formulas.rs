@@ -1,5 +1,7 @@
 //! Random formulas: derivatives against duals, claims against probes.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
+
 use contact_geom::VelocityPoint;
 use formula_lagrangian::{Formula, FormulaLagrangian};
 
@@ -38,11 +40,24 @@ impl Random {
             13 => format!("sqrt(1 + ({a})^2)"),
             14 => format!("(1.5 + ({a})^2)^{}", self.pick(&["-1", "-0.5", "-1.5", "0.3", "a", "-2"])),
             15..17 => {
-                let form = self.pick(&["sin(_)", "cos(_)", "tanh(_)", "atan(_)", "versine(_)", "-_", "exp(-1 - _^2)", "log1p(2 + _^2)"]);
+                let form = self.pick(&[
+                    "sin(_)",
+                    "cos(_)",
+                    "tanh(_)",
+                    "atan(_)",
+                    "versine(_)",
+                    "-_",
+                    "exp(-1 - _^2)",
+                    "log1p(2 + _^2)",
+                ]);
                 form.replace('_', &format!("({a})"))
             }
             17 => format!("{}({a})", self.pick(&["abs", "sign"])),
-            18 => format!("{}({a}, {})", self.pick(&["min", "max", "hypot", "atan2"]), self.expression(depth - 1, leaves, kinks)),
+            18 => format!(
+                "{}({a}, {})",
+                self.pick(&["min", "max", "hypot", "atan2"]),
+                self.expression(depth - 1, leaves, kinks)
+            ),
             _ => {
                 let [b, c, d] = [0; 3].map(|_| self.expression(depth - 1, leaves, kinks));
                 format!("if({a} < {b}, {c}, {d})")
@@ -61,7 +76,20 @@ impl Random {
                 4 => &["x", "y'", "t"],
                 5 => &["x", "y", "x'", "y'", "z", "t", "a"],
                 6 => return format!("{:.2}*z", random.number()),
-                7 => return random.pick(&["x*y'", "x*y", "x'*y'/2", "a*x^2", "t*z", "x'", "z^2", "0*z", "t*x^2", "sign(t)*z"]),
+                7 => {
+                    return random.pick(&[
+                        "x*y'",
+                        "x*y",
+                        "x'*y'/2",
+                        "a*x^2",
+                        "t*z",
+                        "x'",
+                        "z^2",
+                        "0*z",
+                        "t*x^2",
+                        "sign(t)*z",
+                    ]);
+                }
                 _ => &["x", "t"],
             };
             let depth = 1 + random.below(4);

@@ -1,10 +1,14 @@
 //! Rust source of formulas: compiled here, and compared with the formulas bit by bit.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
+
 use contact_geom::{Derivatives, Dual, Lagrangian, Scalar, VelocityPoint, nalgebra::SVector};
 use formula_lagrangian::{Formula, FormulaLagrangian};
 
+#[rustfmt::skip]
 #[path = "snapshots/all_functions.rs"]
 mod all_functions;
+#[rustfmt::skip]
 #[path = "snapshots/kepler.rs"]
 mod kepler;
 

@@ -82,7 +82,12 @@ impl Table {
             }
             let (ours, theirs) = (median(&mut ours), median(&mut theirs));
             let ratio = ours / theirs;
-            println!("{:20} {name:16} {ratio:6.3}  ({:.1} us, {:.1} us; q differs by {off:.1e})", case.name, ours * 1e6, theirs * 1e6);
+            println!(
+                "{:20} {name:16} {ratio:6.3}  ({:.1} us, {:.1} us; q differs by {off:.1e})",
+                case.name,
+                ours * 1e6,
+                theirs * 1e6
+            );
             let numbers = [ours, theirs, ratio, off].map(|x| x.to_string());
             self.csv.write_record([case.name, *name].map(str::to_owned).into_iter().chain(numbers))?;
         }
