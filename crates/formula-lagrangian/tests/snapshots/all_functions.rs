@@ -200,7 +200,7 @@ impl Lagrangian<2> for AllFunctions {
         let a176: T = Scalar::powf(a43, a175);
         let a177: T = a176 * self.type_;
         let a178: T = a170 + a177;
-        let a180: T = Scalar::powf(a17, (-0.7));
+        let a180: T = Scalar::powf(a17, -0.7);
         let a181: T = a180 * 0.3;
         let a182: T = a37 + 1.0;
         let a183: T = Scalar::recip(a182);
