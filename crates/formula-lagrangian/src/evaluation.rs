@@ -50,17 +50,33 @@ impl Tape {
             heap = vec![zero; self.registers];
             &mut heap
         };
-        let inputs = at.q.iter().chain(at.v).chain([&at.z, &at.t]);
-        for (register, input) in registers.iter_mut().zip(inputs) {
-            *register = *input;
+        // Plain loops: chained iterators, and copies of slices, cost more than all the work of a short tape.
+        let mut next = 0;
+        let mut put = |x: T| {
+            if let Some(register) = registers.get_mut(next) {
+                *register = x;
+            }
+            next += 1;
+        };
+        for x in at.q {
+            put(*x);
         }
+        for x in at.v {
+            put(*x);
+        }
+        put(at.z);
+        put(at.t);
         for instruction in &self.code {
             self.perform(*instruction, registers);
         }
-        let mut places = self.results.iter();
-        for result in results.iter_mut().flat_map(|part| part.iter_mut()) {
-            if let Some(value) = places.next().and_then(|place| registers.get(usize::from(*place))) {
-                *result = *value;
+        let mut next = 0;
+        for part in results.iter_mut() {
+            for result in part.iter_mut() {
+                let place = self.results.get(next).map(|place| usize::from(*place));
+                if let Some(value) = place.and_then(|place| registers.get(place)) {
+                    *result = *value;
+                }
+                next += 1;
             }
         }
     }

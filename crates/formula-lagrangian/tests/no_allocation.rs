@@ -41,7 +41,8 @@ fn nothing_is_allocated() {
     // The counter counts.
     assert_eq!(allocations(|| drop(Box::new(1.0))), 1);
     // Eight coordinates, each coupled to its neighbours, in a curved kinetic energy: two hundred second derivatives.
-    let text = "sum(i, 0, n-1, v[i]^2*(2 + sin(q[i])))/2 - sum(i, 1, n-1, cos(q[i] - q[i-1])*v[i]*v[i-1]) - exp(-a*t)*z";
+    let text =
+        "sum(i, 0, n-1, v[i]^2*(2 + sin(q[i])))/2 - sum(i, 1, n-1, cos(q[i] - q[i-1])*v[i]*v[i-1]) - exp(-a*t)*z";
     let l: FormulaLagrangian<8> = Formula::parse(text, &["q[8]"], &[("a", 0.1)]).unwrap().lagrangian().unwrap();
     let x = VelocityPoint::new([0.3; 8], [0.7; 8], 0.1);
     let moving = |x: f64| Dual { re: x, d: SVector::<f64, 2>::new(1.0, 2.0) };

@@ -154,7 +154,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             h: 0.5,
             time: 200.0,
         },
-        &all,
+        &gauss,
     )?;
     let text = "x'^2 + y'^2/2 + cos(x - y)*x'*y' - 2*(1 - cos(x)) - (1 - cos(y)) + gamma*z";
     table.compare(
