@@ -1,7 +1,7 @@
 //! Dense output of contact Gauss collocation, and events along it.
 
 use crate::gauss::{Claims, cut};
-use contact_geom::systems::{HarmonicOscillator, Pendulum, QuadraticInZ};
+use contact_geom::systems::{HarmonicOscillator, OneCoordinate, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, Larger, Largest, PhasePoint, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{
     AnyIntegrator, Crossing, Event, Events, Gauss, GaussRoute, InputError, Outcome, Problem, Status, StepError,
@@ -12,9 +12,10 @@ use discrete_herglotz::{
 /// by `2^(s+1)`, the local order of the polynomial of degree s.
 #[test]
 fn curves_have_the_order_of_the_stages() {
-    let system = HarmonicOscillator { gamma: -0.5 };
+    let oscillator = HarmonicOscillator { gamma: -0.5 };
+    let system = OneCoordinate::from(oscillator);
     let x = VelocityPoint::new([1.0], [0.5], 0.3);
-    let exact = |t: f64| legendre(&system, t, &system.solution(t, &x));
+    let exact = |t: f64| legendre(&system, t, &oscillator.solution(t, &x));
     for s in 1..=4 {
         let mut all = Vec::new();
         for route in [GaussRoute::Linear, GaussRoute::Condensed, GaussRoute::ConstantMass, GaussRoute::General] {
@@ -69,10 +70,11 @@ fn events<'f, const N: usize, L: Lagrangian<N>>(
 /// 1e-13, since 16 stages leave less.
 #[test]
 fn crossings_are_those_of_the_closed_form() {
-    let system = HarmonicOscillator { gamma: -0.1 };
+    let oscillator = HarmonicOscillator { gamma: -0.1 };
+    let system = OneCoordinate::from(oscillator);
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
     // q = e^(a t) (cos w t - (a/w) sin w t) vanishes where tan w t = w/a, a < 0.
-    let a = 0.5 * system.gamma;
+    let a = 0.5 * oscillator.gamma;
     let w = (1.0 - a * a).sqrt();
     let expected = |k: usize| (k as f64 * std::f64::consts::PI + (w.atan2(a))) / w;
     let zero = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
@@ -82,7 +84,7 @@ fn crossings_are_those_of_the_closed_form() {
     assert_eq!((of(0).len(), of(1).len(), of(2).len()), (7, 3, 4));
     for (k, c) in of(0).iter().enumerate() {
         assert!((c.t - expected(k)).abs() <= 1e-13 * expected(k), "{k}: {} {}", c.t, expected(k));
-        let there = legendre(&system, c.t, &system.solution(c.t, &x));
+        let there = legendre(&system, c.t, &oscillator.solution(c.t, &x));
         let off = Triple::from(c.state).minus(there.into()).largest();
         assert!(off <= 1e-13, "{k}: {off:e}");
         // Falling first.
@@ -106,7 +108,8 @@ fn crossings_are_those_of_the_closed_form() {
 /// and what vanishes at the start is no change of sign.
 #[test]
 fn events_within_one_step() {
-    let system = HarmonicOscillator { gamma: -0.1 };
+    let oscillator = HarmonicOscillator { gamma: -0.1 };
+    let system = OneCoordinate::from(oscillator);
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
     // q > -0.8 but for a short time around the first turning point, within one step.
     let dip = || Event::new(|_, x: &PhasePoint<1>| x.q[0] + 0.8);
@@ -126,10 +129,16 @@ fn events_within_one_step() {
 fn a_zero_at_a_node_is_one_crossing() {
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
     let steps = (4, 6, 3.0);
-    let (_, crossings) = events(&Pendulum::default(), x, steps, [Event::new(|t, _: &PhasePoint<1>| t - 1.0)]);
+    let (_, crossings) =
+        events(&OneCoordinate::from(Pendulum::default()), x, steps, [Event::new(|t, _: &PhasePoint<1>| t - 1.0)]);
     assert_eq!(crossings.iter().map(|c| c.t).collect::<Vec<_>>(), [1.0]);
     // It touches and does not cross.
-    let (_, crossings) = events(&Pendulum::default(), x, steps, [Event::new(|t, _: &PhasePoint<1>| (t - 1.0).powi(2))]);
+    let (_, crossings) = events(
+        &OneCoordinate::from(Pendulum::default()),
+        x,
+        steps,
+        [Event::new(|t, _: &PhasePoint<1>| (t - 1.0).powi(2))],
+    );
     assert_eq!(crossings, []);
 }
 
@@ -139,7 +148,8 @@ fn bad_luck_is_a_status() {
     let x = VelocityPoint::new([1.0], [0.0], 1.0);
     let passes = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
     let undefined = Event::new(|t, _: &PhasePoint<1>| if t > 2.0 { f64::NAN } else { 1.0 });
-    let (outcome, crossings) = events(&QuadraticInZ { c: 0.1 }, x, (5, 20, 6.0), [passes(), undefined]);
+    let (outcome, crossings) =
+        events(&OneCoordinate::from(QuadraticInZ { c: 0.1 }), x, (5, 20, 6.0), [passes(), undefined]);
     let Status::Failed { step, t: ended, cause: StepError::Event { t } } = outcome.status else {
         panic!("{outcome:?}")
     };
@@ -147,7 +157,7 @@ fn bad_luck_is_a_status() {
     assert!(t > 2.0 && t <= 2.1 && ended <= 2.1, "{t}, {ended}");
     assert_eq!((outcome.steps, outcome.t, crossings.len()), (step, ended, 1));
     // No step is no run.
-    let (pendulum, mut none) = (Pendulum::default(), Events::new([]));
+    let (pendulum, mut none) = (OneCoordinate::from(Pendulum::default()), Events::new([]));
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let refused = problem.steps(Steps::Count(0)).observe(&mut none).run(Until::Time(1.0));
     assert!(matches!(refused, Err(InputError::Count { found: 0, .. })), "{refused:?}");
@@ -156,7 +166,7 @@ fn bad_luck_is_a_status() {
 /// Where the action is not requested, z stays what it was, and the rest of the curve is the same.
 #[test]
 fn without_action() {
-    let system = Pendulum { gamma: -0.1 };
+    let system = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let start = PhasePoint::new([1.0], [0.5], 0.25);
     let gauss = Gauss::new(system, 6, 0.3);
     let Ok(gauss) = &gauss else { panic!("no method") };

@@ -1,6 +1,6 @@
 //! What a run gives, by integrators that are in no table of names: the exact flow, and a discrete Lagrangian of a user's own.
 
-use contact_geom::systems::{Pendulum, QuadraticInZ, System};
+use contact_geom::systems::{OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{DiscretePoint, Lagrangian, Scalar, VelocityPoint, largest};
 use discrete_herglotz::{
     Checkpoint, Discrete, DiscreteLagrangian, Event, Events, Integrator, Interrupted, Moment, Outcome, Problem, Rows,
@@ -78,8 +78,8 @@ fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, 
 
 #[test]
 fn by_the_exact_flow() {
-    everything(&Pendulum { gamma: -0.1 }, ExactFlow, 16);
-    everything(&QuadraticInZ::default(), ExactFlow, 16);
+    everything(&OneCoordinate::from(Pendulum { gamma: -0.1 }), ExactFlow, 16);
+    everything(&OneCoordinate::from(QuadraticInZ::default()), ExactFlow, 16);
 }
 
 #[test]
@@ -88,18 +88,18 @@ fn by_a_discrete_lagrangian_of_ones_own() {
         let lagrangian = *system;
         everything(system, Discrete::new("own", 2, move |h| Ok(Own { lagrangian, h })), 2);
     }
-    of(&Pendulum { gamma: -0.1 });
-    of(&QuadraticInZ::default());
+    of(&OneCoordinate::from(Pendulum { gamma: -0.1 }));
+    of(&OneCoordinate::from(QuadraticInZ::default()));
 }
 
 /// The start of a run may be the momentum, two points, or the end of another; each gives the velocity back.
 #[test]
 fn starts() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let start = VelocityPoint::new([1.0], [0.3], 0.2);
     let by_velocity = Problem::new(&pendulum, 0.0, start).unwrap();
     let by_momentum = Problem::new(&pendulum, 0.0, contact_geom::legendre(&pendulum, 0.0, &start)).unwrap();
-    let end = |problem: &Problem<'_, Pendulum, 1>| {
+    let end = |problem: &Problem<'_, OneCoordinate, 1>| {
         problem.by(ExactFlow).steps(Steps::Count(3)).run(Until::Time(1.0)).unwrap()
     };
     assert_eq!(end(&by_velocity), end(&by_momentum));

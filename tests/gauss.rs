@@ -5,7 +5,8 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
-    CoupledInZ, CoupledPlane, DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, Relativistic, System,
+    CoupledInZ, CoupledPlane, DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ,
+    Relativistic, System, TwoCoordinates,
 };
 use contact_geom::{Lagrangian, Larger, Largest, PhasePoint, Scalar, Structure, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{DiscreteLagrangian, Gauss, GaussRoute, Halt, InputError, StepError, Stepper};
@@ -120,11 +121,11 @@ fn orders_are_twice_the_stages() {
             coarsest = points[0].1;
         }
     }
-    of(&QuadraticInZ { c: 1.0 });
-    of(&CoupledInZ { gamma: -1.0, ..CoupledInZ::default() });
-    of(&CoupledPlane { c: 1.5, ..CoupledPlane::default() });
-    of(&Relativistic { gamma: -1.0 });
-    of(&DoublePendulum { gamma: -1.0, ..DoublePendulum::default() });
+    of(&OneCoordinate::from(QuadraticInZ { c: 1.0 }));
+    of(&OneCoordinate::from(CoupledInZ { gamma: -1.0, ..CoupledInZ::default() }));
+    of(&TwoCoordinates::from(CoupledPlane { c: 1.5, ..CoupledPlane::default() }));
+    of(&OneCoordinate::from(Relativistic { gamma: -1.0 }));
+    of(&TwoCoordinates::from(DoublePendulum { gamma: -1.0, ..DoublePendulum::default() }));
 }
 
 /// The difference of two states relative to the larger.
@@ -137,11 +138,12 @@ pub fn distance<const N: usize>(a: PhasePoint<N>, b: PhasePoint<N>) -> f64 {
 /// the stages are sums with rounded coefficients, a fraction of an eps in every step and in the same direction.
 #[test]
 fn decayed_states_keep_their_accuracy() {
-    let system = HarmonicOscillator { gamma: -0.05 };
+    let oscillator = HarmonicOscillator { gamma: -0.05 };
+    let system = OneCoordinate::from(oscillator);
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
     let t = 1000.0;
     // The closed form without the rounding of the phase `w t` and of the exponent `a t`.
-    let a = 0.5 * system.gamma;
+    let a = 0.5 * oscillator.gamma;
     let w_less_one = -a * a / ((1.0 - a * a).sqrt() + 1.0);
     let ((s1, c1), (s2, c2)) = (f64::sin_cos(t), f64::sin_cos(w_less_one * t));
     let (s, c, w) = (s1 * c2 + c1 * s2, c1 * c2 - s1 * s2, 1.0 + w_less_one);
@@ -195,8 +197,8 @@ fn routes_agree() {
     }
     use GaussRoute::{Condensed, ConstantMass, General, Linear};
     for s in [3, 8, 13] {
-        of(&HarmonicOscillator::default(), s, 0.1, &[Linear, Condensed, ConstantMass, General]);
-        of(&Pendulum::default(), s, 0.1, &[Condensed, ConstantMass, General]);
+        of(&OneCoordinate::from(HarmonicOscillator::default()), s, 0.1, &[Linear, Condensed, ConstantMass, General]);
+        of(&OneCoordinate::from(Pendulum::default()), s, 0.1, &[Condensed, ConstantMass, General]);
         of(&Kepler::<3>::default(), s, 0.05, &[Condensed, ConstantMass, General]);
     }
 }
@@ -205,7 +207,7 @@ fn routes_agree() {
 /// and 5.93 on the general ones were measured, and a tenth more is allowed.
 #[test]
 fn few_sweeps() {
-    let system = Pendulum { gamma: -0.01 };
+    let system = OneCoordinate::from(Pendulum { gamma: -0.01 });
     let x = VelocityPoint::new([1.0], [1.0], 0.0);
     for (route, most) in [(GaussRoute::Condensed, 4.85), (GaussRoute::ConstantMass, 6.5), (GaussRoute::General, 6.5)] {
         let (_, evaluations, _) = run(&Claims(system, cut(&system, route)), (0.0, x), 8, 0.5, 1000);
@@ -226,10 +228,10 @@ fn repeated_runs_are_the_same() {
         assert!(one_by_one && b.advance(50).is_ok());
         assert_eq!((a.state(), a.sigma(), a.evaluations()), (b.state(), b.sigma(), b.evaluations()));
     }
-    of(&HarmonicOscillator::default());
+    of(&OneCoordinate::from(HarmonicOscillator::default()));
     of(&Kepler::<2>::default());
-    of(&Relativistic::default());
-    of(&DoublePendulum::default());
+    of(&OneCoordinate::from(Relativistic::default()));
+    of(&TwoCoordinates::from(DoublePendulum::default()));
 }
 
 /// Steps so long that the iteration does not contract are Newton's, and those of the discrete Lagrangian; without Newton they
@@ -268,13 +270,13 @@ fn newton_takes_over() {
         );
         assert_eq!(stepper.advance(2), Ok(()));
     }
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let x = VelocityPoint::new([2.0], [1.0], 0.0);
     for route in [GaussRoute::Condensed, GaussRoute::ConstantMass, GaussRoute::General] {
         of(&Claims(pendulum, cut(&pendulum, route)), x, 4, 5.0, 1e-12);
     }
     // Damping by e^20 in one step: factors of stages are negative where there is a solution, and Newton's method does not hide it.
-    let damped = Claims(HarmonicOscillator { gamma: -20.0 }, Structure::default());
+    let damped = Claims(OneCoordinate::from(HarmonicOscillator { gamma: -20.0 }), Structure::default());
     let gauss = Gauss::new(&damped, 8, 1.0).unwrap();
     let mut stepper = gauss.stepper(0.0, PhasePoint::new([1.0], [1.0], 0.0), [1.0].into()).unwrap();
     let halt = stepper.advance(1);
@@ -289,7 +291,7 @@ fn newton_takes_over() {
 /// Bad input: a number of stages that there is not, and a step whose conformal factor is not positive.
 #[test]
 fn bad_input_is_refused() {
-    let system = Pendulum::default();
+    let system = OneCoordinate::from(Pendulum::default());
     for stages in [0, 17] {
         let error = Gauss::new::<1>(&system, stages, 0.1).err();
         assert_eq!(error, Some(InputError::Stages { found: stages }));
@@ -297,7 +299,7 @@ fn bad_input_is_refused() {
     // sigma_d = (1 + gamma h/2) / (1 - gamma h/2) with one stage.
     let start = PhasePoint::new([1.0], [0.0], 0.0);
     for gamma in [-30.0, 30.0] {
-        let gauss = Gauss::new(Pendulum { gamma }, 1, 0.1);
+        let gauss = Gauss::new(OneCoordinate::from(Pendulum { gamma }), 1, 0.1);
         let error = gauss.map(|gauss| gauss.stepper(0.0, start, [0.0].into()).err());
         // A stage's factor, 1 / (1 + gamma h/2), is negative with the damping, the end's with the growth.
         let refused = match error {
@@ -307,7 +309,7 @@ fn bad_input_is_refused() {
         };
         assert!(refused, "{error:?}");
         // The general route finds it in the step.
-        let general = Gauss::new(Claims(Pendulum { gamma }, Structure::default()), 1, 0.1);
+        let general = Gauss::new(Claims(OneCoordinate::from(Pendulum { gamma }), Structure::default()), 1, 0.1);
         let halt = general.map(|gauss| gauss.stepper(0.0, start, [0.0].into()).map(|mut s| s.advance(1)));
         let same = match halt {
             Ok(Ok(Err(Halt { taken: 0, cause: StepError::StageFactor { rho } }))) => gamma < 0.0 && rho < 0.0,
@@ -347,7 +349,7 @@ fn what_is_not_finite_is_refused() {
         assert!(matches!(halt, Err(Halt { taken: 10..100, .. })), "{halt:?}");
         assert!(Triple::from(stepper.state()).is_finite() && stepper.state().q[0] < 2.0);
     }
-    let gauss = Gauss::new(HarmonicOscillator { gamma: 1.0 }, 4, 0.5);
+    let gauss = Gauss::new(OneCoordinate::from(HarmonicOscillator { gamma: 1.0 }), 4, 0.5);
     let stepper = gauss.as_ref().map(|g| g.stepper(0.0, PhasePoint::new([1.0], [0.0], 0.0), [0.0].into()));
     let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
     let halt = stepper.advance(10_000);

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::systems::{HarmonicOscillator, Kepler, LaneEmden, Pendulum, QuadraticInZ, System};
+use contact_geom::systems::{HarmonicOscillator, Kepler, LaneEmden, OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{GeometryError, Lagrangian, Largest, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
 use discrete_herglotz::{Gauss, InputError, StepError, Stepper};
 
@@ -149,7 +149,7 @@ fn times_that_are_not_finite_are_refused() {
 #[test]
 fn strong_damping_is_refused_by_all_routes() {
     for (s, gamma) in [(1, -30.0), (2, -1000.0), (3, -1000.0)] {
-        let system = HarmonicOscillator { gamma };
+        let system = OneCoordinate::from(HarmonicOscillator { gamma });
         let x = VelocityPoint::new([1.0], [0.0], 0.0);
         let start = legendre(&system, 0.0, &x);
         let claimed = Gauss::new(system, s, 0.1).unwrap();
@@ -161,13 +161,14 @@ fn strong_damping_is_refused_by_all_routes() {
         assert!(matches!(halt.cause, StepError::StageFactor { rho } if rho < 0.0), "s = {s}: {halt:?}");
     }
     // A drag that is singular at t = 0.
-    let system = LaneEmden::default();
+    let star = LaneEmden::default();
+    let system = OneCoordinate::from(star);
     let x = VelocityPoint::new([1.0], [0.0], 0.0);
     for s in 1..=16 {
         let gauss = Gauss::new(system, s, 0.3).unwrap();
         let mut stepper = gauss.stepper(0.01, legendre(&system, 0.01, &x), x.v).unwrap();
         let outcome = stepper.advance(1);
-        let error = (stepper.state().q[0] - system.solution(0.31).unwrap().q[0]).abs();
+        let error = (stepper.state().q[0] - star.solution(0.31).unwrap().q[0]).abs();
         assert!(outcome.is_err() || stepper.suspicion().is_some() || error < 1e-3, "s = {s}: {error:e}");
     }
 }
@@ -197,9 +198,9 @@ fn what_is_not_resolved_is_marked() {
     for s in 1..=16 {
         for h in [0.1, 0.5] {
             let x = VelocityPoint::new([1.0], [1.0], 0.0);
-            let pendulum = Gauss::new(Pendulum::default(), s, h).unwrap();
+            let pendulum = Gauss::new(OneCoordinate::from(Pendulum::default()), s, h).unwrap();
             unmarked(Box::new(pendulum.stepper(0.0, PhasePoint::new([1.0], [1.0], 0.0), x.v).unwrap()), 1000);
-            let square = Gauss::new(QuadraticInZ { c: 0.1 }, s, h).unwrap();
+            let square = Gauss::new(OneCoordinate::from(QuadraticInZ { c: 0.1 }), s, h).unwrap();
             unmarked(Box::new(square.stepper(0.0, PhasePoint::new([1.0], [0.0], 1.0), [0.0].into()).unwrap()), 1000);
         }
     }

@@ -8,8 +8,7 @@ use contact_geom::systems::{
 use contact_geom::{
     DiscretePoint, Lagrangian, Largest, PhasePoint, Scalar, Structure, Triple, VelocityPoint, legendre,
 };
-use discrete_herglotz::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
-use discrete_herglotz::{DiscreteLagrangian, InputError, Method, Quadrature, Rule};
+use discrete_herglotz::{DiscreteLagrangian, InputError, Method, Quadrature, Rule, RuleVisitor};
 
 /// A name leads back to its method, so that no two are the same; an unknown one is answered with all that are known.
 #[test]
@@ -53,27 +52,35 @@ fn rules_take_every_lagrangian() {
 /// Each entry of the table is the rule of its name, to the bit.
 #[test]
 fn rules_by_name() {
-    fn same<R: Rule>(method: Method) {
-        let (system, x) = (CoupledInZ::default(), DiscretePoint::new([0.3], [0.4], 0.7));
-        let by_name = discretise(method, &system, 0.1, 0.0, &VelocityPoint::new([0.3], [0.4], 0.7));
-        let by_type = Quadrature::<_, R>::new(&system, 0.1);
-        let (by_name, by_type) = (by_name.unwrap(), by_type.unwrap());
-        assert_eq!(by_name.step_size(), by_type.step_size());
-        assert_eq!(by_name.value::<f64>(0.0, &x), by_type.value(0.0, &x));
-        assert_eq!(by_name.jet(0.0, &x), by_type.jet(0.0, &x));
-        assert_eq!(by_name.second_jet(0.0, &x), by_type.second_jet(0.0, &x));
-        let (from, guess, mut solver) = (PhasePoint::new([0.3], [0.8], 0.7), SVector::from([0.9]), Default::default());
-        assert_eq!(by_name.forward(0.0, &from, &guess, &mut solver), by_type.forward(0.0, &from, &guess, &mut solver));
-        assert_eq!(
-            by_name.backward(0.0, &from, &guess, &mut solver),
-            by_type.backward(0.0, &from, &guess, &mut solver)
-        );
-        assert_eq!((method.name(), method.order()), (R::NAME, R::ORDER));
+    #[derive(Default)]
+    struct Same(Vec<Method>);
+    impl RuleVisitor for Same {
+        fn visit<R: Rule>(&mut self, method: Method) {
+            let (system, x) = (CoupledInZ::default(), DiscretePoint::new([0.3], [0.4], 0.7));
+            let by_name = discretise(method, &system, 0.1, 0.0, &VelocityPoint::new([0.3], [0.4], 0.7));
+            let by_type = Quadrature::<_, R>::new(&system, 0.1);
+            let (by_name, by_type) = (by_name.unwrap(), by_type.unwrap());
+            assert_eq!(by_name.step_size(), by_type.step_size());
+            assert_eq!(by_name.value::<f64>(0.0, &x), by_type.value(0.0, &x));
+            assert_eq!(by_name.jet(0.0, &x), by_type.jet(0.0, &x));
+            assert_eq!(by_name.second_jet(0.0, &x), by_type.second_jet(0.0, &x));
+            let (from, guess, mut solver) =
+                (PhasePoint::new([0.3], [0.8], 0.7), SVector::from([0.9]), Default::default());
+            assert_eq!(
+                by_name.forward(0.0, &from, &guess, &mut solver),
+                by_type.forward(0.0, &from, &guess, &mut solver)
+            );
+            assert_eq!(
+                by_name.backward(0.0, &from, &guess, &mut solver),
+                by_type.backward(0.0, &from, &guess, &mut solver)
+            );
+            assert_eq!((method.name(), method.order()), (R::NAME, R::ORDER));
+            self.0.push(method);
+        }
     }
-    same::<RectangleRule>(Method::Rectangle);
-    same::<LeftMidpointRule>(Method::LeftMidpoint);
-    same::<MidpointRule>(Method::Midpoint);
-    same::<TrapezoidalRule>(Method::Trapezoidal);
+    let mut same = Same::default();
+    Method::visit_rules(&mut same);
+    assert_eq!(same.0, Method::RULES);
 }
 
 /// No method takes a step that is 0 or not finite; a negative one goes back.

@@ -1,14 +1,17 @@
 //! A step of a small system allocates nothing, with any method, however the derivatives are found; nor do those of contact Gauss
 //! collocation, nor does the exact discrete
-//! Lagrangian with its derivatives.
+//! Lagrangian with its derivatives, a correction of a path, and a step of an ensemble.
 
 // What a test cannot go on without is a failure of it.
 #![allow(clippy::unwrap_used)]
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
-use contact_geom::{Lagrangian, PhasePoint, Scalar, legendre};
-use discrete_herglotz::{DiscreteLagrangian, Flow, Gauss, GaussRoute, Method, Stepper};
+use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint, legendre};
+use discrete_herglotz::{
+    BoundaryPath, DiscreteLagrangian, End, Ensemble, Flow, Gauss, GaussCollocation, GaussRoute, LeftMidpoint, Method,
+    SplittingScheme, Stepper, Steps, Until,
+};
 use exact_lagrangian::{ContactExponential, ExactLagrangian, RetractionRoute};
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
@@ -143,4 +146,45 @@ fn exact() {
     run(&Kepler::<3>::default(), 0.1, RetractionRoute::Collocation);
     run(&Kepler::<2>::default(), 1.0, RetractionRoute::Collocation);
     run(&HarmonicOscillator::default(), 3.0, RetractionRoute::Newton);
+}
+
+/// A search that makes several corrections allocates what one does that starts at its solution: its workspace.
+#[test]
+fn corrections_of_paths() {
+    let ld = LeftMidpoint::new(Pendulum { gamma: -0.1 }, 0.02).unwrap();
+    let problem = BoundaryPath::new(&ld, 100, [0.0, 1.0].map(|q| End::Position([q].into()))).unwrap();
+    let (mut far, mut near) = (None, None);
+    let many = allocations(|| far = Some(problem.search()));
+    let far = far.unwrap();
+    let again = problem.from_path(far.path().unwrap()).unwrap();
+    let few = allocations(|| near = Some(again.search()));
+    let near = near.unwrap();
+    assert!(
+        far.is_found() && near.is_found() && far.iterations > near.iterations + 1,
+        "{} and {}",
+        far.status,
+        near.status
+    );
+    assert_eq!(many, few);
+}
+
+/// In lanes an ensemble of many steps allocates what one of few steps does, by splittings and by collocation.
+#[test]
+fn steps_of_ensembles() {
+    let pendulum = Pendulum { gamma: -0.01 };
+    let start = |i: usize| VelocityPoint::new([0.01 * i as f64], [0.5], 0.0);
+    let of = |ensemble: Ensemble<'_, Pendulum, 1>, steps: usize| {
+        let ensemble = ensemble.steps(Steps::Count(steps)).threads(1);
+        let mut completed = 0;
+        let count =
+            allocations(|| completed = ensemble.run(Until::Time(0.1 * steps as f64), |_| ()).unwrap().completed);
+        assert_eq!(completed, 100);
+        count
+    };
+    for steps in [1000, 4000] {
+        let splitting = || Ensemble::new(&pendulum, 0.0, 100, start).by(SplittingScheme::BLANES_MOAN_4);
+        assert_eq!(of(splitting(), steps), of(splitting(), 100));
+        let collocation = || Ensemble::new(&pendulum, 0.0, 100, start).by(GaussCollocation { stages: 4 });
+        assert_eq!(of(collocation(), steps), of(collocation(), 100));
+    }
 }

@@ -1,7 +1,7 @@
 //! Growth of round-off in long runs of Gauss collocation: Brouwer's law for every route.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, Pendulum};
+use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint, legendre};
 use discrete_herglotz::{Gauss, Stepper};
 
@@ -69,7 +69,7 @@ fn runner<const N: usize>(mut stepper: impl Stepper<N> + 'static) -> Box<dyn FnM
 fn the_energy_does_not_drift() {
     let constant = Structure { autonomous: true, z_affine: true, constant_mass: true, ..Structure::default() };
     for gamma in [0.0, -1e-12] {
-        let pendulum = Pendulum { gamma };
+        let pendulum = OneCoordinate::from(Pendulum { gamma });
         let energy = move |x: &PhasePoint<1>| 0.5 * x.p[0] * x.p[0] + 2.0 * (0.5 * x.q[0]).sin().powi(2);
         for (structure, s, h) in [(pendulum.structure(), 12, 1.2), (constant, 12, 1.2)] {
             let lagrangian = Claims(pendulum, structure);

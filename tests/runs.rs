@@ -3,7 +3,8 @@
 use crate::common::oracle::motion;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
-    DoublePendulum, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System, SystemVisitor,
+    DoublePendulum, Duffing, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System, SystemVisitor,
+    TwoCoordinates,
 };
 use contact_geom::{
     DiscretePoint, Lagrangian, Larger, Largest, OneParameterGroup, Scalar, Structure, Symmetry, Triple, VelocityPoint,
@@ -89,11 +90,11 @@ fn every_integrator() {
     }
     // Each system is compiled with every method: one of each kind of structure.
     let mut visitor = Visitor(0);
-    visitor.visit(&HarmonicOscillator::default());
-    visitor.visit(&Duffing::forced());
-    visitor.visit(&QuadraticInZ::default());
+    visitor.visit(&OneCoordinate::from(HarmonicOscillator::default()));
+    visitor.visit(&OneCoordinate::from(Duffing::forced()));
+    visitor.visit(&OneCoordinate::from(QuadraticInZ::default()));
     visitor.visit(&Kepler::<2>::default());
-    visitor.visit(&DoublePendulum::default());
+    visitor.visit(&TwoCoordinates::from(DoublePendulum::default()));
     // The rules, the Gauss methods and the compositions apply to all.
     assert!(visitor.0 >= 5 * 25, "{}", visitor.0);
 }
@@ -101,7 +102,11 @@ fn every_integrator() {
 /// The same numbers to the last bit, whatever else is asked for: with rows, the action and the factor, or without.
 #[test]
 fn what_is_left_out_changes_nothing() {
-    let (pendulum, square, kepler) = (Pendulum { gamma: -0.1 }, QuadraticInZ { c: 0.3 }, Kepler::<2>::default());
+    let (pendulum, square, kepler) = (
+        OneCoordinate::from(Pendulum { gamma: -0.1 }),
+        OneCoordinate::from(QuadraticInZ { c: 0.3 }),
+        Kepler::<2>::default(),
+    );
     fn compare<L: Lagrangian<N>, const N: usize>(
         lagrangian: &L,
         start: VelocityPoint<N>,
@@ -173,7 +178,7 @@ fn the_conformal_factor() {
 /// The factor of a long run is below all numbers, and its logarithm is not.
 #[test]
 fn the_factor_of_a_long_run_has_a_logarithm() {
-    let pendulum = Pendulum { gamma: -1.0 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -1.0 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let run = problem.by(gauss(4)).steps(Steps::Count(8000)).with_conformal_factor();
     let outcome = run.run(Until::Time(800.0)).unwrap();
@@ -186,8 +191,10 @@ fn the_factor_of_a_long_run_has_a_logarithm() {
 /// A plan says what it skips and why; what it says follows from structure and outputs.
 #[test]
 fn plans_in_words() {
-    let (pendulum, oscillator) = (Pendulum::default(), HarmonicOscillator::default());
-    let (square, double) = (QuadraticInZ::default(), DoublePendulum::default());
+    let (pendulum, oscillator) =
+        (OneCoordinate::from(Pendulum::default()), OneCoordinate::from(HarmonicOscillator::default()));
+    let (square, double) =
+        (OneCoordinate::from(QuadraticInZ::default()), TwoCoordinates::from(DoublePendulum::default()));
     let (until, of_pendulum, of_square) = (Until::Time(10.0), from_start(&pendulum), from_start(&square));
     let plan = ten_steps(&of_pendulum, gauss(8)).without_action().plan(until).unwrap();
     for skipped in ["action z", "conformal factor", "mass matrix", "Jacobian", "Newton's method", "time at the stages"]
@@ -232,7 +239,7 @@ fn plans_in_words() {
 /// The step chosen from a wanted error keeps it, without being far too fine.
 #[test]
 fn steps_from_an_error() {
-    let pendulum = Pendulum { gamma: -0.05 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.05 });
     let (problem, until) = (from_start(&pendulum), Until::Time(20.0));
     let truth = legendre(&pendulum, 20.0, &motion(&pendulum, 0.0, &start(), 20.0));
     let size = (truth.q.norm_squared() + truth.p.norm_squared()).sqrt();
@@ -263,7 +270,7 @@ fn steps_from_an_error() {
 /// Bad input is refused before work starts, with an error that names it.
 #[test]
 fn bad_runs() {
-    let (pendulum, square) = (Pendulum::default(), QuadraticInZ::default());
+    let (pendulum, square) = (OneCoordinate::from(Pendulum::default()), OneCoordinate::from(QuadraticInZ::default()));
     let (problem, until) = (from_start(&pendulum), Until::Time(1.0));
     let by = |integrator| ten_steps(&problem, integrator).plan(until).err();
     let steps = |steps| problem.steps(steps).plan(until).err();
@@ -320,7 +327,7 @@ fn bad_runs() {
 /// A run to a time before its start goes back on the same motion.
 #[test]
 fn a_span_may_be_negative() {
-    let pendulum = Pendulum::default();
+    let pendulum = OneCoordinate::from(Pendulum::default());
     let back = ten_steps(&from_start(&pendulum), gauss(8)).run(Until::Time(-1.0)).unwrap();
     assert_eq!((back.status, back.suspicion, back.steps, back.t), (Status::Completed, None, 10, -1.0));
     let truth = legendre(&pendulum, -1.0, &herglotz_flow(&pendulum, 0.0, &start(), -1.0).unwrap().end);
@@ -332,7 +339,7 @@ fn a_span_may_be_negative() {
 /// A problem from two points starts as the flow of their discrete Lagrangian does, and of two that say too little there is none.
 #[test]
 fn from_two_points() {
-    let pendulum = Pendulum::default();
+    let pendulum = OneCoordinate::from(Pendulum::default());
     let ld = Midpoint::new(&pendulum, 0.1).unwrap();
     let points = DiscretePoint::new([0.3], [0.35], 0.1);
     let problem = Problem::from_points(&pendulum, &ld, 0.5, points).unwrap();

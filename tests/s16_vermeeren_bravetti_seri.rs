@@ -5,8 +5,9 @@ use crate::common::{around, on_random, step_from, within};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
 use contact_geom::{DiscretePoint, Larger, Largest};
-use discrete_herglotz::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
-use discrete_herglotz::{DiscreteLagrangian, DiscretePath, Quadrature, Rule, legendre_minus, legendre_plus};
+use discrete_herglotz::{
+    DiscreteLagrangian, DiscretePath, Method, Quadrature, Rule, RuleVisitor, legendre_minus, legendre_plus,
+};
 
 fn with_rule<R: Rule, const N: usize, S: System<N>>(system: &S) {
     on_random(&format!("{} with {}", system.name(), R::NAME), 2 * N + 3, |u| {
@@ -49,10 +50,13 @@ fn with_every_rule() {
     struct Visitor;
     impl SystemVisitor for Visitor {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-            with_rule::<RectangleRule, N, S>(system);
-            with_rule::<LeftMidpointRule, N, S>(system);
-            with_rule::<MidpointRule, N, S>(system);
-            with_rule::<TrapezoidalRule, N, S>(system);
+            Method::visit_rules(&mut OnSystem(system));
+        }
+    }
+    struct OnSystem<'a, S, const N: usize>(&'a S);
+    impl<S: System<N>, const N: usize> RuleVisitor for OnSystem<'_, S, N> {
+        fn visit<R: Rule>(&mut self, _method: Method) {
+            with_rule::<R, N, S>(self.0);
         }
     }
     visit_catalogue(&mut Visitor);

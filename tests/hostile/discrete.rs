@@ -1,6 +1,10 @@
 //! Attacks on discrete-herglotz. What starts a motion refuses what is not finite, and what it hands out is finite; formulas hand
 //! on what is not a number, or refuse it.
 
+#[path = "discrete/boundary.rs"]
+mod boundary;
+#[path = "discrete/ensembles.rs"]
+mod ensembles;
 #[path = "discrete/integrators.rs"]
 mod integrators;
 #[path = "discrete/lagrangians.rs"]
@@ -24,6 +28,8 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Method::exact_rate", "takes no number"),
     ("Method::check", "takes no number"),
     ("Method::applicable", "takes no number"),
+    ("Method::visit_rules", "takes no number"),
+    ("RuleVisitor::*", "the implementor's"),
     ("SplittingScheme::*", "tables: take no number"),
     ("AnyIntegrator::all", "takes no number"),
     ("AnyIntegrator::order", "takes no number; that of any number of stages is in the attack on check"),
@@ -34,8 +40,15 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Observer::*", "the implementor's; what a run makes of odd ones is in the attack on Run::observe"),
 ];
 
-pub const ATTACKS: &[&[Attack]] =
-    &[integrators::ATTACKS, lagrangians::ATTACKS, observers::ATTACKS, runs::ATTACKS, steppers::ATTACKS];
+pub const ATTACKS: &[&[Attack]] = &[
+    boundary::ATTACKS,
+    ensembles::ATTACKS,
+    integrators::ATTACKS,
+    lagrangians::ATTACKS,
+    observers::ATTACKS,
+    runs::ATTACKS,
+    steppers::ATTACKS,
+];
 
 /// Times and states to start from, and whether they are finite.
 fn starts() -> Vec<(f64, PhasePoint<1>)> {

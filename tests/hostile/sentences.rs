@@ -7,10 +7,10 @@ use contact_geom::{
     herglotz_field, linear,
 };
 use discrete_herglotz::{
-    AnyIntegrator, Checkpoint, Composition, DiscreteLagrangian, Event, Events, Facts, Flow, Gauss, Halt, InputError,
-    Integrator, Interrupted, LeftMidpoint, Method, Midpoint, Moment, Obstacle, Problem, Rectangle, Rows, Solver,
-    SplittingScheme, Status, StepError, Stepper, Steps, Stop, Strang, Suspicion, UnknownIntegrator, UnknownMethod,
-    Until, Wants,
+    AnyIntegrator, BoundaryPath, Checkpoint, Composition, DiscreteLagrangian, DiscretePath, End, Event, Events, Facts,
+    Flow, Gauss, Halt, InputError, Integrator, Interrupted, LeftMidpoint, Method, Midpoint, Moment, Obstacle, Problem,
+    Rectangle, Rows, Solver, SplittingScheme, Status, StepError, Stepper, Steps, Stop, Strang, Suspicion,
+    UnknownIntegrator, UnknownMethod, Until, Wants,
 };
 use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow};
 use std::ops::ControlFlow;
@@ -204,6 +204,11 @@ fn input_errors() {
         }, ["is 0", "positive and finite"];
         InputError::Dimension => Midpoint::new(Nothing, 0.1).err().unwrap(), ["dimension 0", "at least one"];
         InputError::Count { .. } => Rows::<1>::every(0).err().unwrap(), ["the steps between two rows", "= 0", "at least 1"];
+        InputError::PathLength { .. } => {
+            let ends = [End::Position([0.0].into()), End::Free];
+            let path = DiscretePath::new(vec![[0.0].into(); 3]).unwrap();
+            BoundaryPath::new(Midpoint::new(pendulum, 0.1).unwrap(), 5, ends).unwrap().from_path(path).err().unwrap()
+        }, ["2 steps", "problem has 5", "5 + 1 points"];
         InputError::Geometry(_) => {
             Flow::new(&Midpoint::new(pendulum, 0.1).unwrap(), 0.0, pendulum_at(f64::NAN)).err().unwrap()
         }, ["p[0] = NaN", "finite"];

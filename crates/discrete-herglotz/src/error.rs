@@ -102,6 +102,14 @@ pub enum InputError {
         /// The count that was passed.
         found: usize,
     },
+    /// The path from which a search starts has another number of steps than the problem.
+    #[error("the path has {found} steps where the problem has {expected}; pass {expected} + 1 points")]
+    PathLength {
+        /// The number of steps of the problem.
+        expected: usize,
+        /// The number of steps of the path.
+        found: usize,
+    },
     /// A coordinate, a slice or a matrix of the geometry is bad.
     #[error(transparent)]
     Geometry(#[from] GeometryError),

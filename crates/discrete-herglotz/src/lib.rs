@@ -19,8 +19,12 @@
 //! # Ok::<(), discrete_herglotz::InputError>(())
 //! ```
 //!
+//! Features: `faer` (default) for large linear systems, `csv` for rows written while a run goes on, `serde` for integrators by name.
+//!
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
+mod boundary;
+mod ensemble;
 mod error;
 mod gauss;
 pub mod rules;
@@ -29,12 +33,11 @@ mod solve;
 mod splitting;
 mod theory;
 
+pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus, continuation};
+pub use ensemble::{Ending, Ensemble, EnsembleError, InLanes, Member, Tally};
 pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
 pub use gauss::{ClockedGauss, ClockedStepper, DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper};
-pub use rules::{
-    ByRule, Composed, Composition, Discrete, Discretisation, Discretised, ExtendedJet, Flow, FlowStep, LeftMidpoint,
-    Method, Midpoint, Node, Quadrature, Rectangle, Rule, Trapezoidal, UnknownMethod,
-};
+pub use rules::*;
 #[cfg(feature = "csv")]
 pub use run::CsvRows;
 pub use run::{

@@ -5,7 +5,7 @@ use super::{STEPS, starts};
 use crate::Attack;
 use crate::numbers::{Claiming, HOSTILE, Report};
 use contact_geom::{PhasePoint, VelocityPoint};
-use discrete_herglotz::rules::MidpointRule;
+use discrete_herglotz::MidpointRule;
 use discrete_herglotz::{
     AnyIntegrator, ByRule, Checkpoint, CheckpointError, Composed, Discrete, DiscreteLagrangian, Discretisation, Facts,
     InputError, Integrator, Interrupted, Item, Method, Midpoint, Problem, SplittingScheme, Status, Stepper, Steps,

@@ -239,41 +239,41 @@ mod tests {
     use nalgebra::SVector;
 
     /// A number with a first and a second derivative along one direction.
-    type Second = Dual<Dual<f64, SVector<f64, 1>>, SVector<Dual<f64, SVector<f64, 1>>, 1>>;
+    type SecondAlong = Dual<Dual<f64, SVector<f64, 1>>, SVector<Dual<f64, SVector<f64, 1>>, 1>>;
 
-    fn moving(x: f64) -> Second {
+    fn moving(x: f64) -> SecondAlong {
         Dual { re: Dual { re: x, d: SVector::<f64, 1>::new(1.0) }, d: SVector::<_, 1>::new(Dual::from(1.0)) }
     }
 
     /// The value with the first and the second derivative.
-    fn jet(x: Second) -> [f64; 3] {
+    fn jet(x: SecondAlong) -> [f64; 3] {
         assert_eq!(x.re.d[0], x.d[0].re, "the first derivative stands twice");
         [x.re.re, x.re.d[0], x.d[0].d[0]]
     }
 
     #[test]
     fn what_is_chosen_comes_with_its_derivatives() {
-        let square = |x: Second| x.if_less(Second::zero(), x * x, x.powi(3));
+        let square = |x: SecondAlong| x.if_less(SecondAlong::zero(), x * x, x.powi(3));
         assert_eq!(jet(square(moving(-2.0))), [4.0, -4.0, 2.0]);
         assert_eq!(jet(square(moving(2.0))), [8.0, 12.0, 12.0]);
-        assert_eq!(jet(Scalar::max(moving(2.0), Second::one())), [2.0, 1.0, 0.0]);
-        assert_eq!(jet(Scalar::max(moving(0.5), Second::one())), [1.0, 0.0, 0.0]);
-        assert_eq!(jet(Scalar::min(moving(2.0), Second::one())), [1.0, 0.0, 0.0]);
-        assert_eq!(jet(Scalar::min(moving(0.5), Second::one())), [0.5, 1.0, 0.0]);
+        assert_eq!(jet(Scalar::max(moving(2.0), SecondAlong::one())), [2.0, 1.0, 0.0]);
+        assert_eq!(jet(Scalar::max(moving(0.5), SecondAlong::one())), [1.0, 0.0, 0.0]);
+        assert_eq!(jet(Scalar::min(moving(2.0), SecondAlong::one())), [1.0, 0.0, 0.0]);
+        assert_eq!(jet(Scalar::min(moving(0.5), SecondAlong::one())), [0.5, 1.0, 0.0]);
         assert_eq!(jet(moving(-3.0).abs().powi(3)), [27.0, -27.0, 18.0]);
         assert_eq!(jet(moving(-3.0).signum()), [-1.0, 0.0, 0.0]);
         // What is not chosen does not count, not even where it is infinite.
-        let root = |x: Second| x.if_less(Second::zero(), Second::zero(), x.sqrt());
+        let root = |x: SecondAlong| x.if_less(SecondAlong::zero(), SecondAlong::zero(), x.sqrt());
         assert_eq!(jet(root(moving(-1.0))), [0.0; 3]);
-        assert_eq!(jet(Second::zero().if_less(moving(1.0), moving(0.0), moving(0.0).ln())), [0.0, 1.0, 0.0]);
+        assert_eq!(jet(SecondAlong::zero().if_less(moving(1.0), moving(0.0), moving(0.0).ln())), [0.0, 1.0, 0.0]);
     }
 
     #[test]
     fn ties_and_numbers_that_are_none() {
-        assert_eq!(jet(Scalar::max(moving(1.0), Second::one())), [1.0, 1.0, 0.0]);
-        assert_eq!(jet(Scalar::max(Second::one(), moving(1.0))), [1.0, 0.0, 0.0]);
-        assert_eq!(jet(Scalar::min(moving(1.0), Second::one())), [1.0, 1.0, 0.0]);
-        assert_eq!(jet(Scalar::min(Second::one(), moving(1.0))), [1.0, 0.0, 0.0]);
+        assert_eq!(jet(Scalar::max(moving(1.0), SecondAlong::one())), [1.0, 1.0, 0.0]);
+        assert_eq!(jet(Scalar::max(SecondAlong::one(), moving(1.0))), [1.0, 0.0, 0.0]);
+        assert_eq!(jet(Scalar::min(moving(1.0), SecondAlong::one())), [1.0, 1.0, 0.0]);
+        assert_eq!(jet(Scalar::min(SecondAlong::one(), moving(1.0))), [1.0, 0.0, 0.0]);
         assert_eq!(jet(moving(0.0).abs()), [0.0; 3]);
         assert_eq!([0.0, -0.0].map(Scalar::signum), [0.0; 2]);
         for (a, b) in [(f64::NAN, 1.0), (1.0, f64::NAN)] {

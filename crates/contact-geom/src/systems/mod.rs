@@ -2,6 +2,7 @@
 //!
 //! Every theorem test of the workspace runs over all of them; a new system joins [`visit_catalogue`] and is tested at once.
 
+mod as_one;
 mod chain;
 mod charged_particle;
 mod closed_form;
@@ -41,7 +42,9 @@ pub use spherical_pendulum::SphericalPendulum;
 pub use uniform_field::UniformField;
 pub use van_der_pol::VanDerPol;
 
-use crate::{Lagrangian, PhasePoint, Scalar, Symmetry, VelocityPoint};
+use crate::{Hessian, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, Triple, VelocityPoint};
+use as_one::systems;
+use nalgebra::SVector;
 
 /// A system of the catalogue: a regular Lagrangian with what is known of it.
 pub trait System<const N: usize>: Lagrangian<N> {
@@ -71,32 +74,64 @@ pub trait System<const N: usize>: Lagrangian<N> {
     }
 }
 
+systems! {
+    /// The systems of the catalogue in one coordinate, as one system.
+    ///
+    /// For speed take a system's own type: a kernel for this one asks which it is, at each evaluation.
+    OneCoordinate<1> {
+        FreeParticle: FreeParticle,
+        HarmonicOscillator: HarmonicOscillator,
+        Pendulum: Pendulum,
+        Duffing: Duffing,
+        LaneEmden: LaneEmden,
+        QuadraticInZ: QuadraticInZ,
+        CoupledInZ: CoupledInZ,
+        Relativistic: Relativistic,
+    }
+}
+
+systems! {
+    /// The systems of the catalogue in two coordinates, as one system; [`Kepler`] states a clock and stays a type of its own.
+    ///
+    /// For speed take a system's own type: a kernel for this one asks which it is, at each evaluation.
+    TwoCoordinates<2> {
+        UniformField: UniformField<2>,
+        SphericalPendulum: SphericalPendulum,
+        DoublePendulum: DoublePendulum,
+        PerturbedKepler: PerturbedKepler,
+        CoupledPlane: CoupledPlane,
+        ChargedParticle: ChargedParticle,
+    }
+}
+
 /// Something done to every system, whatever its dimension.
 pub trait SystemVisitor {
     /// Does it to one system.
     fn visit<const N: usize, S: System<N>>(&mut self, system: &S);
 }
 
-/// Visits every regular system of the catalogue with its natural parameters. [`Lienard`] and [`VanDerPol`] are not among
-/// them: they have a contact Hamiltonian, but no regular Lagrangian.
+/// Visits every regular system of the catalogue with its natural parameters. [`Lienard`] and
+/// [`VanDerPol`] are not among them: they have a contact Hamiltonian, but no regular Lagrangian.
 pub fn visit_catalogue(visitor: &mut impl SystemVisitor) {
-    visitor.visit(&FreeParticle::default());
-    visitor.visit(&UniformField::<2>::default());
-    visitor.visit(&HarmonicOscillator::default());
-    visitor.visit(&Pendulum::default());
-    visitor.visit(&Duffing::default());
-    visitor.visit(&Duffing::forced());
-    visitor.visit(&SphericalPendulum::default());
-    visitor.visit(&DoublePendulum::default());
+    let one = |system: OneCoordinate, visitor: &mut _| SystemVisitor::visit(visitor, &system);
+    let two = |system: TwoCoordinates, visitor: &mut _| SystemVisitor::visit(visitor, &system);
+    one(FreeParticle::default().into(), visitor);
+    two(UniformField::default().into(), visitor);
+    one(HarmonicOscillator::default().into(), visitor);
+    one(Pendulum::default().into(), visitor);
+    one(Duffing::default().into(), visitor);
+    one(Duffing::forced().into(), visitor);
+    two(SphericalPendulum::default().into(), visitor);
+    two(DoublePendulum::default().into(), visitor);
     visitor.visit(&Kepler::<2>::default());
     visitor.visit(&Kepler::<3>::default());
-    visitor.visit(&PerturbedKepler::default());
-    visitor.visit(&LaneEmden::default());
-    visitor.visit(&QuadraticInZ::default());
-    visitor.visit(&CoupledInZ::default());
-    visitor.visit(&CoupledPlane::default());
-    visitor.visit(&ChargedParticle::default());
-    visitor.visit(&Relativistic::default());
+    two(PerturbedKepler::default().into(), visitor);
+    one(LaneEmden::default().into(), visitor);
+    one(QuadraticInZ::default().into(), visitor);
+    one(CoupledInZ::default().into(), visitor);
+    two(CoupledPlane::default().into(), visitor);
+    two(ChargedParticle::default().into(), visitor);
+    one(Relativistic::default().into(), visitor);
     visitor.visit(&Chain::<4>::default());
     visitor.visit(&Chain::<3>::free());
 }

@@ -8,7 +8,7 @@ use super::instructions::Instructions;
 use super::look::{Compare, Curve, Look};
 use super::mass::Mass;
 use super::stage_equations::Products;
-use super::sweeps::Verdict;
+use super::sweeps::AfterSweep;
 use super::table::StageTable;
 use super::time_transformation::{Extension, Fictitious, Values};
 use crate::gauss::lanes::forget_branches;
@@ -166,7 +166,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
     /// Takes steps by sweeps.
     fn sweep(&mut self, steps: usize) -> Result<(), Halt> {
         let ClockedStepper { general, taken, suspicion, .. } = self;
-        self.arch.dispatch(Advance { general: &mut **general, suspicion, taken, steps })
+        self.arch.dispatch(AdvanceClocked { general: &mut **general, suspicion, taken, steps })
     }
 
     /// From the words of another; no look at its last step.
@@ -193,14 +193,14 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
 }
 
 /// Steps in the lanes of one instruction set; ends at a step that cannot be taken.
-struct Advance<'b, 'a, L, C, const N: usize> {
+struct AdvanceClocked<'b, 'a, L, C, const N: usize> {
     general: &'b mut General<'a, L, Fictitious<C>, N>,
     suspicion: &'b mut Option<Suspicion>,
     taken: &'b mut usize,
     steps: usize,
 }
 
-impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for Advance<'_, '_, L, C, N> {
+impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for AdvanceClocked<'_, '_, L, C, N> {
     type Output = Result<(), Halt>;
 
     #[inline(always)]
@@ -210,7 +210,7 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for Advance<'_, '_,
             // L does not depend on it.
             let t = self.general.extension.t.value;
             let progress = self.general.step::<S>(t);
-            if progress != Verdict::Done {
+            if progress != AfterSweep::Done {
                 return Err(Halt { taken, cause: progress.into() });
             }
             if self.general.misfit > 1.0 && self.suspicion.is_none() {

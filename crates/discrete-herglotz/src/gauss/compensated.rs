@@ -6,7 +6,7 @@ use std::ops::{Add, Mul};
 
 /// A number with the part that its last digit leaves out, so that a sum of small changes loses nothing.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Compensated {
+pub(crate) struct Compensated {
     pub value: f64,
     pub rest: f64,
 }
@@ -38,7 +38,7 @@ pub(super) fn exact_sum(a: f64, b: f64) -> (f64, f64) {
 /// A number in two parts that are not added: what the coefficients of a step leave out of one double acts in the same
 /// direction in every step, and so it is carried along.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Twofold {
+pub(crate) struct Twofold {
     pub head: f64,
     pub tail: f64,
 }

@@ -18,7 +18,7 @@ use std::array::from_fn;
 /// `rho_i` of the integrating factor, which depend on `gamma h` only,
 /// `Q = q0 + u v0 + B a`, `V_i = v0 / rho_i + (D a)_i`, and at the end `q1 = q0 + end_u v0 + end_b.a`,
 /// `v1 = v0 + grow v0 + end_v.a`, `z1 = z0 + grow z0 + end_v.(L - gamma z)`, `sigma_d = 1 + grow`.
-pub(super) struct Condensed {
+pub(crate) struct Condensed {
     pub s: usize,
     pub h: f64,
     pub gamma: f64,
@@ -45,7 +45,7 @@ pub(super) struct Condensed {
 }
 
 /// The coefficients of a [`Condensed`] step that its linear case takes in double-double precision.
-pub(super) struct ExactEnd {
+pub(crate) struct ExactEnd {
     pub d: [Exact; MOST],
     pub inverse_rho: Exact,
     pub end_u: Quad,
@@ -83,7 +83,7 @@ impl Condensed {
         if !(end_rho.0 > 0.0 && end_rho.0.is_finite()) {
             return Err(InputError::Sigma { sigma: 1.0 / end_rho.0 });
         }
-        let Products { velocity, positions } = Instructions::new().dispatch(Multiply { s, h, rho: &rho });
+        let AccelerationProducts { velocity, positions } = Instructions::new().dispatch(Multiply { s, h, rho: &rho });
         let exact = ExactEnd {
             d: velocity.map(|row| from_fn(|j| row.at(j))),
             inverse_rho: rho.map(|r| if gamma == 0.0 { one } else { one / r }),
@@ -125,7 +125,7 @@ impl Condensed {
     /// the force. `None` where the matrix `1 + kappa B` is near to singular.
     pub fn preconditioned(&self, kappa: f64) -> Option<Preconditioned> {
         let s = self.s;
-        let mut rows: Rows = from_fn(|i| {
+        let mut rows: LeftRows = from_fn(|i| {
             from_fn(|j| match j {
                 MOST => 1.0,
                 j if j > MOST => self.u[i].0,
@@ -167,8 +167,8 @@ impl Condensed {
                 j => head.b.0[j].0[i],
             })
         };
-        let rows: Rows = from_fn(row);
-        let mut residual: Rows = [[0.0; MOST + 2]; MOST];
+        let rows: LeftRows = from_fn(row);
+        let mut residual: LeftRows = [[0.0; MOST + 2]; MOST];
         for i in 0..s {
             // What is to be had minus what there is, in two parts.
             let (mut sum, mut lost) = (rows[i].map(|e| -e), [0.0; MOST + 2]);
@@ -210,14 +210,14 @@ impl Condensed {
 type Wide = ExactRow<{ MOST + 8 }>;
 
 /// What a [`Condensed`] step multiplies its accelerations with.
-struct Products {
+struct AccelerationProducts {
     /// `D`, and beside it `1 / rho`.
     velocity: [Wide; MOST],
     /// `B` and `u`, and in row `s` those of the step's end.
     positions: [Wide; MOST + 1],
 }
 
-/// The [`Products`] from the stages of the integrating factor, in the instructions of the processor.
+/// The [`AccelerationProducts`] from the stages of the integrating factor, in the instructions of the processor.
 struct Multiply<'a> {
     s: usize,
     h: f64,
@@ -225,10 +225,10 @@ struct Multiply<'a> {
 }
 
 impl WithSimd for Multiply<'_> {
-    type Output = Products;
+    type Output = AccelerationProducts;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> Products {
+    fn with_simd<S: Simd>(self, _simd: S) -> AccelerationProducts {
         let Multiply { s, h, rho } = self;
         let (g, step, zero) = (Coefficients::of(s), Quad::from(h), Quad::zero());
         let factors = Wide::from_fn(|j| if j < s { step * rho[j] } else { zero });
@@ -247,23 +247,23 @@ impl WithSimd for Multiply<'_> {
                 positions[i].add(step * weight, &velocity[j]);
             }
         }
-        Products { velocity, positions }
+        AccelerationProducts { velocity, positions }
     }
 }
 
 /// Rows of `left_b` with those of `left` and `left_u` at the end.
-type Rows = [[f64; MOST + 2]; MOST];
+type LeftRows = [[f64; MOST + 2]; MOST];
 
 /// The matrices of [`Condensed::preconditioned`], or what their rounding leaves out.
 #[repr(C)] // See `SeparableStages`: the matrix last.
-pub(super) struct Left {
+pub(crate) struct Left {
     pub q: Stages,
     pub u: Stages,
     pub b: StageMap,
 }
 
 impl Left {
-    fn new(rows: &Rows, s: usize) -> Self {
+    fn new(rows: &LeftRows, s: usize) -> Self {
         let column = |j: usize| Stages(from_fn(|i| rows[i.min(s - 1)][j]));
         Left { q: column(MOST), u: column(MOST + 1), b: StageMap(from_fn(column)) }
     }
@@ -271,7 +271,7 @@ impl Left {
 
 /// See [`Condensed::preconditioned`].
 #[repr(C)] // See `SeparableStages`: the head last.
-pub(super) struct Preconditioned {
+pub(crate) struct Preconditioned {
     pub kappa: f64,
     /// What the rounding of the head leaves out, found by [`refine`](Self::refine).
     pub tail: Option<Left>,

@@ -10,7 +10,7 @@ use super::mass::Mass;
 use super::resolution::Tail;
 use super::simplified::{CorrectStages, StageNewton};
 use super::stages::{StageMap, Stages, blocks};
-use super::sweeps::{AGE, SLOW, Sweeps, Verdict};
+use super::sweeps::{AGE, AfterSweep, SLOW, Sweeps};
 use super::table::StageTable;
 use super::time_transformation::{Extension, TimeTransformation, Values};
 use crate::gauss::lanes::{Lanes, branched};
@@ -306,7 +306,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
 
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
-    pub fn step<S: Simd>(&mut self, t: f64) -> Verdict {
+    pub fn step<S: Simd>(&mut self, t: f64) -> AfterSweep {
         let solved = std::mem::take(&mut self.solved);
         // Without a step before, from a motion of constant velocity.
         let mut cold = !self.warm || self.newton.is_some();
@@ -325,7 +325,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
         self.warm = false;
         self.place::<S>();
         if !self.invert_mass::<S>(t) {
-            return Verdict::NonFinite;
+            return AfterSweep::NonFinite;
         }
         let mut sweeps = Sweeps::until(1.0, 0.25);
         // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
@@ -352,8 +352,8 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             // `f64::max` would hide a NaN.
             let change = if !P::PHYSICAL && (of_clock > change || of_clock.is_nan()) { of_clock } else { change };
             match sweeps.judge(change, 1.0) {
-                Verdict::Going => {}
-                Verdict::Done => {
+                AfterSweep::Going => {}
+                AfterSweep::Done => {
                     let outcome = self.finish::<S>();
                     self.judge::<S>(sweeps.first());
                     self.age = self.age.saturating_add(1);
@@ -362,7 +362,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
                     }
                     return outcome;
                 }
-                Verdict::Slow { .. } if self.holds::<S>() => return self.finish::<S>(),
+                AfterSweep::Slow { .. } if self.holds::<S>() => return self.finish::<S>(),
                 refused => return refused,
             }
         }
@@ -442,7 +442,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
 
     /// The end of the step from its stages.
     #[inline(always)]
-    fn finish<S: Simd>(&mut self) -> Verdict {
+    fn finish<S: Simd>(&mut self) -> AfterSweep {
         if !P::PHYSICAL {
             // With the rates of the last evaluation.
             self.stride::<S>();
@@ -455,10 +455,10 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
         }
         let rho = 1.0 - deepest.largest();
         if rho <= 0.0 {
-            return Verdict::StageFactor { rho };
+            return AfterSweep::StageFactor { rho };
         }
         if one_minus_rho >= 1.0 {
-            return Verdict::SigmaVanished { sigma: 1.0 / (1.0 - one_minus_rho) };
+            return AfterSweep::SigmaVanished { sigma: 1.0 / (1.0 - one_minus_rho) };
         }
         // sigma_d - 1, so that a small rate does not round the whole.
         let grow = one_minus_rho / (1.0 - one_minus_rho);
@@ -470,11 +470,11 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             dp[d] = Twofold { head: pushed, tail: grow * (pushed + self.p[d].value) };
         }
         if branched() {
-            return Verdict::Branched;
+            return AfterSweep::Branched;
         }
         // The largest change over lanes may hide a NaN; one of `one_minus_rho` is in `dp`.
         if !finite(&dq, &dp, single(dz)) {
-            return Verdict::NonFinite;
+            return AfterSweep::NonFinite;
         }
         if !P::PHYSICAL {
             let mut dt = Stages::ZERO;
@@ -484,7 +484,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             let dt = dt.sum::<S>(s);
             let runs = self.extension.g.0[..s].iter().all(|g| *g > 0.0);
             if !(runs && dt.is_finite()) {
-                return Verdict::NonFinite;
+                return AfterSweep::NonFinite;
             }
             self.extension.t.add(single(dt));
             self.extension.p_t.add(single(grow * self.extension.p_t.value));
@@ -494,6 +494,6 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
         self.z.add(single(dz));
         self.one_minus_rho = one_minus_rho;
         self.warm = true;
-        Verdict::Done
+        AfterSweep::Done
     }
 }

@@ -7,7 +7,7 @@ use pulp::WithSimd;
 /// As a rule they are compiled for all that a processor of this kind may have, and the best is picked at run time. A build for processors with the
 /// widest registers (`target-cpu=native` on one of them) has no use for the others: it compiles each kernel once instead of three times.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Instructions(chosen::Set);
+pub(crate) struct Instructions(chosen::Set);
 
 impl Instructions {
     /// The best that the processor has.

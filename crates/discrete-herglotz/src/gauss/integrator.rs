@@ -3,7 +3,7 @@
 use super::clocked::OwnClock;
 use super::stage_equations::Products;
 use super::{ClockedStepper, GaussStepper, MOST};
-use crate::{Facts, InputError, Integrator, Problem, Stepper, Wants};
+use crate::{Facts, InLanes, InputError, Integrator, Problem, Stepper, Wants};
 use contact_geom::Lagrangian;
 
 /// Contact [`Gauss`](crate::Gauss) collocation with 1 to 16 stages, of order twice their number, for every regular Lagrangian.
@@ -91,6 +91,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussColloca
         wants: Wants,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         Ok(Box::new(self.run(problem, h, wants)?))
+    }
+
+    fn in_lanes(&self) -> Option<InLanes> {
+        Some(InLanes::Gauss(*self))
     }
 }
 

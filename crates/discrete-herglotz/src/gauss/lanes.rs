@@ -16,7 +16,7 @@ pub(crate) struct Lanes<S: Simd>(pub S::f64s);
 /// The token of an instruction set, out of nothing.
 #[allow(unsafe_code)] // The trait has no other way to a token; why it is sound is said below.
 #[inline(always)]
-fn token<S: Simd>() -> S {
+pub(crate) fn token<S: Simd>() -> S {
     const { assert!(size_of::<S>() == 0, "a token carries nothing") };
     // SAFETY: a token is a proof, of size 0, that the processor has the instructions. `Lanes<S>` is private to this crate, which
     // makes them only below `Instructions::dispatch`, which has handed out a token of the same type there.
@@ -33,6 +33,12 @@ thread_local! {
 #[inline(always)]
 pub(crate) fn branched() -> bool {
     ASKED.get()
+}
+
+/// Notes that a formula has branched.
+#[cold]
+pub(crate) fn note_branch() {
+    ASKED.set(true);
 }
 
 /// Begins anew to watch for branches.
@@ -406,14 +412,14 @@ mod tests {
     }
 
     /// Choices of numbers by pairs, as many as there are lanes at a time.
-    struct Choose<'a>(&'a [f64], &'a [f64]);
+    struct ChooseLanes<'a>(&'a [f64], &'a [f64]);
 
     /// `if_less` of a, b and 10, 20; the larger, the smaller, the size and the sign of a.
     fn choices<T: Scalar>(a: T, b: T) -> [T; 5] {
         [a.if_less(b, 10.0.into(), 20.0.into()), Scalar::max(a, b), Scalar::min(a, b), Scalar::abs(a), a.signum()]
     }
 
-    impl WithSimd for Choose<'_> {
+    impl WithSimd for ChooseLanes<'_> {
         type Output = Vec<[f64; 5]>;
 
         #[inline(always)]
@@ -432,11 +438,11 @@ mod tests {
         let values = [0.0, -0.0, 1.0, -1.0, 2.5, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
         let pairs = values.iter().flat_map(|a| values.iter().map(move |b| (*a, *b)));
         let (a, b): (Vec<_>, Vec<_>) = pairs.unzip();
-        let mut sets = vec![pulp::Scalar::new().vectorize(Choose(&a, &b))];
+        let mut sets = vec![pulp::Scalar::new().vectorize(ChooseLanes(&a, &b))];
         #[cfg(target_arch = "x86_64")]
         {
-            sets.extend(pulp::x86::V3::try_new().map(|set| Simd::vectorize(set, Choose(&a, &b))));
-            sets.extend(pulp::x86::V4::try_new().map(|set| Simd::vectorize(set, Choose(&a, &b))));
+            sets.extend(pulp::x86::V3::try_new().map(|set| Simd::vectorize(set, ChooseLanes(&a, &b))));
+            sets.extend(pulp::x86::V4::try_new().map(|set| Simd::vectorize(set, ChooseLanes(&a, &b))));
         }
         for set in sets {
             assert_eq!(set.len(), a.len());

@@ -4,7 +4,7 @@ use super::condensed::Condensed;
 use super::damping::{Damping, ITERATIONS, Verdict, chances};
 use crate::StepError;
 use crate::rules::step_equations::BLOCK;
-use crate::solve::solver::DenseLu;
+use crate::solve::DenseLu;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, KernelDual, Lagrangian, VelocityPoint, largest};
 

@@ -10,7 +10,7 @@ use super::position_newton::{At, PositionNewton, curvature};
 use super::resolution::{FORETOLD, Tail};
 use super::simplified::SlopeNewton;
 use super::stages::{Stages, blocks};
-use super::sweeps::{AGE, SLOW, Sweeps, Verdict};
+use super::sweeps::{AGE, AfterSweep, SLOW, Sweeps};
 use crate::StepError;
 use crate::gauss::lanes::{Lanes, branched};
 use crate::run::saved::{Saved, load_option, save_option, saved};
@@ -209,7 +209,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
 
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
-    pub fn step<S: Simd>(&mut self, t: f64) -> Verdict {
+    pub fn step<S: Simd>(&mut self, t: f64) -> AfterSweep {
         if self.warm && self.newton.is_none() && self.taken >= self.review {
             self.review *= 2;
             self.look_again();
@@ -270,23 +270,23 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             self.evaluations += s as u64;
             let (mut change, size) = (change.largest(), size.largest());
             if solved {
-                break Verdict::Done;
+                break AfterSweep::Done;
             }
             if self.newton.is_some() {
                 (change, sweeps.still) = self.correct();
             }
             match sweeps.judge(change, size) {
-                Verdict::Going if tails && change > NEAR * size => (due, self.far) = (true, true),
-                Verdict::Going => (again, due) = (again || due, false),
+                AfterSweep::Going if tails && change > NEAR * size => (due, self.far) = (true, true),
+                AfterSweep::Going => (again, due) = (again || due, false),
                 done => break done,
             }
         };
-        if let (Verdict::Done, Some(_)) = (outcome, &self.newton) {
+        if let (AfterSweep::Done, Some(_)) = (outcome, &self.newton) {
             // Stiff forces magnify the round-off of the positions, and the correction takes it back.
             self.a = self.rest;
         }
-        let outcome = if outcome == Verdict::Done { self.finish::<S>(t) } else { outcome };
-        self.warm = outcome == Verdict::Done;
+        let outcome = if outcome == AfterSweep::Done { self.finish::<S>(t) } else { outcome };
+        self.warm = outcome == AfterSweep::Done;
         if !self.warm {
             // What an iteration leaves that does not contract is worse than nothing.
             self.rest = [Stages::ZERO; N];
@@ -300,10 +300,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             if sweeps.count() > SLOW && self.age > AGE {
                 self.renew(t);
             }
-            return Verdict::Done;
+            return AfterSweep::Done;
         }
         self.taken += 1;
-        Verdict::Done
+        AfterSweep::Done
     }
 
     /// Looks at the slope of the force, and refines matrices that last.
@@ -355,7 +355,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
 
     /// The end of the step from its accelerations.
     #[inline(always)]
-    fn finish<S: Simd>(&mut self, t: f64) -> Verdict {
+    fn finish<S: Simd>(&mut self, t: f64) -> AfterSweep {
         let (table, s) = (&self.table, self.table.s);
         let (mut dq, mut dv, mut dz) = ([Twofold::default(); N], [Twofold::default(); N], Twofold::default());
         if self.wants_z {
@@ -367,16 +367,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             dv[d] = table.end_v.sum::<S>(&self.a[d], s) + table.grow.times(v);
         }
         if branched() {
-            return Verdict::Branched;
+            return AfterSweep::Branched;
         }
         // The largest change over lanes may hide a NaN.
         if !finite(&dq, &dv, dz) {
-            return Verdict::NonFinite;
+            return AfterSweep::NonFinite;
         }
         add(&mut self.q, &dq);
         add(&mut self.v, &dv);
         self.z.add(dz);
-        Verdict::Done
+        AfterSweep::Done
     }
 
     /// `L - gamma z` at the stages.

@@ -13,7 +13,8 @@ use super::stages::{Stages, blocks};
 use super::table::StageTable;
 use crate::gauss::lanes::Lanes;
 use crate::run::saved::saved;
-use contact_geom::nalgebra::{Complex, DMatrix, SMatrix, SVector};
+use crate::solve::inverse::invert_complex;
+use contact_geom::nalgebra::{Complex, SMatrix, SVector};
 use contact_geom::{Hessian, Scalar, Triple, larger};
 use pulp::{Simd, WithSimd};
 
@@ -293,12 +294,8 @@ fn invert<const N: usize>(m: &mut Matrix<N>) -> bool {
     if !m.iter().all(|e| e.is_finite()) {
         return false;
     }
-    if const { N <= 8 } {
-        return m.try_inverse_mut() && m.iter().all(|e| e.is_finite());
-    }
-    let Some(inverse) = DMatrix::from_column_slice(N, N, m.as_slice()).try_inverse() else { return false };
-    m.copy_from_slice(inverse.as_slice());
-    m.iter().all(|e| e.is_finite())
+    let inverted = if const { N > 4 && N <= 8 } { m.try_inverse_mut() } else { invert_complex(m.as_mut_slice(), N) };
+    inverted && m.iter().all(|e| e.is_finite())
 }
 
 saved!([const N: usize] SlopeNewton<N> { inverses, a });

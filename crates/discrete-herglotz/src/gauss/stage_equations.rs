@@ -5,7 +5,8 @@
 use super::coefficients::{Coefficients, MOST};
 use super::damping::{Damping, ITERATIONS, Verdict, chances};
 use crate::rules::step_equations::BLOCK;
-use crate::solve::solver::DenseLu;
+use crate::solve::DenseLu;
+use crate::solve::inverse::inverse;
 use crate::{ITERATION_LIMIT, StepError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{Derivatives, Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, seed};
@@ -88,7 +89,7 @@ impl<const N: usize> StageUnknowns<N, f64> {
 }
 
 /// The end of a step, and the momentum at its start.
-pub(super) struct End<const N: usize, T> {
+pub(super) struct StepEnd<const N: usize, T> {
     pub p0: SVector<T, N>,
     pub q: SVector<T, N>,
     pub p: SVector<T, N>,
@@ -375,7 +376,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         given: &Given<N, T>,
         x: &StageUnknowns<N, T>,
         l: &[Dual<T, Triple<N, T>>],
-    ) -> End<N, T> {
+    ) -> StepEnd<N, T> {
         let Products { b, .. } = self.products;
         let (q0, p0) = match given {
             Given::Start(state) => (state.q, state.p),
@@ -383,7 +384,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         };
         let sum = |f: &dyn Fn(usize) -> T| (0..self.products.s).fold(T::zero(), |sum, j| sum + f(j) * b[j]);
         let rho = -sum(&|j| x.rho[j] * l[j].d.z) + 1.0;
-        End {
+        StepEnd {
             p0,
             q: SVector::from_fn(|d, _| q0[d] + sum(&|j| x.v[j][d])),
             p: SVector::from_fn(|d, _| (p0[d] + sum(&|j| x.rho[j] * l[j].d.x[d])) / rho),
@@ -402,10 +403,10 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         given: &Given<N, T>,
         plain: &Given<N, f64>,
         work: &mut Workspace<N>,
-    ) -> Result<End<N, T>, StepError> {
+    ) -> Result<StepEnd<N, T>, StepError> {
         let n = self.unknowns(plain);
         self.jacobian(plain, &work.x, &work.l, &mut work.jacobian);
-        let inverse = work.jacobian.clone().try_inverse().ok_or(StepError::Singular { pivot: 0.0 })?;
+        let inverse = inverse(&work.jacobian).ok_or(StepError::Singular { pivot: 0.0 })?;
         let (mut x, mut l) = (work.x.lifted::<T>(), Vec::new());
         let (mut residual, mut change) = (DVector::from_element(n, T::zero()), DVector::from_element(n, T::zero()));
         let mut before = f64::INFINITY;

@@ -12,7 +12,7 @@ use std::array::from_fn;
 /// regular at the stages are so everywhere, or is multiplied by 0.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Stages(pub [f64; MOST]);
+pub(crate) struct Stages(pub [f64; MOST]);
 
 impl Stages {
     pub const ZERO: Stages = Stages([0.0; MOST]);
@@ -45,7 +45,7 @@ pub(super) fn blocks<S: Simd>(s: usize) -> usize {
 }
 
 /// Numbers for the stages in double-double precision, with 0 beyond the last.
-pub(super) type Exact = [Quad; MOST];
+pub(crate) type Exact = [Quad; MOST];
 
 /// The leading parts of numbers for the stages, the last one repeated beyond it.
 pub(super) fn padded(x: &Exact, s: usize) -> Stages {
@@ -54,7 +54,7 @@ pub(super) fn padded(x: &Exact, s: usize) -> Stages {
 
 /// Weights of the stages, 0 beyond the last, with the part that one double leaves out.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Weights {
+pub(crate) struct Weights {
     head: Stages,
     tail: Stages,
 }
@@ -79,7 +79,7 @@ impl Weights {
 
 /// A linear map between stage values, by columns.
 #[derive(Clone, Debug)]
-pub(super) struct StageMap(pub [Stages; MOST]);
+pub(crate) struct StageMap(pub [Stages; MOST]);
 
 impl StageMap {
     /// The map with these rows.

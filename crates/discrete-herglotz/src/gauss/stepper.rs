@@ -14,7 +14,7 @@ use super::mass::Mass;
 use super::resolution;
 use super::separable::SeparableStages;
 use super::stage_equations::{Given, Products, StageEquations, Workspace};
-use super::sweeps::Verdict;
+use super::sweeps::AfterSweep;
 use super::table::StageTable;
 use super::time_transformation::{Extension, Physical};
 use crate::gauss::lanes::forget_branches;
@@ -304,7 +304,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
 
     /// Takes steps by sweeps; returns how many, and why there are no more where they are not all.
     fn sweep(&mut self, steps: usize) -> (usize, Option<StepError>) {
-        let (taken, refused) = match self.arch.dispatch(Advance { run: self, steps }) {
+        let (taken, refused) = match self.arch.dispatch(AdvanceGauss { run: self, steps }) {
             Ok(()) => (steps, None),
             Err((taken, progress)) => (taken, Some(progress)),
         };
@@ -349,24 +349,24 @@ struct Tried {
 const PAUSE: usize = 8;
 
 /// Steps in the lanes of one instruction set; ends at a step that cannot be taken.
-struct Advance<'b, 'a, L, const N: usize> {
+struct AdvanceGauss<'b, 'a, L, const N: usize> {
     run: &'b mut GaussStepper<'a, L, N>,
     steps: usize,
 }
 
-impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
-    type Output = Result<(), (usize, Verdict)>;
+impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
+    type Output = Result<(), (usize, AfterSweep)>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
-        let Advance { run, steps } = self;
+        let AdvanceGauss { run, steps } = self;
         forget_branches();
         let (t0, h) = (run.t0, run.products.h);
         if let Route::Linear(linear, _) = &mut *run.route {
             let (taken, from) = linear.advance(steps);
             run.k += taken;
             run.from = from;
-            return if taken == steps { Ok(()) } else { Err((taken, Verdict::NonFinite)) };
+            return if taken == steps { Ok(()) } else { Err((taken, AfterSweep::NonFinite)) };
         }
         for taken in 0..steps {
             // Dense output is of the last step.
@@ -375,11 +375,11 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Advance<'_, '_, L, N> {
             }
             let t = t0 + run.k as f64 * h;
             let progress = match &mut *run.route {
-                Route::Linear(..) => Verdict::Done,
+                Route::Linear(..) => AfterSweep::Done,
                 Route::Condensed(condensed) => condensed.step::<S>(t),
                 Route::General(general) => general.step::<S>(t),
             };
-            if progress != Verdict::Done {
+            if progress != AfterSweep::Done {
                 return Err((taken, progress));
             }
             let misfit = match &*run.route {

@@ -4,7 +4,7 @@ use crate::StepError;
 
 /// What is to be done after a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Verdict {
+pub(super) enum AfterSweep {
     /// Another sweep.
     Going,
     /// The stages are solved to round-off.
@@ -21,13 +21,13 @@ pub(super) enum Verdict {
     SigmaVanished { sigma: f64 },
 }
 
-impl From<Verdict> for StepError {
-    fn from(refused: Verdict) -> Self {
+impl From<AfterSweep> for StepError {
+    fn from(refused: AfterSweep) -> Self {
         match refused {
-            Verdict::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
-            Verdict::StageFactor { rho } => StepError::StageFactor { rho },
-            Verdict::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
-            Verdict::Branched => StepError::Branched,
+            AfterSweep::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
+            AfterSweep::StageFactor { rho } => StepError::StageFactor { rho },
+            AfterSweep::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
+            AfterSweep::Branched => StepError::Branched,
             _ => StepError::NonFinite,
         }
     }
@@ -84,14 +84,14 @@ impl Sweeps {
 
     /// Judges a sweep by its largest change and the largest term.
     #[inline(always)]
-    pub fn judge(&mut self, change: f64, size: f64) -> Verdict {
+    pub fn judge(&mut self, change: f64, size: f64) -> AfterSweep {
         self.count += 1;
         let round_off = 0.5 * f64::EPSILON * size;
         if change <= self.enough * round_off || self.last && change <= 256.0 * round_off {
-            return Verdict::Done;
+            return AfterSweep::Done;
         }
         if !(change + size).is_finite() {
-            return Verdict::NonFinite;
+            return AfterSweep::NonFinite;
         }
         if self.count == 1 {
             self.first = (change, size);
@@ -101,21 +101,21 @@ impl Sweeps {
             let expected = f64::max(ratio, if self.count > 2 { self.ratio } else { 0.1 });
             let next = change * expected;
             if next <= self.left * round_off {
-                return Verdict::Done;
+                return AfterSweep::Done;
             }
             self.last = next * expected <= self.left * round_off;
             if ratio >= 1.0 {
                 if change <= 256.0 * round_off || self.still {
-                    return Verdict::Done;
+                    return AfterSweep::Done;
                 }
                 self.risen += 1;
             }
             if self.risen > 3 || self.count > LIMIT {
-                return Verdict::Slow { change: change / size, sweeps: self.count };
+                return AfterSweep::Slow { change: change / size, sweeps: self.count };
             }
             self.ratio = ratio;
         }
         self.before = change;
-        Verdict::Going
+        AfterSweep::Going
     }
 }

@@ -1,8 +1,12 @@
 //! The table of methods: what is known of each, and a discrete Lagrangian by any of them, chosen at run time.
 
 use crate::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
-use crate::{Discretised, InputError, Quadrature, Rule, Strang};
-use contact_geom::{Lagrangian, PhasePoint, Structure};
+use crate::{
+    DiscreteLagrangian, InputError, LeftMidpoint, Midpoint, Quadrature, Rectangle, Rule, Solver, StepError, Strang,
+    Transition, Trapezoidal,
+};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Structure};
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 use thiserror::Error;
@@ -37,6 +41,12 @@ pub enum Method {
     Trapezoidal,
     /// The Strang splitting, [`Strang`].
     Strang,
+}
+
+/// Something done with every quadrature rule.
+pub trait RuleVisitor {
+    /// Does it with one rule, which is a method of this name.
+    fn visit<R: Rule>(&mut self, method: Method);
 }
 
 /// What is known of a method.
@@ -75,6 +85,14 @@ impl Method {
     /// The methods of [`ALL`](Self::ALL) whose hypothesis a Lagrangian of this structure meets.
     pub fn applicable(structure: &Structure) -> impl Iterator<Item = Method> {
         Self::ALL.iter().copied().filter(|method| method.check(structure).is_ok())
+    }
+
+    /// Visits every quadrature rule.
+    pub fn visit_rules(visitor: &mut impl RuleVisitor) {
+        visitor.visit::<RectangleRule>(Method::Rectangle);
+        visitor.visit::<LeftMidpointRule>(Method::LeftMidpoint);
+        visitor.visit::<MidpointRule>(Method::Midpoint);
+        visitor.visit::<TrapezoidalRule>(Method::Trapezoidal);
     }
 
     fn known(self) -> Known {
@@ -155,6 +173,93 @@ impl Method {
             Method::Trapezoidal => Discretised::Trapezoidal(Quadrature::new(lagrangian, h)?),
             Method::Strang => Discretised::Strang(Strang::new(lagrangian, h, t, state)?),
         })
+    }
+}
+
+/// The discrete Lagrangian that a [`Method`] chosen at run time makes from a Lagrangian.
+///
+/// One type for all methods: code that is generic over discrete Lagrangians is compiled once for a Lagrangian, not once
+/// for each method. [`Gauss`](crate::Gauss) is not among them: derivatives of its value, through the stages, would be
+/// compiled into every program that names this type.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum Discretised<L, const N: usize> {
+    /// By the rectangle rule.
+    Rectangle(Rectangle<L>),
+    /// By the paper's midpoint rule.
+    LeftMidpoint(LeftMidpoint<L>),
+    /// By the symmetric midpoint rule.
+    Midpoint(Midpoint<L>),
+    /// By the symmetric trapezoidal rule.
+    Trapezoidal(Trapezoidal<L>),
+    /// By the Strang splitting.
+    Strang(Strang<L, N>),
+}
+
+/// The same expression for each method.
+macro_rules! each {
+    ($self:ident, $ld:ident => $result:expr) => {
+        match $self {
+            Discretised::Rectangle($ld) => $result,
+            Discretised::LeftMidpoint($ld) => $result,
+            Discretised::Midpoint($ld) => $result,
+            Discretised::Trapezoidal($ld) => $result,
+            Discretised::Strang($ld) => $result,
+        }
+    };
+}
+
+impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Discretised<L, N> {
+    fn step_size(&self) -> f64 {
+        each!(self, ld => DiscreteLagrangian::<N>::step_size(ld))
+    }
+
+    fn value<T: Scalar>(&self, t: f64, x: &DiscretePoint<N, T>) -> Result<T, StepError> {
+        each!(self, ld => ld.value(t, x))
+    }
+
+    fn check_start(&self, t: f64, from: &PhasePoint<N>, velocity: &SVector<f64, N>) -> Result<(), InputError> {
+        each!(self, ld => ld.check_start(t, from, velocity))
+    }
+
+    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
+        each!(self, ld => ld.misfit(velocities, to, sigma))
+    }
+
+    fn is_explicit(&self) -> bool {
+        each!(self, ld => DiscreteLagrangian::<N>::is_explicit(ld))
+    }
+
+    fn constant_rate(&self) -> bool {
+        each!(self, ld => DiscreteLagrangian::<N>::constant_rate(ld))
+    }
+
+    fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {
+        each!(self, ld => ld.jet(t, x))
+    }
+
+    fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
+        each!(self, ld => ld.second_jet(t, x))
+    }
+
+    fn forward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        each!(self, ld => ld.forward(t, from, guess, solver))
+    }
+
+    fn backward(
+        &self,
+        t: f64,
+        from: &PhasePoint<N>,
+        guess: &SVector<f64, N>,
+        solver: &mut Solver<N>,
+    ) -> Result<Transition<N>, StepError> {
+        each!(self, ld => ld.backward(t, from, guess, solver))
     }
 }
 

@@ -1,7 +1,6 @@
 //! Rules: discrete Lagrangians from Lagrangians, one file each for the quadratures of the action; their flow, and compositions of it.
 
 mod composition;
-mod discretised;
 pub(crate) mod flow;
 mod integrator;
 mod left_midpoint;
@@ -13,11 +12,10 @@ pub(crate) mod step_equations;
 mod trapezoidal;
 
 pub use composition::Composition;
-pub use discretised::Discretised;
 pub use flow::{Flow, FlowStep};
 pub use integrator::{ByRule, Composed, Discrete, Discretisation};
 pub use left_midpoint::{LeftMidpoint, LeftMidpointRule};
-pub use method::{Method, UnknownMethod};
+pub use method::{Discretised, Method, RuleVisitor, UnknownMethod};
 pub use midpoint::{Midpoint, MidpointRule};
 pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
 pub use rectangle::{Rectangle, RectangleRule};

@@ -45,8 +45,8 @@ impl<const N: usize> Frame<'_, N> {
     ) {
         let Node { weight, place, action } = self.node;
         let h = self.h;
-        type Left<U, const A: usize> = Dual<Dual<f64, U>, SVector<Dual<f64, U>, A>>;
-        let constant = |re: f64| -> Left<U, A> { Dual::constant(Dual::constant(re)) };
+        type LeftDual<U, const A: usize> = Dual<Dual<f64, U>, SVector<Dual<f64, U>, A>>;
+        let constant = |re: f64| -> LeftDual<U, A> { Dual::constant(Dual::constant(re)) };
         let mut x = VelocityPoint { q: self.at.q.map(constant), v: self.at.v.map(constant), z: constant(self.at.z) };
         for j in right..N.min(right + U::LEN) {
             x.q[j].re.d = U::unit(j - right, h * place);

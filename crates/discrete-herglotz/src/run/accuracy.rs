@@ -1,7 +1,7 @@
 //! The integrator and the number of steps for a wanted error.
 
-use super::pilot::{BUDGET, Ending, Marks, Pilots, Track};
-use super::{MOST_STEPS, Problem, Shared, Task};
+use super::pilot::{BUDGET, Marks, PilotEnd, Pilots, Track};
+use super::{MOST_STEPS, Problem, Request, Shared};
 use crate::{ClockedGauss, GaussCollocation, InputError, Obstacle};
 use contact_geom::{Derivatives, Lagrangian, larger};
 use std::sync::Arc;
@@ -71,13 +71,13 @@ fn stages_for(wanted: f64) -> usize {
 /// a run at the first step that does not resolve the motion, so that runs that are far too coarse cost nothing. The error of the
 /// integrator's own runs is then their distance from the reference.
 pub(super) fn choose<'p, L: Lagrangian<N>, const N: usize>(
-    task: &Task<'p, L, N>,
+    request: &Request<'p, L, N>,
     wanted: f64,
 ) -> Result<Choice<'p, L, N>, InputError> {
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
-    choose_with(&mut Pilots { task, left: BUDGET, wanted, watches_clock: false })
+    choose_with(&mut Pilots { request, left: BUDGET, wanted, watches_clock: false })
 }
 
 /// The same with a budget.
@@ -85,10 +85,10 @@ pub(super) fn choose_with<'p, L: Lagrangian<N>, const N: usize>(
     pilots: &mut Pilots<'_, 'p, L, N>,
 ) -> Result<Choice<'p, L, N>, InputError> {
     let wanted = pilots.wanted;
-    let Some(integrator) = pilots.task.integrator.clone() else {
+    let Some(integrator) = pilots.request.integrator.clone() else {
         let stages = stages_for(wanted);
         let equal: Shared<'p, L, N> = Arc::new(GaussCollocation { stages });
-        pilots.watches_clock = const { L::HAS_CLOCK } && pilots.task.problem.structure.autonomous;
+        pilots.watches_clock = const { L::HAS_CLOCK } && pilots.request.problem.structure.autonomous;
         if let Some(choice) = by_equal_steps(pilots, &equal, stages)? {
             return Ok(choice);
         }
@@ -130,7 +130,7 @@ fn by_equal_steps<'p, L: Lagrangian<N>, const N: usize>(
     let wanted = pilots.wanted;
     let Some(found) = converge(pilots, stages, wanted, Compared::Steps)? else { return Ok(None) };
     // Where W or the drag changes along the motion a longer step may leave their domain, as no misfit foretells.
-    let structure = &pilots.task.problem.structure;
+    let structure = &pilots.request.problem.structure;
     let longer = structure.separable && structure.has_constant_rate();
     let (count, error) = fewest(stages, wanted, &found, longer);
     Ok(Some(chosen(pilots, integrator, count, error, &found)))
@@ -177,8 +177,8 @@ fn chosen<'p, L: Lagrangian<N>, const N: usize>(
 }
 
 /// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.
-fn first_guess<L: Lagrangian<N>, const N: usize>(task: &Task<'_, L, N>, stages: usize, goal: f64) -> usize {
-    let Task { problem: Problem { lagrangian, start, t0, .. }, span, .. } = task;
+fn first_guess<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, stages: usize, goal: f64) -> usize {
+    let Request { problem: Problem { lagrangian, start, t0, .. }, span, .. } = request;
     let h = lagrangian.hessian(*t0, start);
     let frequency = h.vv.try_inverse().map_or(0.0, |inverse| (inverse * h.qq).norm()).sqrt();
     // The error of a step of x radians is about x^(2s+1) s!^4 / (2s)!^3.
@@ -199,14 +199,14 @@ fn converge<L: Lagrangian<N>, const N: usize>(
     compared: Compared,
 ) -> Result<Option<Converged<N>>, InputError> {
     let refuse = |wanted, reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
-    let (wanted, t0, span) = (pilots.wanted, pilots.task.problem.t0, pilots.task.span);
+    let (wanted, t0, span) = (pilots.wanted, pilots.request.problem.t0, pilots.request.span);
     let s = stages as f64;
     let marks_of = |k: usize| match compared {
         Compared::Steps => Marks::of(k),
         Compared::Tenths => Marks::equal(k),
         Compared::Times => Marks::Times,
     };
-    let mut k = first_guess(pilots.task, stages, goal);
+    let mut k = first_guess(pilots.request, stages, goal);
     let mut marks = marks_of(k);
     let (mut best, mut strikes, mut narrows, mut halts) = (f64::INFINITY, 0, 0, (0, 0.0));
     let mut cause = Obstacle::Unresolved { t: t0 };
@@ -230,7 +230,7 @@ fn converge<L: Lagrangian<N>, const N: usize>(
             }
             let ending = pilots.gauss(stages, multiple * k, &marks, closely, narrows < NARROWS)?;
             let stopped = match ending {
-                Ending::Followed(track) => {
+                PilotEnd::Followed(track) => {
                     // The error is about the square of the misfit: what is far too large need not be halved again and again.
                     let more = (track.misfit.powi(2) / goal).powf(0.5 / s) / 1.4;
                     if multiple == 1 && !guessed && more > 1.2 {
@@ -241,16 +241,16 @@ fn converge<L: Lagrangian<N>, const N: usize>(
                     tracks.push(track);
                     continue;
                 }
-                Ending::Uneven => return Ok(None),
-                Ending::Exhausted => {
+                PilotEnd::Uneven => return Ok(None),
+                PilotEnd::Exhausted => {
                     return refuse(wanted, best, if best.is_finite() { Obstacle::Budget } else { cause });
                 }
-                Ending::Narrow { part } => {
+                PilotEnd::Narrow { part } => {
                     narrows += 1;
                     (part, Obstacle::Unresolved { t: t0 + part * span })
                 }
-                Ending::Unresolved { part } => (part, Obstacle::Unresolved { t: t0 + part * span }),
-                Ending::Halted { part, cause: halt } => (part, Obstacle::Halted { t: t0 + part * span, cause: halt }),
+                PilotEnd::Unresolved { part } => (part, Obstacle::Unresolved { t: t0 + part * span }),
+                PilotEnd::Halted { part, cause: halt } => (part, Obstacle::Halted { t: t0 + part * span, cause: halt }),
             };
             let (part, obstacle) = stopped;
             // What is narrow may need many halvings, what is singular has no end of them.
@@ -361,7 +361,7 @@ fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
             break;
         }
         let factor = match pilots.own(integrator, count, marks)? {
-            Ending::Followed(track) => {
+            PilotEnd::Followed(track) => {
                 let error = track.distance(&found.truth);
                 if error <= 0.7 * wanted {
                     enough = Some((count, error));
@@ -393,11 +393,11 @@ fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
                     2.0
                 }
             }
-            Ending::Halted { part, cause: halt } => {
+            PilotEnd::Halted { part, cause: halt } => {
                 if enough.is_some() {
                     break;
                 }
-                cause = Obstacle::Halted { t: pilots.task.problem.t0 + part * pilots.task.span, cause: halt };
+                cause = Obstacle::Halted { t: pilots.request.problem.t0 + part * pilots.request.span, cause: halt };
                 2.0
             }
             _ => {

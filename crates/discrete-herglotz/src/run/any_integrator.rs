@@ -1,7 +1,7 @@
 //! The table of integrators.
 
 use super::{Facts, Integrator, Problem, Wants};
-use crate::{ClockedGauss, Composed, Gauss, GaussCollocation, InputError, Method, SplittingScheme, Stepper};
+use crate::{ClockedGauss, Composed, Gauss, GaussCollocation, InLanes, InputError, Method, SplittingScheme, Stepper};
 use contact_geom::Lagrangian;
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
@@ -98,6 +98,10 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyInte
         wants: Wants,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         each!(*self, integrator => integrator.stepper(problem, h, wants))
+    }
+
+    fn in_lanes(&self) -> Option<InLanes> {
+        each!(*self, integrator => Integrator::<'a, L, N>::in_lanes(&integrator))
     }
 }
 

@@ -92,7 +92,7 @@ impl Interrupted {
 }
 
 /// FNV-1a, by words.
-pub(super) fn digest(words: &[u64]) -> u64 {
+pub(crate) fn digest(words: &[u64]) -> u64 {
     words.iter().fold(0xcbf2_9ce4_8422_2325, |sum, word| (sum ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29))
 }
 

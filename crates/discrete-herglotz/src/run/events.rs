@@ -72,7 +72,7 @@ pub struct Crossing<const N: usize> {
 
 /// The function of an event at the last point seen.
 #[derive(Clone, Copy)]
-struct Seen<const N: usize> {
+struct LastSign<const N: usize> {
     value: f64,
     /// The last sign that was not 0; 0 before there was one.
     sign: f64,
@@ -104,7 +104,7 @@ pub struct Events<'f, const N: usize> {
     /// The changes of sign so far, in the order of the run.
     pub crossings: Vec<Crossing<N>>,
     events: Vec<Event<'f, N>>,
-    seen: Vec<Seen<N>>,
+    seen: Vec<LastSign<N>>,
 }
 
 impl<'f, const N: usize> Events<'f, N> {
@@ -148,7 +148,7 @@ impl<const N: usize> Event<'_, N> {
         index: usize,
         step: &LastStep<'_, N>,
         sketch: &[PhasePoint<N>],
-        seen: &mut Seen<N>,
+        seen: &mut LastSign<N>,
         found: &mut Vec<Crossing<N>>,
     ) -> Result<(), StepError> {
         let ((_, end), parts) = (step.ends(), sketch.len() + 1);
@@ -178,7 +178,7 @@ impl<const N: usize> Event<'_, N> {
         &mut self,
         step: &LastStep<'_, N>,
         ends: [f64; 2],
-        seen: &mut Seen<N>,
+        seen: &mut LastSign<N>,
         value: f64,
         (t, state): (f64, &PhasePoint<N>),
     ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
@@ -212,7 +212,7 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
                 Ok(value) => {
                     let zero = (value == 0.0).then_some((at.t, at.state));
                     let sign = if value == 0.0 { 0.0 } else { value.signum() };
-                    self.seen.push(Seen { value, sign, zero });
+                    self.seen.push(LastSign { value, sign, zero });
                 }
                 Err(cause) => return ControlFlow::Break(Stop::failed(cause)),
             }

@@ -1,7 +1,7 @@
 //! Integrators: what advances a run.
 
 use super::Problem;
-use crate::{InputError, Stepper};
+use crate::{InLanes, InputError, Stepper};
 use std::borrow::Cow;
 
 /// What is known of an integrator.
@@ -81,4 +81,10 @@ pub trait Integrator<'a, L, const N: usize> {
         h: f64,
         wants: Wants,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError>;
+
+    /// What an [`Ensemble`](crate::Ensemble) has a kernel for that takes these steps for many motions at once; `None` where each has a
+    /// stepper of its own.
+    fn in_lanes(&self) -> Option<InLanes> {
+        None
+    }
 }

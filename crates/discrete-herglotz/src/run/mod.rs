@@ -27,6 +27,7 @@ pub(crate) mod verified;
 pub(crate) mod watch;
 
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
+pub(crate) use checkpoint::digest;
 pub use checkpoint::{Checkpoint, CheckpointError, Interrupted};
 #[cfg(feature = "csv")]
 pub use csv_rows::CsvRows;
@@ -79,7 +80,7 @@ pub enum Until {
 type Shared<'p, L, const N: usize> = Arc<dyn Integrator<'p, L, N> + 'p>;
 
 /// How a step is chosen for an accuracy: in a program that asks for none it is not compiled.
-type Choose<'p, L, const N: usize> = fn(&Task<'p, L, N>, f64) -> Result<Choice<'p, L, N>, InputError>;
+type Choose<'p, L, const N: usize> = fn(&Request<'p, L, N>, f64) -> Result<Choice<'p, L, N>, InputError>;
 
 /// How long the steps of a run are to be.
 enum Length<'p, L, const N: usize> {
@@ -98,7 +99,7 @@ impl<L, const N: usize> Clone for Length<'_, L, N> {
 impl<L, const N: usize> Copy for Length<'_, L, N> {}
 
 /// What is asked of a run, without its observers.
-struct Task<'p, L, const N: usize> {
+struct Request<'p, L, const N: usize> {
     problem: &'p Problem<'p, L, N>,
     t_end: f64,
     span: f64,
@@ -206,7 +207,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
                 });
             }
         };
-        Task { problem, t_end, span, integrator: self.integrator.clone(), needs }.plan(length)
+        Request { problem, t_end, span, integrator: self.integrator.clone(), needs }.plan(length)
     }
 
     /// Runs it.
@@ -218,9 +219,9 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     }
 }
 
-impl<'p, L: Lagrangian<N>, const N: usize> Task<'p, L, N> {
+impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     fn plan(&self, length: Length<'p, L, N>) -> Result<Plan<'p, L, N>, InputError> {
-        let Task { problem, span, .. } = *self;
+        let Request { problem, span, .. } = *self;
         if !(span != 0.0 && span.is_finite()) {
             return Err(InputError::Span { span });
         }
@@ -281,7 +282,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Task<'p, L, N> {
 
     /// The same for the final (q, p) alone.
     fn bare(&self) -> Self {
-        Task { needs: Needs::default(), integrator: self.integrator.clone(), ..*self }
+        Request { needs: Needs::default(), integrator: self.integrator.clone(), ..*self }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Pilot runs: a motion followed with some number of steps, seen at a few common times, and looked at between its steps.
 
 use super::accuracy::Choice;
-use super::{Plan, Problem, Shared, Task, Wants};
+use super::{Plan, Problem, Request, Shared, Wants};
 use crate::gauss::{Look, SETS};
 use crate::run::verified::refuted;
 use crate::{ClockedGauss, GaussCollocation, GaussRoute, Halt, InputError, StepError, Stepper};
@@ -119,7 +119,7 @@ impl<const N: usize> Track<N> {
 
 /// How a pilot run has ended.
 #[derive(Clone, Debug)]
-pub(super) enum Ending<const N: usize> {
+pub(super) enum PilotEnd<const N: usize> {
     /// At the end of the span.
     Followed(Track<N>),
     /// At a step that does not resolve the motion, after this part of the span.
@@ -136,7 +136,7 @@ pub(super) enum Ending<const N: usize> {
 
 /// What the looks at a run have seen.
 #[derive(Default)]
-struct Seen {
+struct PilotLooks {
     before: Option<Look>,
     /// The largest momentum, and the largest of what misfits of values change, on the way.
     size: f64,
@@ -145,7 +145,7 @@ struct Seen {
     misfit: f64,
 }
 
-impl Seen {
+impl PilotLooks {
     /// Takes in a look at the next step, and says whether the step resolves the motion.
     fn resolves(&mut self, look: &Look) -> bool {
         let jump = self.before.replace(*look).map_or(0.0, |before| before.jump_to(look));
@@ -181,9 +181,9 @@ impl Uneven {
     }
 }
 
-/// Pilot runs of a task, with what is left of their budget.
+/// Pilot runs of a request, with what is left of their budget.
 pub(super) struct Pilots<'t, 'p, L, const N: usize> {
-    pub task: &'t Task<'p, L, N>,
+    pub request: &'t Request<'p, L, N>,
     pub left: u64,
     /// The error that is wanted.
     pub wanted: f64,
@@ -201,8 +201,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
         marks: &Marks,
         closely: bool,
         narrow: bool,
-    ) -> Result<Ending<N>, InputError> {
-        let (problem, h) = (self.task.problem, self.step(count, marks));
+    ) -> Result<PilotEnd<N>, InputError> {
+        let (problem, h) = (self.request.problem, self.step(count, marks));
         let points = if closely { POINTS.div_ceil(stages * count).min(SETS) } else { 1 };
         let course = PilotCourse { count, marks, points, narrow, price: Price::of::<N>(stages) };
         if const { L::HAS_CLOCK } && matches!(marks, Marks::Times) {
@@ -226,8 +226,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
 
     /// The length of steps of which so many fill the span; by a clock, if its rate stayed what it is at the start.
     pub fn step(&self, count: usize, marks: &Marks) -> f64 {
-        let Problem { lagrangian, start, .. } = self.task.problem;
-        let h = self.task.span / count as f64;
+        let Problem { lagrangian, start, .. } = self.request.problem;
+        let h = self.request.span / count as f64;
         if let Marks::Times = marks { h / lagrangian.clock_rate(&start.q) } else { h }
     }
 
@@ -238,44 +238,49 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
         course: &PilotCourse<'_>,
         stride: usize,
         look: impl Fn(&R, usize) -> (Option<Look>, u64),
-    ) -> Result<Ending<N>, InputError> {
+    ) -> Result<PilotEnd<N>, InputError> {
         let PilotCourse { count, marks, points, narrow, price } = course;
-        let Problem { lagrangian, start, .. } = *self.task.problem;
+        let Problem { lagrangian, start, .. } = *self.request.problem;
         let floor = larger(0.1 * self.wanted, 1e-11);
         let watches_clock = self.watches_clock;
-        let (mut looks, mut seen, mut uneven) = (0, Seen::default(), Uneven::default());
+        let (mut looks, mut seen, mut uneven) = (0, PilotLooks::default(), Uneven::default());
         let ending = self.follow(run, *count, marks, stride, |run, part| {
             let (look, newton_steps) = look(run, *points);
             let spent = |looks: u64| run.evaluations() + newton_steps * price.newton + looks * price.look;
             if const { L::HAS_CLOCK } && watches_clock && uneven.profit(lagrangian.clock_rate(&run.state().q)) > PROFIT
             {
-                return (Some(Ending::Uneven), spent(looks));
+                return (Some(PilotEnd::Uneven), spent(looks));
             }
             let ending = look.and_then(|look| {
                 looks += *points as u64 + 1;
                 if !seen.resolves(&look) {
-                    return Some(Ending::Unresolved { part });
+                    return Some(PilotEnd::Unresolved { part });
                 }
-                (*narrow && look.misfit > NARROW * look.expected + floor).then_some(Ending::Narrow { part })
+                (*narrow && look.misfit > NARROW * look.expected + floor).then_some(PilotEnd::Narrow { part })
             });
             (ending, spent(looks))
         });
         // What is met nowhere else may be what a claim denies.
-        if let Ending::Narrow { .. } | Ending::Unresolved { .. } = ending
+        if let PilotEnd::Narrow { .. } | PilotEnd::Unresolved { .. } = ending
             && let Some(Defect { claim, size }) = refuted(lagrangian, run.time(), &run.state(), &start.v)
         {
             return Err(InputError::FalseClaim { claim, size });
         }
         Ok(match ending {
-            Ending::Followed(track) => Ending::Followed(Track { misfit: seen.misfit, ..track }),
+            PilotEnd::Followed(track) => PilotEnd::Followed(Track { misfit: seen.misfit, ..track }),
             other => other,
         })
     }
 
-    /// Follows the motion by the integrator of the task.
-    pub fn own(&mut self, integrator: &Shared<'p, L, N>, count: usize, marks: &Marks) -> Result<Ending<N>, InputError> {
+    /// Follows the motion by the integrator of the request.
+    pub fn own(
+        &mut self,
+        integrator: &Shared<'p, L, N>,
+        count: usize,
+        marks: &Marks,
+    ) -> Result<PilotEnd<N>, InputError> {
         let choice = Choice { integrator: integrator.clone(), count, h: self.step(count, marks), error: None };
-        let stepper = Plan::new(&self.task.bare(), &choice).and_then(|plan| plan.stepper());
+        let stepper = Plan::new(&self.request.bare(), &choice).and_then(|plan| plan.stepper());
         let mut stepper = match stepper {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),
@@ -293,9 +298,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
         count: usize,
         marks: &Marks,
         stride: usize,
-        mut look: impl FnMut(&R, f64) -> (Option<Ending<N>>, u64),
-    ) -> Ending<N> {
-        let &Task { problem: &Problem { t0, .. }, span, .. } = self.task;
+        mut look: impl FnMut(&R, f64) -> (Option<PilotEnd<N>>, u64),
+    ) -> PilotEnd<N> {
+        let &Request { problem: &Problem { t0, .. }, span, .. } = self.request;
         let (mut states, mut taken, mut spent) = (Vec::with_capacity(PARTS), 0, 0);
         let mut ending = None;
         while ending.is_none()
@@ -309,17 +314,17 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
             let part = (run.time() - t0) / span;
             let seen;
             (seen, spent) = look(run, part);
-            ending = cause.map(|cause| Ending::Halted { part, cause }).or(seen);
+            ending = cause.map(|cause| PilotEnd::Halted { part, cause }).or(seen);
             if taken == steps || (run.time() - time) * span >= 0.0 {
                 let x = run.state();
                 states.push([x.q, x.p]);
             }
             if spent > self.left {
-                ending = Some(Ending::Exhausted);
+                ending = Some(PilotEnd::Exhausted);
             }
         }
         self.left = self.left.saturating_sub(spent);
-        ending.unwrap_or(Ending::Followed(Track { states, misfit: 0.0, tau: span }))
+        ending.unwrap_or(PilotEnd::Followed(Track { states, misfit: 0.0, tau: span }))
     }
 }
 
@@ -334,10 +339,10 @@ struct PilotCourse<'m> {
     price: Price,
 }
 
-impl<const N: usize> Ending<N> {
+impl<const N: usize> PilotEnd<N> {
     /// With the span in the time of a clock.
     fn with_tau(self, tau: f64) -> Self {
-        if let Ending::Followed(track) = self { Ending::Followed(Track { tau, ..track }) } else { self }
+        if let PilotEnd::Followed(track) = self { PilotEnd::Followed(Track { tau, ..track }) } else { self }
     }
 }
 
@@ -358,10 +363,10 @@ impl Price {
 }
 
 /// A first step that cannot be taken calls for shorter steps; bad input ends the search.
-fn halted_at_the_start<const N: usize>(error: InputError) -> Result<Ending<N>, InputError> {
+fn halted_at_the_start<const N: usize>(error: InputError) -> Result<PilotEnd<N>, InputError> {
     match error {
-        InputError::Sigma { sigma } => Ok(Ending::Halted { part: 0.0, cause: StepError::SigmaVanished { sigma } }),
-        InputError::FirstStep(cause) => Ok(Ending::Halted { part: 0.0, cause }),
+        InputError::Sigma { sigma } => Ok(PilotEnd::Halted { part: 0.0, cause: StepError::SigmaVanished { sigma } }),
+        InputError::FirstStep(cause) => Ok(PilotEnd::Halted { part: 0.0, cause }),
         bad => Err(bad),
     }
 }

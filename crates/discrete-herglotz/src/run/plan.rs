@@ -3,7 +3,7 @@
 use super::accuracy::Choice;
 use super::checkpoint::digest;
 use super::{
-    Course, Facts, Interrupted, Item, Moment, Motion, Needs, Observer, Outcome, Problem, Shared, Stop, Task, Wants,
+    Course, Facts, Interrupted, Item, Moment, Motion, Needs, Observer, Outcome, Problem, Request, Shared, Stop, Wants,
 };
 use crate::gauss::FEW;
 use crate::run::verified::refuted;
@@ -51,9 +51,9 @@ pub struct Plan<'p, L, const N: usize> {
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
-    /// Finds the route of a task.
-    pub(super) fn new(task: &Task<'p, L, N>, choice: &Choice<'p, L, N>) -> Result<Self, InputError> {
-        let Task { problem, t_end, needs, .. } = *task;
+    /// Finds the route of a request.
+    pub(super) fn new(request: &Request<'p, L, N>, choice: &Choice<'p, L, N>) -> Result<Self, InputError> {
+        let Request { problem, t_end, needs, .. } = *request;
         let Choice { integrator, count, h, error } = choice.clone();
         let stepper = integrator.stepper(problem, h, Wants::default())?;
         Ok(Plan {

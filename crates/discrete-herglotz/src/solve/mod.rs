@@ -1,8 +1,17 @@
 //! The solution of a step's equations: Newton's method, and the only place that knows faer.
 
+#[cfg(feature = "faer")]
+mod faer_lu;
+pub(crate) mod inverse;
+#[cfg(not(feature = "faer"))]
+mod nalgebra_lu;
 pub(crate) mod newton;
 pub(crate) mod solver;
 pub(crate) mod unknowns;
 
+#[cfg(feature = "faer")]
+pub(crate) use faer_lu::DenseLu;
+#[cfg(not(feature = "faer"))]
+pub(crate) use nalgebra_lu::DenseLu;
 pub use newton::{ITERATION_LIMIT, last_correction};
 pub use solver::{CROSSOVER, Solver};

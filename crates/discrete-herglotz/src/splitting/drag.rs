@@ -11,7 +11,7 @@ const NODES: usize = 6;
 
 /// The rate `gamma(t) = L_z` of a linear drag.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Drag<const N: usize> {
+pub(crate) enum Drag<const N: usize> {
     /// The same at all times.
     Constant(f64),
     /// As L states it, read at a place where L is defined.
@@ -20,7 +20,7 @@ pub(super) enum Drag<const N: usize> {
 
 impl<const N: usize> Drag<N> {
     /// That of a separable Lagrangian.
-    pub(super) fn of<L: Lagrangian<N>>(
+    pub(crate) fn of<L: Lagrangian<N>>(
         form: &SeparableForm<L, N>,
         t: f64,
         state: &PhasePoint<N>,
@@ -51,7 +51,7 @@ impl<const N: usize> Drag<N> {
 
     /// The drift over a time s, which may be negative, from the time t.
     #[inline(never)]
-    pub(super) fn drift(&self, lagrangian: &impl Lagrangian<N>, t: f64, s: f64) -> Drift {
+    pub(crate) fn drift(&self, lagrangian: &impl Lagrangian<N>, t: f64, s: f64) -> Drift {
         if let Drag::Constant(gamma) = self {
             let damping = (gamma * s).exp_m1();
             let length = if *gamma == 0.0 { s } else { damping / gamma };
@@ -74,11 +74,11 @@ impl<const N: usize> Drag<N> {
 /// `q += length M^-1 p`, `p += damping p`, `z += damping z + lift p.M^-1 p`. A conformal contact map of rate `1 + damping`, so
 /// for any value of the two integrals.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Drift {
+pub(crate) struct Drift {
     /// The integral of `e^g`; for a constant gamma `(e^(gamma s) - 1)/gamma`.
-    pub(super) length: f64,
+    pub(crate) length: f64,
     /// `e^g(s) - 1`: a momentum that is multiplied by `e^g` itself gathers the rounding of that factor.
-    pub(super) damping: f64,
+    pub(crate) damping: f64,
     /// The action of `p.M^-1 p`: `e^g(s) length / 2`.
-    pub(super) lift: f64,
+    pub(crate) lift: f64,
 }

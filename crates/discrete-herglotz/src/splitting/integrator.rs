@@ -2,7 +2,7 @@
 
 use super::{ActionSplitting, Splitting, SplittingScheme};
 use crate::run::watch::size;
-use crate::{Facts, InputError, Integrator, Problem, Stepper, Wants};
+use crate::{Facts, InLanes, InputError, Integrator, Problem, Stepper, Wants};
 use contact_geom::Lagrangian;
 use std::borrow::Cow;
 
@@ -55,5 +55,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         let splitting = if watched { splitting.watched() } else { splitting };
         let splitting = if little { splitting.compensated() } else { splitting };
         Ok(Box::new(if action { splitting } else { splitting.without_action() }))
+    }
+    fn in_lanes(&self) -> Option<InLanes> {
+        Some(InLanes::Splitting(*self))
     }
 }

@@ -1,7 +1,7 @@
 //! Splittings where the drag is linear.
 
 use super::drag::{Drag, Drift};
-use super::motion::{Advance, Motion, Reached};
+use super::motion::{CompensatedState, Reached, SplittingRun};
 use super::separable::SeparableForm;
 use crate::run::DECOUPLED;
 use crate::run::saved::Saved;
@@ -38,7 +38,7 @@ pub struct Splitting<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
     drag: Drag<N>,
     table: SubstepTable,
-    progress: Advance<N>,
+    progress: SplittingRun<N>,
     action: bool,
     compensated: bool,
     watched: bool,
@@ -46,24 +46,24 @@ pub struct Splitting<'a, L, const N: usize> {
 
 /// The stages of a step, in the lengths of this step and this drag.
 #[derive(Clone, Debug)]
-struct SubstepTable {
+pub(crate) struct SubstepTable {
     /// Those of the first step.
-    first: Vec<Stage>,
+    pub(crate) first: Vec<Stage>,
     /// Those of a later one: its first kick, or its first drift, is one with the last of the step before.
-    joined: Vec<Stage>,
+    pub(crate) joined: Vec<Stage>,
     /// What completes a step: the last kick, and the last drift of a scheme that begins with one.
-    closing: Stage,
+    pub(crate) closing: Stage,
 }
 
 /// A kick, with the force that the motion holds, and the drift that follows; there the force is taken anew.
 #[derive(Clone, Copy, Debug)]
-struct Stage {
-    kick: f64,
-    drift: Drift,
+pub(crate) struct Stage {
+    pub(crate) kick: f64,
+    pub(crate) drift: Drift,
     /// The length of the drift in time.
-    span: f64,
+    pub(crate) span: f64,
     /// The time of its end after the step's start.
-    time: f64,
+    pub(crate) time: f64,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
@@ -84,7 +84,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         let drag = Drag::of(&form, t0, &state)?;
         let kick = form.first_kick(t0, &state.q, 0.0)?;
         let table = SubstepTable::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
-        let progress = Advance::new(h, t0, scheme.stages(), state, kick);
+        let progress = SplittingRun::new(h, t0, scheme.stages(), state, kick);
         Ok(Splitting { form, drag, table, progress, action: true, compensated: false, watched: false })
     }
 
@@ -108,7 +108,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
 
 impl SubstepTable {
     /// Of a drag that depends on time the drifts are those from `t0`; each step makes its own.
-    fn new(scheme: &SplittingScheme, h: f64, drift: impl Fn(f64) -> Drift) -> Self {
+    pub(crate) fn new(scheme: &SplittingScheme, h: f64, drift: impl Fn(f64) -> Drift) -> Self {
         let (drifts, kicks) = scheme.coefficients();
         let stages = scheme.stages();
         let stage =
@@ -131,7 +131,7 @@ impl SubstepTable {
 impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
         let Splitting { form, drag, table, progress, action, compensated, watched } = self;
-        let maps = Maps { form, drag, table };
+        let maps = StepMaps { form, drag, table };
         match (*action, *compensated) {
             (false, false) => maps.advance::<false, false>(progress, steps, *watched),
             (false, true) => maps.advance::<false, true>(progress, steps, *watched),
@@ -149,9 +149,9 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
     }
 
     fn sigma(&self) -> f64 {
-        let Advance { taken, t0, h, .. } = self.progress;
+        let SplittingRun { taken, t0, h, .. } = self.progress;
         let Some(before) = taken.checked_sub(1) else { return 1.0 };
-        Maps { form: &self.form, drag: &self.drag, table: &self.table }.sigma(t0 + before as f64 * h, h)
+        StepMaps { form: &self.form, drag: &self.drag, table: &self.table }.sigma(t0 + before as f64 * h, h)
     }
 
     fn evaluations(&self) -> u64 {
@@ -186,16 +186,16 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
 }
 
 /// What a step consists of.
-struct Maps<'s, 'a, L, const N: usize> {
+struct StepMaps<'s, 'a, L, const N: usize> {
     form: &'s SeparableForm<&'a L, N>,
     drag: &'s Drag<N>,
     table: &'s SubstepTable,
 }
 
-impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
+impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
     fn advance<const ACTION: bool, const COMPENSATED: bool>(
         &self,
-        progress: &mut Advance<N>,
+        progress: &mut SplittingRun<N>,
         steps: usize,
         watched: bool,
     ) -> Result<(), Halt> {
@@ -219,10 +219,10 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
     #[inline(never)]
     fn run<const ACTION: bool, const COMPENSATED: bool, const TIMED: bool, const WATCHED: bool>(
         &self,
-        from: &Advance<N>,
+        from: &SplittingRun<N>,
         steps: usize,
     ) -> Reached<N> {
-        let Maps { form, table, .. } = self;
+        let StepMaps { form, table, .. } = self;
         let (mut m, mut seen) = (from.motion, from.seen());
         let first = usize::from(from.taken == 0);
         for (stages, range) in [(&table.first, 0..first), (&table.joined, first..steps)] {
@@ -269,7 +269,7 @@ impl<L: Lagrangian<N>, const N: usize> Maps<'_, '_, L, N> {
     #[inline(always)]
     fn kick_and_drift<const ACTION: bool, const COMPENSATED: bool, const TIMED: bool>(
         &self,
-        m: &mut Motion<N>,
+        m: &mut CompensatedState<N>,
         t: f64,
         stage: &Stage,
     ) {

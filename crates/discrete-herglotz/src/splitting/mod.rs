@@ -2,15 +2,15 @@
 
 mod action_flow;
 mod action_strang;
-mod drag;
+pub(crate) mod drag;
 mod integrator;
-mod linear_drag;
+pub(crate) mod linear_drag;
 mod motion;
 mod nonlinear_drag;
 #[cfg(test)]
 mod order_conditions;
 mod scheme;
-mod separable;
+pub(crate) mod separable;
 mod strang;
 #[cfg(test)]
 mod tests;

@@ -36,7 +36,7 @@ impl<const N: usize> Sum<N> {
 
 /// Where a run goes on from, with the value and the derivative of the next kick: those at the last position.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Motion<const N: usize> {
+pub(super) struct CompensatedState<const N: usize> {
     pub(super) q: Sum<N>,
     pub(super) p: Sum<N>,
     pub(super) z: Sum<1>,
@@ -48,10 +48,18 @@ pub(super) struct Motion<const N: usize> {
     pub(super) sigma: f64,
 }
 
-impl<const N: usize> Motion<N> {
+impl<const N: usize> CompensatedState<N> {
     pub(super) fn new(state: PhasePoint<N>, (value, force): (f64, SVector<f64, N>)) -> Self {
         let z = Sum::new(SVector::<f64, 1>::new(state.z));
-        Motion { q: Sum::new(state.q), p: Sum::new(state.p), z, force, value, change: SVector::zeros(), sigma: 1.0 }
+        CompensatedState {
+            q: Sum::new(state.q),
+            p: Sum::new(state.p),
+            z,
+            force,
+            value,
+            change: SVector::zeros(),
+            sigma: 1.0,
+        }
     }
 
     pub(super) fn state(&self) -> PhasePoint<N> {
@@ -76,7 +84,7 @@ impl<const N: usize> Motion<N> {
         momentum: &SVector<f64, N>,
         force: &SVector<f64, N>,
         s: f64,
-        seen: &mut Seen,
+        seen: &mut DriftLooks,
     ) {
         let now = (self.force - force) * s;
         let before = std::mem::replace(&mut self.change, now);
@@ -94,7 +102,7 @@ impl<const N: usize> Motion<N> {
 
 /// What looks at drifts have seen.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct DriftLooks {
     /// The largest misfit; 0 where none is above one.
     misfit: f64,
     /// The sharpness of the sharpest turn, or what none is beyond.
@@ -105,10 +113,10 @@ pub(super) struct Seen {
 
 /// Where some steps lead.
 pub(super) struct Reached<const N: usize> {
-    pub(super) motion: Motion<N>,
+    pub(super) motion: CompensatedState<N>,
     /// The state that the motion stands for.
     pub(super) state: PhasePoint<N>,
-    pub(super) seen: Seen,
+    pub(super) seen: DriftLooks,
 }
 
 /// The steps between two looks whether the motion is finite.
@@ -116,22 +124,22 @@ const CHUNK: usize = 256;
 
 /// How far a run has come.
 #[derive(Clone, Debug)]
-pub(super) struct Advance<const N: usize> {
+pub(super) struct SplittingRun<const N: usize> {
     pub(super) h: f64,
     pub(super) t0: f64,
     pub(super) taken: usize,
     /// The forces of a step.
     pub(super) forces: usize,
-    pub(super) motion: Motion<N>,
+    pub(super) motion: CompensatedState<N>,
     /// The state after the steps taken: that of the motion, completed where the next step has a part of the last.
     pub(super) state: PhasePoint<N>,
     pub(super) watch: Watch<N>,
 }
 
-impl<const N: usize> Advance<N> {
+impl<const N: usize> SplittingRun<N> {
     pub(super) fn new(h: f64, t0: f64, forces: usize, state: PhasePoint<N>, kick: (f64, SVector<f64, N>)) -> Self {
         let watch = Watch::new(&state.q, &SVector::zeros(), h);
-        Advance { h, t0, taken: 0, forces, motion: Motion::new(state, kick), state, watch }
+        SplittingRun { h, t0, taken: 0, forces, motion: CompensatedState::new(state, kick), state, watch }
     }
 
     /// The time after so many steps more.
@@ -147,8 +155,8 @@ impl<const N: usize> Advance<N> {
 
     /// Nothing, so far.
     #[inline(always)]
-    pub(super) fn seen(&self) -> Seen {
-        Seen { misfit: 0.0, sharpest: self.watch.sharpest, floor: self.watch.floor }
+    pub(super) fn seen(&self) -> DriftLooks {
+        DriftLooks { misfit: 0.0, sharpest: self.watch.sharpest, floor: self.watch.floor }
     }
 
     /// Takes steps in chunks; one that ends with what is not finite step by step up to the last that is, and one with the first
@@ -157,7 +165,7 @@ impl<const N: usize> Advance<N> {
         let (mut taken, mut longest) = (0, CHUNK);
         while taken < steps {
             let chunk = longest.min(steps - taken);
-            let Reached { motion, state, seen: Seen { misfit, sharpest, .. } } = after(self, chunk);
+            let Reached { motion, state, seen: DriftLooks { misfit, sharpest, .. } } = after(self, chunk);
             // What is not finite in the motion is not finite in its state, or in the next.
             let finite = Triple::from(state).is_finite() && motion.sigma.is_finite();
             let misfit = (misfit > 0.0 && self.watch.first.is_none()).then_some(misfit);
@@ -186,5 +194,5 @@ impl<const N: usize> Advance<N> {
 }
 
 saved!([const N: usize] Sum<N> { value, carry });
-saved!([const N: usize] Motion<N> { q, p, z, force, value, change, sigma });
-saved!([const N: usize] Advance<N> { taken, motion, state, watch });
+saved!([const N: usize] CompensatedState<N> { q, p, z, force, value, change, sigma });
+saved!([const N: usize] SplittingRun<N> { taken, motion, state, watch });

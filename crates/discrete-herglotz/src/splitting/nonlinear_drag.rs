@@ -1,7 +1,7 @@
 //! Splittings where the drag is not linear in the action.
 
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
-use super::motion::{Advance, Motion, Reached};
+use super::motion::{CompensatedState, Reached, SplittingRun};
 use super::separable::SeparableForm;
 use crate::run::saved::Saved;
 use crate::{Doubt, Halt, InputError, Item, SplittingScheme, Stepper, Suspicion};
@@ -18,7 +18,7 @@ use contact_geom::{Lagrangian, PhasePoint};
 pub struct ActionSplitting<'a, L, F: ActionFlow, const N: usize> {
     form: SeparableForm<&'a L, N>,
     table: DragTable<F::Map>,
-    progress: Advance<N>,
+    progress: SplittingRun<N>,
     compensated: bool,
     doubting: bool,
 }
@@ -26,7 +26,7 @@ pub struct ActionSplitting<'a, L, F: ActionFlow, const N: usize> {
 /// The substeps of a step.
 #[derive(Clone, Debug)]
 struct DragTable<C> {
-    stages: Vec<Stage<C>>,
+    stages: Vec<ActionStage<C>>,
     /// The map that ends a step.
     closing: C,
     /// The action at which the potential is read, and f there.
@@ -35,7 +35,7 @@ struct DragTable<C> {
 
 /// A map of the action, and the `B A B` that follows.
 #[derive(Clone, Copy, Debug)]
-struct Stage<C> {
+struct ActionStage<C> {
     action: C,
     half: f64,
     length: f64,
@@ -90,12 +90,12 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
             time += g;
             let action = flow.over(0.5 * (before + g) * h);
             before = *g;
-            Stage { action, half: 0.5 * g * h, length: g * h, time: time * h }
+            ActionStage { action, half: 0.5 * g * h, length: g * h, time: time * h }
         });
         let stages = stages.collect();
         let table = DragTable { stages, closing: flow.over(0.5 * before * h), rest: (state.z, flow.rate(state.z)) };
         let (value, force) = form.first_kick(t0, &state.q, state.z)?;
-        let progress = Advance::new(h, t0, scheme.stages(), state, (value - table.rest.1, force));
+        let progress = SplittingRun::new(h, t0, scheme.stages(), state, (value - table.rest.1, force));
         Ok(ActionSplitting { form, table, progress, compensated: false, doubting: false })
     }
 
@@ -165,7 +165,7 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
 fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool, const DOUBTING: bool>(
     form: &SeparableForm<&L, N>,
     table: &DragTable<C>,
-    from: &Advance<N>,
+    from: &SplittingRun<N>,
     steps: usize,
 ) -> Reached<N> {
     let (mut m, mut seen, (z, constant)) = (from.motion, from.seen(), table.rest);
@@ -193,7 +193,7 @@ fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool, 
 
 /// The flow of f, and its factor.
 #[inline(always)]
-fn apply<C: ActionMap, const N: usize, const COMPENSATED: bool>(m: &mut Motion<N>, map: &C) {
+fn apply<C: ActionMap, const N: usize, const COMPENSATED: bool>(m: &mut CompensatedState<N>, map: &C) {
     let (change, rate) = with_slope(|z| map.change(z), m.z.value[0]);
     m.z.add::<COMPENSATED>(|_, _| change);
     // Carried on as in a linear drag.

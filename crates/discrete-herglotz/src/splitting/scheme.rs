@@ -3,7 +3,7 @@
 // More digits than a double holds, so that the next rounding is this one.
 #![allow(clippy::excessive_precision)]
 
-use Coefficients::{Composition, Nystrom};
+use HalfSequence::{Composition, Nystrom};
 
 /// A symmetric splitting of a flow into kicks and drifts: `kick k_0, drift d_1, kick k_1, ..., drift d_n, kick k_n`, each a
 /// fraction of the step.
@@ -17,12 +17,12 @@ pub struct SplittingScheme {
     order: u32,
     stages: usize,
     source: &'static str,
-    coefficients: Coefficients,
+    coefficients: HalfSequence,
 }
 
 /// The first half of each symmetric sequence, the middle included.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Coefficients {
+enum HalfSequence {
     /// The substeps.
     Composition(&'static [f64]),
     /// Drifts and kicks, and which of them begins and ends the step.

@@ -15,7 +15,7 @@ pub(crate) struct SeparableForm<L, const N: usize> {
     pub(crate) lagrangian: L,
     mass: Box<SMatrix<f64, N, N>>,
     /// `None` for the identity: a product with it would cost a third of a step of the oscillator.
-    inverse: Option<Box<SMatrix<f64, N, N>>>,
+    pub(crate) inverse: Option<Box<SMatrix<f64, N, N>>>,
 }
 
 impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
@@ -104,6 +104,14 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
             }
         }
         sum
+    }
+
+    /// `M v`.
+    pub(crate) fn momentum(&self, v: &SVector<f64, N>) -> SVector<f64, N> {
+        match &self.inverse {
+            None => *v,
+            Some(_) => *self.mass * v,
+        }
     }
 
     /// `M^-1 p`.

@@ -27,15 +27,19 @@ pub fn legendre_inverse<const N: usize>(
 ) -> Result<VelocityPoint<N>, StepError> {
     let mut x = VelocityPoint { q: state.q, v: *guess, z: state.z };
     let mut before = f64::INFINITY;
+    let mut momenta = lagrangian.gradient(t, &x).y;
     for _ in 0..ITERATION_LIMIT {
-        let momenta = lagrangian.gradient(t, &x).y;
         let mut change = momenta - state.p;
         let mut w = mass_matrix(lagrangian, t, &x);
         // To the round-off of its terms: where W is ill conditioned the velocity is determined no better.
         let of = |i: usize| (0..N).map(|j| (w[(i, j)] * x.v[j]).abs()).sum::<f64>() + state.p[i].abs();
         let terms: SVector<f64, N> = SVector::from_fn(|i, _| of(i));
         let held = change.iter().zip(&terms).all(|(off, term)| off.abs() <= 2.0 * N as f64 * f64::EPSILON * term);
+        if !(largest(change.iter().copied()) + largest(w.iter().copied())).is_finite() {
+            return Err(StepError::NonFinite);
+        }
         linear::solve(&mut w, &mut change).map_err(|e| StepError::Singular { pivot: e.pivot })?;
+        let from = x.v;
         x.v -= change;
         let (size, scale) = (largest(change.iter().copied()), largest(x.v.iter().copied()));
         if !(size + scale).is_finite() {
@@ -46,6 +50,43 @@ pub fn legendre_inverse<const N: usize>(
             return Ok(x);
         }
         before = size;
+        momenta = lagrangian.gradient(t, &x).y;
+        // A whole correction may leave the domain of L, as beyond the speed of light.
+        for _ in 0..f64::MANTISSA_DIGITS {
+            if largest(momenta.iter().copied()).is_finite() {
+                break;
+            }
+            change *= 0.5;
+            x.v = from - change;
+            momenta = lagrangian.gradient(t, &x).y;
+        }
     }
     Err(StepError::NotConverged { residual: before, iterations: ITERATION_LIMIT })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contact_geom::{legendre, systems::Relativistic};
+
+    /// From rest, though the first correction is beyond the speed of light: to the rounding of the velocity, which W carries into
+    /// the momentum, and that of the gradient, a difference of terms of size one.
+    #[test]
+    fn from_rest_to_any_momentum() {
+        let system = Relativistic::default();
+        for p in [0.0, 1e-8, -0.9, 1.5, -30.0, 1e3] {
+            let state = PhasePoint::new([0.0], [p], 0.1);
+            let x = legendre_inverse(&system, 0.0, &state, &[0.0].into()).unwrap();
+            let off = (legendre(&system, 0.0, &x).p[0] - p).abs();
+            let w = system.hessian(0.0, &x).vv[(0, 0)];
+            assert!(off <= 2.0 * f64::EPSILON * (1.0 + p.abs() + w * x.v[0].abs()), "p = {p}: {off:e}, W = {w:e}");
+        }
+    }
+
+    /// Where L is not defined at the guess, that is said.
+    #[test]
+    fn a_guess_outside_the_domain() {
+        let found = legendre_inverse(&Relativistic::default(), 0.0, &PhasePoint::new([0.0], [1.0], 0.0), &[2.0].into());
+        assert_eq!(found, Err(StepError::NonFinite));
+    }
 }

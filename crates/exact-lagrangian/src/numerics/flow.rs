@@ -18,9 +18,9 @@ pub(crate) const ACCURACY: f64 = 0.5 * f64::EPSILON;
 /// Herglotz' equations `q'' = a`, `z' = L`, `b' = L_z`.
 pub(crate) struct Herglotz<'a, L>(pub &'a L);
 
-impl<L: Lagrangian<N>, const N: usize> Rates<N> for Herglotz<'_, L> {
+impl<L: Lagrangian<N>, T: Scalar, const N: usize> Rates<N, T> for Herglotz<'_, L> {
     #[inline]
-    fn at<T: Scalar>(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError> {
+    fn at(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError> {
         let point = VelocityPoint { q: x.q, v: x.v, z: x.z };
         let (field, b) = herglotz_rates(self.0, T::from(t), &point)?;
         Ok(Rate { a: field.y, z: field.z, b })
@@ -197,7 +197,7 @@ fn finite<T: Scalar>(what: &'static str, entries: &[T]) -> Result<(), GeometryEr
 /// Integrates equations of motion over a duration by panels. In the result `b` is that of the last state, grown from
 /// `from.b`.
 pub(crate) fn integrate<T: Scalar, const N: usize>(
-    rates: &impl Rates<N>,
+    rates: &dyn Rates<N, T>,
     t0: f64,
     from: &State<N, T>,
     duration: f64,

@@ -44,13 +44,14 @@ impl<const N: usize, T: Scalar> Rate<N, T> {
     }
 }
 
-/// The equations of a motion: what Herglotz' equations, Chetaev's, and the action along a given curve have in common.
-pub(crate) trait Rates<const N: usize> {
+/// The equations of a motion over the scalar T: what Herglotz' equations, Chetaev's, and the action along a given curve have in
+/// common. As an object, so that the integration is compiled once for all of them: a call is little beside the rates.
+pub(crate) trait Rates<const N: usize, T> {
     /// The rates at a time and a state.
     ///
     /// # Errors
     /// A [`GeometryError`] where they are not defined.
-    fn at<T: Scalar>(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError>;
+    fn at(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError>;
 }
 
 /// A panel that has been solved: the velocity at its start, what changes along it, and how exactly.
@@ -233,7 +234,7 @@ pub(crate) struct Problem<'a, const N: usize, T> {
 /// `v0` is the initial velocity, or a guess of it that is improved upon, also if the panel is refused. A panel that the most nodes
 /// do not resolve is returned with its error. The evaluations of the rates are counted in `evaluations`.
 pub(crate) fn collocate<const N: usize, T: Scalar>(
-    rates: &impl Rates<N>,
+    rates: &dyn Rates<N, T>,
     problem: &Problem<N, T>,
     guess: Rate<N, T>,
     v0: &mut SVector<T, N>,
@@ -271,7 +272,7 @@ pub(crate) fn collocate<const N: usize, T: Scalar>(
 /// force at all.
 #[expect(clippy::too_many_arguments)]
 fn between_nodes<const N: usize, T: Scalar>(
-    rates: &impl Rates<N>,
+    rates: &dyn Rates<N, T>,
     problem: &Problem<N, T>,
     g: &Gauss,
     nodes: &[Rate<N, T>],
@@ -352,7 +353,7 @@ fn between_nodes<const N: usize, T: Scalar>(
 /// the last two, is below the accuracy, when changes within round-off no longer fall, or when it is clear that the nodes do
 /// not resolve the motion.
 fn sweeps<const N: usize, T: Scalar>(
-    rates: &impl Rates<N>,
+    rates: &dyn Rates<N, T>,
     problem: &Problem<N, T>,
     g: &Gauss,
     nodes: &mut [Rate<N, T>],

@@ -4,7 +4,7 @@ use crate::numerics::flow::{ACCURACY, Work, integrate};
 use crate::numerics::panel::{Rate, Rates, State};
 use crate::{ExactError, herglotz_flow};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, GeometryError, Lagrangian, Scalar, VelocityPoint};
+use contact_geom::{Derivatives, GeometryError, Lagrangian, VelocityPoint};
 
 /// A curve in Q, or a variation of one: position and velocity at each time, counted from the curve's start.
 ///
@@ -120,20 +120,20 @@ struct AlongCurve<'a, L, C, V, const N: usize> {
     variation: Option<&'a V>,
 }
 
-impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> Rates<N> for AlongCurve<'_, L, C, V, N> {
-    fn at<T: Scalar>(&self, s: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError> {
-        let ((q, v), t) = (self.curve.at(s)?, T::from(self.t0 + s));
-        let point = VelocityPoint { q: q.map(T::from), v: v.map(T::from), z: x.z };
+impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> Rates<N, f64> for AlongCurve<'_, L, C, V, N> {
+    fn at(&self, s: f64, x: &State<N>) -> Result<Rate<N>, GeometryError> {
+        let ((q, v), t) = (self.curve.at(s)?, self.t0 + s);
+        let point = VelocityPoint { q, v, z: x.z };
         let g = self.lagrangian.gradient(t, &point);
         let b = match self.variation {
             None => g.z,
             Some(variation) => {
                 let (dq, dv) = variation.at(s)?;
-                g.x.dot(&dq.map(T::from)) + g.y.dot(&dv.map(T::from)) + g.z * x.b
+                g.x.dot(&dq) + g.y.dot(&dv) + g.z * x.b
             }
         };
         let z = self.lagrangian.value(t, &point.q, &point.v, x.z);
-        Ok(Rate { a: SVector::from_element(T::zero()), z, b })
+        Ok(Rate { a: SVector::zeros(), z, b })
     }
 }
 

@@ -200,9 +200,9 @@ impl<L> NonHolonomic<L> {
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> Rates<N> for NonHolonomic<L> {
+impl<L: Lagrangian<N>, T: Scalar, const N: usize> Rates<N, T> for NonHolonomic<L> {
     /// The second quantity that grows along the motion is w.
-    fn at<T: Scalar>(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError> {
+    fn at(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError> {
         let solved = self.chetaev(t, &ExtendedPoint { q: x.q, z: x.z, v: x.v, w: x.b })?;
         Ok(Rate { a: solved.a, z: x.b, b: solved.dw })
     }

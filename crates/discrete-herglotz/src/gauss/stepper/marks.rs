@@ -37,7 +37,7 @@ pub(crate) const FEW: usize = 2;
 impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step.
     pub(crate) fn look(&self, sets: usize) -> Option<Look> {
-        let curve = self.arch.dispatch(Stages { run: self })?;
+        let curve = self.arch.dispatch(LookAtStages { run: self })?;
         let at = |set| {
             self.arch.dispatch(Compare { lagrangian: self.lagrangian, transformation: &Physical, curve: &curve, set })
         };
@@ -95,11 +95,11 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
 }
 
 /// The stages of the last step, for a look between them.
-struct Stages<'b, 'a, L, const N: usize> {
+struct LookAtStages<'b, 'a, L, const N: usize> {
     run: &'b GaussStepper<'a, L, N>,
 }
 
-impl<L: Lagrangian<N>, const N: usize> WithSimd for Stages<'_, '_, L, N> {
+impl<L: Lagrangian<N>, const N: usize> WithSimd for LookAtStages<'_, '_, L, N> {
     type Output = Option<Curve<N>>;
 
     #[inline(always)]

@@ -2,10 +2,10 @@
 
 use crate::run::accuracy::choose_with;
 use crate::run::pilot::{BUDGET, Pilots};
-use crate::run::{Needs, Problem, Shared, Task, Until, run_to};
+use crate::run::{Needs, Problem, Request, Shared, Until, run_to};
 use crate::{AnyIntegrator, InputError, Obstacle, Status};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{Kepler, Pendulum};
+use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
 use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -105,8 +105,8 @@ fn search<L: Lagrangian<N>, const N: usize>(
     wanted: f64,
 ) -> (Cow<'static, str>, usize, u64) {
     let integrator = integrator.map(|by| Arc::new(by) as Shared<'_, L, N>);
-    let task = Task { problem, t_end: span, span, integrator, needs: Needs::default() };
-    let mut pilots = Pilots { task: &task, left: BUDGET, wanted, watches_clock: false };
+    let request = Request { problem, t_end: span, span, integrator, needs: Needs::default() };
+    let mut pilots = Pilots { request: &request, left: BUDGET, wanted, watches_clock: false };
     let choice = choose_with(&mut pilots).unwrap();
     (choice.integrator.facts().name, choice.count, BUDGET - pilots.left)
 }
@@ -115,7 +115,7 @@ fn search<L: Lagrangian<N>, const N: usize>(
 /// ends where its misfit is seen to be too large. The run has more than k steps, or more than 1.2 k.
 #[test]
 fn pilot_runs_cost_little() {
-    let pendulum = Pendulum { gamma: -0.01 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
     for (span, wanted) in [(30.0, 1e-4), (30.0, 1e-7), (100.0, 1e-9), (300.0, 1e-6), (1000.0, 1e-8)] {
         let problem = Problem::new(&pendulum, 0.0, at(1.0, 1.0)).unwrap();
         let (_, count, spent) = search(&problem, span, None, wanted);

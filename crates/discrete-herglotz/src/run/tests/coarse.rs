@@ -3,7 +3,7 @@
 use crate::run::run_of;
 use crate::{AnyIntegrator, Gauss, InputError, Method, SplittingScheme, Status, StepError, Stepper, Steps, Suspicion};
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum};
+use contact_geom::systems::{HarmonicOscillator, Kepler, OneCoordinate, Pendulum};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 
 /// How a run of three given steps ends, and its mark; where it begins.
@@ -39,12 +39,12 @@ fn every_integrator<L: Lagrangian<1>>(system: &L) {
 
 #[test]
 fn coarse_steps_of_a_linear_motion_are_marked() {
-    every_integrator(&HarmonicOscillator { gamma: -0.01 });
+    every_integrator(&OneCoordinate::from(HarmonicOscillator { gamma: -0.01 }));
 }
 
 #[test]
 fn coarse_steps_of_a_pendulum_are_marked() {
-    every_integrator(&Pendulum { gamma: -0.01 });
+    every_integrator(&OneCoordinate::from(Pendulum { gamma: -0.01 }));
 }
 
 /// `-v^2/6 + 2 q^4`, a force that grows without bound: long steps are solved by Newton's method, or not at all.
@@ -82,7 +82,7 @@ fn the_action_does_not_decide_where_a_run_ends() {
 /// left.
 #[test]
 fn a_guess_of_the_velocity_may_be_of_any_size() {
-    let gauss = Gauss::new(Pendulum { gamma: -0.01 }, 8, 0.1).unwrap();
+    let gauss = Gauss::new(OneCoordinate::from(Pendulum { gamma: -0.01 }), 8, 0.1).unwrap();
     let end = |guess: f64| {
         let mut run = gauss.stepper(0.0, PhasePoint::new([0.5], [0.4], 0.1), SVector::from([guess])).unwrap();
         run.advance(1).unwrap();
@@ -170,7 +170,7 @@ fn a_centre_that_is_passed_in_a_step_is_marked() {
 #[test]
 fn a_doubt_is_no_mark() {
     let start = VelocityPoint::new([1.0], [0.3], 0.0);
-    let system = Pendulum { gamma: -0.01 };
+    let system = OneCoordinate::from(Pendulum { gamma: -0.01 });
     for integrator in AnyIntegrator::all().into_iter().filter(|i| i.order() > 1 && i.check::<1, _>(&system).is_ok()) {
         let parts =
             if let AnyIntegrator::Gauss { stages } = integrator { f64::max(0.5 * stages as f64, 1.0) } else { 1.0 };
@@ -248,7 +248,7 @@ fn many_stages_do_not_pass_a_centre_at_the_end_of_a_step() {
 /// Steps that move by so little that each is rounded in the same way: the sum of many loses none of it.
 #[test]
 fn tiny_steps_lose_nothing() {
-    let (system, count) = (Pendulum { gamma: -0.1 }, 1000);
+    let (system, count) = (OneCoordinate::from(Pendulum { gamma: -0.1 }), 1000);
     let (q, v) = (1.0, 0.7);
     for (scheme, h) in SplittingScheme::ALL.into_iter().flat_map(|s| [1e-12, 1e-11, 1e-10].map(|h| (s, h))) {
         let (start, steps) = (VelocityPoint::new([q], [v], 0.0), Steps::Count(count as usize));

@@ -5,7 +5,7 @@ use crate::run::{
     Run, Steps, Stop, Until, run_of,
 };
 use crate::{Gauss, InputError, Method, Outcome, Status};
-use contact_geom::systems::{Kepler, Pendulum, QuadraticInZ, System};
+use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
 use std::ops::ControlFlow;
 
@@ -70,8 +70,8 @@ fn there_and_back() {
         count
     }
     let kepler = Kepler::<2> { mu: 1.0, gamma: -0.05 };
-    assert!(check(&Pendulum { gamma: -0.1 }, VelocityPoint::new([1.0], [0.3], 0.2)) > 40);
-    assert!(check(&QuadraticInZ { c: 0.3 }, VelocityPoint::new([1.0], [0.3], 0.2)) > 30);
+    assert!(check(&OneCoordinate::from(Pendulum { gamma: -0.1 }), VelocityPoint::new([1.0], [0.3], 0.2)) > 40);
+    assert!(check(&OneCoordinate::from(QuadraticInZ { c: 0.3 }), VelocityPoint::new([1.0], [0.3], 0.2)) > 30);
     assert!(check(&kepler, kepler.initial()) > 50);
 }
 
@@ -103,7 +103,7 @@ fn rows_at_times() {
 /// Rows by steps and the last, with columns; a run back records them in its own order.
 #[test]
 fn rows_every_so_many_steps() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let problem = Problem::new(&pendulum, 1.0, VelocityPoint::new([1.0], [0.3], 0.2)).unwrap();
     for (to, way) in [(2.0, 1.0), (0.0, -1.0)] {
         let mut rows = Rows::every(4).unwrap().column("t + q", |t, x: &PhasePoint<1>| t + x.q[0]);
@@ -119,7 +119,7 @@ fn rows_every_so_many_steps() {
 /// Velocity, energy and conformal factor at given times: the energy decays as the factor, also between the ends of steps.
 #[test]
 fn what_rows_hold() {
-    let system = QuadraticInZ::default();
+    let system = OneCoordinate::from(QuadraticInZ::default());
     let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
     for integrator in takers(&system) {
         let mut rows = Rows::at((0..=7).map(|k| f64::from(k) / 7.0)).unwrap();
@@ -147,12 +147,13 @@ fn what_rows_hold() {
 fn progress_is_told() {
     let kepler = Kepler::<2>::default();
     let problem = Problem::new(&kepler, 0.0, kepler.initial()).unwrap();
-    for (integrator, count) in [(AnyIntegrator::Gauss { stages: 2 }, 777), (AnyIntegrator::Clocked { stages: 2 }, 7000)]
-    {
+    // By a clock the number of steps is not known, and it is told after so many steps.
+    let (gauss, clocked) = (AnyIntegrator::Gauss { stages: 2 }, AnyIntegrator::Clocked { stages: 2 });
+    for (integrator, count, least) in [(gauss, 777, 98), (clocked, 7000, 6)] {
         let mut parts = Vec::new();
         let mut progress = Progress::new(|part| parts.push(part));
         run_in(&problem, integrator, count, 5.0).observe(&mut progress).run(Until::Time(5.0)).unwrap();
-        assert!(parts.len() > 5 && parts.len() <= 102, "{integrator}: {}", parts.len());
+        assert!(parts.len() >= least && parts.len() <= 102, "{integrator}: {}", parts.len());
         assert_eq!((parts[0], parts[parts.len() - 1]), (0.0, 1.0));
         assert!(parts.windows(2).all(|pair| pair[0] < pair[1]), "{parts:?}");
     }
@@ -176,7 +177,7 @@ fn quotients_are_conserved() {
 /// Events by every integrator: as exact as its steps, in both directions, and terminal ones end the run there.
 #[test]
 fn events_by_every_integrator() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let start = VelocityPoint::new([1.0], [0.3], 0.2);
     let problem = Problem::new(&pendulum, 0.0, start).unwrap();
     let lowest = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
@@ -214,7 +215,7 @@ fn events_by_every_integrator() {
 /// The factor of a run that an event ends within a step is that up to there, as of a run to that time.
 #[test]
 fn the_factor_of_a_stop_is_that_up_to_it() {
-    let system = QuadraticInZ::default();
+    let system = OneCoordinate::from(QuadraticInZ::default());
     let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
     for integrator in takers(&system) {
         let mut events = Events::new([Event::new(|t, _: &PhasePoint<1>| t - 0.53).terminal()]);
@@ -233,7 +234,7 @@ fn the_factor_of_a_stop_is_that_up_to_it() {
 /// A function that is not finite ends the run there; one that is zero at the start has no sign before it moves.
 #[test]
 fn events_that_are_not_defined() {
-    let pendulum = Pendulum { gamma: 0.0 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: 0.0 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
     let run = |events: &mut Events<'_, 1>| {
         problem
@@ -300,7 +301,7 @@ fn observers_ask_and_stop() {
 /// Output times out of order, outside of the span, or not finite; and a span of 0.
 #[test]
 fn what_cannot_be_observed_is_refused() {
-    let pendulum = Pendulum { gamma: 0.0 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: 0.0 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
     for times in [vec![1.0, 0.5, 2.0], vec![0.0, f64::NAN], vec![f64::INFINITY], vec![1.0, 1.0]] {
         assert!(matches!(Rows::<1>::at(times.clone()), Err(InputError::Times { .. })), "{times:?}");
@@ -358,9 +359,9 @@ fn interrupted_runs_go_on() {
     let kepler = Kepler::<2> { mu: 1.0, gamma: -0.05 };
     let oscillator = contact_geom::systems::HarmonicOscillator { gamma: -0.1 };
     let start = VelocityPoint::new([1.0], [0.3], 0.2);
-    let places = check(&Pendulum { gamma: -0.1 }, start, "pendulum")
+    let places = check(&OneCoordinate::from(Pendulum { gamma: -0.1 }), start, "pendulum")
         + check(&oscillator, start, "oscillator")
-        + check(&QuadraticInZ { c: 0.3 }, start, "square")
+        + check(&OneCoordinate::from(QuadraticInZ { c: 0.3 }), start, "square")
         + check(&kepler, kepler.initial(), "kepler");
     assert!(places > 400, "{places}");
 }
@@ -399,7 +400,7 @@ fn marks_are_resumed() {
 /// A file that is not there, not one of a run, of another version, cut off or changed.
 #[test]
 fn damaged_checkpoints_are_refused() {
-    let pendulum = Pendulum { gamma: -0.1 };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.3], 0.2)).unwrap();
     let path = std::env::temp_dir().join(format!("damaged_{}", std::process::id()));
     assert!(matches!(Interrupted::read(&path), Err(CheckpointError::Unreadable(_))));

@@ -5,7 +5,7 @@ use crate::{
     Stepper, Strang, Trapezoidal,
 };
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::HarmonicOscillator;
+use contact_geom::systems::{HarmonicOscillator, OneCoordinate};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 
 type MakeStepper<'a> = dyn Fn(f64, PhasePoint<1>) -> Result<Box<dyn Stepper<1> + 'a>, InputError> + 'a;
@@ -79,9 +79,9 @@ const H: f64 = 0.1;
 
 #[test]
 fn rounding_is_a_random_walk() -> Result<(), InputError> {
-    let free = HarmonicOscillator { gamma: 0.0 };
+    let free = OneCoordinate::from(HarmonicOscillator { gamma: 0.0 });
     for gamma in [0.0, -1e-12, -1e-14] {
-        let damped = HarmonicOscillator { gamma };
+        let damped = OneCoordinate::from(HarmonicOscillator { gamma });
         for scheme in [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_6, SplittingScheme::BLANES_CASAS_8] {
             let name = format!("{} gamma = {gamma:e}", scheme.name());
             let motion = |l, t, start| Splitting::new(l, &scheme, H, t, start);

@@ -5,7 +5,9 @@ use crate::{
     Strang, Trapezoidal,
 };
 use contact_geom::nalgebra::SVector;
-use contact_geom::systems::{DoublePendulum, Duffing, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
+use contact_geom::systems::{
+    DoublePendulum, Duffing, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System, TwoCoordinates,
+};
 use contact_geom::{GeometryError, Lagrangian, PhasePoint, Scalar, Structure, legendre};
 
 type Outcome = Result<(), InputError>;
@@ -84,7 +86,7 @@ fn no_run_passes_a_centre_of_force() -> Outcome {
 /// Duffing's oscillator with steps just below those with which it blows up: every run that ends is marked.
 #[test]
 fn the_edge_of_stability_is_marked() -> Outcome {
-    let hard = Duffing { alpha: 1.0, beta: 1.0, force: 0.3, omega: 1.2, gamma: -0.001 };
+    let hard = OneCoordinate::from(Duffing { alpha: 1.0, beta: 1.0, force: 0.3, omega: 1.2, gamma: -0.001 });
     let start = PhasePoint::new([1.5], [0.0], 0.0);
     for k in 0..10 {
         // The frequency at this amplitude is about 1.6.
@@ -148,13 +150,19 @@ impl Lagrangian<1> for Pulse {
 #[test]
 fn what_is_resolved_raises_no_suspicion() -> Outcome {
     let start = PhasePoint::new([1.0], [1.0], 0.2);
-    assert_resolved(&Pendulum { gamma: -0.05 }, 0.05, 0.0, start, 100.0)?;
-    assert_resolved(&Pendulum { gamma: -0.05 }, 0.05, 0.0, PhasePoint::new([3.0], [0.0], 0.0), 100.0)?;
+    assert_resolved(&OneCoordinate::from(Pendulum { gamma: -0.05 }), 0.05, 0.0, start, 100.0)?;
+    assert_resolved(
+        &OneCoordinate::from(Pendulum { gamma: -0.05 }),
+        0.05,
+        0.0,
+        PhasePoint::new([3.0], [0.0], 0.0),
+        100.0,
+    )?;
     // Down to rest, at a place that is not zero, with velocities of rounding alone.
-    assert_resolved(&Duffing::default(), 0.02, 0.0, start, 500.0)?;
-    assert_resolved(&Duffing::forced(), 0.01, 0.0, start, 500.0)?;
+    assert_resolved(&OneCoordinate::from(Duffing::default()), 0.02, 0.0, start, 500.0)?;
+    assert_resolved(&OneCoordinate::from(Duffing::forced()), 0.01, 0.0, start, 500.0)?;
     // Through subnormals to zero.
-    assert_resolved(&HarmonicOscillator { gamma: -2.0 }, 0.01, 0.0, start, 1000.0)?;
+    assert_resolved(&OneCoordinate::from(HarmonicOscillator { gamma: -2.0 }), 0.01, 0.0, start, 1000.0)?;
     // At rest, before a force and after.
     // A known false alarm: the long substeps of a composition of midpoint steps see such a beginning as a turn.
     let rest = PhasePoint::new([0.0], [0.0], 0.0);
@@ -174,7 +182,8 @@ fn what_is_resolved_raises_no_suspicion() -> Outcome {
     let kepler = Kepler::<2> { mu: 1.0, gamma: 0.0 };
     assert_resolved(&kepler, 0.001, 0.0, PhasePoint::new([1.9, 0.0], [0.0, (0.1f64 / 1.9).sqrt()], 0.0), 50.0)?;
     // Mass matrices and actions that act back.
-    let (double, square) = (DoublePendulum::default(), QuadraticInZ { c: 0.3 });
+    let (double, square) =
+        (TwoCoordinates::from(DoublePendulum::default()), OneCoordinate::from(QuadraticInZ { c: 0.3 }));
     assert_rules_resolve(&double, 0.02, 0.0, legendre(&double, 0.0, &double.initial()), 5000)?;
     assert_rules_resolve(&square, 0.05, 0.0, start, 2000)?;
     for scheme in SplittingScheme::ALL.iter().filter(|s| !s.is_nystrom()) {
@@ -269,7 +278,7 @@ fn what_is_not_finite_is_refused() -> Outcome {
     fn named<T>(result: Result<T, InputError>, name: &str) -> bool {
         matches!(result, Err(InputError::Geometry(GeometryError::NonFinite { what, .. })) if what == name)
     }
-    let (pendulum, square) = (Pendulum::default(), QuadraticInZ::default());
+    let (pendulum, square) = (OneCoordinate::from(Pendulum::default()), OneCoordinate::from(QuadraticInZ::default()));
     let scheme = &SplittingScheme::YOSHIDA_4;
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let cases = [

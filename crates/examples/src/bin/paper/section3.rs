@@ -5,9 +5,10 @@ use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::System;
 use contact_geom::{DiscretePoint, GeometryError, Statement, VelocityPoint, legendre};
-use discrete_herglotz::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
 use discrete_herglotz::statements::{STATEMENTS, residual};
-use discrete_herglotz::{DiscreteLagrangian, DiscretePath, InputError, Method, Quadrature, Rule, derived_jet};
+use discrete_herglotz::{
+    DiscreteLagrangian, DiscretePath, InputError, Method, Quadrature, Rule, RuleVisitor, derived_jet,
+};
 
 /// The points at which each statement is checked for each system, discretisation and step.
 const SAMPLES: usize = 16;
@@ -25,10 +26,20 @@ pub fn check<const N: usize, S: System<N>>(system: &S, checks: &mut Checks) {
         for method in Method::applicable(&system.structure()) {
             with_method(method, system, h, checks);
         }
-        with_rule::<RectangleRule, N, S>(system, h, checks);
-        with_rule::<LeftMidpointRule, N, S>(system, h, checks);
-        with_rule::<MidpointRule, N, S>(system, h, checks);
-        with_rule::<TrapezoidalRule, N, S>(system, h, checks);
+        Method::visit_rules(&mut Checked { system, h, checks });
+    }
+}
+
+/// What is checked with every rule.
+struct Checked<'a, S, const N: usize> {
+    system: &'a S,
+    h: f64,
+    checks: &'a mut Checks,
+}
+
+impl<S: System<N>, const N: usize> RuleVisitor for Checked<'_, S, N> {
+    fn visit<R: Rule>(&mut self, _method: Method) {
+        with_rule::<R, N, S>(self.system, self.h, self.checks);
     }
 }
 

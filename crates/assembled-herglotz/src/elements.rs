@@ -1,0 +1,218 @@
+//! Lists of elements: the unknowns of each, and where they follow each other.
+
+use crate::AssemblyError;
+use crate::blocks::{self, BLOCK, ByBlock};
+
+/// Instead of an unknown of an element: a place that is held at 0, as by a wall.
+pub const FIXED: usize = usize::MAX;
+
+/// The unknowns and the parameters of one element. Made of `[usize; K]`, or of `([usize; K], [f64; P])`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ElementData<const K: usize, const P: usize> {
+    /// The unknowns, or [`FIXED`].
+    pub unknowns: [usize; K],
+    /// The parameters.
+    pub parameters: [f64; P],
+}
+
+impl<const K: usize> From<[usize; K]> for ElementData<K, 0> {
+    fn from(unknowns: [usize; K]) -> Self {
+        ElementData { unknowns, parameters: [] }
+    }
+}
+
+impl<const K: usize, const P: usize> From<([usize; K], [f64; P])> for ElementData<K, P> {
+    fn from((unknowns, parameters): ([usize; K], [f64; P])) -> Self {
+        ElementData { unknowns, parameters }
+    }
+}
+
+/// The fewest elements of a run: fewer do not fill a register.
+const LEAST: usize = 8;
+
+/// Elements in a row whose unknowns all go up by one: the bonds of a chain, or of a row of a lattice. Their unknowns are read as
+/// they stand in memory.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Run<const K: usize> {
+    /// The places of the first element's unknowns.
+    pub start: [usize; K],
+    /// The number of elements.
+    pub len: usize,
+    /// The place of the first element's parameters.
+    pub first: usize,
+}
+
+/// Unknowns of a block, in a row, on which the same slots of a run act.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Piece {
+    /// Which run.
+    pub run: u32,
+    /// The first unknown, from the block's first.
+    pub from: u32,
+    /// The end.
+    pub to: u32,
+    /// A bit for each slot in which elements of the run have these unknowns.
+    pub slots: u32,
+}
+
+/// Elements of a run in a row.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Span {
+    pub run: u32,
+    pub from: usize,
+    pub to: usize,
+}
+
+/// The elements of one kind. Places count from 1, so that [`FIXED`] is a place too: 0, or the one after the last unknown.
+///
+/// A list that was given element by element is taken apart into runs, which need no memory for each element, and the rest.
+#[derive(Clone, Debug)]
+pub(crate) struct Elements<const K: usize, const P: usize> {
+    pub runs: Vec<Run<K>>,
+    pub run_parameters: [Vec<f64>; P],
+    /// What the runs do to each block of unknowns.
+    pub pieces: ByBlock<Piece>,
+    /// The elements of runs by the block of their first unknown.
+    pub spans: ByBlock<Span>,
+    /// The places of the elements that are in no run.
+    pub loose: Vec<[u32; K]>,
+    pub loose_parameters: [Vec<f64>; P],
+    /// Which of them have unknowns in each block.
+    pub loose_of: ByBlock<u32>,
+}
+
+impl<const K: usize, const P: usize> Elements<K, P> {
+    /// Checks the elements and finds the runs.
+    pub fn new(
+        list: usize,
+        unknowns: usize,
+        elements: impl IntoIterator<Item = impl Into<ElementData<K, P>>>,
+    ) -> Result<Self, AssemblyError> {
+        const { assert!(K >= 1 && K <= 32, "a local term has from 1 to 32 unknowns") };
+        let mut found = Elements {
+            runs: Vec::new(),
+            run_parameters: std::array::from_fn(|_| Vec::new()),
+            pieces: ByBlock::new(0, Vec::new()),
+            spans: ByBlock::new(0, Vec::new()),
+            loose: Vec::new(),
+            loose_parameters: std::array::from_fn(|_| Vec::new()),
+            loose_of: ByBlock::new(0, Vec::new()),
+        };
+        let mut open: Option<Run<K>> = None;
+        for (element, data) in elements.into_iter().enumerate() {
+            let ElementData { unknowns: named, parameters } = data.into();
+            check(list, element, unknowns, &named, &parameters)?;
+            match &mut open {
+                Some(run) if (0..K).all(|k| follows(run.start[k] + run.len, named[k], unknowns)) => run.len += 1,
+                _ => {
+                    found.close(open.take());
+                    let start = named.map(|u| if u == FIXED { 0 } else { u + 1 });
+                    open = Some(Run { start, len: 1, first: found.run_parameters.first().map_or(0, Vec::len) });
+                }
+            }
+            for (all, c) in found.run_parameters.iter_mut().zip(parameters) {
+                all.push(c);
+            }
+        }
+        found.close(open);
+        found.divide(unknowns);
+        Ok(found)
+    }
+
+    /// Keeps a run, or its elements one by one where they are few.
+    fn close(&mut self, run: Option<Run<K>>) {
+        let Some(run) = run else { return };
+        if run.len >= LEAST {
+            self.runs.push(run);
+            return;
+        }
+        self.loose.extend((0..run.len).map(|e| run.start.map(|s| (s + e) as u32)));
+        for (loose, all) in self.loose_parameters.iter_mut().zip(&mut self.run_parameters) {
+            loose.append(&mut all.split_off(run.first));
+        }
+    }
+
+    /// Divides the work among the blocks of unknowns.
+    fn divide(&mut self, unknowns: usize) {
+        let mut pieces = Vec::new();
+        let mut spans = Vec::new();
+        for (number, run) in self.runs.iter().enumerate() {
+            let number = number as u32;
+            cut(run, number, unknowns, &mut pieces);
+            // The fixed place before the first unknown counts to the first block.
+            let block_of = |e: usize| (run.start[0] + e).saturating_sub(1).min(unknowns - 1) / BLOCK;
+            let mut from = 0;
+            while from < run.len {
+                let block = block_of(from);
+                let to = ((block + 1) * BLOCK + 1 - run.start[0]).clamp(from + 1, run.len);
+                let to = if block_of(run.len - 1) == block { run.len } else { to };
+                spans.push((block as u32, Span { run: number, from, to }));
+                from = to;
+            }
+        }
+        let mut loose_of = Vec::new();
+        for (e, places) in self.loose.iter().enumerate() {
+            let real = places.iter().filter(|p| (1..=unknowns).contains(&(**p as usize)));
+            let mut of: Vec<u32> = real.map(|p| (*p - 1) / BLOCK as u32).collect();
+            of.sort_unstable();
+            of.dedup();
+            loose_of.extend(of.into_iter().map(|block| (block, e as u32)));
+        }
+        let blocks = blocks::count(unknowns);
+        self.pieces = ByBlock::new(blocks, pieces);
+        self.spans = ByBlock::new(blocks, spans);
+        self.loose_of = ByBlock::new(blocks, loose_of);
+    }
+}
+
+/// Whether an unknown is the one that stands at a place.
+fn follows(place: usize, unknown: usize, unknowns: usize) -> bool {
+    if unknown == FIXED { place == unknowns + 1 } else { place == unknown + 1 }
+}
+
+fn check(
+    list: usize,
+    element: usize,
+    unknowns: usize,
+    named: &[usize],
+    parameters: &[f64],
+) -> Result<(), AssemblyError> {
+    for (k, &unknown) in named.iter().enumerate() {
+        if unknown == FIXED {
+            continue;
+        }
+        if unknown >= unknowns {
+            return Err(AssemblyError::OutOfRange { list, element, unknown, last: unknowns - 1 });
+        }
+        if named[..k].contains(&unknown) {
+            return Err(AssemblyError::Repeated { list, element, unknown });
+        }
+    }
+    match parameters.iter().find(|c| !c.is_finite()) {
+        Some(&value) => Err(AssemblyError::Parameter { list, element, value }),
+        None => Ok(()),
+    }
+}
+
+/// Cuts the unknowns that a run acts on where a slot begins or ends, and at the ends of blocks.
+fn cut<const K: usize>(run: &Run<K>, number: u32, unknowns: usize, pieces: &mut Vec<(u32, Piece)>) {
+    // The unknowns of a slot; fixed places left out.
+    let slot = |k: usize| (run.start[k].max(1) - 1)..(run.start[k] + run.len - 1).min(unknowns);
+    let mut cuts: Vec<usize> = (0..K).flat_map(|k| [slot(k).start, slot(k).end]).collect();
+    cuts.sort_unstable();
+    cuts.dedup();
+    for ends in cuts.windows(2) {
+        let &[mut from, end] = ends else { continue };
+        let slots = (0..K).filter(|k| slot(*k).contains(&from)).fold(0, |bits, k| bits | 1 << k);
+        if slots == 0 {
+            continue;
+        }
+        while from < end {
+            let block = from / BLOCK;
+            let to = end.min((block + 1) * BLOCK);
+            let (from_in, to_in) = ((from - block * BLOCK) as u32, (to - block * BLOCK) as u32);
+            pieces.push((block as u32, Piece { run: number, from: from_in, to: to_in, slots }));
+            from = to;
+        }
+    }
+}

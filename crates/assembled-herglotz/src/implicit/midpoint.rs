@@ -1,0 +1,284 @@
+//! The implicit midpoint rule for assembled systems.
+
+use super::factors::Factors;
+use super::largest;
+use super::pattern::Pattern;
+use crate::AssemblyError;
+use crate::blocks::BLOCK;
+use crate::kernels::Weight;
+use crate::system::{AssembledSystem, Masses, State};
+use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError};
+
+/// The most iterations with kept factors that are worth one factorisation.
+const PATIENCE: f64 = 6.0;
+
+/// The symmetric midpoint rule on `L = sum m_i v_i^2/2 - V(t, q) + gamma z`: the discrete Herglotz equations of
+/// [`Midpoint`](discrete_herglotz::Midpoint), for systems of any size.
+///
+/// With the mean velocity u as the unknown, `q' = q0 + h u/2` and `V_q` at `(t + h/2, q')`, a step solves
+/// `M u + (h/2) V_q = (1 + gamma h/2) p0`; then `q1 = q0 + h u`, `(1 - gamma h/2) p1 = M u - (h/2) V_q`, and
+/// `sigma_d = (1 + gamma h/2)/(1 - gamma h/2)`. The rank-one coupling through z is eliminated by hand: what is left to factorise is
+/// `M + (h^2/4) V_qq`, sparse and symmetric.
+///
+/// Newton's method keeps the factors from step to step. It factorises anew only where the corrections shrink so slowly that more
+/// solves would cost more, and stops where the next correction is below round-off.
+pub struct AssembledMidpoint<'a> {
+    system: &'a AssembledSystem,
+    pub(super) factors: Factors,
+    /// The entries of each list's elements.
+    places: Vec<Vec<u32>>,
+    diagonal: Vec<u32>,
+    pub(super) entries: Vec<f64>,
+    h: f64,
+    t0: f64,
+    taken: usize,
+    factorised: bool,
+    factorisations: u64,
+    iterations: u64,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    z: f64,
+    action: bool,
+    /// The mean velocities of the last two steps, the latter first.
+    u: Vec<f64>,
+    before: Vec<f64>,
+    middle: Vec<f64>,
+    residual: Vec<f64>,
+    change: Vec<f64>,
+}
+
+impl<'a> AssembledMidpoint<'a> {
+    /// From a state, without the action; factors and workspace of more than `memory` bytes are refused.
+    ///
+    /// # Errors
+    /// As [`AssembledSplitting`](crate::AssembledSplitting::new); [`InputError::Sigma`] unless `|gamma h| < 2`;
+    /// [`AssemblyError::Memory`] with the estimate.
+    pub fn new(system: &'a AssembledSystem, h: f64, start: State, memory: usize) -> Result<Self, AssemblyError> {
+        if !(h != 0.0 && h.is_finite()) {
+            return Err(InputError::Step { h }.into());
+        }
+        start.check(system)?;
+        system.check_masses()?;
+        AssembledSystem::check_number("gamma", system.gamma())?;
+        let half = 0.5 * system.gamma() * h;
+        if half.abs() >= 1.0 {
+            return Err(InputError::Sigma { sigma: (1.0 + half) / (1.0 - half) }.into());
+        }
+        let n = system.unknowns();
+        let pattern = Pattern::new(n, |f| system.potentials.iter().for_each(|list| list.visit(f)))?;
+        let places = system.potentials.iter().map(|list| list.entries(&pattern)).collect();
+        let diagonal = (1..=n).map(|i| pattern.entry(i, i)).collect();
+        let entries = vec![0.0; pattern.rows.len()];
+        let factors = Factors::new(pattern, memory)?;
+        let mut q = vec![0.0; n + 2];
+        q[1..=n].copy_from_slice(start.q);
+        let zeros = vec![0.0; n];
+        let mut midpoint = AssembledMidpoint {
+            system,
+            factors,
+            places,
+            diagonal,
+            entries,
+            h,
+            t0: start.t,
+            taken: 0,
+            factorised: false,
+            factorisations: 0,
+            iterations: 0,
+            middle: q.clone(),
+            q,
+            v: start.v.to_vec(),
+            z: start.z,
+            action: false,
+            u: start.v.to_vec(),
+            before: zeros.clone(),
+            residual: zeros.clone(),
+            change: zeros,
+        };
+        midpoint.forces(start.t);
+        match midpoint.residual.iter().position(|f| !f.is_finite()) {
+            Some(unknown) => Err(AssemblyError::Undefined { unknown }),
+            None => Ok(midpoint),
+        }
+    }
+
+    /// With the action z, which costs the energies once a step.
+    pub fn with_action(self) -> Self {
+        AssembledMidpoint { action: true, ..self }
+    }
+
+    /// Takes steps.
+    ///
+    /// # Errors
+    /// [`Halt`] with the steps taken before and the cause: [`StepError::NotConverged`], [`StepError::Singular`] or
+    /// [`StepError::NonFinite`]. The state is that before the step which failed.
+    pub fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        for taken in 0..steps {
+            self.step().map_err(|cause| Halt { taken, cause })?;
+        }
+        Ok(())
+    }
+
+    /// The state.
+    pub fn state(&self) -> State<'_> {
+        let n = self.system.unknowns();
+        State { t: self.t0 + self.taken as f64 * self.h, q: &self.q[1..=n], v: &self.v, z: self.z }
+    }
+
+    /// `sigma_d` of a step.
+    pub fn sigma(&self) -> f64 {
+        let half = 0.5 * self.system.gamma() * self.h;
+        (1.0 + half) / (1.0 - half)
+    }
+
+    /// The numeric factorisations made.
+    pub fn factorisations(&self) -> u64 {
+        self.factorisations
+    }
+
+    /// The iterations made, each a solve and a force.
+    pub fn iterations(&self) -> u64 {
+        self.iterations
+    }
+
+    fn step(&mut self) -> Result<(), StepError> {
+        let (h, n) = (self.h, self.system.unknowns());
+        let t = self.t0 + (self.taken as f64 + 0.5) * h;
+        let half = 0.5 * self.system.gamma() * h;
+        // The guess continues the mean velocities linearly; `before` holds it.
+        for ((before, u), v) in self.before.iter_mut().zip(&self.u).zip(&self.v) {
+            *before = if self.taken == 0 { *v } else { 2.0 * u - *before };
+        }
+        let root = self.solve(t, half);
+        if root.is_err() {
+            // What was known before the step, for another try.
+            self.before.copy_from_slice(&self.u);
+        }
+        root?;
+        let gain = 1.0 / (1.0 - half);
+        let mut twice_kinetic = 0.0;
+        for i in 0..n {
+            let u = self.before[i];
+            self.middle[i + 1] = self.q[i + 1] + 0.5 * h * u;
+            self.q[i + 1] += h * u;
+            self.v[i] = (2.0 * u - (1.0 + half) * self.v[i]) * gain;
+            if self.action {
+                twice_kinetic += self.system.mass(i) * u * u;
+            }
+        }
+        if self.action {
+            let potential = self.system.potential(t, &self.middle);
+            self.z = ((1.0 + half) * self.z + h * (0.5 * twice_kinetic - potential)) * gain;
+        }
+        std::mem::swap(&mut self.u, &mut self.before);
+        self.taken += 1;
+        Ok(())
+    }
+
+    /// Solves for the mean velocity, from the guess in `before` and into it.
+    fn solve(&mut self, t: f64, half: f64) -> Result<(), StepError> {
+        let (h, n) = (self.h, self.system.unknowns());
+        let resolution = largest(&self.q) / h.abs();
+        let mut last = f64::INFINITY;
+        let mut size = f64::INFINITY;
+        for _ in 0..ITERATION_LIMIT {
+            for i in 0..n {
+                self.middle[i + 1] = self.q[i + 1] + 0.5 * h * self.before[i];
+            }
+            // -(h/2) V_q, then the residual.
+            self.forces(t);
+            for i in 0..n {
+                let m = self.system.mass(i);
+                let (u, v) = (self.before[i], self.v[i]);
+                self.residual[i] = m * (u - (1.0 + half) * v) - 0.5 * h * self.residual[i];
+            }
+            size = largest(&self.residual);
+            if !size.is_finite() {
+                return Err(StepError::NonFinite);
+            }
+            let fresh = !self.factorised;
+            if fresh {
+                self.factorise(t)?;
+                last = f64::INFINITY;
+            }
+            self.change.copy_from_slice(&self.residual);
+            self.factors.solve(&mut self.change)?;
+            if fresh {
+                self.check_factors()?;
+            }
+            for (u, change) in self.before.iter_mut().zip(&self.change) {
+                *u -= change;
+            }
+            self.iterations += 1;
+            let (now, speed) = (largest(&self.change), largest(&self.before));
+            if !now.is_finite() {
+                return Err(StepError::NonFinite);
+            }
+            // Below this a correction does not move the position or the velocity.
+            let round_off = f64::EPSILON * (speed + resolution);
+            if now <= round_off * f64::EPSILON {
+                return Ok(());
+            }
+            // The first correction tells nothing of the next.
+            if last.is_finite() {
+                let rate = now / last;
+                let next = if rate < 1.0 { now * rate / (1.0 - rate) } else { f64::INFINITY };
+                // What round-off leaves of the residual comes back at each solve.
+                if next <= round_off || rate >= 0.5 && now <= 8.0 * round_off {
+                    return Ok(());
+                }
+                // The solves that are left at this rate; new factors are worth their price where those are many.
+                let left = (round_off / now).ln() / rate.min(1.0).ln();
+                if left.is_nan() || left > PATIENCE {
+                    self.factorised = false;
+                }
+            }
+            last = now;
+        }
+        self.factorised = false;
+        Err(StepError::NotConverged { residual: size, iterations: ITERATION_LIMIT })
+    }
+
+    /// `-V_q` at the middle, into `residual`.
+    fn forces(&mut self, t: f64) {
+        for (block, force) in self.residual.chunks_mut(BLOCK).enumerate() {
+            force.fill(0.0);
+            for list in &self.system.potentials {
+                list.kick(block, t, &self.middle, Weight::Same(1.0), force);
+            }
+        }
+    }
+
+    /// Factorises `M + (h^2/4) V_qq` at the middle.
+    pub(super) fn factorise(&mut self, t: f64) -> Result<(), StepError> {
+        self.entries.fill(0.0);
+        for (i, at) in self.diagonal.iter().enumerate() {
+            self.entries[*at as usize] = match &self.system.masses {
+                Masses::Same(m) => *m,
+                Masses::Each(masses) => masses[i],
+            };
+        }
+        let factor = 0.25 * self.h * self.h;
+        for (list, places) in self.system.potentials.iter().zip(&self.places) {
+            list.hessian(t, &self.middle, factor, places, &mut self.entries);
+        }
+        self.factors.factorise(&self.entries)?;
+        self.factorised = true;
+        self.factorisations += 1;
+        Ok(())
+    }
+
+    /// Whether new factors solve: faer does not say where they are singular.
+    fn check_factors(&mut self) -> Result<(), StepError> {
+        let AssembledMidpoint { factors, entries, change, residual, middle, .. } = self;
+        let n = change.len();
+        let (left, size) = factors.residual(entries, change, residual, &mut middle[1..=n]);
+        // Half of the digits: Newton's method makes up for the rest.
+        if left <= f64::EPSILON.sqrt() * (size + largest(residual)) {
+            Ok(())
+        } else {
+            self.factorised = false;
+            Err(StepError::Singular { pivot: 0.0 })
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! Implicit steps: sparse equations, solved with faer.
+
+mod factors;
+mod midpoint;
+mod pattern;
+mod second;
+#[cfg(test)]
+mod tests;
+
+pub use midpoint::AssembledMidpoint;
+pub(crate) use pattern::Pattern;
+
+/// The largest absolute component; infinite where one is not a number.
+fn largest(x: &[f64]) -> f64 {
+    let mut largest = 0.0f64;
+    let mut sum = 0.0;
+    for x in x {
+        largest = largest.max(x.abs());
+        sum += x;
+    }
+    if sum.is_nan() { f64::INFINITY } else { largest }
+}

@@ -1,0 +1,248 @@
+//! Forces and energies of a list of elements, eight at a time.
+
+use crate::Potential;
+use crate::blocks::BLOCK;
+use crate::elements::{Elements, Piece, Run};
+use crate::implicit::Pattern;
+use crate::lanes::{LANES, Lanes};
+use crate::term::column;
+use contact_geom::nalgebra::SVector;
+
+/// What a force is multiplied by where it is added to a velocity.
+#[derive(Clone, Copy)]
+pub(crate) enum Weight<'a> {
+    /// The same factor for all unknowns.
+    Same(f64),
+    /// A factor, and the inverse masses of the block.
+    Masses(f64, &'a [f64]),
+}
+
+/// A list of potentials, whatever the number of their unknowns.
+pub(crate) trait PotentialList: Send + Sync {
+    /// Adds the weighted forces `-V_q` on the unknowns of a block. `q` begins with a fixed place and ends with one.
+    fn kick(&self, block: usize, t: f64, q: &[f64], weight: Weight, v: &mut [f64]);
+
+    /// The energy of the elements that begin in a block.
+    fn energy(&self, block: usize, blocks: usize, t: f64, q: &[f64]) -> f64;
+
+    /// Calls a function with the places of each element.
+    fn visit(&self, f: &mut dyn FnMut(&[usize]));
+
+    /// Where the second derivatives of each element stand in a matrix: for each pair of unknowns with the second not after the first.
+    fn entries(&self, pattern: &Pattern) -> Vec<u32>;
+
+    /// Adds the second derivatives, times a factor, to the entries of the matrix.
+    fn hessian(&self, t: f64, q: &[f64], factor: f64, places: &[u32], entries: &mut [f64]);
+}
+
+/// A potential with its elements.
+pub(crate) struct Kind<V, const K: usize, const P: usize> {
+    pub term: V,
+    pub elements: Elements<K, P>,
+}
+
+impl<V: Potential<K, P>, const K: usize, const P: usize> PotentialList for Kind<V, K, P> {
+    fn kick(&self, block: usize, t: f64, q: &[f64], weight: Weight, v: &mut [f64]) {
+        let all = if K == 32 { u32::MAX } else { (1 << K) - 1 };
+        for piece in self.elements.pieces.of(block) {
+            let Some(run) = self.elements.runs.get(piece.run as usize) else { continue };
+            match (weight, piece.slots == all) {
+                (Weight::Same(w), true) => self.kick_piece::<true, false>(block, t, q, run, piece, w, &[], v),
+                (Weight::Same(w), false) => self.kick_piece::<false, false>(block, t, q, run, piece, w, &[], v),
+                (Weight::Masses(w, m), true) => self.kick_piece::<true, true>(block, t, q, run, piece, w, m, v),
+                (Weight::Masses(w, m), false) => self.kick_piece::<false, true>(block, t, q, run, piece, w, m, v),
+            }
+        }
+        self.kick_loose(block, t, q, weight, v);
+    }
+
+    fn energy(&self, block: usize, blocks: usize, t: f64, q: &[f64]) -> f64 {
+        let t = Lanes::splat(t);
+        let mut sum = Lanes::splat(0.0);
+        let mut rest = 0.0;
+        for span in self.elements.spans.of(block) {
+            let Some(run) = self.elements.runs.get(span.run as usize) else { continue };
+            let mut e = span.from;
+            while e + LANES <= span.to {
+                sum += self.term.energy(t, &unknowns(q, run, e), &self.parameters(run, e));
+                e += LANES;
+            }
+            if e < span.to {
+                let count = span.to - e;
+                let part = self.term.energy(t, &unknowns_part(q, run, e, count), &self.parameters_part(run, e, count));
+                rest += part.to_array()[..count].iter().sum::<f64>();
+            }
+        }
+        let loose = self.elements.loose.len();
+        let (mut e, end) = (loose * block / blocks, loose * (block + 1) / blocks);
+        while e < end {
+            let count = LANES.min(end - e);
+            let (x, c) = self.gathered(q, count, |lane| e + lane);
+            rest += self.term.energy(t, &x, &c).to_array()[..count].iter().sum::<f64>();
+            e += count;
+        }
+        rest + sum.to_array().iter().sum::<f64>()
+    }
+
+    fn visit(&self, f: &mut dyn FnMut(&[usize])) {
+        for run in &self.elements.runs {
+            (0..run.len).for_each(|e| f(&run.start.map(|s| s + e)));
+        }
+        self.elements.loose.iter().for_each(|places| f(&places.map(|p| p as usize)));
+    }
+
+    fn entries(&self, pattern: &Pattern) -> Vec<u32> {
+        let mut entries = Vec::new();
+        self.visit(&mut |places| {
+            for (i, a) in places.iter().enumerate() {
+                entries.extend(places[..=i].iter().map(|b| pattern.entry(*a, *b)));
+            }
+        });
+        entries
+    }
+
+    fn hessian(&self, t: f64, q: &[f64], factor: f64, places: &[u32], entries: &mut [f64]) {
+        self.add_second(t, q, factor, places, entries);
+    }
+}
+
+/// The unknowns of eight elements of a run.
+#[inline(always)]
+pub(crate) fn unknowns<const K: usize>(q: &[f64], run: &Run<K>, e: usize) -> SVector<Lanes, K> {
+    column(std::array::from_fn(|i| Lanes::load(q, run.start[i] + e)))
+}
+
+/// The unknowns of fewer.
+#[inline(always)]
+pub(crate) fn unknowns_part<const K: usize>(q: &[f64], run: &Run<K>, e: usize, count: usize) -> SVector<Lanes, K> {
+    column(std::array::from_fn(|i| Lanes::load_part(q, run.start[i] + e, count)))
+}
+
+impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
+    #[inline(always)]
+    pub(crate) fn parameters(&self, run: &Run<K>, e: usize) -> [Lanes; P] {
+        std::array::from_fn(|p| Lanes::load(&self.elements.run_parameters[p], run.first + e))
+    }
+
+    #[inline(always)]
+    pub(crate) fn parameters_part(&self, run: &Run<K>, e: usize, count: usize) -> [Lanes; P] {
+        std::array::from_fn(|p| Lanes::load_part(&self.elements.run_parameters[p], run.first + e, count))
+    }
+
+    /// The kick of the unknowns of a piece: each is gone to once, and has its forces from all elements of the run there. An element is
+    /// evaluated once for each of its unknowns, which costs less than to write its forces and to read them again.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn kick_piece<'a, const FULL: bool, const MASSES: bool>(
+        &'a self,
+        block: usize,
+        t: f64,
+        q: &'a [f64],
+        run: &Run<K>,
+        piece: &Piece,
+        weight: f64,
+        inverse_masses: &'a [f64],
+        v: &mut [f64],
+    ) {
+        let (from, to) = (piece.from as usize, piece.to as usize);
+        let Some(v) = v.get_mut(from..to) else { return };
+        let inverse_masses = if MASSES { inverse_masses.get(from..to).unwrap_or(&[]) } else { &[] };
+        let t = Lanes::splat(t);
+        // The place of the piece's first unknown.
+        let place = block * BLOCK + from + 1;
+        let acts = |k: usize| FULL || piece.slots >> k & 1 == 1;
+        let (chunks, rest) = v.as_chunks_mut::<LANES>();
+        let count = chunks.len();
+        // For each slot its elements' unknowns and parameters, as many registers of each as there are of velocities: then no load
+        // asks whether it is inside.
+        let of = |x: &'a [f64], from: usize| {
+            x.get(from..).and_then(|x| x.as_chunks::<LANES>().0.get(..count)).unwrap_or(&[])
+        };
+        let first = |k: usize| if acts(k) { place - run.start[k] } else { 0 };
+        let x: [[&[[f64; LANES]]; K]; K] =
+            std::array::from_fn(|k| std::array::from_fn(|i| of(q, run.start[i] + first(k))));
+        let c: [[&[[f64; LANES]]; P]; K] = std::array::from_fn(|k| {
+            std::array::from_fn(|p| of(&self.elements.run_parameters[p], run.first + first(k)))
+        });
+        let masses = if MASSES { of(inverse_masses, 0) } else { &[] };
+        let inside = |slices: &[&[[f64; LANES]]]| slices.iter().all(|s| s.len() == count);
+        if !(0..K).all(|k| !acts(k) || inside(&x[k]) && inside(&c[k])) || MASSES && masses.len() != count {
+            return;
+        }
+        for (number, chunk) in chunks.iter_mut().enumerate() {
+            let mut force = Lanes::splat(0.0);
+            for k in 0..K {
+                if acts(k) {
+                    let x = std::array::from_fn(|i| Lanes::new(x[k][i][number]));
+                    let c = std::array::from_fn(|p| Lanes::new(c[k][p][number]));
+                    force -= self.term.gradient(t, &column(x), &c)[k];
+                }
+            }
+            let factor = if MASSES { Lanes::new(masses[number]) * weight } else { Lanes::splat(weight) };
+            *chunk = force.mul_add(factor, Lanes::new(*chunk)).to_array();
+        }
+        if rest.is_empty() {
+            return;
+        }
+        let (done, count) = (chunks.len() * LANES, rest.len());
+        let mut force = Lanes::splat(0.0);
+        for k in 0..K {
+            if acts(k) {
+                let e = place + done - run.start[k];
+                let (x, c) = (unknowns_part(q, run, e, count), self.parameters_part(run, e, count));
+                force -= self.term.gradient(t, &x, &c)[k];
+            }
+        }
+        let factor = if MASSES { Lanes::load_part(inverse_masses, done, count) * weight } else { Lanes::splat(weight) };
+        for (v, kick) in rest.iter_mut().zip((force * factor).to_array()) {
+            *v += kick;
+        }
+    }
+
+    /// The kick of a block by the elements that are in no run.
+    #[inline(always)]
+    fn kick_loose(&self, block: usize, t: f64, q: &[f64], weight: Weight, v: &mut [f64]) {
+        let t = Lanes::splat(t);
+        let first = block * BLOCK + 1;
+        for group in self.elements.loose_of.of(block).chunks(LANES) {
+            let (x, c) = self.gathered(q, group.len(), |lane| group[lane] as usize);
+            let gradient = self.term.gradient(t, &x, &c);
+            for k in 0..K {
+                for (e, g) in group.iter().zip(gradient[k].to_array()) {
+                    // A fixed place, or one of another block, is none of these unknowns.
+                    let Some(place) = self.elements.loose.get(*e as usize).map(|places| places[k] as usize) else {
+                        continue;
+                    };
+                    let Some(at) = place.checked_sub(first) else { continue };
+                    if let Some(v) = v.get_mut(at) {
+                        *v -= g * match weight {
+                            Weight::Same(w) => w,
+                            Weight::Masses(w, m) => w * m.get(at).copied().unwrap_or(0.0),
+                        };
+                    }
+                }
+            }
+        }
+    }
+
+    /// Unknowns and parameters of elements that are in no run; the first stands in the lanes that are left.
+    #[inline(always)]
+    pub(crate) fn gathered(
+        &self,
+        q: &[f64],
+        count: usize,
+        element: impl Fn(usize) -> usize,
+    ) -> (SVector<Lanes, K>, [Lanes; P]) {
+        let of = |lane: usize| element(if lane < count { lane } else { 0 });
+        let elements: [usize; LANES] = std::array::from_fn(of);
+        let nan = f64::NAN;
+        let places = elements.map(|e| self.elements.loose.get(e).copied().unwrap_or([0; K]));
+        let x = std::array::from_fn(|i| {
+            Lanes::new(std::array::from_fn(|lane| q.get(places[lane][i] as usize).copied().unwrap_or(nan)))
+        });
+        let c = std::array::from_fn(|p| {
+            Lanes::new(elements.map(|e| self.elements.loose_parameters[p].get(e).copied().unwrap_or(nan)))
+        });
+        (column(x), c)
+    }
+}

@@ -1,0 +1,215 @@
+//! Eight numbers in vector registers, over which local terms are evaluated.
+
+use contact_geom::Scalar;
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+use wide::f64x8;
+
+/// The number of lanes.
+pub(crate) const LANES: usize = 8;
+
+/// Eight numbers, worked on at once: the same local term of eight elements. The instructions are those that the build is for
+/// (`target-cpu`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Lanes(f64x8);
+
+impl Lanes {
+    #[inline(always)]
+    pub fn new(x: [f64; LANES]) -> Self {
+        Lanes(f64x8::new(x))
+    }
+
+    #[inline(always)]
+    pub fn splat(x: f64) -> Self {
+        Lanes(f64x8::splat(x))
+    }
+
+    /// The eight numbers from a place of a slice on; not numbers where it ends before.
+    #[inline(always)]
+    pub fn load(x: &[f64], at: usize) -> Self {
+        match x.get(at..).and_then(|rest| rest.first_chunk::<LANES>()) {
+            Some(chunk) => Self::new(*chunk),
+            None => Self::splat(f64::NAN),
+        }
+    }
+
+    /// The numbers from a place of a slice on, fewer than eight; the first of them stands in the lanes that are left.
+    #[inline(always)]
+    pub fn load_part(x: &[f64], at: usize, count: usize) -> Self {
+        let part = x.get(at..at + count).unwrap_or(&[]);
+        let mut all = [part.first().copied().unwrap_or(f64::NAN); LANES];
+        for (a, b) in all.iter_mut().zip(part) {
+            *a = *b;
+        }
+        Self::new(all)
+    }
+
+    /// `self * b + c`, fused where the build has the instruction.
+    #[inline(always)]
+    pub fn mul_add(self, b: Self, c: Self) -> Self {
+        Lanes(self.0.mul_add(b.0, c.0))
+    }
+
+    #[inline(always)]
+    pub fn to_array(self) -> [f64; LANES] {
+        self.0.to_array()
+    }
+
+    /// A function of one number, lane by lane: for those that are rare in mechanics.
+    #[inline]
+    fn each(self, f: impl Fn(f64) -> f64) -> Self {
+        Self::new(self.to_array().map(f))
+    }
+
+    /// Whether all lanes are in the range in which sines are reduced without loss.
+    #[inline(always)]
+    fn reducible(self) -> bool {
+        self.0.abs().simd_lt(f64x8::splat(REDUCIBLE)).all()
+    }
+}
+
+/// The arguments up to which the three parts of pi/2 of `wide` reduce a sine: the first two have 27 and 23 binary digits less than a
+/// double, so that their products with up to 2^19 quarter turns are exact.
+const REDUCIBLE: f64 = 5e5;
+
+impl From<f64> for Lanes {
+    #[inline(always)]
+    fn from(x: f64) -> Self {
+        Self::splat(x)
+    }
+}
+
+impl num_traits::Zero for Lanes {
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::splat(0.0)
+    }
+    fn is_zero(&self) -> bool {
+        *self == Self::zero()
+    }
+}
+
+impl num_traits::One for Lanes {
+    #[inline(always)]
+    fn one() -> Self {
+        Self::splat(1.0)
+    }
+}
+
+impl Neg for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Lanes(-self.0)
+    }
+}
+
+macro_rules! arithmetic {
+    ($($op:ident, $method:ident, $assign:ident, $assign_method:ident;)*) => {$(
+        impl $op for Lanes {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, b: Self) -> Self {
+                Lanes($op::$method(self.0, b.0))
+            }
+        }
+        impl $op<f64> for Lanes {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, b: f64) -> Self {
+                Lanes($op::$method(self.0, f64x8::splat(b)))
+            }
+        }
+        impl $assign for Lanes {
+            #[inline(always)]
+            fn $assign_method(&mut self, b: Self) {
+                *self = $op::$method(*self, b);
+            }
+        }
+    )*};
+}
+arithmetic! {
+    Add, add, AddAssign, add_assign;
+    Sub, sub, SubAssign, sub_assign;
+    Mul, mul, MulAssign, mul_assign;
+    Div, div, DivAssign, div_assign;
+}
+
+impl Scalar for Lanes {
+    /// Not a number where lanes differ: a formula that branches on it gives no number, and the step is refused.
+    #[inline(always)]
+    fn re(self) -> f64 {
+        let lanes = self.to_array();
+        if lanes.iter().all(|x| *x == lanes[0]) { lanes[0] } else { f64::NAN }
+    }
+    fn pivot_size(self) -> f64 {
+        self.to_array().iter().fold(f64::INFINITY, |m, x| if x.abs() < m || x.is_nan() { x.abs() } else { m })
+    }
+    fn extent(self) -> f64 {
+        Scalar::extent(self.re())
+    }
+    #[inline(always)]
+    fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
+        let not_less = self.0.simd_ge(than.0).select(otherwise.0, f64x8::splat(f64::NAN));
+        Lanes(self.0.simd_lt(than.0).select(then.0, not_less))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Lanes(self.0.abs())
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Lanes(f64x8::splat(1.0) / self.0)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Lanes(self.0.sqrt())
+    }
+    #[inline(always)]
+    fn powi(self, n: i32) -> Self {
+        let (mut power, mut base, mut left) = (Self::splat(1.0), self, n.unsigned_abs());
+        while left > 0 {
+            if left % 2 == 1 {
+                power *= base;
+            }
+            base *= base;
+            left /= 2;
+        }
+        if n < 0 { power.recip() } else { power }
+    }
+    fn powf(self, a: f64) -> Self {
+        self.each(|x| x.powf(a))
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        Lanes(self.0.exp())
+    }
+    fn exp_m1(self) -> Self {
+        self.each(f64::exp_m1)
+    }
+    fn ln(self) -> Self {
+        self.each(f64::ln)
+    }
+    fn ln_1p(self) -> Self {
+        self.each(f64::ln_1p)
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        if !self.reducible() {
+            return (self.each(f64::sin), self.each(f64::cos));
+        }
+        let (s, c) = self.0.sin_cos();
+        (Lanes(s), Lanes(c))
+    }
+    fn sinh(self) -> Self {
+        self.each(f64::sinh)
+    }
+    fn cosh(self) -> Self {
+        self.each(f64::cosh)
+    }
+    fn tanh(self) -> Self {
+        self.each(f64::tanh)
+    }
+    fn atan(self) -> Self {
+        self.each(f64::atan)
+    }
+}

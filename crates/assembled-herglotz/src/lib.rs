@@ -1,0 +1,44 @@
+//! Large contact systems: Lagrangians that are sums of local terms, of any number of unknowns.
+//!
+//! A site, a bond, a finite element: the user writes its term once, generic in the scalar, with the list of the elements that have
+//! it. The crate assembles forces and sparse second derivatives from small fixed jets, and takes explicit and implicit steps
+//! whose cost grows linearly with the size.
+//!
+//! ```
+//! use assembled_herglotz::systems::{FputBond, fput_chain};
+//! use assembled_herglotz::{AssembledSplitting, State};
+//! use discrete_herglotz::SplittingScheme;
+//!
+//! let n = 1000;
+//! let chain = fput_chain(n, FputBond { alpha: 0.0, beta: 1.0 }, -0.01)?;
+//! let q: Vec<f64> = (1..=n).map(|i| (std::f64::consts::PI * i as f64 / (n + 1) as f64).sin()).collect();
+//! let start = State { t: 0.0, q: &q, v: &vec![0.0; n], z: 0.0 };
+//! let mut motion = AssembledSplitting::new(&chain, &SplittingScheme::BLANES_MOAN_6, 1.0, start)?;
+//! assert!(motion.advance(100).is_ok());
+//! println!("{:?}", motion.state().q[500]);
+//! # Ok::<(), assembled_herglotz::AssemblyError>(())
+//! ```
+
+mod aligned;
+mod blocks;
+mod elements;
+mod error;
+mod implicit;
+mod kernels;
+mod lanes;
+mod splitting;
+mod system;
+pub mod systems;
+mod term;
+
+pub use elements::{ElementData, FIXED};
+pub use error::AssemblyError;
+pub use implicit::AssembledMidpoint;
+pub use splitting::AssembledSplitting;
+pub use system::{AssembledSystem, State};
+pub use term::{Difference, Potential};
+
+/// The program of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -1,0 +1,91 @@
+//! Steps of assembled systems allocate nothing, but for a refactorisation; and how much memory a long chain holds.
+
+// What a test cannot go on without is a failure of it.
+#![allow(clippy::unwrap_used)]
+
+use assembled_herglotz::systems::{FputBond, fput_chain};
+use assembled_herglotz::{AssembledMidpoint, AssembledSplitting, State};
+use discrete_herglotz::SplittingScheme;
+use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
+use std::cell::Cell;
+
+thread_local! {
+    /// Of this thread, since the test runner's own do not count: the allocations, the bytes that are held, and the most that were.
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+    static HELD: Cell<isize> = const { Cell::new(0) };
+    static MOST: Cell<isize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+fn count(bytes: isize) {
+    let _ = HELD.try_with(|held| {
+        held.set(held.get() + bytes);
+        let _ = MOST.try_with(|most| most.set(most.get().max(held.get())));
+    });
+}
+
+#[allow(unsafe_code)] // An allocator cannot be written without.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let _ = COUNT.try_with(|c| c.set(c.get() + 1));
+        count(layout.size() as isize);
+        unsafe { SystemAllocator.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        count(-(layout.size() as isize));
+        unsafe { SystemAllocator.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(action: impl FnOnce()) -> usize {
+    let before = COUNT.with(Cell::get);
+    action();
+    COUNT.with(Cell::get) - before
+}
+
+#[test]
+fn steps() {
+    assert!(allocations(|| drop(std::hint::black_box(vec![1.0; 8]))) >= 1, "the counter counts");
+    let n = 3000;
+    let chain = fput_chain(n, FputBond { alpha: 0.1, beta: 1.0 }, -0.01).unwrap();
+    let (q, v) = (vec![0.5; n], vec![0.1; n]);
+    let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let mut explicit =
+        AssembledSplitting::new(&chain, &SplittingScheme::BLANES_MOAN_6, 0.1, start).unwrap().with_action();
+    explicit.state();
+    let found = allocations(|| {
+        explicit.advance(300).unwrap();
+        explicit.state();
+    });
+    assert_eq!(found, 0);
+    let mut implicit = AssembledMidpoint::new(&chain, 0.05, start, usize::MAX).unwrap();
+    implicit.advance(5).unwrap();
+    let before = implicit.factorisations();
+    assert_eq!(allocations(|| implicit.advance(50).unwrap()), 0);
+    assert!(
+        implicit.factorisations() - before <= 5,
+        "{} factorisations in 50 steps",
+        implicit.factorisations() - before
+    );
+}
+
+/// A chain and its motion hold at most six vectors, the start of the user included.
+#[test]
+fn memory_of_a_chain() {
+    let n = 100_000;
+    let before = HELD.with(Cell::get);
+    MOST.with(|most| most.set(before));
+    let (q, v) = (vec![0.5; n], vec![0.1; n]);
+    let chain = fput_chain(n, FputBond { alpha: 0.1, beta: 1.0 }, -0.01).unwrap();
+    let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let mut motion = AssembledSplitting::new(&chain, &SplittingScheme::BLANES_MOAN_6, 0.1, start).unwrap();
+    motion.advance(2).unwrap();
+    motion.state();
+    let most = MOST.with(Cell::get) - before;
+    // And 64 kB for the lists of blocks.
+    assert!(most <= 6 * 8 * n as isize + 65_536, "{most} bytes, {} vectors", most as f64 / (8 * n) as f64);
+}

@@ -1,0 +1,144 @@
+//! What the theory says of the flows of assembled systems: orders, conformal factors, decay of momenta and of the energy.
+
+// What a test cannot go on without is a failure of it.
+#![allow(clippy::unwrap_used)]
+
+use assembled_herglotz::systems::{FputBond, KleinGordon, OuterSolarSystem, SineGordon, fput_chain, lattice};
+use assembled_herglotz::{AssembledMidpoint, AssembledSplitting, AssembledSystem, State};
+use discrete_herglotz::SplittingScheme;
+
+/// A motion without symmetry.
+fn start(n: usize) -> (Vec<f64>, Vec<f64>) {
+    let of = |shift: f64| (0..n).map(|i| 0.8 * (0.37 * i as f64 + shift).sin()).collect();
+    (of(0.2), of(1.4))
+}
+
+/// Positions and velocities after a time.
+fn explicit(system: &AssembledSystem, scheme: &SplittingScheme, start: State, time: f64, steps: usize) -> Vec<f64> {
+    let mut motion = AssembledSplitting::new(system, scheme, time / steps as f64, start).unwrap().with_action();
+    motion.advance(steps).unwrap();
+    let end = motion.state();
+    [end.q, end.v, &[end.z]].concat()
+}
+
+fn implicit(system: &AssembledSystem, start: State, time: f64, steps: usize) -> Vec<f64> {
+    let mut motion = AssembledMidpoint::new(system, time / steps as f64, start, usize::MAX).unwrap().with_action();
+    motion.advance(steps).unwrap();
+    let end = motion.state();
+    [end.q, end.v, &[end.z]].concat()
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The least-squares slope of the logarithms.
+fn slope(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|(h, e)| (h.ln(), e.ln())).unzip();
+    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
+    let (top, bottom) =
+        x.iter().zip(&y).fold((0.0, 0.0), |(t, b), (x, y)| (t + (x - mx) * (y - my), b + (x - mx).powi(2)));
+    top / bottom
+}
+
+/// A nonlinear chain of 50 sites: the error of each rule falls with its power of the step, to 0.15.
+#[test]
+fn orders() {
+    let n = 50;
+    let chain = fput_chain(n, FputBond { alpha: 0.3, beta: 1.0 }, -0.1).unwrap();
+    let (q, v) = start(n);
+    let from = State { t: 0.0, q: &q, v: &v, z: 0.2 };
+    let exact = explicit(&chain, &SplittingScheme::SOFRONIOU_SPALETTA_10, from, 4.0, 256);
+    let check = |name: &str, order: f64, steps: [usize; 4], run: &dyn Fn(usize) -> Vec<f64>| {
+        let points = steps.map(|k| (4.0 / k as f64, distance(&run(k), &exact)));
+        let found = slope(&points);
+        assert!((found - order).abs() <= 0.15, "{name}: order {found}, not {order}: {points:?}");
+        // Above what rounding leaves of some 1e3 stages of 50 sites.
+        assert!(points[3].1 > 1e-12, "{name}: {points:?} is round-off");
+    };
+    for (scheme, steps) in [
+        (SplittingScheme::STRANG, [128, 192, 256, 384]),
+        (SplittingScheme::BLANES_MOAN_4, [64, 96, 128, 160]),
+        (SplittingScheme::BLANES_MOAN_6, [32, 40, 48, 64]),
+    ] {
+        check(scheme.name(), f64::from(scheme.order()), steps, &|k| explicit(&chain, &scheme, from, 4.0, k));
+    }
+    check("midpoint", 2.0, [128, 192, 256, 384], &|k| implicit(&chain, from, 4.0, k));
+}
+
+/// With free ends and no force on single sites the sum of the momenta is multiplied by `sigma_d` in each step, by any rule.
+#[test]
+fn momenta_decay_with_the_conformal_factor() {
+    let size = [12, 5, 3];
+    let n = size.iter().product();
+    let free = KleinGordon { mass_squared: 0.0, lambda: 0.0 };
+    let system = lattice(size, free, 2.0, -0.3).unwrap();
+    let (q, v) = start(n);
+    let v: Vec<f64> = v.iter().map(|v| v + 0.5).collect();
+    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let (h, steps) = (0.1, 50);
+    let before: f64 = v.iter().sum();
+    // The forces are opposite to the last bit; each unknown rounds about four times a stage, at random.
+    let tolerance = |stages: usize| 4.0 * f64::EPSILON * (n * steps * stages) as f64;
+    for scheme in [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_6_LONG] {
+        let mut motion = AssembledSplitting::new(&system, &scheme, h, from).unwrap();
+        motion.advance(steps).unwrap();
+        let after: f64 = motion.state().v.iter().sum();
+        let expected = before * (-0.3 * h * steps as f64).exp();
+        assert!((after - expected).abs() <= tolerance(scheme.stages()), "{}: {after} {expected}", scheme.name());
+    }
+    let mut motion = AssembledMidpoint::new(&system, h, from, usize::MAX).unwrap();
+    motion.advance(steps).unwrap();
+    let after: f64 = motion.state().v.iter().sum();
+    let expected = before * motion.sigma().powi(steps as i32);
+    // Newton's method ends within the rounding of q/h.
+    assert!((after - expected).abs() <= tolerance(1) / h, "midpoint: {after} {expected}");
+}
+
+/// The energy `E_L` of an autonomous system is multiplied by `e^(gamma t)` along the motion; a splitting keeps to that within an error of its
+/// order that does not grow with time.
+#[test]
+fn energy_decays() {
+    let system = lattice([16, 16], SineGordon { omega_squared: 1.0 }, 1.0, -0.05).unwrap();
+    let n = system.unknowns();
+    let (q, v) = start(n);
+    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let before = system.energy(from).unwrap();
+    let defect = |h: f64| {
+        let mut motion = AssembledSplitting::new(&system, &SplittingScheme::STRANG, h, from).unwrap().with_action();
+        let mut worst = 0.0f64;
+        for _ in 0..10 {
+            motion.advance((4.0 / h).round() as usize).unwrap();
+            let end = motion.state();
+            let (e, t) = (system.energy(end).unwrap(), end.t);
+            worst = worst.max((e * (0.05 * t).exp() / before - 1.0).abs());
+        }
+        worst
+    };
+    // The frequencies of the lattice are below 3: the error of Strang is about (3 h)^2/24 at h = 0.05.
+    let (coarse, fine) = (defect(0.05), defect(0.025));
+    assert!(coarse < 1e-3 && fine > 1e-8, "{coarse:e}, {fine:e}");
+    assert!((coarse / fine).log2() > 1.8, "order of the energy's error: {coarse:e}, {fine:e}");
+}
+
+/// With drag the outer solar system has the same error as without: nothing is proportional to the drag.
+///
+/// In the time `tau = int e^(gamma t) dt` an orbit with drag is not one without, so each is compared with its own fine run.
+#[test]
+fn outer_solar_system() {
+    let (q, v) = (OuterSolarSystem::positions(6), OuterSolarSystem::velocities(6));
+    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let error = |gamma: f64, steps: usize| {
+        let system = OuterSolarSystem::system(6, gamma).unwrap();
+        let exact = explicit(&system, &SplittingScheme::SOFRONIOU_SPALETTA_10, from, 20_000.0, 400);
+        let found = explicit(&system, &SplittingScheme::BLANES_MOAN_4, from, 20_000.0, steps);
+        distance(&found[..18], &exact[..18])
+    };
+    let free = error(0.0, 100);
+    // A drag of 1e-6/day halves no orbit in 20 000 days, but its error as a force of low order would be 1e-6 * h of each position.
+    for gamma in [-1e-7, -1e-6] {
+        let dragged = error(gamma, 100);
+        assert!(dragged < 1.5 * free && free > 1e-9, "gamma {gamma:e}: {dragged:e}, without {free:e}");
+    }
+}

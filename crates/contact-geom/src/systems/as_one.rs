@@ -1,0 +1,59 @@
+//! Systems with as many coordinates as one type.
+
+/// An enum of systems with as many coordinates, as a system: what is generic over systems is compiled once for all of them.
+macro_rules! systems {
+    ($(#[$of:meta])* $name:ident<$n:literal> { $($system:ident: $type:ty,)* }) => {
+        $(#[$of])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum $name {
+            $(#[doc = concat!("[`", stringify!($system), "`].")] $system($type),)*
+        }
+
+        $(impl From<$type> for $name {
+            fn from(system: $type) -> Self {
+                $name::$system(system)
+            }
+        })*
+
+        impl Lagrangian<$n> for $name {
+            #[inline]
+            fn value<T: Scalar>(&self, t: T, q: &SVector<T, $n>, v: &SVector<T, $n>, z: T) -> T {
+                match self { $($name::$system(system) => system.value(t, q, v, z),)* }
+            }
+            #[inline]
+            fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<$n, T>) -> Option<Triple<$n, T>> {
+                match self { $($name::$system(system) => system.closed_gradient(t, x),)* }
+            }
+            #[inline]
+            fn closed_hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<$n, T>) -> Option<Hessian<$n, T>> {
+                match self { $($name::$system(system) => system.closed_hessian(t, x),)* }
+            }
+            fn structure(&self) -> Structure {
+                match self { $($name::$system(system) => system.structure(),)* }
+            }
+        }
+
+        impl System<$n> for $name {
+            fn name(&self) -> &'static str {
+                match self { $($name::$system(system) => system.name(),)* }
+            }
+            fn initial(&self) -> VelocityPoint<$n> {
+                match self { $($name::$system(system) => system.initial(),)* }
+            }
+            fn initial_time(&self) -> f64 {
+                match self { $($name::$system(system) => system.initial_time(),)* }
+            }
+            fn sample(&self, u: &[f64]) -> (f64, VelocityPoint<$n>) {
+                match self { $($name::$system(system) => system.sample(u),)* }
+            }
+            fn hamiltonian<T: Scalar>(&self, t: T, x: &PhasePoint<$n, T>) -> Option<T> {
+                match self { $($name::$system(system) => system.hamiltonian(t, x),)* }
+            }
+            fn symmetries(&self) -> Vec<Symmetry<$n>> {
+                match self { $($name::$system(system) => system.symmetries(),)* }
+            }
+        }
+    };
+}
+
+pub(super) use systems;

@@ -1,0 +1,56 @@
+//! Continuation: a path from that of a problem nearby.
+
+use super::critical_path::CriticalPath;
+use super::problem::BoundaryPath;
+use crate::{DiscreteLagrangian, DiscretePath, InputError};
+use contact_geom::nalgebra::SVector;
+
+/// Solves problems one after another, each from the path of the one before: continuation in a parameter of the Lagrangian, in the
+/// step, the number of steps or the ends, whatever changes along the sequence. The first starts as it is told to.
+///
+/// The paths that were found, in the order of the problems; the last one has another status where the search ended without
+/// a path, and the problems after it are not tried.
+///
+/// # Errors
+/// [`InputError`] where a problem cannot start from the path before it, which no finite one causes.
+///
+/// ```
+/// use contact_geom::systems::Pendulum;
+/// use discrete_herglotz::{BoundaryPath, End, Midpoint, continuation};
+///
+/// // The same span with more and more steps.
+/// let ends = [End::Position([0.0].into()), End::Position([1.0].into())];
+/// let problem = |n: usize| BoundaryPath::new(Midpoint::new(Pendulum { gamma: -0.1 }, 2.0 / n as f64)?, n, ends);
+/// let found = continuation([problem(10)?, problem(100)?, problem(1000)?])?;
+/// assert!(found.len() == 3 && found[2].is_found());
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+pub fn continuation<D: DiscreteLagrangian<N>, const N: usize>(
+    problems: impl IntoIterator<Item = BoundaryPath<D, N>>,
+) -> Result<Vec<CriticalPath<N>>, InputError> {
+    let mut paths: Vec<CriticalPath<N>> = Vec::new();
+    for problem in problems {
+        let problem = match paths.last() {
+            Some(last) if !last.is_found() => break,
+            Some(last) => {
+                let start = DiscretePath::new(resampled(&last.points, problem.steps()))?;
+                problem.from_path(start)?
+            }
+            None => problem,
+        };
+        paths.push(problem.search());
+    }
+    Ok(paths)
+}
+
+/// A path with another number of steps, at the same fractions of its span; linear between its points.
+fn resampled<const N: usize>(points: &[SVector<f64, N>], steps: usize) -> Vec<SVector<f64, N>> {
+    let from = points.len() - 1;
+    let at = |k: usize| {
+        let place = k as f64 * from as f64 / steps as f64;
+        let before = (place as usize).min(from - 1);
+        let part = place - before as f64;
+        points[before] * (1.0 - part) + points[before + 1] * part
+    };
+    (0..=steps).map(at).collect()
+}

@@ -1,0 +1,114 @@
+//! Newton's method with a line search for the discrete Herglotz equations of a whole path.
+
+use super::critical_path::{CriticalPath, PathStatus};
+use super::deflation::Deflation;
+use super::sweep::{Equations, Measured, Nodes, Sweep};
+use crate::{DiscreteLagrangian, last_correction};
+use contact_geom::larger;
+use contact_geom::nalgebra::SVector;
+
+/// The corrections that a search may make.
+const LIMIT: u32 = 200;
+/// The halvings of one correction, beyond which the residual does not fall along it.
+const HALVINGS: u32 = 12;
+/// How often a search goes on from where the residual does not fall, by a whole correction: local minima of the residual that are no
+/// critical paths are common.
+const LEAPS: u32 = 12;
+/// What the relative residual of a path at round-off may be: rounded positions leave some units in the last place of the terms,
+/// and a discrete Lagrangian that is found by an iteration some more.
+const ROUND_OFF: f64 = 1024.0 * f64::EPSILON;
+
+/// The sum of squares that corrections lessen, each coordinate's in units of its largest terms.
+fn merit<const N: usize>(at: &Measured<N>, sizes: &SVector<f64, N>) -> f64 {
+    (0..N).filter(|&i| at.squares[i] != 0.0).map(|i| at.squares[i] / sizes[i].powi(2)).sum()
+}
+
+/// The largest part of its coordinate's size, along this path or the first, that a correction changes.
+fn relative<const N: usize>(change: &[SVector<f64, N>], x: &[SVector<f64, N>], first: &SVector<f64, N>) -> f64 {
+    let (mut off, mut size) = (SVector::<f64, N>::zeros(), *first);
+    for (dq, q) in change.iter().zip(x) {
+        for i in 0..N {
+            off[i] = larger(off[i], dq[i].abs());
+            size[i] = larger(size[i], q[i].abs() + dq[i].abs());
+        }
+    }
+    (0..N).filter(|&i| off[i] != 0.0).fold(0.0, |worst, i| larger(worst, off[i] / size[i]))
+}
+
+/// Searches from a path, away from known ones.
+///
+/// A correction is halved until the sum of the squares of the residuals falls. The search ends where the next correction,
+/// predicted from the last two, is below round-off, or where corrections stagnate with residuals at round-off. Without
+/// a path it ends with the one of the least residual where it first no longer fell.
+pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
+    of: &Equations<'_, D, N>,
+    mut x: Nodes<N>,
+    deflation: &Deflation<'_, N>,
+) -> CriticalPath<N> {
+    let mut sweep = Sweep::new(of);
+    let first = x.q.iter().fold(SVector::zeros(), |most: SVector<f64, N>, q| most.sup(&q.abs()));
+    let (mut change, mut trial) = (x.q.clone(), x.clone());
+    let mut at = match sweep.forward(of, &mut x) {
+        Ok(at) => at,
+        Err(e) => return CriticalPath::ended(PathStatus::Undefined { step: e.step, cause: e.cause }, x, 0),
+    };
+    let least = 16.0 * of.steps as f64 * f64::EPSILON;
+    let mut before = f64::INFINITY;
+    // The path with the least residual before the leaps.
+    let mut best: Option<(Nodes<N>, Measured<N>)> = None;
+    let mut leaps = 0;
+    for iterations in 1..=LIMIT {
+        if at.regularity.is_nan() || at.regularity <= least {
+            let status = PathStatus::Conjugate { regularity: at.regularity };
+            return CriticalPath::ended(status, x, iterations - 1).measured(&at);
+        }
+        sweep.backward(of, &mut change);
+        let (repulsion, stretch) = deflation.of(&x.q, &change);
+        let (mut part, mut halvings, mut leap) = (1.0, 0, false);
+        let next = loop {
+            for ((to, from), dq) in trial.q.iter_mut().zip(&x.q).zip(&change) {
+                *to = from + dq * (part * stretch);
+            }
+            if let Ok(next) = sweep.forward(of, &mut trial) {
+                let sizes = at.sizes.sup(&next.sizes);
+                let now = merit(&at, &sizes) * repulsion.powi(2);
+                let then = merit(&next, &sizes) * deflation.factor(&trial.q).powi(2);
+                if leap || then <= (1.0 - 1e-4 * part) * now || next.relative <= ROUND_OFF {
+                    break Some(next);
+                }
+            }
+            part *= 0.5;
+            halvings += 1;
+            if halvings > HALVINGS {
+                if leap || leaps == LEAPS {
+                    break None;
+                }
+                if best.as_ref().is_none_or(|(_, best)| at.residual < best.residual) {
+                    best = Some((x.clone(), at));
+                }
+                (part, halvings, leap) = (1.0, 0, true);
+                leaps += 1;
+            }
+        };
+        let Some(next) = next else {
+            let (x, at) = best.filter(|(_, best)| best.residual <= at.residual).unwrap_or((x, at));
+            return CriticalPath::ended(PathStatus::Stalled, x, iterations).measured(&at);
+        };
+        let size = relative(&change, &x.q, &first) * part * stretch.abs();
+        std::mem::swap(&mut x, &mut trial);
+        at = next;
+        let predicted = part == 1.0 && last_correction(size, before, f64::EPSILON);
+        let stagnant = size >= 0.5 * before && size <= f64::EPSILON.sqrt();
+        let still = part == 1.0 && size <= f64::EPSILON;
+        if still || at.relative <= ROUND_OFF && (predicted || stagnant) {
+            let status = match at.not_contact {
+                Some((step, sigma)) => PathStatus::SigmaVanished { step, sigma },
+                None => PathStatus::Found,
+            };
+            return CriticalPath::ended(status, x, iterations).measured(&at);
+        }
+        before = if part == 1.0 { size } else { f64::INFINITY };
+    }
+    let (x, at) = best.filter(|(_, best)| best.residual <= at.residual).unwrap_or((x, at));
+    CriticalPath::ended(PathStatus::NotConverged, x, LIMIT).measured(&at)
+}

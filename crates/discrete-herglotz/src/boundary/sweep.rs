@@ -1,0 +1,383 @@
+//! The discrete Herglotz equations along a path: their residuals, and Newton's correction from one sweep through the path and back.
+
+use super::elimination::{ActionRow, BlockRows, Panel, back_substitute};
+use super::end::Conditions;
+use crate::{DiscreteLagrangian, StepError};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{DiscretePoint, SecondDiscreteJet, larger, linear};
+
+/// The positions and actions of a path.
+#[derive(Clone)]
+pub(super) struct Nodes<const N: usize> {
+    pub q: Vec<SVector<f64, N>>,
+    pub z: Vec<f64>,
+}
+
+/// What is left of the equations at a point: `dq_k + next dq_{k+1} = rhs`, with one more term on the left where the [`Sweep`] has
+/// one of this point.
+#[derive(Clone, Copy)]
+struct Eliminated<const N: usize> {
+    next: SMatrix<f64, N, N>,
+    rhs: SVector<f64, N>,
+}
+
+/// The workspace of a sweep, of a length proportional to that of the path.
+pub(super) struct Sweep<const N: usize> {
+    points: Vec<Eliminated<N>>,
+    /// The matrices of `dq_{k+2}`, of the points k where rows were exchanged with the next point's.
+    after: Vec<(usize, SMatrix<f64, N, N>)>,
+    /// The matrices of `dq_0`, of a periodic path.
+    first: Vec<SMatrix<f64, N, N>>,
+    /// The correction of the last unknown position, `q_0` of a periodic path.
+    last: SVector<f64, N>,
+}
+
+/// What a path satisfies.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measured<const N: usize> {
+    /// The largest residual of a discrete Herglotz equation or of an end's condition, a momentum.
+    pub residual: f64,
+    /// The largest residual relative to the size of the terms of its equation.
+    pub relative: f64,
+    /// The sums of the squares of the residuals of each coordinate.
+    pub squares: SVector<f64, N>,
+    /// The largest size of the terms of each coordinate's equations.
+    pub sizes: SVector<f64, N>,
+    /// The logarithm of the product of the sigma_d, not a number where one is negative.
+    pub log_factor: f64,
+    /// The product of the sigma_d whose logarithm is not yet in it.
+    factors: f64,
+    /// The first step with a sigma_d that is not positive, and its value.
+    pub not_contact: Option<(usize, f64)>,
+    /// The smallest pivot of the last block relative to what it was before the elimination; 0 where a pivot vanishes.
+    pub regularity: f64,
+}
+
+/// A step at which the discrete Lagrangian is not defined.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Undefined {
+    pub step: usize,
+    pub cause: StepError,
+}
+
+/// The equations of a path.
+pub(super) struct Equations<'a, D, const N: usize> {
+    pub ld: &'a D,
+    pub conditions: &'a Conditions<N>,
+    pub t0: f64,
+    pub steps: usize,
+}
+
+impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
+    /// The momentum at the end of a path, with the actions set on the way.
+    fn last_momentum(&self, x: &mut Nodes<N>) -> Result<SVector<f64, N>, Undefined> {
+        let mut p = SVector::zeros();
+        for k in 0..self.steps {
+            let point = DiscretePoint { q0: x.q[k], q1: x.q[k + 1], z0: x.z[k] };
+            let jet = self.ld.jet(self.t0 + k as f64 * self.ld.step_size(), &point);
+            let jet = jet.map_err(|cause| Undefined { step: k, cause })?;
+            p = jet.d2;
+            x.z[k + 1] = x.z[k] + jet.value;
+        }
+        Ok(p)
+    }
+
+    /// The second jet of a step, all of whose entries are finite.
+    #[inline(always)]
+    pub fn jet(
+        &self,
+        k: usize,
+        q0: &SVector<f64, N>,
+        q1: &SVector<f64, N>,
+        z0: f64,
+    ) -> Result<SecondDiscreteJet<N>, Undefined> {
+        let t = self.t0 + k as f64 * self.ld.step_size();
+        let jet = self.ld.second_jet(t, &DiscretePoint { q0: *q0, q1: *q1, z0 });
+        let jet = jet.map_err(|cause| Undefined { step: k, cause })?;
+        let second = jet.d11.sum() + jet.d12.sum() + jet.d22.sum() + jet.d1z.sum() + jet.d2z.sum() + jet.dzz;
+        let first = jet.first.value + jet.first.d1.sum() + jet.first.d2.sum() + jet.first.dz;
+        // A multiple by zero is zero unless an entry is infinite or not a number, or a sum overflows.
+        if (first + second) * 0.0 == 0.0 { Ok(jet) } else { Err(Undefined { step: k, cause: StepError::NonFinite }) }
+    }
+}
+
+/// The discrete Herglotz equation of a point, `H = D1 + sigma p` with `p = D2` of the step before (or a given momentum), and its
+/// derivatives in the point's own position and action and in the next position, those through p left out.
+pub(super) struct Herglotz<const N: usize> {
+    value: SVector<f64, N>,
+    /// The sizes of its terms.
+    size: SVector<f64, N>,
+    pub here: SMatrix<f64, N, N>,
+    action: SVector<f64, N>,
+    pub next: SMatrix<f64, N, N>,
+}
+
+impl<const N: usize> Herglotz<N> {
+    #[inline(always)]
+    pub fn new(p: &SVector<f64, N>, jet: &SecondDiscreteJet<N>, neighbour: &SVector<f64, N>) -> Self {
+        let sigma = jet.first.sigma();
+        let next = jet.d12 + p * jet.d2z.transpose();
+        Herglotz {
+            value: jet.first.d1 + p * sigma,
+            // The three positions of the equation are rounded, and move it by as much.
+            size: jet.first.d1.abs() + p.abs() * sigma.abs() + next.abs() * neighbour.abs() * 4.0,
+            here: jet.d11 + p * jet.d1z.transpose(),
+            action: jet.d1z + p * jet.dzz,
+            next,
+        }
+    }
+
+    /// The condition `D2 = p` at the end of a path.
+    fn at_end(p: &SVector<f64, N>, jet: &SecondDiscreteJet<N>, neighbour: &SVector<f64, N>) -> Self {
+        Herglotz {
+            value: jet.first.d2 - p,
+            size: jet.first.d2.abs() + p.abs() + jet.d12.abs().transpose() * neighbour.abs() * 2.0,
+            here: SMatrix::zeros(),
+            action: SVector::zeros(),
+            next: SMatrix::zeros(),
+        }
+    }
+
+    /// The linearised equation of point k+1 in the corrections of positions: those of both actions are expressed by them. `before`
+    /// is the jet of the step k, `sigma` the factor of p.
+    #[inline(always)]
+    fn rows<const PERIODIC: bool>(
+        &self,
+        before: &SecondDiscreteJet<N>,
+        sigma: f64,
+        action: &ActionRow<N>,
+        next_action: &ActionRow<N>,
+    ) -> BlockRows<N> {
+        let by_action = before.d2z * sigma;
+        let first = if PERIODIC {
+            -by_action * action.first.transpose() - self.action * next_action.first.transpose()
+        } else {
+            SMatrix::zeros()
+        };
+        BlockRows {
+            here: before.d12.transpose() * sigma
+                - by_action * action.here.transpose()
+                - self.action * next_action.here.transpose(),
+            next: self.here + before.d22 * sigma
+                - by_action * action.next.transpose()
+                - self.action * next_action.next.transpose(),
+            after: self.next,
+            first,
+            rhs: -self.value - by_action * action.rhs - self.action * next_action.rhs,
+        }
+    }
+}
+
+impl<const N: usize> Measured<N> {
+    fn new() -> Self {
+        Measured {
+            residual: 0.0,
+            relative: 0.0,
+            squares: SVector::zeros(),
+            sizes: SVector::zeros(),
+            log_factor: 0.0,
+            factors: 1.0,
+            not_contact: None,
+            regularity: 0.0,
+        }
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: &Herglotz<N>) {
+        for i in 0..N {
+            let off = at.value[i].abs();
+            self.residual = larger(self.residual, off);
+            self.squares[i] += off * off;
+            self.sizes[i] = larger(self.sizes[i], at.size[i]);
+            // A quotient at each point would cost as much as the rest; one that is not a number stays.
+            if off > self.relative * at.size[i] || off.is_nan() || at.size[i].is_nan() {
+                self.relative = larger(self.relative, off / at.size[i]);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn factor(&mut self, step: usize, sigma: f64) {
+        if sigma <= 0.0 && self.not_contact.is_none() {
+            self.not_contact = Some((step, sigma));
+        }
+        if sigma < 0.0 {
+            self.log_factor = f64::NAN;
+        }
+        // The logarithm of many factors at once.
+        self.factors *= sigma;
+        if !(1e-100..1e100).contains(&self.factors) {
+            self.log_factor += self.factors.ln();
+            self.factors = 1.0;
+        }
+    }
+}
+
+impl<const N: usize> Sweep<N> {
+    pub fn new<D>(of: &Equations<'_, D, N>) -> Self {
+        let zero = SMatrix::zeros();
+        let closed = if of.conditions.is_periodic() { of.steps } else { 0 };
+        Sweep {
+            points: vec![Eliminated { next: zero, rhs: SVector::zeros() }; of.steps],
+            after: Vec::new(),
+            first: vec![zero; closed],
+            last: SVector::zeros(),
+        }
+    }
+
+    /// Sets the actions of a path by their recursion, measures it, and eliminates its linearised equations.
+    ///
+    /// The correction of an action is an affine function of those of positions, carried along, so that the blocks that are
+    /// factorised have N rows, not N + 1.
+    pub fn forward<D: DiscreteLagrangian<N>>(
+        &mut self,
+        of: &Equations<'_, D, N>,
+        x: &mut Nodes<N>,
+    ) -> Result<Measured<N>, Undefined> {
+        // What a periodic path has more is compiled out of the others.
+        if of.conditions.is_periodic() { self.forward_of::<D, true>(of, x) } else { self.forward_of::<D, false>(of, x) }
+    }
+
+    fn forward_of<D: DiscreteLagrangian<N>, const PERIODIC: bool>(
+        &mut self,
+        of: &Equations<'_, D, N>,
+        x: &mut Nodes<N>,
+    ) -> Result<Measured<N>, Undefined> {
+        let steps = of.steps;
+        self.after.clear();
+        let mut measured = Measured::new();
+        let mut now = of.jet(0, &x.q[0], &x.q[1], x.z[0])?;
+        let (start, end) = of.conditions.momenta();
+        let mut panel = Panel::new(PERIODIC);
+        if let Some(p) = &start {
+            let at = Herglotz::new(p, &now, &x.q[1]);
+            measured.take(&at);
+            panel.top = BlockRows { here: at.here, next: at.next, rhs: -at.value, ..BlockRows::zero() };
+        }
+        // Of a periodic path the jet of the first step, and where the path is regular to round-off so far.
+        let (opening, mut regular) = (now, true);
+        let mut diagonal = SVector::<f64, N>::zeros();
+        // The row of the action at point k; zero at the start, where the action is given.
+        let mut action = ActionRow::zero();
+        for k in 0..steps {
+            measured.factor(k, now.first.sigma());
+            x.z[k + 1] = x.z[k] + now.first.value;
+            panel.action = action.recursion(&now.first);
+            let ahead = if k + 1 < steps { Some(of.jet(k + 1, &x.q[k + 1], &x.q[k + 2], x.z[k + 1])?) } else { None };
+            let bottom = match (&ahead, &end) {
+                (Some(jet), _) => {
+                    let at = Herglotz::new(&now.first.d2, jet, &x.q[k + 2]);
+                    Some((at, jet.first.sigma()))
+                }
+                (None, Some(p)) => Some((Herglotz::at_end(p, &now, &x.q[k]), 1.0)),
+                // The momentum at the end of a periodic path is that of its start.
+                (None, None) if PERIODIC => {
+                    let at = Herglotz::new(&now.first.d2, &opening, &x.q[1]);
+                    // Its derivatives in the first two positions have waited since the start.
+                    let (here, next) = (SMatrix::zeros(), SMatrix::zeros());
+                    Some((Herglotz { here, next, action: SVector::zeros(), ..at }, opening.first.sigma()))
+                }
+                (None, None) => None,
+            };
+            let Some((at, sigma)) = bottom else {
+                // The last position is given: what is left is the equation of the point before.
+                break;
+            };
+            measured.take(&at);
+            panel.bottom = at.rows::<PERIODIC>(&now, sigma, &action, &panel.action);
+            diagonal = panel.bottom.next.diagonal().abs();
+            if k == 0 && start.is_none() {
+                // The first position is given, or is the last unknown of a periodic path.
+                if PERIODIC {
+                    panel.open(&opening, &of.last_momentum(x)?);
+                }
+            } else {
+                if PERIODIC && k + 1 == steps {
+                    panel.close();
+                }
+                if regular {
+                    match panel.eliminate::<PERIODIC>() {
+                        Ok(exchanged) => self.keep(k, &panel, exchanged),
+                        Err(_) => regular = false,
+                    }
+                }
+            }
+            panel.advance::<PERIODIC>();
+            action = panel.action;
+            if let Some(ahead) = ahead {
+                now = ahead;
+            }
+        }
+        measured.log_factor += measured.factors.ln();
+        if regular {
+            measured.regularity = self.finish(&panel.top, &diagonal);
+        }
+        Ok(measured)
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, k: usize, panel: &Panel<N>, exchanged: bool) {
+        let (mut next, mut rhs) = (panel.top.next, panel.top.rhs);
+        let (u, inverses) = (&panel.top.here, &panel.inverses);
+        back_substitute(u, inverses, &mut next);
+        back_substitute(u, inverses, &mut rhs);
+        if exchanged {
+            let mut after = panel.top.after;
+            back_substitute(u, inverses, &mut after);
+            self.after.push((k, after));
+        }
+        if let Some(kept) = self.first.get_mut(k) {
+            let mut first = panel.top.first;
+            back_substitute(u, inverses, &mut first);
+            *kept = first;
+        }
+        self.points[k] = Eliminated { next, rhs };
+    }
+
+    /// Solves for the last unknown position; the smallest pivot relative to the diagonal before the elimination.
+    fn finish(&mut self, top: &BlockRows<N>, diagonal: &SVector<f64, N>) -> f64 {
+        // In units in which the diagonal was 1, so that pivots can be compared.
+        let unit = diagonal.map(|size| if size > 0.0 { size.sqrt().recip() } else { 1.0 });
+        let mut here = SMatrix::<f64, N, N>::from_fn(|i, j| top.here[(i, j)] * unit[i] * unit[j]);
+        self.last = top.rhs.component_mul(&unit);
+        let regularity = match linear::solve(&mut here, &mut self.last) {
+            Ok(_) => (0..N).fold(1.0, |least: f64, i| least.min(here[(i, i)].abs())),
+            Err(_) => 0.0,
+        };
+        self.last.component_mul_assign(&unit);
+        regularity
+    }
+
+    /// The corrections of the positions, from the last point back to the first.
+    pub fn backward<D>(&self, of: &Equations<'_, D, N>, change: &mut [SVector<f64, N>]) {
+        let steps = of.steps;
+        let mut exchanged = self.after.iter().rev().peekable();
+        let zero = SVector::<f64, N>::zeros();
+        let (last, closed) = match of.conditions {
+            Conditions::Ends(_, end) if end.position().is_some() => (steps - 1, zero),
+            Conditions::Ends(..) => (steps, zero),
+            Conditions::Periodic(_) => (steps, self.last),
+        };
+        let (mut next, mut after) = (zero, zero);
+        for k in (0..=steps).rev() {
+            let mut dq = zero;
+            if k == last {
+                dq = self.last;
+            } else if let Some(point) = self.points.get(k) {
+                dq = point.rhs - point.next * next;
+                if let Some((_, by)) = exchanged.next_if(|(at, _)| *at == k) {
+                    dq -= by * after;
+                }
+                if let Some(by) = self.first.get(k) {
+                    dq -= by * closed;
+                }
+            }
+            change[k] = dq;
+            (after, next) = (next, dq);
+        }
+        // Of a periodic path the first point is the last, but for the shift.
+        if of.conditions.is_periodic() || of.conditions.momenta().0.is_none() {
+            change[0] = closed;
+        }
+    }
+}

@@ -1,0 +1,328 @@
+//! Contact Gauss collocation with trajectories in lanes: the stages of a step are a loop.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+use super::pack::Pack;
+use super::twofold::{Pair, Summed};
+use crate::gauss::coefficients::MOST;
+use crate::gauss::condensed::Condensed;
+use crate::gauss::instructions::Instructions;
+use crate::splitting::separable::SeparableForm;
+use crate::{InputError, StepError};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use num_traits::Zero;
+use pulp::{Simd, WithSimd};
+use qd::Quad;
+
+/// The steps of contact Gauss collocation condensed to the positions, for many motions of one Lagrangian: the equations are those of
+/// [`Condensed`], which see.
+///
+/// A sweep takes the stages in their order, each from the newest accelerations of the others (Gauss and Seidel's iteration). Lanes end their
+/// sweeps each for itself, by the rules of `gauss/sweeps.rs`; what has ended is kept while others go on.
+pub(super) struct GaussPacks<'a, L, const N: usize> {
+    form: SeparableForm<&'a L, N>,
+    table: Box<Table>,
+    t0: f64,
+    h: f64,
+    steps: usize,
+}
+
+/// What a step multiplies with, in two parts where it acts in the same direction in every step.
+struct Table {
+    s: usize,
+    b: [[f64; MOST]; MOST],
+    b_tail: [[f64; MOST]; MOST],
+    u: [Pair; MOST],
+    d: [[f64; MOST]; MOST],
+    inverse_rho: [f64; MOST],
+    times: [f64; MOST],
+    ahead: [[f64; MOST]; MOST],
+    end_u: Pair,
+    end_b: [Pair; MOST],
+    grow: Pair,
+    end_v: [Pair; MOST],
+}
+
+impl Table {
+    fn new(condensed: &Condensed) -> Self {
+        let pair = |x: Quad| [x.0, x.1];
+        let exact = &condensed.exact;
+        Table {
+            s: condensed.s,
+            b: condensed.b.map(|row| row.map(|e| e.0)),
+            b_tail: condensed.b.map(|row| row.map(|e| e.1)),
+            u: condensed.u.map(pair),
+            d: exact.d.map(|row| row.map(|e| e.0)),
+            inverse_rho: condensed.inverse_rho.0,
+            times: condensed.times.0,
+            ahead: std::array::from_fn(|i| std::array::from_fn(|j| condensed.ahead.0[j].0[i])),
+            end_u: pair(exact.end_u),
+            end_b: exact.end_b.map(pair),
+            grow: pair(exact.grow),
+            end_v: exact.end_v.map(pair),
+        }
+    }
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
+    /// With what is read of L at a start.
+    pub fn new(
+        lagrangian: &'a L,
+        stages: usize,
+        (h, steps): (f64, usize),
+        t0: f64,
+        state: &PhasePoint<N>,
+    ) -> Result<Self, InputError> {
+        let form = SeparableForm::read(lagrangian, h, t0, state)?;
+        let x = VelocityPoint { q: state.q, v: form.velocity(&state.p), z: state.z };
+        let gamma = lagrangian.gradient(t0, &x).z;
+        if !gamma.is_finite() {
+            return Err(InputError::FirstStep(StepError::NonFinite));
+        }
+        let table = Box::new(Table::new(&Condensed::new(stages, h, gamma)?));
+        Ok(GaussPacks { form, table, t0, h, steps })
+    }
+
+    /// Takes all steps of some motions, in place. One whose steps could not be solved, or that is not finite, is not finite then.
+    pub fn run(&self, instructions: Instructions, states: &mut [PhasePoint<N>], action: bool) {
+        if action {
+            instructions.dispatch(All::<_, N, true> { packs: self, states });
+        } else {
+            instructions.dispatch(All::<_, N, false> { packs: self, states });
+        }
+    }
+}
+
+/// All motions of a slice in the lanes of one instruction set.
+struct All<'s, 'a, L, const N: usize, const ACTION: bool> {
+    packs: &'s GaussPacks<'a, L, N>,
+    states: &'s mut [PhasePoint<N>],
+}
+
+impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, '_, L, N, ACTION> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let All { packs, states } = self;
+        if const { N == 1 } {
+            packs.all::<S, 2, ACTION>(states);
+        } else {
+            packs.all::<S, 1, ACTION>(states);
+        }
+    }
+}
+
+/// The state and the workspace of the motions of a pack.
+struct Moving<S: Simd, const K: usize, const N: usize> {
+    q: [Summed<S, K>; N],
+    v: [Summed<S, K>; N],
+    z: Summed<S, K>,
+    /// The accelerations of the stages, and their positions.
+    a: [[Pack<S, K>; N]; MOST],
+    x: [[Pack<S, K>; N]; MOST],
+    /// What the positions begin with: what comes of the state, and of the parts that rounding of the coefficients leaves out.
+    base: [[Pack<S, K>; N]; MOST],
+    /// 1 in lanes whose sweeps go on; and in those that have failed.
+    going: Pack<S, K>,
+    failed: Pack<S, K>,
+}
+
+/// The sweeps after which an iteration counts as not contracting.
+const LIMIT: u32 = 60;
+
+/// See `Sweeps` of `gauss/sweeps.rs`, lane by lane.
+struct Judge<S: Simd, const K: usize> {
+    before: Pack<S, K>,
+    ratio: Pack<S, K>,
+    /// 1 where the next sweep is the last.
+    last: Pack<S, K>,
+    risen: Pack<S, K>,
+    count: u32,
+}
+
+impl<S: Simd, const K: usize> Judge<S, K> {
+    #[inline(always)]
+    fn new() -> Self {
+        let zero = Pack::zero();
+        Judge { before: zero, ratio: zero, last: zero, risen: zero, count: 0 }
+    }
+
+    /// Judges a sweep by the largest change and the largest term of each lane: 1 where it goes on, in the second where it is given up.
+    #[inline(always)]
+    fn judge(&mut self, change: Pack<S, K>, size: Pack<S, K>) -> [Pack<S, K>; 2] {
+        let [zero, one] = [0.0, 1.0].map(Pack::splat);
+        self.count += 1;
+        let round_off = size * (0.5 * f64::EPSILON);
+        let near = round_off * 256.0;
+        // Not `less` the other way: a NaN goes on, and is given up below.
+        let enough = change.at_most(round_off * (1.0 / 16.0), one, self.last * change.at_most(near, one, zero));
+        let mut going = one - enough;
+        let mut given_up = one - (change + size).at_most(Pack::splat(f64::MAX), one, zero);
+        if self.count > 1 {
+            let ratio = change / self.before;
+            let slower = if self.count > 2 { self.ratio } else { Pack::splat(0.1) };
+            let expected = ratio.at_most(slower, slower, ratio);
+            let next = change * expected;
+            let left = round_off * (1.0 / 64.0);
+            going = next.at_most(left, zero, going);
+            self.last = (next * expected).at_most(left, one, zero);
+            let rises = one.at_most(ratio, one, zero);
+            going = (rises * change.at_most(near, one, zero)).at_most(zero, going, zero);
+            self.risen += rises;
+            let slow = if self.count > LIMIT { one } else { self.risen.at_most(Pack::splat(3.0), zero, one) };
+            given_up = slow.at_most(zero, given_up, one);
+            self.ratio = ratio;
+        }
+        self.before = change;
+        [going, given_up * going]
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
+    #[inline(always)]
+    fn all<S: Simd, const K: usize, const ACTION: bool>(&self, states: &mut [PhasePoint<N>]) {
+        let zero = Pack::<S, K>::zero();
+        for some in states.chunks_mut(Pack::<S, K>::COUNT) {
+            // What is beyond the last repeats it.
+            let last = some.len() - 1;
+            for state in some.iter_mut() {
+                state.p = self.form.velocity(&state.p);
+            }
+            let lane = |f: &dyn Fn(&PhasePoint<N>) -> f64| Summed::from(Pack::from_lanes(|i| f(&some[i.min(last)])));
+            let mut m = Moving {
+                q: std::array::from_fn(|d| lane(&|state| state.q[d])),
+                v: std::array::from_fn(|d| lane(&|state| state.p[d])),
+                z: lane(&|state| state.z),
+                a: [[zero; N]; MOST],
+                x: [[zero; N]; MOST],
+                base: [[zero; N]; MOST],
+                going: zero,
+                failed: zero,
+            };
+            for k in 0..self.steps {
+                self.step::<S, K, ACTION>(&mut m, self.t0 + k as f64 * self.h, k > 0);
+            }
+            for (i, state) in some.iter_mut().enumerate() {
+                let v = SVector::from_fn(|d, _| m.v[d].value.lanes()[i]);
+                state.q = SVector::from_fn(|d, _| m.q[d].value.lanes()[i]);
+                state.p = self.form.momentum(&v);
+                state.z = if m.failed.lanes()[i] == 0.0 { m.z.value.lanes()[i] } else { f64::NAN };
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn step<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64, warm: bool) {
+        let Table { s, b, ahead, .. } = &*self.table;
+        let s = (*s).min(MOST);
+        let zero = Pack::<S, K>::zero();
+        if warm {
+            let before = m.a;
+            for i in 0..s {
+                m.a[i] = combined(&ahead[i], &before, s);
+            }
+        } else {
+            m.a = [[zero; N]; MOST];
+        }
+        self.begin(m, s);
+        m.going = Pack::splat(1.0) - m.failed;
+        let mut judge = Judge::new();
+        while m.going.any() {
+            let (mut change, mut size) = (zero, zero);
+            for i in 0..s {
+                let sum = combined(&b[i], &m.a, s);
+                let x: [Pack<S, K>; N] = std::array::from_fn(|d| m.base[i][d] + sum[d]);
+                let a = self.accelerations(t + self.table.times[i], &x);
+                for d in 0..N {
+                    let before = m.a[i][d];
+                    change = change.larger((a[d] - before).abs());
+                    size = size.larger(a[d].abs());
+                    m.a[i][d] = m.going.at_most(zero, before, a[d]);
+                    if ACTION {
+                        m.x[i][d] = m.going.at_most(zero, m.x[i][d], x[d]);
+                    }
+                }
+            }
+            let [going, given_up] = judge.judge(change, size);
+            m.failed += given_up * m.going;
+            m.going = m.going * going * (Pack::splat(1.0) - given_up);
+            if !warm && judge.count == 1 {
+                // The first guess was no motion at all.
+                self.begin(m, s);
+            }
+        }
+        self.finish::<S, K, ACTION>(m, t, s);
+    }
+
+    /// What the sweeps of a step have in common.
+    #[inline(always)]
+    fn begin<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, s: usize) {
+        for i in 0..s {
+            let [u, u_tail] = self.table.u[i].map(Pack::splat);
+            let of_tails = combined(&self.table.b_tail[i], &m.a, s);
+            for d in 0..N {
+                let (q, v) = (m.q[d], m.v[d]);
+                // The small terms first: a sum that has been rounded would not know them.
+                let small = u.mul_add(v.rest, q.rest) + u_tail.mul_add(v.value, of_tails[d]);
+                m.base[i][d] = q.value + u.mul_add(v.value, small);
+            }
+        }
+    }
+
+    /// `M^-1 L_q` at a stage.
+    #[inline(always)]
+    fn accelerations<S: Simd, const K: usize>(&self, t: f64, x: &[Pack<S, K>; N]) -> SVector<Pack<S, K>, N> {
+        let zero = Pack::zero();
+        let at = VelocityPoint { q: SVector::from_fn(|d, _| x[d]), v: SVector::from_element(zero), z: zero };
+        let (_, force) = self.form.lagrangian.with_force(Pack::splat(t), &at);
+        super::splitting::velocity(&self.form, &force)
+    }
+
+    /// The end of the step from its accelerations.
+    #[inline(always)]
+    fn finish<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64, s: usize) {
+        let Table { end_u, end_b, grow, end_v, d: velocities, inverse_rho, times, .. } = &*self.table;
+        if ACTION {
+            let mut dz = Summed::product(*grow, m.z);
+            for i in 0..s {
+                let sum = combined(&velocities[i], &m.a, s);
+                let rho = Pack::splat(inverse_rho[i]);
+                let v = SVector::from_fn(|d, _| rho.mul_add(m.v[d].value, sum[d]));
+                let q = SVector::from_fn(|d, _| m.x[i][d]);
+                let action = self.form.lagrangian.value(Pack::splat(t + times[i]), &q, &v, Pack::zero());
+                dz = dz.plus(end_v[i], action);
+            }
+            m.z = m.z.add(dz);
+        }
+        for d in 0..N {
+            let (mut dq, mut dv) = (Summed::zero(), Summed::zero());
+            for i in 0..s {
+                dq = dq.plus(end_b[i], m.a[i][d]);
+                dv = dv.plus(end_v[i], m.a[i][d]);
+            }
+            let (of_u, of_v) = (Summed::product(*end_u, m.v[d]), Summed::product(*grow, m.v[d]));
+            m.q[d] = m.q[d].add(dq.with(of_u));
+            m.v[d] = m.v[d].add(dv.with(of_v));
+        }
+    }
+}
+
+/// The sum over the stages of a row of coefficients with the values there.
+#[inline(always)]
+fn combined<S: Simd, const K: usize, const N: usize>(
+    row: &[f64; MOST],
+    values: &[[Pack<S, K>; N]; MOST],
+    s: usize,
+) -> [Pack<S, K>; N] {
+    let mut sum = [Pack::zero(); N];
+    for (c, value) in row[..s].iter().zip(&values[..s]) {
+        let c = Pack::splat(*c);
+        for d in 0..N {
+            sum[d] = c.mul_add(value[d], sum[d]);
+        }
+    }
+    sum
+}

@@ -1,0 +1,58 @@
+//! What becomes of a member of an ensemble.
+
+use crate::{InputError, Status, Suspicion};
+use contact_geom::PhasePoint;
+
+/// One motion of an ensemble, at its end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Member<const N: usize> {
+    /// Which one, counted from 0.
+    pub index: usize,
+    /// Where its motion has led to; an error where it could not begin, as that of a single run.
+    pub ending: Result<Ending<N>, InputError>,
+}
+
+/// Where the motion of a member has led to. Where it was ended before its time, that is what was computed before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ending<const N: usize> {
+    /// How it ended.
+    pub status: Status,
+    /// The first step that was seen not to have resolved the motion, where it was watched.
+    pub suspicion: Option<Suspicion>,
+    /// The steps taken.
+    pub steps: usize,
+    /// The time reached.
+    pub t: f64,
+    /// The state `(q, p, z)`; the action is the start's where it was not asked for.
+    pub state: PhasePoint<N>,
+}
+
+/// How many members have ended in which way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Those that were handed to the fold.
+    pub members: usize,
+    /// Those that took all of their steps.
+    pub completed: usize,
+    /// Those that did not, or could not begin.
+    pub failed: usize,
+    /// Those with a suspicion.
+    pub suspicious: usize,
+    /// Those that were advanced in lanes; the others had a run of their own.
+    pub in_lanes: usize,
+    /// The first that failed.
+    pub first_failed: Option<usize>,
+}
+
+impl Tally {
+    pub(super) fn add<const N: usize>(&mut self, member: &Member<N>) {
+        self.members += 1;
+        let completed = member.ending.is_ok_and(|ending| ending.status == Status::Completed);
+        self.completed += usize::from(completed);
+        self.failed += usize::from(!completed);
+        self.suspicious += usize::from(member.ending.is_ok_and(|ending| ending.suspicion.is_some()));
+        if !completed {
+            self.first_failed = self.first_failed.or(Some(member.index));
+        }
+    }
+}

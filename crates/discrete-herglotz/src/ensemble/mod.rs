@@ -1,0 +1,423 @@
+//! Ensembles: many motions at once, each in a lane of a vector register.
+
+mod checkpoint;
+mod error;
+mod gauss;
+mod member;
+mod pack;
+mod shards;
+mod sine;
+mod single;
+mod splitting;
+#[cfg(test)]
+mod tests;
+mod twofold;
+
+pub use error::EnsembleError;
+pub use member::{Ending, Member, Tally};
+
+use crate::gauss::instructions::Instructions;
+use crate::gauss::lanes::{branched, forget_branches};
+use crate::run::digest;
+use crate::run::watch::size;
+use crate::{GaussCollocation, InputError, Integrator, SplittingScheme, Start, Status, Steps, Until};
+use checkpoint::Shards;
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
+use gauss::GaussPacks;
+use single::Common;
+use splitting::SplittingPacks;
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+/// What an [`Integrator`] has a kernel for that takes a step of many motions at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InLanes {
+    /// The steps of a splitting with linear drag.
+    Splitting(SplittingScheme),
+    /// Those of contact Gauss collocation, for constant mass and constant rate of the conformal factor.
+    Gauss(GaussCollocation),
+}
+
+/// The members that are computed, kept and handed on together: whole packs of one, two or three registers of at most eight lanes.
+const SHARD: usize = 384;
+
+/// The members of an ensemble that get all checks of a run before it begins.
+const SAMPLE: usize = 4;
+
+/// A member by its index: its Lagrangian and its start.
+type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a>;
+
+/// Many motions, by one integrator and the same steps.
+///
+/// Where the [integrator](Integrator::in_lanes) has a kernel for it the motions lie in the lanes of the processor's vector registers, so that a whole
+/// pack takes a step together: every [`SplittingScheme`] for separable Lagrangians with linear drag, and [`GaussCollocation`] for those
+/// of a constant rate. All other members, and those that a lane cannot finish (what is not finite, an iteration that does not contract, a
+/// formula that branches), have a run of their own. Packs are shared among threads, in shards; the fold is given the members in the order of
+/// their index, on the thread of the caller, while others are computed, so that the memory does not grow with the count. What a member is
+/// drawn from should be a function of its index, as a random number seeded with it.
+///
+/// A member's bits depend on that member alone: not on the number of threads, the width of the registers, its neighbours or the order. By
+/// splittings they are those of a single run, as long as L is made of sums, products, quotients and roots. The sine and the cosine of a lane are within 2
+/// units in the last place, as those of the standard library are within one, so that with them a member differs from a single run by what
+/// its rounding makes of it. By collocation both are exact but for rounding.
+///
+/// Of what a single run looks at: the claims of the structure are probed for some members, the first and the last among them, and not along
+/// all motions; a start must be finite, a motion must end finite; whether steps resolve the motion is not watched. A single run of a
+/// member that matters looks at all of it.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use discrete_herglotz::{Ensemble, SplittingScheme, Steps, Until};
+///
+/// let pendulum = Pendulum { gamma: -0.01 };
+/// let start = |i: usize| VelocityPoint::new([0.001 * i as f64], [0.5], 0.0);
+/// let ensemble = Ensemble::new(&pendulum, 0.0, 1000, start).by(SplittingScheme::BLANES_MOAN_6).steps(Steps::Size(0.25));
+/// let mut farthest = 0.0f64;
+/// let tally = ensemble.run(Until::Time(10.0), |member| {
+///     if let Ok(ending) = member.ending {
+///         farthest = farthest.max(ending.state.q[0]);
+///     }
+/// })?;
+/// println!("{} of {} completed, farthest {farthest}", tally.completed, tally.members);
+/// # Ok::<(), discrete_herglotz::EnsembleError>(())
+/// ```
+pub struct Ensemble<'a, L, const N: usize> {
+    members: MemberOf<'a, L, N>,
+    /// Whether all members have one Lagrangian.
+    shared: bool,
+    count: usize,
+    t0: f64,
+    integrator: Option<Box<dyn Integrator<'a, L, N> + Sync + 'a>>,
+    steps: Option<Steps>,
+    action: bool,
+    threads: Option<usize>,
+    instructions: Instructions,
+    checkpoint: Option<PathBuf>,
+    progress: Option<Box<dyn Fn(f64) + 'a>>,
+}
+
+impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
+    /// So many motions of one Lagrangian from the time `t0`: the start of each is a function of its index.
+    pub fn new<X: Into<Start<N>>>(
+        lagrangian: &'a L,
+        t0: f64,
+        count: usize,
+        start: impl Fn(usize) -> X + Sync + 'a,
+    ) -> Self {
+        let members = move |index: usize| (lagrangian, start(index).into());
+        Ensemble { shared: true, ..Self::of(t0, count, members) }
+    }
+
+    /// So many motions from the time `t0`: Lagrangian and start of each are functions of its index, as in a study of parameters. Those in
+    /// sequence that have the same Lagrangian share their registers.
+    pub fn of<X: Into<Start<N>>>(t0: f64, count: usize, member: impl Fn(usize) -> (&'a L, X) + Sync + 'a) -> Self {
+        let members = move |index: usize| {
+            let (lagrangian, start) = member(index);
+            (lagrangian, start.into())
+        };
+        Ensemble {
+            members: Box::new(members),
+            shared: false,
+            count,
+            t0,
+            integrator: None,
+            steps: None,
+            action: true,
+            threads: None,
+            instructions: Instructions::new(),
+            checkpoint: None,
+            progress: None,
+        }
+    }
+
+    /// The same by this integrator.
+    pub fn by(self, integrator: impl Integrator<'a, L, N> + Sync + 'a) -> Self {
+        Ensemble { integrator: Some(Box::new(integrator)), ..self }
+    }
+
+    /// The same by steps of a given length or number.
+    pub fn steps(self, steps: Steps) -> Self {
+        Ensemble { steps: Some(steps), ..self }
+    }
+
+    /// The same on so many threads; as many as there are processors where nothing is said.
+    pub fn threads(self, threads: usize) -> Self {
+        Ensemble { threads: Some(threads), ..self }
+    }
+
+    /// Without the action: where z does not act back on the motion it is not computed.
+    pub fn without_action(self) -> Self {
+        Ensemble { action: false, ..self }
+    }
+
+    /// With a file of the shards that are done. Where it is there already, the ensemble goes on behind them: the fold is given their members
+    /// again, to the last bit, and the rest is computed. A process that is killed loses the shards under way. Members that have failed
+    /// are run again for their cause.
+    pub fn checkpoint(self, path: impl Into<PathBuf>) -> Self {
+        Ensemble { checkpoint: Some(path.into()), ..self }
+    }
+
+    /// With a function that is told, on the thread of the caller, which part of the members is done.
+    pub fn progress(self, tell: impl Fn(f64) + 'a) -> Self {
+        Ensemble { progress: Some(Box::new(tell)), ..self }
+    }
+
+    /// Only with these instructions.
+    #[cfg(test)]
+    fn only(self, instructions: Instructions) -> Self {
+        Ensemble { instructions, ..self }
+    }
+
+    /// Runs it, and hands each member at its end to a fold, in the order of the index, on this thread.
+    ///
+    /// # Errors
+    /// [`EnsembleError`]: no members or threads; what every member's run is refused for, or a false claim of the Lagrangian's structure, found at some
+    /// of them; a checkpoint of another ensemble, a damaged one, or one that cannot be written. A member that cannot begin by itself, or
+    /// whose motion fails, is handed to the fold with the cause, and the others go on.
+    pub fn run(&self, until: Until, mut fold: impl FnMut(&Member<N>)) -> Result<Tally, EnsembleError> {
+        let task = self.task(until)?;
+        let threads = match self.threads {
+            Some(0) => return Err(EnsembleError::Threads),
+            Some(threads) => threads,
+            None => std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
+        };
+        let shards = self.count.div_ceil(SHARD);
+        let mut tally = Tally::default();
+        let mut hand_on = |shard: usize, Shard { members, in_lanes }: &Shard<N>| {
+            tally.in_lanes += in_lanes;
+            for member in members {
+                tally.add(member);
+                fold(member);
+            }
+            if let Some(tell) = &self.progress {
+                tell((shard + 1) as f64 / shards as f64);
+            }
+        };
+        let mut done = 0;
+        let mut file = None;
+        if let Some(path) = &self.checkpoint {
+            let mut stored = Shards::open(path, task.fingerprint())?;
+            while done < shards
+                && let Some(mut shard) = stored.next(done, done * SHARD)?
+            {
+                task.run_again(&mut shard);
+                hand_on(done, &shard);
+                done += 1;
+            }
+            file = Some(stored);
+        }
+        let mut error = None;
+        shards::in_order(
+            threads,
+            done,
+            shards,
+            |shard| task.shard(shard),
+            |index, shard| {
+                if let Some(Err(cause)) = file.as_mut().map(|file| file.write(index, &shard)) {
+                    error = Some(cause);
+                    return ControlFlow::Break(());
+                }
+                hand_on(index, &shard);
+                ControlFlow::Continue(())
+            },
+        );
+        error.map_or(Ok(tally), Err)
+    }
+
+    /// Members spread over the ensemble, the first and the last among them.
+    fn sample(&self) -> impl Iterator<Item = usize> + use<L, N> {
+        let (count, sample) = (self.count, self.count.min(SAMPLE));
+        (0..sample).map(move |i| i * (count - 1) / (sample - 1).max(1))
+    }
+
+    /// Checks what all members have in common, and some of them wholly.
+    fn task(&self, until: Until) -> Result<Task<'_, 'a, L, N>, EnsembleError> {
+        if self.count == 0 {
+            return Err(EnsembleError::Empty);
+        }
+        let refused = |cause| EnsembleError::Member { index: 0, cause };
+        let Some(integrator) = self.integrator.as_deref() else { return Err(refused(InputError::NoIntegrator)) };
+        let Some(steps) = self.steps else { return Err(refused(InputError::NoSteps)) };
+        let common = Common { t0: self.t0, steps, until, action: self.action };
+        let (mut planned, mut refused) = (None, None);
+        for index in self.sample() {
+            let (lagrangian, start) = (self.members)(index);
+            match common.plan(integrator, lagrangian, start) {
+                Ok(plan) => planned = planned.or(Some((index, plan))),
+                Err(cause @ InputError::FalseClaim { .. }) => return Err(EnsembleError::Member { index, cause }),
+                Err(cause) => refused = refused.or(Some(EnsembleError::Member { index, cause })),
+            }
+        }
+        let Some((index, plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
+        let (members, count, instructions) = (&*self.members, self.count, self.instructions);
+        let mut task = Task { members, count, instructions, integrator, common, plan, kernel: None, fingerprint: 0 };
+        task.fingerprint = task.fingerprint_of(self.sample());
+        if self.shared {
+            let (lagrangian, start) = members(index);
+            task.kernel = Some(task.kernel_of(lagrangian, start.state(lagrangian, self.t0).as_ref()));
+        }
+        Ok(task)
+    }
+}
+
+/// How the members of one Lagrangian are advanced.
+enum Kernel<'a, L, const N: usize> {
+    OneByOne,
+    Splitting(SplittingPacks<'a, L, N>),
+    Gauss(GaussPacks<'a, L, N>),
+}
+
+/// A run of an ensemble after its checks.
+struct Task<'e, 'a, L, const N: usize> {
+    members: &'e (dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a),
+    count: usize,
+    instructions: Instructions,
+    integrator: &'e (dyn Integrator<'a, L, N> + Sync + 'a),
+    common: Common,
+    /// The step, and how many.
+    plan: (f64, usize),
+    /// That of all members, where they have one Lagrangian.
+    kernel: Option<Kernel<'a, L, N>>,
+    fingerprint: u64,
+}
+
+/// The members of a shard at their ends.
+struct Shard<const N: usize> {
+    members: Vec<Member<N>>,
+    in_lanes: usize,
+}
+
+impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
+    /// The kernel for a Lagrangian, by what is read of it at a state.
+    fn kernel_of(&self, lagrangian: &'a L, state: Option<&PhasePoint<N>>) -> Kernel<'a, L, N> {
+        let (structure, Some(state)) = (lagrangian.structure(), state) else { return Kernel::OneByOne };
+        let kernel = match self.integrator.in_lanes() {
+            Some(InLanes::Splitting(scheme)) if structure.separable && structure.is_affine_in_z() => {
+                SplittingPacks::new(lagrangian, &scheme, self.plan, self.common.t0, state).map(Kernel::Splitting)
+            }
+            Some(InLanes::Gauss(GaussCollocation { stages }))
+                if structure.separable && structure.has_constant_rate() =>
+            {
+                GaussPacks::new(lagrangian, stages, self.plan, self.common.t0, state).map(Kernel::Gauss)
+            }
+            _ => Ok(Kernel::OneByOne),
+        };
+        // Where L cannot be read a run of the member says why.
+        kernel.unwrap_or(Kernel::OneByOne)
+    }
+
+    /// What the ensemble is, by some of its members: of the integrator, the steps, starts, and of L there.
+    fn fingerprint_of(&self, sample: impl Iterator<Item = usize>) -> u64 {
+        let Common { t0, action, .. } = self.common;
+        let mut words = vec![N as u64, self.count as u64, t0.to_bits(), action.into(), self.plan.0.to_bits()];
+        words.push(self.plan.1 as u64);
+        words.extend(self.integrator.facts().name.bytes().map(u64::from));
+        for index in sample {
+            let (lagrangian, start) = (self.members)(index);
+            let (q, y, z) = match start {
+                Start::Velocity(x) => (x.q, x.v, x.z),
+                Start::Momentum(x, _) => (x.q, x.p, x.z),
+            };
+            let (value, slope) = lagrangian.with_gradient(t0, &VelocityPoint { q, v: y, z });
+            let vectors = [&q, &y, &slope.x, &slope.y];
+            let numbers = vectors.into_iter().flat_map(|x| x.iter().copied()).chain([z, value, slope.z]);
+            words.extend(numbers.map(f64::to_bits));
+        }
+        digest(&words)
+    }
+
+    fn fingerprint(&self) -> u64 {
+        self.fingerprint
+    }
+
+    /// Runs members again that have not completed.
+    fn run_again(&self, shard: &mut Shard<N>) {
+        for member in shard.members.iter_mut().filter(|member| member.ending.is_err()) {
+            let (lagrangian, start) = (self.members)(member.index);
+            member.ending = self.common.run(self.integrator, lagrangian, start);
+        }
+    }
+
+    /// Runs the members of a shard.
+    fn shard(&self, shard: usize) -> Shard<N> {
+        let range = shard * SHARD..self.count.min((shard + 1) * SHARD);
+        let mut members: Vec<Member<N>> = Vec::with_capacity(range.len());
+        let mut starts = Vec::with_capacity(range.len());
+        for index in range {
+            starts.push((self.members)(index));
+            members.push(Member { index, ending: Err(InputError::NoSteps) });
+        }
+        let mut in_lanes = 0;
+        let mut from = 0;
+        // Members in sequence that have one Lagrangian.
+        for group in starts.chunk_by(|a, b| std::ptr::eq(a.0, b.0)) {
+            in_lanes += self.group(group, &mut members[from..from + group.len()]);
+            from += group.len();
+        }
+        Shard { members, in_lanes }
+    }
+
+    /// Runs members of one Lagrangian; returns how many of them in lanes.
+    fn group(&self, starts: &[(&'a L, Start<N>)], members: &mut [Member<N>]) -> usize {
+        let Some(lagrangian) = starts.first().map(|start| start.0) else { return 0 };
+        let (t0, (h, steps)) = (self.common.t0, self.plan);
+        let (mut places, mut states) = (Vec::with_capacity(starts.len()), Vec::with_capacity(starts.len()));
+        let mut own = None;
+        let kernel = self.kernel.as_ref().unwrap_or_else(|| {
+            let state = starts.iter().find_map(|(_, start)| start.state(lagrangian, t0));
+            own.insert(self.kernel_of(lagrangian, state.as_ref()))
+        });
+        if !matches!(kernel, Kernel::OneByOne) {
+            for (place, (_, start)) in starts.iter().enumerate() {
+                if let Some(state) = start.state(lagrangian, t0)
+                    && !tiny(&state, h)
+                {
+                    places.push(place);
+                    states.push(state);
+                }
+            }
+        }
+        let mut done = [false; SHARD];
+        let mut in_lanes = 0;
+        forget_branches();
+        match kernel {
+            Kernel::OneByOne => {}
+            Kernel::Splitting(packs) => packs.run(self.instructions, &mut states, self.common.action),
+            Kernel::Gauss(packs) => packs.run(self.instructions, &mut states, self.common.action),
+        }
+        if !branched() {
+            for (place, state) in places.iter().zip(&states) {
+                if Triple::from(*state).is_finite() {
+                    let t = t0 + steps as f64 * h;
+                    members[*place].ending =
+                        Ok(Ending { status: Status::Completed, suspicion: None, steps, t, state: *state });
+                    done[*place] = true;
+                    in_lanes += 1;
+                }
+            }
+        }
+        for ((_, start), (member, _)) in starts.iter().zip(members.iter_mut().zip(done)).filter(|(_, (_, done))| !done)
+        {
+            member.ending = self.common.run(self.integrator, lagrangian, *start);
+        }
+        in_lanes
+    }
+}
+
+/// Whether steps are so short that a single run compensates their sums: half of the digits are lost in each.
+fn tiny<const N: usize>(state: &PhasePoint<N>, h: f64) -> bool {
+    let moved = h.abs() * size(&state.p);
+    moved > 0.0 && moved < f64::EPSILON.sqrt() * size(&state.q)
+}
+
+impl<const N: usize> Start<N> {
+    /// The state `(q, p, z)`, where it is finite.
+    fn state<L: Lagrangian<N>>(&self, lagrangian: &L, t0: f64) -> Option<PhasePoint<N>> {
+        let state = match self {
+            Start::Velocity(x) => legendre(lagrangian, t0, x),
+            Start::Momentum(x, _) => *x,
+        };
+        Triple::from(state).is_finite().then_some(state)
+    }
+}

@@ -1,0 +1,104 @@
+//! Work in shards, by several threads, handed on in order.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+
+/// The shards that may be done, or under way, before one of them that is not: what a slow one holds up.
+const WINDOW_OF_A_THREAD: usize = 8;
+
+/// What the threads share.
+struct Window<R> {
+    /// The next shard to be taken.
+    next: usize,
+    /// The shards that were handed on.
+    handed_on: usize,
+    done: BTreeMap<usize, R>,
+    /// No more are wanted, or a thread has panicked.
+    over: bool,
+}
+
+struct Shared<R> {
+    window: Mutex<Window<R>>,
+    changed: Condvar,
+}
+
+impl<R> Shared<R> {
+    fn lock(&self) -> MutexGuard<'_, Window<R>> {
+        self.window.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Window<R>)) {
+        change(&mut self.lock());
+        self.changed.notify_all();
+    }
+
+    fn wait_while(&self, condition: impl Fn(&Window<R>) -> bool) -> MutexGuard<'_, Window<R>> {
+        let condition = |window: &mut Window<R>| condition(window);
+        self.changed.wait_while(self.lock(), condition).unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Ends the work of all when it is dropped: also when a closure of the user panics, so that no thread waits for ever.
+struct AtTheEnd<'s, R>(&'s Shared<R>, bool);
+
+impl<R> Drop for AtTheEnd<'_, R> {
+    fn drop(&mut self) {
+        if self.1 || std::thread::panicking() {
+            self.0.change(|window| window.over = true);
+        }
+    }
+}
+
+/// Does the shards `first..count` by so many threads, and hands each result on, in the order of the shards, on the
+/// thread of the caller, until that breaks. At most [`WINDOW_OF_A_THREAD`] results a thread are kept at a time.
+pub(super) fn in_order<R: Send>(
+    threads: usize,
+    first: usize,
+    count: usize,
+    work: impl Fn(usize) -> R + Sync,
+    mut hand_on: impl FnMut(usize, R) -> ControlFlow<()>,
+) {
+    if threads < 2 || count - first < 2 {
+        for shard in first..count {
+            if hand_on(shard, work(shard)).is_break() {
+                return;
+            }
+        }
+        return;
+    }
+    let window = Window { next: first, handed_on: first, done: BTreeMap::new(), over: false };
+    let shared = Shared { window: Mutex::new(window), changed: Condvar::new() };
+    let threads = threads.min(count - first);
+    let most = WINDOW_OF_A_THREAD * threads;
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                let _guard = AtTheEnd(&shared, false);
+                loop {
+                    let mut window = shared.wait_while(|w| !w.over && w.next < count && w.next - w.handed_on >= most);
+                    if window.over || window.next >= count {
+                        return;
+                    }
+                    let shard = window.next;
+                    window.next += 1;
+                    drop(window);
+                    let result = work(shard);
+                    shared.change(|window| {
+                        window.done.insert(shard, result);
+                    });
+                }
+            });
+        }
+        let _guard = AtTheEnd(&shared, true);
+        for shard in first..count {
+            let mut window = shared.wait_while(|w| !w.over && !w.done.contains_key(&shard));
+            let Some(result) = window.done.remove(&shard) else { return };
+            drop(window);
+            if hand_on(shard, result).is_break() {
+                return;
+            }
+            shared.change(|window| window.handed_on = shard + 1);
+        }
+    });
+}

@@ -1,0 +1,67 @@
+//! Sine and cosine of packs.
+
+use super::pack::Pack;
+use crate::gauss::lanes::token;
+use pulp::Simd;
+
+/// The arguments below which sine and cosine are reduced by three parts of pi: the half turns then have at most 19 binary digits.
+pub(super) const REDUCIBLE: f64 = 5e5;
+
+/// 1.5 * 2^52: a number of a smaller size added to it is rounded to an integer, whose last digit is the last of the sum's.
+const ROUNDING: f64 = 6_755_399_441_055_744.0;
+
+/// pi to 140 binary digits: 33, 33 and the rest. The products of the first two with the turns are exact.
+const PI: [f64; 3] = [
+    f64::from_bits(0x4009_21fb_5440_0000),
+    f64::from_bits(0x3de0_b461_1a60_0000),
+    f64::from_bits(0x3bb3_198a_2e03_7073),
+];
+
+/// The polynomial of degree 7 in `r^2` nearest to `(sin r / r - 1) / r^2` for `|r| <= pi/2` (Remez): it is off by 3.4e-19 of the sine, with its
+/// coefficients rounded by 3.6e-17, a third of the rounding of the sine itself. The Taylor series needs eleven terms.
+const SINE: [f64; 8] = [
+    2.731428986122616e-15,
+    -7.643969031052769e-13,
+    1.605_897_727_281_550_6e-10,
+    -2.505_210_761_638_459_5e-8,
+    2.755731921915843e-6,
+    -1.984_126_984_125_495_5e-4,
+    8.333333333333316e-3,
+    -0.166_666_666_666_666_66,
+];
+
+/// `sin x` for `|x|` below [`REDUCIBLE`], within 2 units in the last place.
+#[inline(always)]
+pub(super) fn sine<S: Simd, const K: usize>(x: Pack<S, K>) -> Pack<S, K> {
+    let rounded = x.mul_add(Pack::splat(std::f64::consts::FRAC_1_PI), Pack::splat(ROUNDING));
+    reduced(x, rounded - ROUNDING, rounded)
+}
+
+/// `cos x = sin(x + pi/2)`, the quarter turn put among the turns.
+#[inline(always)]
+pub(super) fn cosine<S: Simd, const K: usize>(x: Pack<S, K>) -> Pack<S, K> {
+    // The half is added before it is rounded to an integer.
+    let half = x.mul_add(Pack::splat(std::f64::consts::FRAC_1_PI), Pack::splat(0.5));
+    let rounded = half + ROUNDING;
+    reduced(x, (rounded - ROUNDING) - 0.5, rounded)
+}
+
+/// `(-1)^k sin(x - turns pi)` where the last binary digit of `rounded` is that of k.
+#[inline(always)]
+fn reduced<S: Simd, const K: usize>(x: Pack<S, K>, turns: Pack<S, K>, rounded: Pack<S, K>) -> Pack<S, K> {
+    let r = turns.mul_add(Pack::splat(-PI[0]), x);
+    let r = turns.mul_add(Pack::splat(-PI[1]), r);
+    let r = turns.mul_add(Pack::splat(-PI[2]), r);
+    let y = r * r;
+    let mut sum = Pack::splat(SINE[0]);
+    for c in &SINE[1..] {
+        sum = sum.mul_add(y, Pack::splat(*c));
+    }
+    let sine = (y * r).mul_add(sum, r);
+    let set = token::<S>();
+    let (one, zero) = (set.splat_u64s(1), set.splat_u64s(0));
+    Pack(std::array::from_fn(|k| {
+        let last = set.and_u64s(set.transmute_u64s_f64s(rounded.0[k]), one);
+        set.select_f64s(set.equal_u64s(last, zero), sine.0[k], set.neg_f64s(sine.0[k]))
+    }))
+}

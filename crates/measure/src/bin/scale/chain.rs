@@ -1,0 +1,221 @@
+//! Chains of Fermi, Pasta, Ulam and Tsingou: explicit steps against a loop written by hand and a copy of memory, implicit ones against
+//! one factorisation by faer.
+
+use crate::memory::peak;
+use crate::report::Report;
+use crate::seconds::{best, done, together};
+use assembled_herglotz::systems::{FputBond, fput_chain};
+use assembled_herglotz::{AssembledMidpoint, AssembledSplitting, AssembledSystem, AssemblyError, State};
+use contact_examples::Failure;
+use discrete_herglotz::SplittingScheme;
+use faer::prelude::Solve;
+use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::sparse::{SparseColMat, Triplet};
+use faer::{Mat, Side};
+use std::hint::black_box;
+
+const CASE: &str = "chain";
+const GAMMA: f64 = -0.01;
+const BOND: FputBond = FputBond { alpha: 0.0, beta: 1.0 };
+
+/// Boost.odeint on P4 without z at the errors 1e-4, 1e-8, 1e-12, of the table of peers: another program, on a machine of this kind.
+const BOOST: [(f64, f64); 3] = [(1e-4, 574e-6), (1e-8, 585e-6), (1e-12, 585e-6)];
+
+/// How a refusal ends the program.
+pub fn refused(error: AssemblyError) -> Failure {
+    match error {
+        AssemblyError::Input(cause) => Failure::Input(cause),
+        other => Failure::Exact(other.to_string()),
+    }
+}
+
+pub fn run(report: &mut Report) -> Result<(), Failure> {
+    p4(report)?;
+    sizes(report)?;
+    copy(report, 1_000_000)?;
+    factorisation(report, if report.quick { 100_000 } else { 1_000_000 })
+}
+
+/// The first mode at rest, of amplitude one.
+fn start(n: usize) -> (Vec<f64>, Vec<f64>) {
+    let of = |i: usize| (std::f64::consts::PI * (i + 1) as f64 / (n + 1) as f64).sin();
+    ((0..n).map(of).collect(), vec![0.0; n])
+}
+
+fn chain(n: usize) -> Result<AssembledSystem, Failure> {
+    fput_chain(n, BOND, GAMMA).map_err(refused)
+}
+
+/// FPUT-beta with 1000 sites until t = 100: the shortest time to an error, over the schemes and steps of a sweep.
+fn p4(report: &mut Report) -> Result<(), Failure> {
+    let n = 1000;
+    let system = chain(n)?;
+    let (q, v) = start(n);
+    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let reference = {
+        let scheme = SplittingScheme::SOFRONIOU_SPALETTA_10;
+        let mut motion = AssembledSplitting::new(&system, &scheme, 0.25, from).map_err(refused)?;
+        let _ = motion.advance(400);
+        let end = motion.state();
+        [end.q, end.v].concat()
+    };
+    let norm = reference.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let error =
+        |y: &mut dyn Iterator<Item = f64>| y.zip(&reference).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt() / norm;
+    let rounds = if report.quick { 50 } else { 400 };
+    // Errors, the library's times and those of the loop.
+    let mut found: Vec<[f64; 3]> = Vec::new();
+    let schemes = [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_4, SplittingScheme::BLANES_MOAN_6];
+    for (scheme, counts) in schemes.iter().zip([[100, 200, 400], [20, 50, 100], [13, 16, 20]]) {
+        for steps in counts {
+            let h = 100.0 / steps as f64;
+            let mut error_here = f64::NAN;
+            let mut library = || {
+                let Ok(mut motion) = AssembledSplitting::new(&system, scheme, h, from) else { return };
+                let _ = motion.advance(steps);
+                let end = motion.state();
+                error_here = error(&mut end.q.iter().chain(end.v).copied());
+            };
+            library();
+            let mut hand = || done(by_hand(scheme, h, steps, &q, &v));
+            let mut motion = AssembledSplitting::new(&system, scheme, h, from).map_err(refused)?;
+            let mut steps_only = || {
+                let _ = motion.advance(steps);
+                black_box(motion.state().z);
+            };
+            let [library, hand] = together(rounds, [&mut steps_only, &mut hand]);
+            if error_here < 0.1 {
+                found.push([error_here, library, hand]);
+            }
+        }
+    }
+    for (level, boost) in BOOST {
+        let cheapest = |k: usize| found.iter().filter(|f| f[0] <= level).map(|f| f[k]).fold(f64::INFINITY, f64::min);
+        report.row(CASE, &format!("P4 to {level:e}"), n, cheapest(1), None);
+        report.row(CASE, &format!("P4 to {level:e} by a loop"), n, cheapest(2), None);
+        report.verdict(CASE, &format!("P4 to {level:e} over a loop written by hand"), cheapest(1) / cheapest(2), 1.2);
+        report.verdict(CASE, &format!("P4 to {level:e} over Boost.odeint as tabulated"), cheapest(1) / boost, 0.25);
+    }
+    Ok(())
+}
+
+/// The same steps by loops for this chain alone.
+fn by_hand(scheme: &SplittingScheme, h: f64, steps: usize, q0: &[f64], v0: &[f64]) -> Vec<f64> {
+    let n = q0.len();
+    let (drifts, kicks) = scheme.coefficients();
+    let s = drifts.len();
+    let mut q = vec![0.0; n + 2];
+    q[1..=n].copy_from_slice(q0);
+    let mut v = v0.to_vec();
+    kick(&q, &mut v, h * kicks[0]);
+    for step in 0..steps {
+        for i in 0..s {
+            let damping = (GAMMA * drifts[i] * h).exp_m1();
+            let length = damping / GAMMA;
+            for (q, v) in q[1..=n].iter_mut().zip(&mut v) {
+                *q = length.mul_add(*v, *q);
+                *v = damping.mul_add(*v, *v);
+            }
+            let joined = if i + 1 == s && step + 1 < steps { kicks[s] + kicks[0] } else { kicks[i + 1] };
+            kick(&q, &mut v, h * joined);
+        }
+    }
+    v.extend(&q[1..=n]);
+    v
+}
+
+fn kick(q: &[f64], v: &mut [f64], h: f64) {
+    for (q, v) in q.windows(3).zip(v) {
+        let (left, right) = (q[1] - q[0], q[2] - q[1]);
+        let force = (right * right).mul_add(right, right) - (left * left).mul_add(left, left);
+        *v = h.mul_add(force, *v);
+    }
+}
+
+/// Time and memory against size, for the time 1.
+fn sizes(report: &mut Report) -> Result<(), Failure> {
+    let sizes: &[usize] = if report.quick { &[1000, 10_000, 100_000] } else { &[1000, 10_000, 100_000, 1_000_000] };
+    for &n in sizes {
+        let (q, v) = start(n);
+        let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+        for scheme in [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_4, SplittingScheme::BLANES_MOAN_6] {
+            let (seconds, bytes) = peak(|| {
+                let system = chain(n)?;
+                let mut motion = AssembledSplitting::new(&system, &scheme, 0.1, from).map_err(refused)?;
+                Ok::<f64, Failure>(best(3, || done((motion.advance(10), motion.state().z))) / 10.0)
+            });
+            report.row(CASE, &format!("a step by {}", scheme.name()), n, seconds?, Some(bytes));
+            if n == sizes[sizes.len() - 1] && scheme == SplittingScheme::STRANG {
+                // The start is the user's.
+                let vectors = bytes as f64 / (8 * n) as f64;
+                report.verdict(CASE, "vectors of n held by an explicit chain and its motion", vectors, 6.0);
+            }
+        }
+        let (seconds, bytes) = peak(|| {
+            let system = chain(n)?;
+            let mut motion = AssembledMidpoint::new(&system, 0.1, from, usize::MAX).map_err(refused)?;
+            Ok::<f64, Failure>(best(3, || done(motion.advance(3))) / 3.0)
+        });
+        report.row(CASE, "a step by the midpoint rule", n, seconds?, Some(bytes));
+    }
+    Ok(())
+}
+
+/// A stage of a long chain against a copy of the positions and velocities.
+fn copy(report: &mut Report, n: usize) -> Result<(), Failure> {
+    let system = chain(n)?;
+    let (q, v) = start(n);
+    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let mut motion = AssembledSplitting::new(&system, &SplittingScheme::STRANG, 0.1, from).map_err(refused)?;
+    let (mut a, mut b) = (q.clone(), v.clone());
+    const STAGES: usize = 20;
+    let mut copies = || {
+        for _ in 0..STAGES {
+            a.copy_from_slice(&q);
+            b.copy_from_slice(&v);
+            black_box((&mut a, &mut b));
+        }
+    };
+    let mut steps = || done(motion.advance(STAGES));
+    let [copies, steps] = together(if report.quick { 5 } else { 15 }, [&mut copies, &mut steps]);
+    report.row(CASE, "a stage", n, steps / STAGES as f64, None);
+    report.row(CASE, "a copy of positions and velocities", n, copies / STAGES as f64, None);
+    report.verdict(CASE, "a stage over a copy of positions and velocities", steps / copies, 1.1);
+    Ok(())
+}
+
+/// Steps of the midpoint rule against a factorisation and a solve of their matrix.
+fn factorisation(report: &mut Report, n: usize) -> Result<(), Failure> {
+    let system = chain(n)?;
+    let (q, v) = start(n);
+    let h = 0.1;
+    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let mut motion = AssembledMidpoint::new(&system, h, from, usize::MAX).map_err(refused)?;
+    // M + (h^2/4) V_qq at the start.
+    let place = |i: usize| if i == 0 || i > n { 0.0 } else { q[i - 1] };
+    let slope = |i: usize| 0.25 * h * h * (1.0 + 3.0 * BOND.beta * (place(i + 1) - place(i)).powi(2));
+    let mut entries = Vec::with_capacity(2 * n);
+    for i in 0..n {
+        entries.push(Triplet::new(i as u32, i as u32, 1.0 + slope(i) + slope(i + 1)));
+        if i + 1 < n {
+            entries.push(Triplet::new(i as u32 + 1, i as u32, -slope(i + 1)));
+        }
+    }
+    let failed = |e: &dyn std::fmt::Debug| Failure::Exact(format!("faer: {e:?}"));
+    let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(n, n, &entries).map_err(|e| failed(&e))?;
+    let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower).map_err(|e| failed(&e))?;
+    let mut x = Mat::<f64>::from_fn(n, 1, |i, _| q[i]);
+    let mut factorise = || {
+        if let Ok(llt) = Llt::try_new_with_symbolic(symbolic.clone(), matrix.as_ref(), Side::Lower) {
+            llt.solve_in_place(x.as_mut());
+        }
+        black_box(&mut x);
+    };
+    const STEPS: usize = 4;
+    let mut steps = || done(motion.advance(STEPS));
+    let [factorise, steps] = together(if report.quick { 3 } else { 5 }, [&mut factorise, &mut steps]);
+    report.row(CASE, "faer's factorise and solve of the midpoint's matrix", n, factorise, None);
+    report.verdict(CASE, "a midpoint step over faer's factorise and solve", steps / STEPS as f64 / factorise, 3.0);
+    let work = format!("{} factorisations, {} iterations", motion.factorisations(), motion.iterations());
+    contact_examples::print(&format!("            {work}\n"))
+}

@@ -1,0 +1,264 @@
+//! Ensembles: 1e5 pendula to given errors, neighbours of one pendulum for a long time, time and memory against the count, two threads.
+
+use crate::report::Report;
+use contact_examples::Failure;
+use contact_geom::VelocityPoint;
+use contact_geom::systems::Pendulum;
+use discrete_herglotz::{AnyIntegrator, Ensemble, EnsembleError, InputError, SplittingScheme, Steps, Until};
+use std::time::Instant;
+
+const CASE: &str = "ensembles";
+
+/// The best of heyoka 7's batch mode at the errors 1e-4, 1e-8 and 1e-12 over 1e5 pendula, in seconds, and how much of it is the target.
+const PENDULA: [(f64, f64, f64); 3] = [(1e-4, 0.124, 0.1), (1e-8, 0.127, 0.15), (1e-12, 0.145, 0.3)];
+
+/// heyoka's best for one pendulum until t = 1000 to a relative error of 1e-9, in seconds: batch or scalar.
+const NEIGHBOUR: f64 = 355e-6;
+
+const PENDULUM: Pendulum = Pendulum { gamma: -0.01 };
+
+/// Positions and momenta at the end, and the seconds that they took.
+type Timed = (Vec<[f64; 2]>, f64);
+
+fn failure(error: EnsembleError) -> Failure {
+    let cause = match error {
+        EnsembleError::Member { cause, .. } => cause,
+        _ => InputError::Count { what: "members", least: 1, found: 0 },
+    };
+    cause.into()
+}
+
+/// An ensemble of pendula, timed.
+fn timed(
+    count: usize,
+    start: impl Fn(usize) -> VelocityPoint<1> + Sync,
+    integrator: AnyIntegrator,
+    (steps, end): (usize, f64),
+    threads: usize,
+) -> Result<Timed, Failure> {
+    let ensemble = Ensemble::new(&PENDULUM, 0.0, count, start)
+        .by(integrator)
+        .steps(Steps::Count(steps))
+        .threads(threads)
+        .without_action();
+    let mut ends = Vec::with_capacity(count);
+    let clock = Instant::now();
+    let tally = ensemble
+        .run(Until::Time(end), |member| {
+            ends.push(member.ending.map_or([f64::NAN; 2], |e| [e.state.q[0], e.state.p[0]]));
+        })
+        .map_err(failure)?;
+    let seconds = clock.elapsed().as_secs_f64();
+    if tally.members != count {
+        return Err(InputError::Hypothesis { hypothesis: "all members" }.into());
+    }
+    Ok((ends, seconds))
+}
+
+/// The shortest of so many times.
+fn shortest(repeats: usize, run: impl Fn() -> Result<Timed, Failure>) -> Result<Timed, Failure> {
+    let mut best = run()?;
+    for _ in 1..repeats {
+        let next = run()?;
+        if next.1 < best.1 {
+            best = next;
+        }
+    }
+    Ok(best)
+}
+
+/// The largest distance of two ensembles, absolute or relative to the second.
+fn distance(a: &[[f64; 2]], b: &[[f64; 2]], relative: bool) -> f64 {
+    let of = |(a, b): (&[f64; 2], &[f64; 2])| {
+        (a[0] - b[0]).hypot(a[1] - b[1]) / if relative { b[0].hypot(b[1]) } else { 1.0 }
+    };
+    contact_geom::largest(a.iter().zip(b).map(of))
+}
+
+/// The pendula of problem P5: `q0` in [-2, 2] by `v0` in [-1, 1], 400 by 250.
+fn grid(i: usize) -> VelocityPoint<1> {
+    let part = |i: usize, n: usize| i as f64 / (n - 1) as f64;
+    VelocityPoint::new([4.0 * part(i / 250, 400) - 2.0], [2.0 * part(i % 250, 250) - 1.0], 0.0)
+}
+
+/// Neighbours of the pendulum of problem P2.
+fn neighbour(i: usize) -> VelocityPoint<1> {
+    VelocityPoint::new([1.0 + 1e-6 * i as f64], [1.0], 0.0)
+}
+
+fn candidates() -> Vec<AnyIntegrator> {
+    let gauss = [6, 8, 10, 12].map(|stages| AnyIntegrator::Gauss { stages });
+    SplittingScheme::ALL.into_iter().map(AnyIntegrator::Splitting).chain(gauss).collect()
+}
+
+/// The fewest steps, within about a tenth, by which an integrator is within an error.
+fn steps_for(
+    error: &dyn Fn(usize) -> Result<f64, Failure>,
+    wanted: f64,
+    most: usize,
+) -> Result<Option<usize>, Failure> {
+    let mut steps = 1;
+    while steps <= most {
+        if error(steps)? <= wanted {
+            return Ok(Some(steps));
+        }
+        steps = (steps + 1).max(steps * 17 / 16);
+    }
+    Ok(None)
+}
+
+fn pendula(report: &mut Report) -> Result<(), Failure> {
+    let (count, end) = (100_000, 10.0);
+    let thin = 40;
+    // A part of the grid finds the steps; the whole of it judges them.
+    let part = |i: usize| grid(i * thin);
+    let reference = AnyIntegrator::Gauss { stages: 16 };
+    let (exact_part, _) = timed(count / thin, part, reference, (20, end), 1)?;
+    let (exact, _) = timed(count, grid, reference, (20, end), 2)?;
+    for (wanted, heyoka, share) in PENDULA {
+        let mut best: Option<(f64, AnyIntegrator, usize)> = None;
+        for integrator in candidates() {
+            let error = |steps: usize| -> Result<f64, Failure> {
+                let (ends, _) = timed(count / thin, part, integrator, (steps, end), 1)?;
+                Ok(distance(&ends, &exact_part, false))
+            };
+            let most = if wanted < 1e-6 && integrator.order() < 6 { 0 } else { 400 };
+            let Some(mut steps) = steps_for(&error, wanted, most)? else { continue };
+            loop {
+                let (ends, seconds) = shortest(3, || timed(count, grid, integrator, (steps, end), 1))?;
+                let error = distance(&ends, &exact, false);
+                if error <= wanted {
+                    report.row(
+                        CASE,
+                        &format!("pendula, {integrator}, {steps} steps, error {error:.1e}"),
+                        count,
+                        seconds,
+                        None,
+                    );
+                    if best.is_none_or(|(fastest, ..)| seconds < fastest) {
+                        best = Some((seconds, integrator, steps));
+                    }
+                    break;
+                }
+                steps += 1;
+            }
+        }
+        let Some((_, integrator, steps)) = best else { continue };
+        let (_, seconds) = shortest(9, || timed(count, grid, integrator, (steps, end), 1))?;
+        let what = format!("pendula to {wanted:e} by {integrator} in {steps} steps, of heyoka's time");
+        report.verdict(CASE, &what, seconds / heyoka, share);
+    }
+    Ok(())
+}
+
+fn neighbours(report: &mut Report) -> Result<(), Failure> {
+    let (count, end, wanted) = (10_000, 1000.0, 1e-9);
+    let part = |i: usize| neighbour(i * 200);
+    let (exact, _) = timed(50, part, AnyIntegrator::Gauss { stages: 16 }, (1600, end), 1)?;
+    let mut best: Option<(f64, AnyIntegrator, usize)> = None;
+    for integrator in [
+        AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6),
+        AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6_LONG),
+        AnyIntegrator::Splitting(SplittingScheme::BLANES_CASAS_8),
+        AnyIntegrator::Splitting(SplittingScheme::SOFRONIOU_SPALETTA_10),
+        AnyIntegrator::Gauss { stages: 8 },
+        AnyIntegrator::Gauss { stages: 12 },
+    ] {
+        let mut steps = 500;
+        while steps < 20_000 {
+            let (ends, seconds) = timed(50, part, integrator, (steps, end), 1)?;
+            let error = distance(&ends, &exact, true);
+            if error <= wanted {
+                report.row(
+                    CASE,
+                    &format!("neighbours, {integrator}, {steps} steps, error {error:.1e}"),
+                    50,
+                    seconds,
+                    None,
+                );
+                if best.is_none_or(|(fastest, ..)| seconds < fastest) {
+                    best = Some((seconds, integrator, steps));
+                }
+                break;
+            }
+            steps = steps * 9 / 8;
+        }
+    }
+    let Some((_, integrator, steps)) = best else { return Ok(()) };
+    let (_, seconds) = timed(count, neighbour, integrator, (steps, end), 1)?;
+    let what = format!("neighbours to 1e-9 by {integrator} in {steps} steps, each of heyoka's time");
+    report.verdict(CASE, &what, seconds / count as f64 / NEIGHBOUR, 0.5);
+    Ok(())
+}
+
+/// The largest memory of this process since the last call, where the system tells.
+fn peak() -> Option<usize> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kilobytes: usize = line.split_whitespace().nth(1)?.parse().ok()?;
+    // The next peak begins here.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+    Some(kilobytes * 1024)
+}
+
+fn sizes(report: &mut Report) -> Result<(), Failure> {
+    let largest = if report.quick { 100_000 } else { 1_000_000 };
+    let start = |i: usize| VelocityPoint::new([2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0], [0.5], 0.0);
+    let run = |count: usize, integrator: AnyIntegrator, threads: usize| -> Result<f64, Failure> {
+        let ensemble = Ensemble::new(&PENDULUM, 0.0, count, start)
+            .by(integrator)
+            .steps(Steps::Count(40))
+            .threads(threads)
+            .without_action();
+        let (clock, mut sum) = (Instant::now(), 0.0);
+        ensemble
+            .run(Until::Time(10.0), |member| sum += member.ending.map_or(0.0, |e| e.state.q[0]))
+            .map_err(failure)?;
+        Ok(clock.elapsed().as_secs_f64())
+    };
+    for integrator in [AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6), AnyIntegrator::Gauss { stages: 4 }] {
+        let mut peaks = Vec::new();
+        let mut count = 100;
+        while count <= largest {
+            peak();
+            let seconds = run(count, integrator, 1)?;
+            let bytes = peak();
+            report.row(CASE, &format!("{integrator}, 40 steps"), count, seconds, bytes);
+            peaks.extend(bytes);
+            count *= 10;
+        }
+        if let [first, .., last] = peaks[..] {
+            report.verdict(
+                CASE,
+                &format!("{integrator}: growth of the memory with the count"),
+                last as f64 / first as f64,
+                1.1,
+            );
+        }
+        // In turn, so that others on the machine disturb both.
+        let count = largest / 5;
+        let mut seconds = [f64::INFINITY; 2];
+        for _ in 0..5 {
+            for threads in [1, 2] {
+                seconds[threads - 1] = seconds[threads - 1].min(run(count, integrator, threads)?);
+            }
+        }
+        report.verdict(
+            CASE,
+            &format!("{integrator}: two threads, of the time of one"),
+            seconds[1] / seconds[0],
+            1.0 / 1.8,
+        );
+    }
+    Ok(())
+}
+
+/// Runs the case.
+///
+/// # Errors
+/// [`Failure`] where a run cannot begin.
+pub fn run(report: &mut Report) -> Result<(), Failure> {
+    sizes(report)?;
+    neighbours(report)?;
+    pendula(report)
+}

@@ -1,0 +1,43 @@
+//! Sine-Gordon lattices in the plane: steps of the implicit midpoint rule, and explicit ones beside them.
+
+use crate::chain::refused;
+use crate::memory::peak;
+use crate::report::Report;
+use crate::seconds::{best, done};
+use assembled_herglotz::systems::{SineGordon, lattice};
+use assembled_herglotz::{AssembledMidpoint, AssembledSplitting, State};
+use contact_examples::Failure;
+use discrete_herglotz::SplittingScheme;
+
+const CASE: &str = "lattice";
+
+/// What the factors may take: half of a small machine.
+const MEMORY: usize = 8 << 30;
+
+pub fn run(report: &mut Report) -> Result<(), Failure> {
+    let sides: &[usize] = if report.quick { &[30, 100, 200] } else { &[100, 200, 500, 1000] };
+    for &side in sides {
+        let n = side * side;
+        // A kink in each row, at rest.
+        let q: Vec<f64> = (0..n).map(|i| 4.0 * (0.5 * ((i % side) as f64 - 0.5 * side as f64)).exp().atan()).collect();
+        let v = vec![0.0; n];
+        let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+        let site = SineGordon { omega_squared: 1.0 };
+        let (seconds, bytes) = peak(|| {
+            let system = lattice([side, side], site, 4.0, -0.01).map_err(refused)?;
+            let mut motion = AssembledMidpoint::new(&system, 0.2, from, MEMORY).map_err(refused)?;
+            let first = best(1, || done(motion.advance(1)));
+            Ok::<_, Failure>((first, best(3, || done(motion.advance(2))) / 2.0))
+        });
+        let (first, later) = seconds?;
+        report.row(CASE, "the first step by the midpoint rule", n, first, Some(bytes));
+        report.row(CASE, "a step by the midpoint rule", n, later, Some(bytes));
+        let (seconds, bytes) = peak(|| {
+            let system = lattice([side, side], site, 4.0, -0.01).map_err(refused)?;
+            let mut motion = AssembledSplitting::new(&system, &SplittingScheme::STRANG, 0.2, from).map_err(refused)?;
+            Ok::<_, Failure>(best(3, || done(motion.advance(5))) / 5.0)
+        });
+        report.row(CASE, "a step by strang", n, seconds?, Some(bytes));
+    }
+    Ok(())
+}

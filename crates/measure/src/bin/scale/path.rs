@@ -1,0 +1,228 @@
+//! Boundary-value paths: time against the number of nodes, beside a Newton's method written by hand for the one system.
+
+use crate::report::Report;
+use crate::sparse_path;
+use contact_examples::Failure;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::systems::Chain;
+use contact_geom::{Hessian, Lagrangian, Scalar, Triple, VelocityPoint, largest};
+use discrete_herglotz::{BoundaryPath, DiscreteLagrangian, End, LeftMidpoint};
+use std::hint::black_box;
+use std::time::Instant;
+
+const SPAN: f64 = 1.0;
+const BETA: f64 = 0.5;
+const GAMMA: f64 = -0.1;
+
+/// Times of n = 2 and 6 from 1e2 to 1e5 nodes, their slope, and the ratio to the loops below.
+pub fn run(report: &mut Report) -> Result<(), Failure> {
+    of::<2>(report, ["n=2", "n=2 by hand", "n=2 ratio to the hand-written Newton", "n=2 slope from 1e3 to 1e5"])?;
+    of::<6>(report, ["n=6", "n=6 by hand", "n=6 ratio to the hand-written Newton", "n=6 slope from 1e3 to 1e5"])
+}
+
+fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str; 4]) -> Result<(), Failure> {
+    let mut sizes = vec![100, 1000, 10_000];
+    if !report.quick {
+        sizes.push(100_000);
+    }
+    let mut times = Vec::new();
+    for &steps in &sizes {
+        let [mut best, mut best_by_hand, mut best_sparse] = [f64::INFINITY; 3];
+        // Not a number where a rival finds no path.
+        let mut differences = [f64::NAN; 2];
+        // In turns, so that what disturbs one disturbs the other.
+        for _ in 0..(200_000 / steps).clamp(3, 50) {
+            let ld = LeftMidpoint::new(Springs::<N>, SPAN / steps as f64)?;
+            let problem = BoundaryPath::new(&ld, steps, ends().map(End::Position))?;
+            let start = Instant::now();
+            let found = black_box(problem.search());
+            let seconds = start.elapsed().as_secs_f64();
+            // Each correction is followed by one sweep, beside the first.
+            best = best.min(seconds / f64::from(found.iterations + 1));
+            let start = Instant::now();
+            let (points, sweeps) = black_box(by_hand_newton::<N>(steps, ld.step_size()));
+            best_by_hand = best_by_hand.min(start.elapsed().as_secs_f64() / f64::from(sweeps));
+            let start = Instant::now();
+            let sparse = black_box(sparse_path::newton::<N>(&ld, steps, ends()));
+            let seconds = start.elapsed().as_secs_f64();
+            let off = |points: &[SVector<f64, N>]| {
+                largest(points.iter().zip(&found.points).flat_map(|(a, b)| (a - b).data.0[0]))
+            };
+            differences[0] = off(&points);
+            if let Some((points, corrections)) = sparse {
+                best_sparse = best_sparse.min(seconds / f64::from(corrections));
+                differences[1] = off(&points);
+            }
+        }
+        report.row("path", name, steps, best, None);
+        report.row("path", by_hand, steps, best_by_hand, None);
+        report.row("path", &format!("{name} by faer's sparse LU"), steps, best_sparse, None);
+        // All solve the same equations: a reference that does not would measure nothing. The round-off of positions, eps q / h
+        // in each equation, gathers over the path.
+        for (rival, off) in ["the loop by hand", "faer's sparse LU"].into_iter().zip(differences) {
+            let what = format!("{name} difference from the path by {rival} at N={steps}");
+            report.verdict("path", &what, off, 1e-15 * (steps as f64).powf(1.5));
+        }
+        report.verdict("path", &format!("{name} ratio to faer's sparse LU at N={steps}"), best / best_sparse, 1.0);
+        report.verdict("path", &format!("{ratio} at N={steps}"), best / best_by_hand, 1.5);
+        times.push(best);
+    }
+    if let [_, from, .., to] = times[..] {
+        let decades = (sizes[sizes.len() - 1] as f64 / 1e3).log10();
+        report.verdict("path", slope, (to / from).log10() / decades, 1.05);
+    }
+    if !report.quick {
+        // The whole of a search, with derivatives by automatic differentiation.
+        let ld = LeftMidpoint::new(Chain::<N> { beta: BETA, gamma: GAMMA, ..Chain::default() }, SPAN / 1e5)?;
+        let start = Instant::now();
+        let found = BoundaryPath::new(&ld, 100_000, ends().map(End::Position))?.search();
+        let seconds = start.elapsed().as_secs_f64();
+        let what = format!("{name} search with derived derivatives");
+        report.row("path", &what, 100_000, seconds, None);
+        if N == 2 {
+            let figure = if found.is_found() { seconds } else { f64::NAN };
+            report.verdict("path", &format!("{what}: seconds at N=1e5"), figure, 2.0);
+        }
+    }
+    Ok(())
+}
+
+/// Ends far enough apart for the springs to be nonlinear.
+fn ends<const N: usize>() -> [SVector<f64, N>; 2] {
+    [SVector::from_fn(|i, _| 0.3 * i as f64), SVector::from_fn(|i, _| 1.0 - 0.4 * i as f64)]
+}
+
+/// The chain of Fermi, Pasta, Ulam and Tsingou with its derivatives in closed form, the same that the loop by hand has: what is
+/// compared is all but the formulas of the one system.
+struct Springs<const N: usize>;
+
+impl<const N: usize> Lagrangian<N> for Springs<N> {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        Chain::<N> { beta: BETA, gamma: GAMMA, ..Chain::default() }.value(t, q, v, z)
+    }
+
+    #[inline(always)]
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+        Some(Triple { x: -springs(&x.q).0, y: x.v, z: T::from(GAMMA) })
+    }
+
+    #[inline(always)]
+    fn closed_hessian<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
+        let one = |i, j| if i == j { T::one() } else { T::zero() };
+        let (none, still) = (SMatrix::from_element(T::zero()), SVector::from_element(T::zero()));
+        let qq = -springs(&x.q).1;
+        Some(Hessian { qq, qv: none, vv: SMatrix::from_fn(one), qz: still, vz: still, zz: T::zero() })
+    }
+}
+
+/// The potential's gradient and second derivative of the chain between two walls, a tridiagonal matrix.
+#[inline(always)]
+fn springs<T: Scalar, const N: usize>(q: &SVector<T, N>) -> (SVector<T, N>, SMatrix<T, N, N>) {
+    let (mut gradient, mut hessian) = (SVector::from_element(T::zero()), SMatrix::from_element(T::zero()));
+    for bond in 0..=N {
+        let left = if bond > 0 { q[bond - 1] } else { T::zero() };
+        let right = if bond < N { q[bond] } else { T::zero() };
+        let r = right - left;
+        let (force, stiffness) = (r + r * r * r * BETA, r * r * (3.0 * BETA) + 1.0);
+        if bond < N {
+            gradient[bond] += force;
+            hessian[(bond, bond)] += stiffness;
+        }
+        if bond > 0 {
+            gradient[bond - 1] -= force;
+            hessian[(bond - 1, bond - 1)] += stiffness;
+        }
+        if bond > 0 && bond < N {
+            hessian[(bond, bond - 1)] -= stiffness;
+            hessian[(bond - 1, bond)] -= stiffness;
+        }
+    }
+    (gradient, hessian)
+}
+
+/// Newton's method with block elimination, as one writes it for this system alone: derivatives by hand, of the paper's midpoint rule
+/// `L_d = h (v^2/2 - V((q0 + q1)/2) + gamma z0)`; no line search, no pivots between blocks, no actions (z does not act on the
+/// positions where the drag is linear), no bounds on round-off. Returns the path and the number of its sweeps.
+fn by_hand_newton<const N: usize>(steps: usize, h: f64) -> (Vec<SVector<f64, N>>, u32) {
+    let [from, to] = ends::<N>();
+    let at = |k: usize| k as f64 / steps as f64;
+    let mut q: Vec<_> = (0..=steps).map(|k| from * (1.0 - at(k)) + to * at(k)).collect();
+    let mut next = vec![SMatrix::<f64, N, N>::zeros(); steps];
+    let mut rhs = vec![SVector::<f64, N>::zeros(); steps];
+    let sigma = 1.0 + h * GAMMA;
+    for sweep in 1..=50 {
+        // Of the step before: its D2, D22 and D12.
+        let of = |k: usize, q: &[SVector<f64, N>]| {
+            let (g, k_mid) = springs(&((q[k] + q[k + 1]) * 0.5));
+            (((q[k + 1] - q[k]) / h), g * (0.5 * h), k_mid * (0.25 * h))
+        };
+        let identity = SMatrix::<f64, N, N>::identity() / h;
+        let (mut u, mut g, mut k_mid) = of(0, &q);
+        for k in 1..steps {
+            let (u1, g1, k1) = of(k, &q);
+            let residual = -u1 - g1 + (u - g) * sigma;
+            let lower = (-identity - k_mid) * sigma;
+            let mut diagonal = identity - k1 + (identity - k_mid) * sigma;
+            let mut right = -residual;
+            if k > 1 {
+                diagonal -= lower * next[k - 1];
+                right -= lower * rhs[k - 1];
+            }
+            let mut upper = -identity - k1;
+            eliminate(&mut diagonal, &mut upper, &mut right);
+            (next[k], rhs[k]) = (upper, right);
+            (u, g, k_mid) = (u1, g1, k1);
+        }
+        let (mut change, mut largest, mut size) = (SVector::<f64, N>::zeros(), 0.0f64, 0.0f64);
+        for k in (1..steps).rev() {
+            change = rhs[k] - next[k] * change;
+            q[k] += change;
+            largest = largest.max(change.amax());
+            size = size.max(q[k].amax());
+        }
+        // Quadratic convergence: after a correction of 1e-8 the next is round-off; the library makes it to be sure.
+        if largest <= 1e-10 * size {
+            return (q, sweep);
+        }
+    }
+    (q, 50)
+}
+
+/// `a x = b` for a matrix and a vector on the right, with pivots within the block.
+#[inline(always)]
+fn eliminate<const N: usize>(a: &mut SMatrix<f64, N, N>, b: &mut SMatrix<f64, N, N>, c: &mut SVector<f64, N>) {
+    for j in 0..N {
+        let pivot = (j..N).fold(j, |best, i| if a[(i, j)].abs() > a[(best, j)].abs() { i } else { best });
+        if pivot != j {
+            a.swap_rows(j, pivot);
+            b.swap_rows(j, pivot);
+            c.swap_rows(j, pivot);
+        }
+        let inverse = 1.0 / a[(j, j)];
+        for i in j + 1..N {
+            let factor = a[(i, j)] * inverse;
+            for m in j + 1..N {
+                a[(i, m)] -= factor * a[(j, m)];
+            }
+            for m in 0..N {
+                b[(i, m)] -= factor * b[(j, m)];
+            }
+            c[i] -= factor * c[j];
+        }
+    }
+    for j in (0..N).rev() {
+        let inverse = 1.0 / a[(j, j)];
+        for m in 0..N {
+            b[(j, m)] *= inverse;
+        }
+        c[j] *= inverse;
+        for i in 0..j {
+            let factor = a[(i, j)];
+            for m in 0..N {
+                b[(i, m)] -= factor * b[(j, m)];
+            }
+            c[i] -= factor * c[j];
+        }
+    }
+}
