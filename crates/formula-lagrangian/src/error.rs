@@ -53,6 +53,9 @@ pub enum FormulaError {
         /// How many there are.
         count: usize,
     },
+    /// A formula was built of symbols that do not belong together.
+    #[error("symbols of different graphs were mixed: take all that a formula is made of from the same `Symbols`")]
+    Mixed,
     /// A parameter has a value that is not finite.
     #[error("the parameter `{name}` is {value}, where a finite number is needed")]
     ParameterValue {

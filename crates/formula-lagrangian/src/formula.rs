@@ -60,12 +60,15 @@ impl Formula {
         coordinates: &[&str],
         parameters: &[(&str, f64)],
     ) -> Result<Self, FormulaError> {
-        let names = Names::new(coordinates, parameters)?;
+        let values = parameters.iter().map(|(_, value)| *value).collect();
+        Self::named(graph, root, Names::new(coordinates, parameters)?, values)
+    }
+
+    pub(crate) fn named(graph: Graph, root: Id, names: Names, values: Vec<f64>) -> Result<Self, FormulaError> {
         if graph.len() > MOST_NODES {
             return Err(FormulaError::TooLarge { limit: MOST_NODES });
         }
         graph.check(names.dimension, names.parameters.len())?;
-        let values = parameters.iter().map(|(_, value)| *value).collect();
         Ok(Formula { names, graph, root, values })
     }
 

@@ -5,7 +5,7 @@ use contact_geom::Scalar;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// The functions of one number by their names in a text. More than one name may mean the same.
-pub(crate) const FUNCTIONS: [(&str, Function); 18] = [
+pub(crate) const FUNCTIONS: [(&str, Function); 21] = [
     ("sqrt", Function::Sqrt),
     ("abs", Function::Abs),
     ("sign", Function::Sign),
@@ -17,6 +17,9 @@ pub(crate) const FUNCTIONS: [(&str, Function); 18] = [
     ("sinh", Function::Sinh),
     ("cosh", Function::Cosh),
     ("tanh", Function::Tanh),
+    ("asinh", Function::Asinh),
+    ("acosh", Function::Acosh),
+    ("atanh", Function::Atanh),
     ("exp", Function::Exp),
     ("expm1", Function::ExpM1),
     ("ln", Function::Ln),
@@ -53,6 +56,9 @@ impl Function {
             Function::Sinh => x.sinh(),
             Function::Cosh => x.cosh(),
             Function::Tanh => x.tanh(),
+            Function::Asinh => asinh(x),
+            Function::Acosh => acosh(x),
+            Function::Atanh => atanh(x),
             Function::Exp => x.exp(),
             Function::ExpM1 => x.exp_m1(),
             Function::Ln => x.ln(),
@@ -62,8 +68,8 @@ impl Function {
 
     /// Whether `f(-x) = -f(x)`, to the last digit.
     pub(crate) fn is_odd(self) -> bool {
-        use Function::{Atan, Recip, Sign, Sin, Sinh, Tan, Tanh};
-        matches!(self, Recip | Sign | Sin | Tan | Atan | Sinh | Tanh)
+        use Function::{Asinh, Atan, Atanh, Recip, Sign, Sin, Sinh, Tan, Tanh};
+        matches!(self, Recip | Sign | Sin | Tan | Atan | Sinh | Tanh | Asinh | Atanh)
     }
 
     /// Whether it has a kink or a jump.
@@ -106,6 +112,22 @@ impl Function {
             Function::Tanh => {
                 let square = graph.mul(y, y);
                 graph.sub(one, square)
+            }
+            Function::Asinh => {
+                let size = graph.binary(Operation::Hypot, x, one);
+                graph.recip(size)
+            }
+            // By factors: the difference of squares would cancel.
+            Function::Acosh => {
+                let (below, above) = (graph.sub(x, one), graph.add(x, one));
+                let [below, above] = [below, above].map(|factor| graph.unary(Function::Sqrt, factor));
+                let root = graph.mul(below, above);
+                graph.recip(root)
+            }
+            Function::Atanh => {
+                let (below, above) = (graph.sub(one, x), graph.add(x, one));
+                let product = graph.mul(below, above);
+                graph.recip(product)
             }
             Function::Exp => y,
             Function::ExpM1 => graph.add(y, one),
@@ -157,4 +179,28 @@ pub(crate) fn hypot<T: Scalar>(x: T, y: T) -> T {
     let ratio = small / large;
     let length = large * (ratio * ratio + 1.0).sqrt();
     T::zero().if_less(large, length, large)
+}
+
+/// The inverse of the hyperbolic sine, without cancellation and without overflow: that of `|x|`, with the sign of x.
+#[inline(always)]
+pub(crate) fn asinh<T: Scalar>(x: T) -> T {
+    // Not the absolute value, whose derivative is 0 at 0.
+    let size = x.if_less(T::zero(), -x, x);
+    let value = (size + size * (size / (hypot(size, T::one()) + 1.0))).ln_1p();
+    x.if_less(T::zero(), -value, value)
+}
+
+/// The inverse of the hyperbolic cosine, without cancellation and without overflow.
+#[inline(always)]
+pub(crate) fn acosh<T: Scalar>(x: T) -> T {
+    let above = x - 1.0;
+    (above + above.sqrt() * (x + 1.0).sqrt()).ln_1p()
+}
+
+/// The inverse of the hyperbolic tangent: that of `|x|`, with the sign of x.
+#[inline(always)]
+pub(crate) fn atanh<T: Scalar>(x: T) -> T {
+    let size = x.if_less(T::zero(), -x, x);
+    let value = (size * 2.0 / (-size + 1.0)).ln_1p() * 0.5;
+    x.if_less(T::zero(), -value, value)
 }

@@ -42,6 +42,12 @@ pub enum Function {
     Cosh,
     /// The hyperbolic tangent.
     Tanh,
+    /// The inverse of the hyperbolic sine.
+    Asinh,
+    /// The inverse of the hyperbolic cosine, of numbers from 1 on.
+    Acosh,
+    /// The inverse of the hyperbolic tangent.
+    Atanh,
     /// `e^x`.
     Exp,
     /// `e^x - 1`, without cancellation near 0.

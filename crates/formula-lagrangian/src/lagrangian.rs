@@ -43,6 +43,8 @@ pub struct FormulaLagrangian<const N: usize> {
     pub(crate) partials: Vec<Id>,
     value: Tape,
     force: Tape,
+    /// The value, and `L_q`.
+    with_force: Tape,
     gradient: Tape,
     /// `L_q`, `L_v`, `L_z`, and the value.
     with_gradient: Tape,
@@ -65,6 +67,8 @@ impl<const N: usize> FormulaLagrangian<N> {
         let partials = graph.gradient(root, &variables, WITH_GRADIENT).ok_or(too_large.clone())?;
         let tape = |graph: &Graph, nodes: &[Id]| Tape::new(graph, nodes, N).ok_or(too_large.clone());
         let (value, force) = (tape(&graph, &[root])?, tape(&graph, partials.get(..N).unwrap_or(&[]))?);
+        let of_kick: Vec<Id> = std::iter::once(root).chain(partials.iter().copied().take(N)).collect();
+        let with_force = tape(&graph, &of_kick)?;
         let gradient = tape(&graph, &partials)?;
         let all: Vec<Id> = partials.iter().copied().chain([root]).collect();
         let with_gradient = tape(&graph, &all)?;
@@ -102,6 +106,7 @@ impl<const N: usize> FormulaLagrangian<N> {
             partials,
             value,
             force,
+            with_force,
             gradient,
             with_gradient,
             second: tapes,
@@ -130,8 +135,9 @@ impl<const N: usize> FormulaLagrangian<N> {
 
     fn set_constants(&mut self) {
         let constants = self.formula.graph.constants(&self.formula.values);
-        let first = [&mut self.value, &mut self.force, &mut self.gradient, &mut self.with_gradient];
-        for tape in first.into_iter().chain(self.second.iter_mut().flatten()) {
+        let FormulaLagrangian { value, force, with_force, gradient, with_gradient, second, .. } = &mut *self;
+        let first = [value, force, with_force, gradient, with_gradient];
+        for tape in first.into_iter().chain(second.iter_mut().flatten()) {
             tape.set_constants(&constants);
         }
         let rate = self.partials.last().filter(|_| self.structure.constant_rate);
@@ -150,10 +156,15 @@ impl<const N: usize> FormulaLagrangian<N> {
         self.smooth
     }
 
-    /// The coordinates on which L does not depend: moving along them is a symmetry, and its momentum decays as the conformal factor.
+    /// The symmetries that are seen, whose momenta decay as the conformal factor: moving along a coordinate on which L does not depend,
+    /// and turning two coordinates where L has them in squares of lengths, products and areas alone, as `x^2 + y^2`.
     pub fn symmetries(&self) -> Vec<Symmetry<N>> {
         let along = |i: usize| Symmetry::Translation(SVector::from_fn(|j, _| if i == j { 1.0 } else { 0.0 }));
-        (0..N).filter(|i| self.cyclic.get(*i) == Some(&true)).map(along).collect()
+        let moving = (0..N).filter(|i| self.cyclic.get(*i) == Some(&true)).map(along);
+        let Formula { graph, root, .. } = &self.formula;
+        let turns = |(i, j): &(usize, usize)| graph.turns_into_itself(*root, *i as u32, *j as u32);
+        let pairs = (0..N).flat_map(|j| (0..j).map(move |i| (i, j)));
+        moving.chain(pairs.filter(turns).map(|(i, j)| Symmetry::Rotation(i, j))).collect()
     }
 }
 
@@ -209,6 +220,14 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
         let mut force = x.q;
         self.force.evaluate(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
         Some(force)
+    }
+
+    #[inline(always)]
+    fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
+        let (mut value, mut force) = (x.z, x.q);
+        let results = &mut [std::slice::from_mut(&mut value), force.as_mut_slice()];
+        self.with_force.evaluate(At::new(t, &x.q, &x.v, x.z), results);
+        Some((value, force))
     }
 
     #[inline(always)]

@@ -31,7 +31,7 @@
 //! | `sum(i, 1, n-1, (q[i] - q[i-1])^2)` | the sum over i from 1 to n - 1; an empty one is 0 |
 //! | `if(a < b, c, d)` | c where a < b, else d; also with `>` |
 //! | `sqrt exp expm1 ln log log1p ln1p recip` | roots, exponentials, natural logarithms, `1/x` |
-//! | `sin cos tan asin acos atan versine sinh cosh tanh` | `versine` is `1 - cos`, without cancellation |
+//! | `sin cos tan asin acos atan versine sinh cosh tanh asinh acosh atanh` | `versine` is `1 - cos`, without cancellation |
 //! | `atan2(y, x)`, `hypot(x, y)`, `pow(x, a)` | of two numbers |
 //! | `abs sign`, `min(a, b, ...)`, `max(a, b, ...)` | with kinks or jumps, as `if`, `atan2` and `hypot` |
 //! | `# ...` | a comment |
@@ -63,8 +63,10 @@ mod graph;
 mod lagrangian;
 mod names;
 mod parser;
+mod rotation;
 mod rust_source;
 mod structure;
+mod symbol;
 mod tape;
 mod token;
 
@@ -74,3 +76,4 @@ pub use formula::Formula;
 pub use graph::{Function, Graph, Id, Node, Operation};
 pub use lagrangian::FormulaLagrangian;
 pub use parser::{DEEPEST_NESTING, LONGEST_TEXT, MOST_NODES};
+pub use symbol::{Operand, Symbol, Symbols};

@@ -16,6 +16,9 @@ const KEYWORDS: [&str; 51] = [
 /// The functions that are not methods of numbers, as they are written where they are used.
 const ATAN2: &str = include_str!("rust_source/atan2.txt");
 const HYPOT: &str = include_str!("rust_source/hypot.txt");
+const ASINH: &str = include_str!("rust_source/asinh.txt");
+const ACOSH: &str = include_str!("rust_source/acosh.txt");
+const ATANH: &str = include_str!("rust_source/atanh.txt");
 
 impl<const N: usize> FormulaLagrangian<N> {
     /// The source of a file with this Lagrangian as a type: parameters are its fields, and value, gradient and structure are those of
@@ -102,10 +105,19 @@ impl<const N: usize> FormulaLagrangian<N> {
             writeln!(out, "            {claim}: true,")?;
         }
         writeln!(out, "            ..Structure::default()\n        }}\n    }}\n}}")?;
-        for (operation, helper) in [(Operation::Atan2, ATAN2), (Operation::Hypot, HYPOT)] {
-            if body.uses(operation) || value.uses(operation) {
-                write!(out, "\n{helper}")?;
-            }
+        let uses = |of: &dyn Fn(Node) -> bool| body.uses(of) || value.uses(of);
+        let operation = |of| uses(&|node| matches!(node, Node::Binary(o, ..) if o == of));
+        let function = |of| uses(&|node| matches!(node, Node::Unary(f, _) if f == of));
+        let [asinh, acosh, atanh] = [Function::Asinh, Function::Acosh, Function::Atanh].map(function);
+        let helpers = [
+            (operation(Operation::Atan2), ATAN2),
+            (operation(Operation::Hypot) || asinh, HYPOT),
+            (asinh, ASINH),
+            (acosh, ACOSH),
+            (atanh, ATANH),
+        ];
+        for (_, helper) in helpers.iter().filter(|(used, _)| *used) {
+            write!(out, "\n{helper}")?;
         }
         Ok(())
     }
@@ -137,8 +149,8 @@ impl Body<'_> {
         needed.into_iter().enumerate().filter(|(_, needed)| *needed).map(|(i, _)| Id(i as u32))
     }
 
-    fn uses(&self, operation: Operation) -> bool {
-        self.nodes().any(|id| matches!(self.graph.node(id), Node::Binary(o, ..) if o == operation))
+    fn uses(&self, of: impl Fn(Node) -> bool) -> bool {
+        self.nodes().any(|id| of(self.graph.node(id)))
     }
 
     /// The names of the arguments, with a line before those that are not used.
@@ -189,7 +201,7 @@ impl Body<'_> {
         let all = |ids: [Id; 2]| if constant(id) { ids.map(o) } else { ids.map(n) };
         Some(match self.graph.node(id) {
             Node::Unary(Function::Neg, a) => format!("-{}", o(a)),
-            Node::Unary(f, a) => format!("Scalar::{}({})", method(f), o(a)),
+            Node::Unary(f, a) => format!("{}({})", method(f), o(a)),
             Node::Powi(a, 3) => format!("{0} * {0} * {0}", o(a)),
             Node::Powi(a, n) => format!("Scalar::powi({}, {n})", o(a)),
             Node::Select([a, b, c, d]) => {
@@ -247,25 +259,28 @@ fn literal(x: f64) -> String {
     }
 }
 
-/// The method of a function.
+/// The method of a function, or what is written for it.
 fn method(function: Function) -> &'static str {
     match function {
-        Function::Neg => "neg",
-        Function::Recip => "recip",
-        Function::Sqrt => "sqrt",
-        Function::Abs => "abs",
-        Function::Sign => "signum",
-        Function::Sin => "sin",
-        Function::Cos => "cos",
-        Function::Tan => "tan",
-        Function::Versine => "versine",
-        Function::Atan => "atan",
-        Function::Sinh => "sinh",
-        Function::Cosh => "cosh",
-        Function::Tanh => "tanh",
-        Function::Exp => "exp",
-        Function::ExpM1 => "exp_m1",
-        Function::Ln => "ln",
-        Function::Ln1p => "ln_1p",
+        Function::Neg => "Scalar::neg",
+        Function::Recip => "Scalar::recip",
+        Function::Sqrt => "Scalar::sqrt",
+        Function::Abs => "Scalar::abs",
+        Function::Sign => "Scalar::signum",
+        Function::Sin => "Scalar::sin",
+        Function::Cos => "Scalar::cos",
+        Function::Tan => "Scalar::tan",
+        Function::Versine => "Scalar::versine",
+        Function::Atan => "Scalar::atan",
+        Function::Sinh => "Scalar::sinh",
+        Function::Cosh => "Scalar::cosh",
+        Function::Tanh => "Scalar::tanh",
+        Function::Asinh => "asinh",
+        Function::Acosh => "acosh",
+        Function::Atanh => "atanh",
+        Function::Exp => "Scalar::exp",
+        Function::ExpM1 => "Scalar::exp_m1",
+        Function::Ln => "Scalar::ln",
+        Function::Ln1p => "Scalar::ln_1p",
     }
 }

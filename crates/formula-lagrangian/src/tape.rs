@@ -1,26 +1,30 @@
 //! Straight code in registers, made of a graph.
 
+use crate::graph::Inputs;
 use crate::{Function, Graph, Id, Node, Operation};
 
-/// One instruction: what is written to a register, of which others. Constants are numbers of a table.
+/// One instruction: what is written to the register `to`, of the registers `a` and `b` and of what is in `extra`: a constant by its
+/// bits, an exponent, or two registers more. In two words, so that a program is read as fast as it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Instruction {
     pub code: Code,
     pub to: u16,
     pub a: u16,
     pub b: u16,
-    pub c: u16,
-    pub d: u16,
+    pub extra: u64,
 }
 
-/// What an instruction does, with `k` the constant of index `b`.
+/// The operand that is the result of the instruction before: it does not have to come from memory.
+pub(crate) const PREVIOUS: u16 = u16::MAX;
+
+/// What an instruction does, with `k` the constant and `c`, `d` the registers in `extra`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Code {
     Add,
     Sub,
     Mul,
     Div,
-    /// `a b + c`, each rounded.
+    /// `a b + c`, each rounded, as Rust code is.
     MulAdd,
     /// `a + k`.
     AddConstant,
@@ -32,7 +36,7 @@ pub(crate) enum Code {
     DivConstant,
     /// `k / a`.
     ConstantDiv,
-    /// `a k + c`, each rounded.
+    /// `a k + b`, each rounded.
     MulConstantAdd,
     Function(Function),
     Min,
@@ -41,11 +45,37 @@ pub(crate) enum Code {
     Hypot,
     /// `a^k`.
     Power,
-    /// `a^n`, n the bits of `b` and `c`.
+    /// `a^n`, n in `extra`.
     Powi,
     Select,
     /// The constant itself.
     Constant,
+}
+
+impl Instruction {
+    /// The registers `c` and `d`.
+    #[inline(always)]
+    pub fn third_and_fourth(&self) -> [u16; 2] {
+        [self.extra as u16, (self.extra >> 16) as u16]
+    }
+
+    /// The constant.
+    #[inline(always)]
+    pub fn constant(&self) -> f64 {
+        f64::from_bits(self.extra)
+    }
+
+    /// Reads what was last written to a register where that is an operand.
+    fn follow(&mut self, written: u16) {
+        let [c, d] = self.third_and_fourth();
+        let follow = |operand: u16| if operand == written { PREVIOUS } else { operand };
+        let after = |c: u16, d: u16| u64::from(follow(c)) | u64::from(follow(d)) << 16;
+        match self.code {
+            Code::Constant => {}
+            Code::Select | Code::MulAdd => (self.a, self.b, self.extra) = (follow(self.a), follow(self.b), after(c, d)),
+            _ => (self.a, self.b) = (follow(self.a), follow(self.b)),
+        }
+    }
 }
 
 /// Straight code that computes some nodes of a graph: the inputs are in the first registers, in the order q, v, z, t.
@@ -56,9 +86,10 @@ pub(crate) struct Tape {
     pub results: Vec<u16>,
     /// How many registers there are.
     pub registers: usize,
-    pub constants: Vec<f64>,
-    /// The nodes of the constants.
-    sources: Vec<Id>,
+    /// Which inputs it reads.
+    pub reads: Inputs,
+    /// The instructions with a constant, and the nodes of these.
+    constants: Vec<(usize, Id)>,
 }
 
 /// How nodes are placed in registers.
@@ -71,8 +102,6 @@ struct Builder<'g> {
     uses: Vec<u32>,
     free: Vec<u16>,
     dimension: usize,
-    /// The index of each constant in the table.
-    slots: std::collections::HashMap<Id, u16>,
 }
 
 impl Tape {
@@ -92,16 +121,10 @@ impl Tape {
                 }
             }
         }
-        let registers = 2 * dimension + 2;
-        let mut builder = Builder {
-            graph,
-            tape: Tape { registers, ..Tape::default() },
-            place: vec![None; last],
-            uses,
-            free: Vec::new(),
-            dimension,
-            slots: Default::default(),
-        };
+        let reads = nodes.iter().fold(Inputs::NONE, |all, id| all.and(graph.inputs(*id)));
+        let tape = Tape { registers: 2 * dimension + 2, reads, ..Tape::default() };
+        let (place, free) = (vec![None; last], Vec::new());
+        let mut builder = Builder { graph, tape, place, uses, free, dimension };
         for id in nodes {
             builder.compute(*id)?;
         }
@@ -109,13 +132,23 @@ impl Tape {
             let register = builder.register(*id)?;
             builder.tape.results.push(register);
         }
-        Some(builder.tape)
+        let mut tape = builder.tape;
+        for i in 1..tape.code.len() {
+            let written = tape.code[i - 1].to;
+            tape.code[i].follow(written);
+        }
+        if let Some(last) = tape.code.last() {
+            tape.results.iter_mut().filter(|place| **place == last.to).for_each(|place| *place = PREVIOUS);
+        }
+        Some(tape)
     }
 
     /// Takes the constants for other values of the parameters: those of all nodes of the graph.
     pub fn set_constants(&mut self, values: &[f64]) {
-        for (constant, source) in self.constants.iter_mut().zip(&self.sources) {
-            *constant = values.get(source.index()).copied().unwrap_or(f64::NAN);
+        for (instruction, source) in &self.constants {
+            if let Some(instruction) = self.code.get_mut(*instruction) {
+                instruction.extra = values.get(source.index()).copied().unwrap_or(f64::NAN).to_bits();
+            }
         }
     }
 }
@@ -177,28 +210,22 @@ impl Builder<'_> {
         of(b, a).or_else(|| of(a, b))
     }
 
-    fn constant(&mut self, id: Id) -> Option<u16> {
-        if let Some(slot) = self.slots.get(&id) {
-            return Some(*slot);
-        }
-        let slot = u16::try_from(self.tape.sources.len()).ok()?;
-        self.tape.sources.push(id);
-        self.tape.constants.push(self.graph.as_number(id).unwrap_or(f64::NAN));
-        self.slots.insert(id, slot);
-        Some(slot)
-    }
-
     fn allocate(&mut self) -> Option<u16> {
         if let Some(register) = self.free.pop() {
             return Some(register);
         }
-        let register = u16::try_from(self.tape.registers).ok()?;
+        let register = u16::try_from(self.tape.registers).ok().filter(|register| *register < PREVIOUS)?;
         self.tape.registers += 1;
         Some(register)
     }
 
-    fn emit(&mut self, code: Code, to: u16, [a, b, c, d]: [u16; 4]) {
-        self.tape.code.push(Instruction { code, to, a, b, c, d });
+    fn emit(&mut self, code: Code, to: u16, [a, b]: [u16; 2], extra: u64) {
+        self.tape.code.push(Instruction { code, to, a, b, extra });
+    }
+
+    /// The next instruction has the value of a constant node in it.
+    fn note_constant(&mut self, id: Id) {
+        self.tape.constants.push((self.tape.code.len(), id));
     }
 
     /// The register of a node that is an input, is computed, or is a constant, which is put there.
@@ -217,11 +244,16 @@ impl Builder<'_> {
         if let Some(place) = self.place[id.index()] {
             return Some(place);
         }
-        let slot = self.constant(id)?;
         let to = self.allocate()?;
-        self.emit(Code::Constant, to, [0, slot, 0, 0]);
+        self.note_constant(id);
+        self.emit(Code::Constant, to, [0, 0], self.number(id));
         self.place[id.index()] = Some(to);
         Some(to)
+    }
+
+    /// The bits of a node that is a number; those of a parameter are set later.
+    fn number(&self, id: Id) -> u64 {
+        self.graph.as_number(id).unwrap_or(f64::NAN).to_bits()
     }
 
     /// Says that a node was read once; its register is free after the last time.
@@ -278,11 +310,11 @@ impl Builder<'_> {
                 // The square has a register of its own, then the cube.
                 let from = self.register(a)?;
                 let square = self.allocate()?;
-                self.emit(Code::Mul, square, [from, from, 0, 0]);
+                self.emit(Code::Mul, square, [from, from], 0);
                 self.free.push(square);
                 self.release(a);
                 let to = self.allocate()?;
-                self.emit(Code::Mul, to, [square, from, 0, 0]);
+                self.emit(Code::Mul, to, [square, from], 0);
                 self.place[id.index()] = Some(to);
                 return Some(());
             }
@@ -290,16 +322,12 @@ impl Builder<'_> {
                 let from = self.register(a)?;
                 self.release(a);
                 let to = self.allocate()?;
-                self.emit(Code::Powi, to, [from, n as u16, (n >> 16) as u16, 0]);
+                self.emit(Code::Powi, to, [from, 0], u64::from(n as u32));
                 self.place[id.index()] = Some(to);
                 return Some(());
             }
             Node::Select(all) => (Code::Select, all.to_vec(), None),
             _ => return None,
-        };
-        let slot = match slot {
-            Some(slot) => Some(self.constant(slot)?),
-            None => None,
         };
         let mut registers = Vec::with_capacity(4);
         for a in &read {
@@ -314,11 +342,14 @@ impl Builder<'_> {
         }
         let to = self.allocate()?;
         let operand = |i: usize| registers.get(i).copied().unwrap_or(0);
-        let operands = match (code, slot) {
-            (_, Some(slot)) => [operand(0), slot, operand(1), 0],
-            (_, None) => [operand(0), operand(1), operand(2), operand(3)],
+        let extra = match slot {
+            Some(slot) => {
+                self.note_constant(slot);
+                self.number(slot)
+            }
+            None => u64::from(operand(2)) | u64::from(operand(3)) << 16,
         };
-        self.emit(code, to, operands);
+        self.emit(code, to, [operand(0), operand(1)], extra);
         self.place[id.index()] = Some(to);
         Some(())
     }

@@ -129,3 +129,19 @@ fn changes_of_good_texts() {
     }
     assert!(good > 2_000, "{good}");
 }
+
+/// Bytes of any kind, most of them no text.
+#[test]
+fn random_bytes() {
+    let mut random = Random(0x1234_5678_9abc_def1);
+    let mut good = 0;
+    for _ in 0..50_000 {
+        let length = random.below(24);
+        // Half of them printable, so that some are read beyond the first.
+        let byte = |random: &mut Random| if random.below(2) == 0 { random.below(256) } else { 32 + random.below(95) };
+        let bytes: Vec<u8> = (0..length).map(|_| byte(&mut random) as u8).collect();
+        good += usize::from(attack(&String::from_utf8_lossy(&bytes)));
+    }
+    // Single digits and names at least.
+    assert!(good > 10, "{good}");
+}

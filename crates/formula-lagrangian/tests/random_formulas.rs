@@ -49,6 +49,9 @@ impl Random {
                     "-_",
                     "exp(-1 - _^2)",
                     "log1p(2 + _^2)",
+                    "asinh(_)",
+                    "acosh(2 + _^2)",
+                    "atanh(_/(2 + _^2))",
                 ]);
                 form.replace('_', &format!("({a})"))
             }

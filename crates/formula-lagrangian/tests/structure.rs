@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
-use contact_geom::{Lagrangian, Structure, Symmetry, VelocityPoint};
+use contact_geom::{Lagrangian, OneParameterGroup, Structure, Symmetry, VelocityPoint};
 use discrete_herglotz::{Problem, Steps, Until};
 use formula_lagrangian::{Formula, FormulaLagrangian};
 
@@ -73,6 +73,52 @@ fn coordinates_that_are_not_there_are_symmetries() {
     assert!(matches!(along_y.as_slice(), [Symmetry::Translation(d)] if d[0] == 0.0 && d[1] == 1.0));
     assert!(lagrangian("x'^2 + y'^2 + x*y").symmetries().is_empty());
     assert!(lagrangian("x'^2").is_smooth() && !lagrangian("max(x, y)").is_smooth());
+}
+
+/// Whether the rotation of x and y is seen, and whether it is a symmetry, by the derivative of L along it at a point without
+/// symmetry: round-off, to a few units for each of some ten terms, or not.
+fn rotation(text: &str) -> [bool; 2] {
+    let l = lagrangian(text);
+    let seen = l.symmetries().iter().any(|s| matches!(s, Symmetry::Rotation(0, 1)));
+    let x = VelocityPoint::new([0.3, 0.71], [-0.4, 0.93], 0.2);
+    let defect = Symmetry::<2>::Rotation(0, 1).symmetry_defect(&l, 0.6, &x);
+    [seen, defect < 1e-14]
+}
+
+#[test]
+fn rotations_are_seen_where_they_are_symmetries() {
+    let symmetric = [
+        "(x'^2 + y'^2)/2 + a/sqrt(x^2 + y^2) + t*z",
+        "a*x'^2/2 + x^2 + cos(t) + y^2 + a*y'^2/2",
+        "(x'^2 + y'^2)/2 + a*(x*y' - y*x')/2",
+        "(x'^2 + y'^2)/2 - (x*x' + y*y')^2/(1 + hypot(x, y))",
+        "r = sqrt(x^2 + y^2)\n (x'^2 + y'^2)*(1 + r^3) - sin(r) - z*(x^2 + y^2)/a",
+    ];
+    for text in symmetric {
+        assert_eq!(rotation(text), [true, true], "{text}");
+    }
+    let others = [
+        "(x'^2 + 2*y'^2)/2 + x^2 + y^2",
+        "(x'^2 - y'^2)/2",
+        "(x'^2 + y'^2)/2 + x*y' + y*x'",
+        "(x'^2 + y'^2)/2 + x*y",
+        "(x'^2 + y'^2)/2 + x",
+        "(x'^2 + y'^2)/2 + a*x^2 + t*y^2",
+        "(x'^2 + y'^2)/2 + x^2/a + y^2*a",
+        "(x'^2 + y'^2)/2 + sqrt(x^2 + y'^2)",
+        "(x'^2 + y'^2)/2 + x*x' - y*y'",
+        "(x'^2 + y'^2)/2 + hypot(x, y')",
+        "(x'^2 + y'^2)/2 + x^2*y^2",
+    ];
+    for text in others {
+        assert_eq!(rotation(text), [false, false], "{text}");
+    }
+    // Not seen, though it is one.
+    assert_eq!(rotation("x'^2 + y'^2 + (x + y)^2 + (x - y)^2"), [false, true]);
+    // In space, each of three.
+    let text = "(x'^2 + y'^2 + w'^2)/2 + 1/sqrt(x^2 + y^2 + w^2)";
+    let space = Formula::parse(text, &["x", "y", "w"], &[]).unwrap().lagrangian::<3>().unwrap();
+    assert_eq!(space.symmetries().len(), 3);
 }
 
 #[test]

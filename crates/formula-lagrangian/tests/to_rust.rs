@@ -17,9 +17,10 @@ const KEPLER: &str = "(x'^2 + y'^2)/2 + mu/sqrt(x^2 + y^2) + gamma*z";
 const ALL: &str = "
     smooth = sin(x)*cos(y) + tan(x/2) + versine(y) + atan(y) + sinh(x) - cosh(y)/tanh(2 + x) + recip(3 - x)
     roots = sqrt(4 + x*y) + exp(-x)*expm1(y) + ln(3 + x) - log1p(x^2) + (2 + x)^0.3 + (3 + y)^type - x^3 + (2 + y)^-5 + x^7
+    inverse = asinh(x)*atanh(y) + acosh(2 + x)
     kinks = abs(x - y) + sign(x)*y + min(x, y, 0.1)*max(x, 2*y) + atan2(x, y) + hypot(x, 1 - y) + if(x < y, x, 2 - y)
     constants = sin(type)*x + (type^2 + 1)/(2 + y) + (type - y) + t*type*hypot(type, 2)
-    L = (2 + cos(x))*x'^2/2 + (y' - x*z)^2/2 + smooth + roots + kinks + constants";
+    L = (2 + cos(x))*x'^2/2 + (y' - x*z)^2/2 + smooth + roots + inverse + kinks + constants";
 
 fn all() -> FormulaLagrangian<2> {
     Formula::parse(ALL, &["x", "y"], &[("type", 0.7)]).unwrap().lagrangian().unwrap()

@@ -76,8 +76,8 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
 
     #[inline(always)]
     fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>) {
-        if let Some(force) = self.closed_force(t, x) {
-            return (self.value(t, &x.q, &x.v, x.z), force);
+        if let Some(both) = self.closed_with_force(t, x) {
+            return both;
         }
         if const { N > BLOCK } {
             return blocks::with_force(self, t, x);

@@ -56,6 +56,12 @@ pub trait Lagrangian<const N: usize> {
         self.closed_gradient(t, x).map(|gradient| gradient.x)
     }
 
+    /// The value with `L_q`, where the two share work that the compiler cannot see: the default asks for each by itself.
+    #[inline(always)]
+    fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
+        self.closed_force(t, x).map(|force| (self.value(t, &x.q, &x.v, x.z), force))
+    }
+
     /// `W = L_vv` alone, where it is less work than all second derivatives and the compiler cannot see that.
     #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
@@ -118,6 +124,10 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
     #[inline(always)]
     fn closed_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
         (**self).closed_force(t, x)
+    }
+    #[inline(always)]
+    fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
+        (**self).closed_with_force(t, x)
     }
     #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
