@@ -185,7 +185,7 @@ pub trait AlongMotion {
 
 impl<F: AlongMotion> SystemVisitor for OverMotions<F> {
     fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
-        let cases = if N > 2 { 12 } else { 48 };
+        let cases = if N > 2 { 8 } else { 24 };
         let mut outside = 0;
         on_some(cases, system.name(), 2 * N + 3, |u| {
             let (t, x) = system.sample(&u[1..]);

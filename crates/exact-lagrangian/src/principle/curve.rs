@@ -5,6 +5,7 @@ use crate::numerics::panel::{Rate, Rates, State};
 use crate::{ExactError, herglotz_flow};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, GeometryError, Lagrangian, VelocityPoint};
+use std::cell::RefCell;
 
 /// A curve in Q, or a variation of one: position and velocity at each time, counted from the curve's start.
 ///
@@ -89,7 +90,7 @@ pub fn action<C: Curve<N>, const N: usize>(
     (t0, duration): (f64, f64),
     z0: f64,
 ) -> Result<CurveAction, ExactError<N>> {
-    let along = AlongCurve { lagrangian, curve, t0, variation: None::<&C> };
+    let along = AlongCurve { lagrangian, curve, t0, variation: None::<&C>, read: RefCell::default() };
     let (z, b) = along.solve(duration, (z0, 0.0))?;
     Ok(CurveAction { z, b })
 }
@@ -107,7 +108,7 @@ pub fn action_derivative<const N: usize>(
     (t0, duration): (f64, f64),
     (z0, dz0): (f64, f64),
 ) -> Result<f64, ExactError<N>> {
-    let along = AlongCurve { lagrangian, curve, t0, variation: Some(variation) };
+    let along = AlongCurve { lagrangian, curve, t0, variation: Some(variation), read: RefCell::default() };
     Ok(along.solve(duration, (z0, dz0))?.1)
 }
 
@@ -118,19 +119,25 @@ struct AlongCurve<'a, L, C, V, const N: usize> {
     /// The time at which the curve starts.
     t0: f64,
     variation: Option<&'a V>,
+    /// What was read of the curve and of its variation last, by the time: the sweeps of a panel come back to the same times, and a curve may be
+    /// a whole motion to compute.
+    read: RefCell<Vec<(f64, [CurvePoint<N>; 2])>>,
 }
+
+/// Position and velocity on a curve.
+type CurvePoint<const N: usize> = (SVector<f64, N>, SVector<f64, N>);
+
+/// The times that are kept: those of a panel and of the one before.
+const KEPT: usize = 64;
 
 impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> Rates<N, f64> for AlongCurve<'_, L, C, V, N> {
     fn at(&self, s: f64, x: &State<N>) -> Result<Rate<N>, GeometryError> {
-        let ((q, v), t) = (self.curve.at(s)?, self.t0 + s);
+        let ([(q, v), (dq, dv)], t) = (self.read(s)?, self.t0 + s);
         let point = VelocityPoint { q, v, z: x.z };
         let g = self.lagrangian.gradient(t, &point);
         let b = match self.variation {
             None => g.z,
-            Some(variation) => {
-                let (dq, dv) = variation.at(s)?;
-                g.x.dot(&dq) + g.y.dot(&dv) + g.z * x.b
-            }
+            Some(_) => g.x.dot(&dq) + g.y.dot(&dv) + g.z * x.b,
         };
         let z = self.lagrangian.value(t, &point.q, &point.v, x.z);
         Ok(Rate { a: SVector::zeros(), z, b })
@@ -138,6 +145,21 @@ impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> Rates<N, f64> f
 }
 
 impl<L: Lagrangian<N>, C: Curve<N>, V: Curve<N>, const N: usize> AlongCurve<'_, L, C, V, N> {
+    /// The curve and its variation at a time; 0 for one that is not there.
+    fn read(&self, s: f64) -> Result<[CurvePoint<N>; 2], GeometryError> {
+        let mut read = self.read.borrow_mut();
+        if let Some((_, points)) = read.iter().rev().find(|(at, _)| at.to_bits() == s.to_bits()) {
+            return Ok(*points);
+        }
+        let rest = (SVector::zeros(), SVector::zeros());
+        let points = [self.curve.at(s)?, self.variation.map_or(Ok(rest), |variation| variation.at(s))?];
+        if read.len() == KEPT {
+            read.drain(..KEPT / 2);
+        }
+        read.push((s, points));
+        Ok(points)
+    }
+
     /// The end values of z and b, solved from break to break.
     fn solve(&self, duration: f64, (z0, b0): (f64, f64)) -> Result<(f64, f64), ExactError<N>> {
         let inside = |s: &&f64| (**s > duration.min(0.0)) && (**s < duration.max(0.0));

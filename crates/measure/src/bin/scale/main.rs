@@ -40,15 +40,15 @@ struct Arguments {
     out: PathBuf,
 }
 
-/// A case: its name, and what it does.
-type Case = (&'static str, fn(&mut Report) -> Result<(), Failure>);
+/// A case: its name, what its sizes count, and what it does.
+type Case = (&'static str, &'static str, fn(&mut Report) -> Result<(), Failure>);
 
 const CASES: &[Case] = &[
-    ("path", path::run),
-    ("chain", chain::run),
-    ("lattice", lattice::run),
-    ("solar", solar::run),
-    ("ensembles", ensembles::run),
+    ("path", "steps", path::run),
+    ("chain", "unknowns", chain::run),
+    ("lattice", "unknowns", lattice::run),
+    ("solar", "years", solar::run),
+    ("ensembles", "members", ensembles::run),
 ];
 
 fn main() -> ExitCode {
@@ -56,14 +56,15 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let names: Vec<&str> = CASES.iter().map(|(name, _)| *name).collect();
+    let names: Vec<&str> = CASES.iter().map(|(name, ..)| *name).collect();
     let unknown = |name: &&String| name.as_str() != "all" && !names.contains(&name.as_str());
     if let Some(name) = arguments.case.iter().find(unknown) {
         return Err(Failure::Unknown { what: "case", name: name.clone(), known: names.join(", ") });
     }
     let mut report = Report::new(Directory::create(&arguments.out)?, arguments.quick);
-    for (name, case) in CASES {
+    for (name, size, case) in CASES {
         if arguments.case.iter().any(|wanted| wanted == "all" || wanted == name) {
+            report.begin(name, size);
             case(&mut report)?;
         }
     }

@@ -1,6 +1,6 @@
 //! What the cases find: times and memory against size, and figures with their bounds.
 
-use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number, print};
+use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw, number, print};
 
 /// A measurement at one size.
 struct Row {
@@ -33,11 +33,18 @@ pub struct Report {
     pub quick: bool,
     rows: Vec<Row>,
     verdicts: Vec<Verdict>,
+    /// The cases, with what the size of each counts.
+    cases: Vec<(&'static str, &'static str)>,
 }
 
 impl Report {
     pub fn new(out: Directory, quick: bool) -> Self {
-        Report { out, quick, rows: Vec::new(), verdicts: Vec::new() }
+        Report { out, quick, rows: Vec::new(), verdicts: Vec::new(), cases: Vec::new() }
+    }
+
+    /// Begins a case, with what its sizes count.
+    pub fn begin(&mut self, case: &'static str, size: &'static str) {
+        self.cases.push((case, size));
     }
 
     /// A measurement: the seconds that something took at a size, and the most memory that it held where that was counted.
@@ -68,8 +75,8 @@ impl Report {
             |v: &Verdict| vec![v.case.clone(), v.what.clone(), number(v.figure), number(v.bound), word(v).into()];
         let columns = ["case", "what", "figure", "bound", "verdict"];
         self.out.table("verdicts.csv", &columns, self.verdicts.iter().map(verdict))?;
-        for case in distinct(self.rows.iter().map(|r| r.case.as_str())) {
-            self.figure(case)?;
+        for (case, size) in &self.cases {
+            self.figures(case, size)?;
         }
         print(&format!("\nTables and figures are in {}.\n", self.out.path().display()))?;
         let failing: Vec<&Verdict> = self.verdicts.iter().filter(|v| !v.passes()).collect();
@@ -82,9 +89,9 @@ impl Report {
     }
 
     /// Time, and memory where it was counted, against size: of what has more than one size.
-    fn figure(&self, case: &str) -> Result<(), Failure> {
+    fn figures(&self, case: &str, size: &str) -> Result<(), Failure> {
         let rows: Vec<&Row> = self.rows.iter().filter(|r| r.case == case).collect();
-        let panel = |label: &str, of: fn(&Row) -> Option<f64>| {
+        let figure = |label: &str, of: fn(&Row) -> Option<f64>| {
             let mut curves = Vec::new();
             for what in distinct(rows.iter().map(|r| r.what.as_str())) {
                 let of_it = rows.iter().filter(|r| r.what == what);
@@ -95,20 +102,16 @@ impl Report {
             }
             let points = || curves.iter().flat_map(|c| &c.points);
             let (x, y) = (decades(points().map(|p| p.0)), decades(points().map(|p| p.1)));
-            Some(Panel {
-                x_label: "size".into(),
-                y_label: label.into(),
-                x: x?,
-                y: y?,
-                legend: (0.04, 0.97),
-                curves,
-                marks: Vec::new(),
-            })
+            let (x_label, y_label) = (size.into(), label.into());
+            Some(draw(&Panel { x_label, y_label, x: x?, y: y?, legend: (1.03, 1.0), curves, marks: Vec::new() }))
         };
-        let time = panel("time (s)", |r| Some(r.seconds));
-        let memory = panel("peak memory (bytes)", |r| r.bytes.map(|b| b as f64));
-        let panels: Vec<Panel> = [time, memory].into_iter().flatten().collect();
-        if panels.is_empty() { Ok(()) } else { self.out.text(&format!("{case}.svg"), &draw_row(&panels)) }
+        if let Some(time) = figure("time (s)", |r| Some(r.seconds)) {
+            self.out.text(&format!("{case}.svg"), &time)?;
+        }
+        if let Some(memory) = figure("peak memory (bytes)", |r| r.bytes.map(|b| b as f64)) {
+            self.out.text(&format!("{case}_memory.svg"), &memory)?;
+        }
+        Ok(())
     }
 }
 
