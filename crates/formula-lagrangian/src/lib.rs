@@ -1,8 +1,9 @@
-//! A Lagrangian as text, at nearly the speed of a compiled one.
+//! A Lagrangian as text, run by all integrators.
 //!
 //! A formula becomes a graph of expressions; its first and second derivatives are derived on the graph; both become straight code in
 //! registers, which works on numbers, on duals and on the vector lanes of the integrators alike. The structure of L (separable, affine in
-//! z, ...) is proved from the graph, so that no integrator probes it.
+//! z, ...) is proved from the graph, so that no integrator probes it. A run takes 1.3 to 1.6 times as long as that of the Rust type of the
+//! same Lagrangian with a splitting, and 0.7 to 2.2 times with Gauss collocation; [`FormulaLagrangian::to_rust`] writes that type.
 //!
 //! ```
 //! use contact_geom::VelocityPoint;
