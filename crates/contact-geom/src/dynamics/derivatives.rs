@@ -25,6 +25,9 @@ pub trait Derivatives<const N: usize>: Lagrangian<N> {
     /// The value with the partial derivatives `L_q` alone, for kernels: what a force needs.
     fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>);
 
+    /// `L_q` without the value, for kernels.
+    fn force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N>;
+
     /// The matrix `W = L_vv` alone, for kernels.
     fn mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SMatrix<T, N, N>;
 
@@ -53,8 +56,8 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
 
     #[inline(always)]
     fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, Triple<N, T>) {
-        if let Some(gradient) = self.closed_gradient(t, x) {
-            return (self.value(t, &x.q, &x.v, x.z), gradient);
+        if let Some(both) = self.closed_with_gradient(t, x) {
+            return both;
         }
         if const { N > BLOCK } {
             return blocks::with_gradient(self, t, x);
@@ -73,8 +76,8 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
 
     #[inline(always)]
     fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>) {
-        if let Some(gradient) = self.closed_gradient(t, x) {
-            return (self.value(t, &x.q, &x.v, x.z), gradient.x);
+        if let Some(both) = self.closed_with_force(t, x) {
+            return both;
         }
         if const { N > BLOCK } {
             return blocks::with_force(self, t, x);
@@ -88,9 +91,17 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
     }
 
     #[inline(always)]
+    fn force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
+        match self.closed_force(t, x) {
+            Some(force) => force,
+            None => self.with_force(t, x).1,
+        }
+    }
+
+    #[inline(always)]
     fn mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SMatrix<T, N, N> {
-        if let Some(hessian) = self.closed_hessian(t, x) {
-            return hessian.vv;
+        if let Some(w) = self.closed_mass_matrix(t, x) {
+            return w;
         }
         if const { N > BLOCK } {
             return blocks::mass_matrix(self, t, x);

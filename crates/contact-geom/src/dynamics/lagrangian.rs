@@ -1,7 +1,7 @@
 //! Lagrangians L(t, q, v, z).
 
 use crate::{Hessian, Scalar, Structure, Triple, VelocityPoint};
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 /// A Lagrangian of Herglotz' variational principle, `L : R x TQ x R -> R`, written once as a generic function.
 ///
@@ -42,6 +42,30 @@ pub trait Lagrangian<const N: usize> {
     /// The second partial derivatives in closed form, if the implementor has one that is worth it.
     fn closed_hessian<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
         None
+    }
+
+    /// The value with the gradient, where the two share work that the compiler cannot see: the default asks for each by itself.
+    #[inline(always)]
+    fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, Triple<N, T>)> {
+        self.closed_gradient(t, x).map(|gradient| (self.value(t, &x.q, &x.v, x.z), gradient))
+    }
+
+    /// `L_q` alone, where it is less work than the gradient and the compiler cannot see that.
+    #[inline(always)]
+    fn closed_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
+        self.closed_gradient(t, x).map(|gradient| gradient.x)
+    }
+
+    /// The value with `L_q`, where the two share work that the compiler cannot see: the default asks for each by itself.
+    #[inline(always)]
+    fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
+        self.closed_force(t, x).map(|force| (self.value(t, &x.q, &x.v, x.z), force))
+    }
+
+    /// `W = L_vv` alone, where it is less work than all second derivatives and the compiler cannot see that.
+    #[inline(always)]
+    fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
+        self.closed_hessian(t, x).map(|hessian| hessian.vv)
     }
 
     /// What is known of this Lagrangian's form; see [`Structure`]. The default claims nothing.
@@ -92,6 +116,22 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
     #[inline(always)]
     fn closed_hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
         (**self).closed_hessian(t, x)
+    }
+    #[inline(always)]
+    fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, Triple<N, T>)> {
+        (**self).closed_with_gradient(t, x)
+    }
+    #[inline(always)]
+    fn closed_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
+        (**self).closed_force(t, x)
+    }
+    #[inline(always)]
+    fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
+        (**self).closed_with_force(t, x)
+    }
+    #[inline(always)]
+    fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
+        (**self).closed_mass_matrix(t, x)
     }
     fn structure(&self) -> Structure {
         (**self).structure()

@@ -284,6 +284,10 @@ macro_rules! arithmetic {
             fn atan(self) -> Self {
                 self.chain(self.re.atan(), (self.re * self.re + 1.0).recip())
             }
+            #[inline]
+            fn apart<R>(work: impl FnOnce() -> R) -> R {
+                T::apart(work)
+            }
         }
     };
 }

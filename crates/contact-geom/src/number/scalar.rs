@@ -128,6 +128,13 @@ pub trait Scalar:
     fn tanh(self) -> Self;
     /// The arc tangent.
     fn atan(self) -> Self;
+    /// Does a piece of work over these numbers as a function of its own, with the instructions that they need: for programs that are
+    /// too long to become a part of each kernel that calls them, such as interpreters. What the work calls is marked
+    /// `#[inline(always)]`.
+    #[inline(never)]
+    fn apart<R>(work: impl FnOnce() -> R) -> R {
+        work()
+    }
 }
 
 impl Scalar for f64 {

@@ -66,6 +66,7 @@ impl Lagrangian<1> for Duffing {
             separable: true,
             quadratic: self.beta == 0.0,
             constant_mass: true,
+            ..Structure::default()
         }
     }
 }

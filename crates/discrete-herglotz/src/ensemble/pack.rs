@@ -1,6 +1,6 @@
 //! Several registers of lanes as one number, each lane a trajectory of its own.
 
-use crate::gauss::lanes::{note_branch, token};
+use crate::gauss::lanes::{Lanes, note_branch, token};
 use contact_geom::Scalar;
 use pulp::{Simd, bytemuck};
 use std::fmt::{Debug, Formatter};
@@ -264,5 +264,9 @@ impl<S: Simd, const K: usize> Scalar for Pack<S, K> {
     }
     fn atan(self) -> Self {
         self.each(f64::atan)
+    }
+    #[inline(always)]
+    fn apart<R>(work: impl FnOnce() -> R) -> R {
+        Lanes::<S>::apart(work)
     }
 }

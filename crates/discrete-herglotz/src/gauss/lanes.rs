@@ -1,7 +1,7 @@
 //! Lanes of a vector register as numbers that a Lagrangian can be written over.
 
 use contact_geom::Scalar;
-use pulp::{Simd, bytemuck};
+use pulp::{Simd, WithSimd, bytemuck};
 use std::cell::Cell;
 use std::fmt::{Debug, Formatter};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -344,12 +344,23 @@ impl<S: Simd> Scalar for Lanes<S> {
     fn atan(self) -> Self {
         self.each(f64::atan)
     }
+    #[inline(never)]
+    fn apart<R>(work: impl FnOnce() -> R) -> R {
+        struct Work<F>(F);
+        impl<R, F: FnOnce() -> R> WithSimd for Work<F> {
+            type Output = R;
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, _simd: S) -> R {
+                (self.0)()
+            }
+        }
+        token::<S>().vectorize(Work(work))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pulp::WithSimd;
 
     /// Sine and cosine of arguments, as many as there are lanes at a time.
     struct Evaluate<'a>(&'a [f64]);

@@ -69,7 +69,7 @@ fn by_directions<const N: usize, const B: usize>(
         for j in directions.clone() {
             x.q[j].d[j - first] = 1.0;
         }
-        let (_, force) = lagrangian.with_force(constant(t), &x);
+        let force = lagrangian.force(constant(t), &x);
         for j in directions {
             for i in 0..N {
                 curvature[(i, j)] = force[i].d[j - first];
@@ -185,7 +185,7 @@ impl<const N: usize> PositionNewton<N> {
     fn evaluate<L: Lagrangian<N>>(&mut self, at: &At<L, N>) {
         for (i, (a, q)) in self.a.iter_mut().zip(&self.trial).enumerate() {
             let (t, x) = (at.t + at.table.times.0[i], VelocityPoint { q: *q, v: SVector::zeros(), z: 0.0 });
-            let (_, force) = at.lagrangian.with_force(t, &x);
+            let force = at.lagrangian.force(t, &x);
             *a = at.inverse_mass.map_or(force, |inverse| inverse * force);
         }
         for (i, out) in self.residual.chunks_exact_mut(N).enumerate() {

@@ -192,7 +192,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         let zero = Lanes::<S>::splat(0.0);
         let x =
             VelocityPoint { q: SVector::from_fn(|d, _| self.x[d].block(r)), v: SVector::from_element(zero), z: zero };
-        let (_, force) = self.lagrangian.with_force(self.table.times.block::<S>(r) + t, &x);
+        let force = self.lagrangian.force(self.table.times.block::<S>(r) + t, &x);
         match &self.inverse_mass {
             None => force,
             Some(inverse) => {

@@ -48,7 +48,14 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
                 Item::skipped(what, "the product is not requested; each step checks that its own is positive")
             }
         });
-        let (what, autonomous) = ("time at the stages", self.problem.structure.autonomous);
+        let structure = self.problem.structure;
+        let what = "probes of the structure";
+        items.push(if structure.proved {
+            Item::skipped(what, "it is proved from the formula of L")
+        } else {
+            Item::computed(what, "it is claimed: at the start, and along the run")
+        });
+        let (what, autonomous) = ("time at the stages", structure.autonomous);
         items.push(Item {
             what,
             computed: !autonomous,

@@ -231,7 +231,11 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
                 for stage in stages {
                     let (momentum, force) = (m.p.value, m.force);
                     self.kick_and_drift::<ACTION, COMPENSATED, TIMED>(&mut m, t, stage);
-                    (m.value, m.force) = form.kick(t + stage.time, &m.q.value, 0.0);
+                    if ACTION {
+                        (m.value, m.force) = form.kick(t + stage.time, &m.q.value, 0.0);
+                    } else {
+                        m.force = form.force(t + stage.time, &m.q.value, 0.0);
+                    }
                     if WATCHED {
                         m.look::<true>(&momentum, &force, stage.span, &mut seen);
                     }

@@ -29,12 +29,13 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         }
         crate::run::check_time(t)?;
         state.check()?;
-        if !lagrangian.structure().separable {
+        let structure = lagrangian.structure();
+        if !structure.separable {
             return Err(InputError::Unclaimed { claim: "separable" });
         }
-        for x in probes(state) {
+        for x in probes(state).into_iter().filter(|_| !structure.proved) {
             // A state beside the given one may be outside of the domain.
-            let mut defects = lagrangian.structure().defects(&lagrangian, t, &x).into_iter().flatten();
+            let mut defects = structure.defects(&lagrangian, t, &x).into_iter().flatten();
             if let Some(Defect { claim, size }) = defects.find(|d| d.size > PROBE) {
                 return Err(InputError::FalseClaim { claim, size });
             }
@@ -76,6 +77,12 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
     pub(crate) fn kick(&self, t: f64, q: &SVector<f64, N>, z: f64) -> (f64, SVector<f64, N>) {
         let rest = VelocityPoint { q: *q, v: SVector::zeros(), z };
         self.lagrangian.with_force(t, &rest)
+    }
+
+    /// `L_q` alone, for what does not ask for the action.
+    #[inline(always)]
+    pub(crate) fn force(&self, t: f64, q: &SVector<f64, N>, z: f64) -> SVector<f64, N> {
+        self.lagrangian.force(t, &VelocityPoint { q: *q, v: SVector::zeros(), z })
     }
 
     /// The kick at a start.

@@ -77,6 +77,7 @@ const NOTHING: Structure = Structure {
     separable: false,
     quadratic: false,
     constant_mass: false,
+    proved: false,
 };
 
 /// Units as small and as large as third derivatives of L stay in the range of a double.
@@ -130,6 +131,7 @@ fn a_true_claim_holds_to_the_rounding_of_its_terms() {
         separable: true,
         quadratic: true,
         constant_mass: true,
+        proved: false,
     };
     for term in [Term::Nothing, Term::Cancelling] {
         for units in all_units() {

@@ -1,0 +1,145 @@
+//! What can be wrong with a formula.
+
+use std::fmt::{Display, Formatter};
+use thiserror::Error;
+
+/// The largest number of coordinates of a [`FormulaLagrangian`](crate::FormulaLagrangian).
+pub const MOST_COORDINATES: usize = 8;
+
+/// Bad input to a formula.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum FormulaError {
+    /// The text is not a formula.
+    #[error(transparent)]
+    Parse(#[from] ParseError),
+    /// A name of a coordinate or of a parameter cannot be one.
+    #[error("the name {name:?} {why}")]
+    Name {
+        /// The name.
+        name: String,
+        /// What is wrong with it.
+        why: &'static str,
+    },
+    /// The number of coordinates is not one that is compiled in.
+    #[error("{found} coordinates, where 1 to {MOST_COORDINATES} are possible")]
+    Dimension {
+        /// The number of coordinates.
+        found: usize,
+    },
+    /// A Lagrangian was asked for with another dimension than that of the formula.
+    #[error("the formula has {found} coordinates, not {asked}: ask for FormulaLagrangian<{found}>")]
+    OtherDimension {
+        /// The number of coordinates of the formula.
+        found: usize,
+        /// The dimension that was asked for.
+        asked: usize,
+    },
+    /// There is no parameter of this name.
+    #[error("there is no parameter `{name}`; {known}")]
+    UnknownParameter {
+        /// The name.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// A graph has a coordinate or a parameter that was not given a name.
+    #[error("the graph has a {what} of index {index}, where {count} are named")]
+    Unknown {
+        /// A coordinate, a velocity or a parameter.
+        what: &'static str,
+        /// Its index.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A formula was built of symbols that do not belong together.
+    #[error("symbols of different graphs were mixed: take all that a formula is made of from the same `Symbols`")]
+    Mixed,
+    /// A parameter has a value that is not finite.
+    #[error("the parameter `{name}` is {value}, where a finite number is needed")]
+    ParameterValue {
+        /// The name.
+        name: String,
+        /// Its value.
+        value: f64,
+    },
+    /// The formula, or its gradient, is too large.
+    #[error("the formula or its gradient has more than {limit} parts; write it in Rust, or take a smaller one")]
+    TooLarge {
+        /// The bound.
+        limit: usize,
+    },
+}
+
+/// A place in a text that cannot be read, with the reason. Printed, it shows the line with a mark below.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParseError {
+    /// What is wrong, with the remedy where there is one.
+    pub message: String,
+    /// The nearest known name, where a name is unknown.
+    pub nearest: Option<String>,
+    /// The line, counted from 1.
+    pub line: usize,
+    /// The column, counted in characters from 1.
+    pub column: usize,
+    /// The length of the marked part, in characters: at least 1.
+    pub length: usize,
+    /// The text of the line.
+    pub text: String,
+    /// Where the marked part begins in the text of the line, in characters from 0.
+    pub mark: usize,
+}
+
+/// The characters of a line that are shown before and after the marked place.
+const AROUND: usize = 60;
+
+impl ParseError {
+    /// The error at the bytes `start .. end` of a text.
+    pub(crate) fn at(source: &str, (start, end): (usize, usize), message: impl Into<String>) -> Self {
+        let start = (0..=start.min(source.len())).rev().find(|i| source.is_char_boundary(*i)).unwrap_or(0);
+        let (before, rest) = source.split_at(start);
+        let head = before.rsplit('\n').next().unwrap_or("");
+        let tail = rest.split('\n').next().unwrap_or("");
+        let marked = rest.char_indices().take_while(|(i, c)| start + i < end && *c != '\n').count();
+        ParseError {
+            message: message.into(),
+            nearest: None,
+            line: before.matches('\n').count() + 1,
+            column: head.chars().count() + 1,
+            mark: head.chars().count(),
+            length: marked.max(1),
+            text: format!("{head}{tail}").trim_end_matches('\r').to_owned(),
+        }
+    }
+
+    /// The same error of a text that is a part of another, such as a file: shown with the line and the column of its own.
+    pub fn moved_to(mut self, line: usize, column: usize) -> Self {
+        if self.line == 1 {
+            self.column += column.saturating_sub(1);
+        }
+        self.line += line.saturating_sub(1);
+        self
+    }
+}
+
+impl Display for ParseError {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let ParseError { message, line, column, length, text, mark, .. } = self;
+        write!(f, "line {line}, column {column}: {message}")?;
+        if let Some(nearest) = &self.nearest {
+            write!(f, "; did you mean `{nearest}`?")?;
+        }
+        // The column within the shown text, which may be a part of a longer line.
+        let width = text.chars().count();
+        let at = (*mark).min(width);
+        let first = at.saturating_sub(AROUND);
+        let shown: String = text.chars().skip(first).take(2 * AROUND).collect();
+        // Tabs stay, so that the mark is below its place.
+        let indent: String = shown.chars().take(at - first).map(|c| if c == '\t' { c } else { ' ' }).collect();
+        let mark = "^".repeat((*length).clamp(1, AROUND));
+        write!(f, "\n  {shown}\n  {indent}{mark}")
+    }
+}
+
+impl std::error::Error for ParseError {}

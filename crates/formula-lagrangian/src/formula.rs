@@ -1,0 +1,133 @@
+//! Formulas: a graph with the names of what it is made of.
+
+use crate::names::Names;
+use crate::parser::{MOST_NODES, Parser};
+use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id};
+
+/// A Lagrangian `L(t, q, v, z)` that is known when the program runs: an expression of coordinates, velocities, z, t and parameters, all
+/// with names of the user's.
+///
+/// The language is in the [crate's documentation](crate). [`lagrangian`](Self::lagrangian) makes what integrators run.
+///
+/// ```
+/// use formula_lagrangian::Formula;
+/// let pendulum = Formula::parse("theta'^2/2 + cos(theta) + gamma*z", &["theta"], &[("gamma", -0.1)])?;
+/// assert_eq!(pendulum.coordinates(), ["theta"]);
+/// let error = Formula::parse("theta'^2/2 + cos(teta)", &["theta"], &[]).unwrap_err();
+/// assert!(error.to_string().starts_with("line 1, column 18: unknown name `teta`; did you mean `theta`?"));
+/// # Ok::<(), formula_lagrangian::FormulaError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Formula {
+    pub(crate) names: Names,
+    pub(crate) graph: Graph,
+    pub(crate) root: Id,
+    pub(crate) values: Vec<f64>,
+}
+
+impl Formula {
+    /// Reads a text over coordinates, of which `"q[3]"` is an array of three, and parameters with their values.
+    ///
+    /// # Errors
+    /// [`FormulaError::Parse`] with the place in the text; [`FormulaError::Name`], [`FormulaError::Dimension`],
+    /// [`FormulaError::ParameterValue`] where a name, the number of coordinates or a value is not possible.
+    pub fn parse(text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
+        let names = Names::new(coordinates, parameters)?;
+        let mut graph = Graph::new();
+        let root = Parser::parse(text, &names, &mut graph)?;
+        let values = parameters.iter().map(|(_, value)| *value).collect();
+        Ok(Formula { names, graph, root, values })
+    }
+
+    /// A formula that was built by a program: a node of a graph, in which coordinates and parameters are known by their indices.
+    ///
+    /// ```
+    /// use formula_lagrangian::{Formula, Graph, Operation};
+    /// let mut graph = Graph::new();
+    /// let v = graph.velocity(0);
+    /// let kinetic = graph.binary(Operation::Mul, v, v);
+    /// let free = Formula::from_graph(graph, kinetic, &["x"], &[])?;
+    /// assert!(free.lagrangian::<1>()?.proved().quadratic);
+    /// # Ok::<(), formula_lagrangian::FormulaError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`parse`](Self::parse) but for the text; [`FormulaError::TooLarge`]; [`FormulaError::Unknown`] where the graph has
+    /// a coordinate or a parameter beyond those given.
+    pub fn from_graph(
+        graph: Graph,
+        root: Id,
+        coordinates: &[&str],
+        parameters: &[(&str, f64)],
+    ) -> Result<Self, FormulaError> {
+        let values = parameters.iter().map(|(_, value)| *value).collect();
+        Self::named(graph, root, Names::new(coordinates, parameters)?, values)
+    }
+
+    pub(crate) fn named(graph: Graph, root: Id, names: Names, values: Vec<f64>) -> Result<Self, FormulaError> {
+        if graph.len() > MOST_NODES {
+            return Err(FormulaError::TooLarge { limit: MOST_NODES });
+        }
+        graph.check(names.dimension, names.parameters.len())?;
+        Ok(Formula { names, graph, root, values })
+    }
+
+    /// The Lagrangian for integrators, with its derivatives and what is proved of its structure. It is compiled once for each
+    /// dimension, whatever the formula.
+    ///
+    /// # Errors
+    /// [`FormulaError::OtherDimension`] unless the formula has `N` coordinates, [`FormulaError::TooLarge`].
+    pub fn lagrangian<const N: usize>(&self) -> Result<FormulaLagrangian<N>, FormulaError> {
+        FormulaLagrangian::new(self)
+    }
+
+    /// Another expression over the same names: a column, or a function whose zeros are events.
+    ///
+    /// # Errors
+    /// [`FormulaError::Parse`], [`FormulaError::TooLarge`].
+    pub fn expression(&self, text: &str) -> Result<Expression, FormulaError> {
+        Expression::parse(self, text)
+    }
+
+    /// The number of coordinates.
+    pub fn dimension(&self) -> usize {
+        self.names.dimension
+    }
+
+    /// The names of the coordinates in their order: `x`, or `q[0]`.
+    pub fn coordinates(&self) -> Vec<String> {
+        self.names.coordinates().collect()
+    }
+
+    /// The parameters with their values, in their order.
+    pub fn parameters(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.names.parameters.iter().map(String::as_str).zip(self.values.iter().copied())
+    }
+
+    /// Gives a parameter another value.
+    ///
+    /// # Errors
+    /// [`FormulaError::UnknownParameter`], [`FormulaError::ParameterValue`].
+    pub fn set(&mut self, parameter: &str, value: f64) -> Result<(), FormulaError> {
+        let i = index(&self.names, parameter, value)?;
+        if let Some(old) = self.values.get_mut(i) {
+            *old = value;
+        }
+        Ok(())
+    }
+}
+
+/// The index of a parameter that gets a value.
+pub(crate) fn index(names: &Names, parameter: &str, value: f64) -> Result<usize, FormulaError> {
+    let Some(i) = names.parameters.iter().position(|name| name == parameter) else {
+        let known = match names.parameters.as_slice() {
+            [] => "the formula has none".to_owned(),
+            some => format!("those of the formula are {}", some.join(", ")),
+        };
+        return Err(FormulaError::UnknownParameter { name: parameter.to_owned(), known });
+    };
+    if !value.is_finite() {
+        return Err(FormulaError::ParameterValue { name: parameter.to_owned(), value });
+    }
+    Ok(i)
+}

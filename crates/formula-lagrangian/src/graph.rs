@@ -1,0 +1,526 @@
+//! Expressions as one graph, in which equal ones are one node.
+
+use crate::FormulaError;
+use std::collections::HashMap;
+
+/// A node of a [`Graph`]. The nodes that it is made of have smaller numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Id(pub(crate) u32);
+
+impl Id {
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A function of one number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Function {
+    /// `-x`.
+    Neg,
+    /// `1 / x`.
+    Recip,
+    /// The square root.
+    Sqrt,
+    /// The absolute value; its derivative is the sign.
+    Abs,
+    /// 1, -1 or 0; its derivative is 0.
+    Sign,
+    /// The sine.
+    Sin,
+    /// The cosine.
+    Cos,
+    /// The tangent.
+    Tan,
+    /// `1 - cos x`, without cancellation near 0.
+    Versine,
+    /// The arc tangent.
+    Atan,
+    /// The hyperbolic sine.
+    Sinh,
+    /// The hyperbolic cosine.
+    Cosh,
+    /// The hyperbolic tangent.
+    Tanh,
+    /// The inverse of the hyperbolic sine.
+    Asinh,
+    /// The inverse of the hyperbolic cosine, of numbers from 1 on.
+    Acosh,
+    /// The inverse of the hyperbolic tangent.
+    Atanh,
+    /// `e^x`.
+    Exp,
+    /// `e^x - 1`, without cancellation near 0.
+    ExpM1,
+    /// The natural logarithm.
+    Ln,
+    /// `ln(1 + x)`, without cancellation near 0.
+    Ln1p,
+}
+
+/// A function of two numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Operation {
+    /// `a + b`.
+    Add,
+    /// `a - b`.
+    Sub,
+    /// `a b`.
+    Mul,
+    /// `a / b`.
+    Div,
+    /// The smaller; at a tie the first.
+    Min,
+    /// The larger; at a tie the first.
+    Max,
+    /// The angle of the point `(b, a)`.
+    Atan2,
+    /// `sqrt(a^2 + b^2)` without overflow.
+    Hypot,
+    /// `a^b`, where b is constant.
+    Power,
+}
+
+/// What a node is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Node {
+    /// A number, by its bits.
+    Number(u64),
+    /// The parameter of this index.
+    Parameter(u32),
+    /// The coordinate of this index.
+    Position(u32),
+    /// The velocity of the coordinate of this index.
+    Velocity(u32),
+    /// The action z.
+    Action,
+    /// The time t.
+    Time,
+    /// A function of one node.
+    Unary(Function, Id),
+    /// A function of two nodes.
+    Binary(Operation, Id, Id),
+    /// An integer power; its exponent is none of 0, 1, 2 and -1.
+    Powi(Id, i32),
+    /// `c` where `a < b`, else `d`, in the order `[a, b, c, d]`.
+    Select([Id; 4]),
+}
+
+impl Node {
+    /// The nodes that it is made of.
+    pub fn operands(&self) -> impl Iterator<Item = Id> + use<> {
+        let (operands, count) = match *self {
+            Node::Unary(_, a) | Node::Powi(a, _) => ([a; 4], 1),
+            Node::Binary(_, a, b) => ([a, b, b, b], 2),
+            Node::Select(all) => (all, 4),
+            _ => ([Id(0); 4], 0),
+        };
+        operands.into_iter().take(count)
+    }
+}
+
+/// What a node depends on, as a set.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Inputs(u8);
+
+impl Inputs {
+    pub const NONE: Inputs = Inputs(0);
+    pub const TIME: Inputs = Inputs(1);
+    pub const POSITION: Inputs = Inputs(2);
+    pub const VELOCITY: Inputs = Inputs(4);
+    pub const ACTION: Inputs = Inputs(8);
+
+    pub const fn and(self, other: Inputs) -> Inputs {
+        Inputs(self.0 | other.0)
+    }
+    /// Whether they have an input in common.
+    pub fn meets(self, others: Inputs) -> bool {
+        self.0 & others.0 != 0
+    }
+    /// Whether it holds no input but these.
+    pub fn within(self, others: Inputs) -> bool {
+        self.0 & !others.0 == 0
+    }
+}
+
+/// Hash-consed expressions: what is built twice is one node. Each is simplified as it is built, in ways that are exact but for the sign
+/// of zeros and for numbers that are not finite: constants are folded, `x + 0`, `1 x`, `0 x`, `x - x` and double signs vanish, factors
+/// that are powers of two are gathered. Nothing is reordered that would change a rounding.
+///
+/// ```
+/// use formula_lagrangian::{Function, Graph, Operation};
+/// let mut graph = Graph::new();
+/// let q = graph.position(0);
+/// let a = graph.unary(Function::Sin, q);
+/// let b = graph.unary(Function::Sin, q);
+/// assert_eq!(a, b);
+/// let zero = graph.number(0.0);
+/// assert_eq!(graph.binary(Operation::Add, a, zero), a);
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Graph {
+    nodes: Vec<Node>,
+    inputs: Vec<Inputs>,
+    index: HashMap<Node, Id>,
+}
+
+impl Graph {
+    /// A graph without nodes.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The number of nodes.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Whether it has no nodes.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// What a node is; the number 0 for one that is not of this graph.
+    pub fn node(&self, id: Id) -> Node {
+        self.nodes.get(id.index()).copied().unwrap_or(Node::Number(0))
+    }
+
+    /// What a node depends on.
+    pub(crate) fn inputs(&self, id: Id) -> Inputs {
+        self.inputs.get(id.index()).copied().unwrap_or(Inputs::NONE)
+    }
+
+    /// Whether a node is made of numbers and parameters alone.
+    pub fn is_constant(&self, id: Id) -> bool {
+        self.inputs(id) == Inputs::NONE
+    }
+
+    /// The value of a node that is a number.
+    pub fn as_number(&self, id: Id) -> Option<f64> {
+        match self.node(id) {
+            Node::Number(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    fn intern(&mut self, node: Node) -> Id {
+        if let Some(id) = self.index.get(&node) {
+            return *id;
+        }
+        let id = Id(self.nodes.len() as u32);
+        let own = match node {
+            Node::Position(_) => Inputs::POSITION,
+            Node::Velocity(_) => Inputs::VELOCITY,
+            Node::Action => Inputs::ACTION,
+            Node::Time => Inputs::TIME,
+            _ => Inputs::NONE,
+        };
+        let inputs = node.operands().fold(own, |all, a| all.and(self.inputs(a)));
+        self.nodes.push(node);
+        self.inputs.push(inputs);
+        self.index.insert(node, id);
+        id
+    }
+
+    /// A number.
+    pub fn number(&mut self, x: f64) -> Id {
+        // One zero, and one NaN.
+        let x = if x == 0.0 { 0.0 } else { x };
+        self.intern(Node::Number(if x.is_nan() { f64::NAN } else { x }.to_bits()))
+    }
+
+    /// The parameter of an index.
+    pub fn parameter(&mut self, index: u32) -> Id {
+        self.intern(Node::Parameter(index))
+    }
+
+    /// The coordinate of an index.
+    pub fn position(&mut self, index: u32) -> Id {
+        self.intern(Node::Position(index))
+    }
+
+    /// The velocity of a coordinate.
+    pub fn velocity(&mut self, index: u32) -> Id {
+        self.intern(Node::Velocity(index))
+    }
+
+    /// The action z.
+    pub fn action(&mut self) -> Id {
+        self.intern(Node::Action)
+    }
+
+    /// The time t.
+    pub fn time(&mut self) -> Id {
+        self.intern(Node::Time)
+    }
+
+    /// A function of a node.
+    pub fn unary(&mut self, function: Function, a: Id) -> Id {
+        if let Some(x) = self.as_number(a) {
+            let y = function.value(x);
+            return self.number(y);
+        }
+        match (function, self.node(a)) {
+            (Function::Neg, Node::Unary(Function::Neg, b)) => b,
+            (Function::Neg, Node::Binary(Operation::Sub, b, c)) => self.sub(c, b),
+            (Function::Neg, Node::Binary(Operation::Mul, b, c)) if self.is_constant(c) => {
+                let c = self.unary(Function::Neg, c);
+                self.mul(b, c)
+            }
+            (Function::Recip, Node::Unary(Function::Recip, b)) => b,
+            // Even and odd functions.
+            (Function::Cos | Function::Cosh | Function::Abs | Function::Versine, Node::Unary(Function::Neg, b)) => {
+                self.unary(function, b)
+            }
+            (f, Node::Unary(Function::Neg, b)) if f.is_odd() => {
+                let positive = self.unary(f, b);
+                self.neg(positive)
+            }
+            _ => self.intern(Node::Unary(function, a)),
+        }
+    }
+
+    /// A function of two nodes. A power with an exponent that depends on the state is `e^(b ln a)`.
+    pub fn binary(&mut self, operation: Operation, a: Id, b: Id) -> Id {
+        match operation {
+            Operation::Add => self.add(a, b),
+            Operation::Sub => self.sub(a, b),
+            Operation::Mul => self.mul(a, b),
+            Operation::Div => self.div(a, b),
+            Operation::Power => self.power(a, b),
+            Operation::Min | Operation::Max if a == b => a,
+            _ => match (self.as_number(a), self.as_number(b)) {
+                (Some(x), Some(y)) => self.number(operation.value(x, y)),
+                _ => self.intern(Node::Binary(operation, a, b)),
+            },
+        }
+    }
+
+    pub(crate) fn neg(&mut self, a: Id) -> Id {
+        self.unary(Function::Neg, a)
+    }
+
+    pub(crate) fn recip(&mut self, a: Id) -> Id {
+        self.unary(Function::Recip, a)
+    }
+
+    /// The operand of a change of sign.
+    fn negated(&self, a: Id) -> Option<Id> {
+        match self.node(a) {
+            Node::Unary(Function::Neg, b) => Some(b),
+            _ => None,
+        }
+    }
+
+    /// The two nodes of a commutative operation in their order: numbers last.
+    fn ordered(&self, a: Id, b: Id) -> (Id, Id) {
+        let key = |id: Id| (self.as_number(id).is_some(), id);
+        if key(a) <= key(b) { (a, b) } else { (b, a) }
+    }
+
+    pub(crate) fn add(&mut self, a: Id, b: Id) -> Id {
+        let (a, b) = self.ordered(a, b);
+        match (self.as_number(a), self.as_number(b)) {
+            (Some(x), Some(y)) => return self.number(x + y),
+            (None, Some(0.0)) => return a,
+            _ => {}
+        }
+        match (self.negated(a), self.negated(b)) {
+            (_, Some(b)) => self.sub(a, b),
+            (Some(a), None) => self.sub(b, a),
+            _ if a == b => {
+                let two = self.number(2.0);
+                self.mul(a, two)
+            }
+            _ => self.intern(Node::Binary(Operation::Add, a, b)),
+        }
+    }
+
+    pub(crate) fn sub(&mut self, a: Id, b: Id) -> Id {
+        if a == b {
+            return self.number(0.0);
+        }
+        match (self.as_number(a), self.as_number(b)) {
+            (_, Some(y)) => {
+                let minus = self.number(-y);
+                return self.add(a, minus);
+            }
+            (Some(0.0), None) => return self.neg(b),
+            _ => {}
+        }
+        match (self.negated(a), self.negated(b)) {
+            (_, Some(b)) => self.add(a, b),
+            (Some(a), None) => {
+                let sum = self.add(a, b);
+                self.neg(sum)
+            }
+            _ => self.intern(Node::Binary(Operation::Sub, a, b)),
+        }
+    }
+
+    pub(crate) fn mul(&mut self, a: Id, b: Id) -> Id {
+        let (a, b) = self.ordered(a, b);
+        match (self.as_number(a), self.as_number(b)) {
+            (Some(x), Some(y)) => return self.number(x * y),
+            (None, Some(0.0)) => return b,
+            (None, Some(1.0)) => return a,
+            (None, Some(-1.0)) => return self.neg(a),
+            (None, Some(y)) => {
+                if let Some(a) = self.negated(a) {
+                    let minus = self.number(-y);
+                    return self.mul(a, minus);
+                }
+                // One of two factors is a power of two: their product is exact.
+                if let Some((c, x)) = self.scaled(a)
+                    && (is_power_of_two(x) || is_power_of_two(y))
+                    && (x * y).is_normal()
+                {
+                    let factor = self.number(x * y);
+                    return self.mul(c, factor);
+                }
+                return self.intern(Node::Binary(Operation::Mul, a, b));
+            }
+            _ => {}
+        }
+        for (first, second) in [(a, b), (b, a)] {
+            if let Some(first) = self.negated(first).filter(|a| !self.is_constant(*a)) {
+                let product = self.mul(first, second);
+                return self.neg(product);
+            }
+            if let Some((c, x)) = self.scaled(first)
+                && is_power_of_two(x)
+            {
+                let product = self.mul(c, second);
+                let factor = self.number(x);
+                return self.mul(product, factor);
+            }
+        }
+        self.intern(Node::Binary(Operation::Mul, a, b))
+    }
+
+    /// A product with a number.
+    fn scaled(&self, a: Id) -> Option<(Id, f64)> {
+        match self.node(a) {
+            Node::Binary(Operation::Mul, b, c) => self.as_number(c).map(|x| (b, x)),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn div(&mut self, a: Id, b: Id) -> Id {
+        match (self.as_number(a), self.as_number(b)) {
+            (Some(x), Some(y)) => return self.number(x / y),
+            (_, Some(1.0)) => return a,
+            (_, Some(y)) if is_power_of_two(y) && y.recip().is_normal() => {
+                let factor = self.number(y.recip());
+                return self.mul(a, factor);
+            }
+            (Some(0.0), None) => return a,
+            (Some(1.0), None) => return self.recip(b),
+            _ => {}
+        }
+        match (self.negated(a), self.negated(b)) {
+            (Some(a), Some(b)) => self.div(a, b),
+            (Some(c), None) => {
+                let quotient = self.div(c, b);
+                self.neg(quotient)
+            }
+            (None, Some(c)) => {
+                let quotient = self.div(a, c);
+                self.neg(quotient)
+            }
+            _ => self.intern(Node::Binary(Operation::Div, a, b)),
+        }
+    }
+
+    /// An integer power.
+    pub fn powi(&mut self, a: Id, n: i32) -> Id {
+        if let Some(x) = self.as_number(a) {
+            return self.number(x.powi(n));
+        }
+        match n {
+            0 => self.number(1.0),
+            1 => a,
+            2 => self.mul(a, a),
+            -1 => self.recip(a),
+            _ => match self.negated(a) {
+                Some(b) if n % 2 == 0 => self.powi(b, n),
+                Some(b) => {
+                    let power = self.powi(b, n);
+                    self.neg(power)
+                }
+                None => self.intern(Node::Powi(a, n)),
+            },
+        }
+    }
+
+    /// A power: products for an integer exponent, powers of the root for half of an integer.
+    fn power(&mut self, a: Id, b: Id) -> Id {
+        match (self.as_number(a), self.as_number(b)) {
+            (Some(x), Some(y)) => self.number(Operation::Power.value(x, y)),
+            (None, Some(y)) if y.fract() == 0.0 && y.abs() <= 1e9 => self.powi(a, y as i32),
+            (None, Some(y)) if (2.0 * y).fract() == 0.0 && y.abs() <= 32.0 => {
+                let root = self.unary(Function::Sqrt, a);
+                self.powi(root, (2.0 * y) as i32)
+            }
+            _ if self.is_constant(b) => self.intern(Node::Binary(Operation::Power, a, b)),
+            _ => {
+                let log = self.unary(Function::Ln, a);
+                let exponent = self.mul(b, log);
+                self.unary(Function::Exp, exponent)
+            }
+        }
+    }
+
+    /// `then` where `a < b`, else `otherwise`.
+    pub fn select(&mut self, [a, b, then, otherwise]: [Id; 4]) -> Id {
+        if then == otherwise {
+            return then;
+        }
+        match (self.as_number(a), self.as_number(b)) {
+            (Some(x), Some(y)) if x < y => then,
+            (Some(x), Some(y)) if x >= y => otherwise,
+            _ => self.intern(Node::Select([a, b, then, otherwise])),
+        }
+    }
+
+    /// Checks that it has no coordinates and parameters but so many.
+    pub(crate) fn check(&self, dimension: usize, parameters: usize) -> Result<(), FormulaError> {
+        for node in &self.nodes {
+            let (what, index, count) = match *node {
+                Node::Position(i) => ("coordinate", i, dimension),
+                Node::Velocity(i) => ("velocity", i, dimension),
+                Node::Parameter(i) => ("parameter", i, parameters),
+                _ => continue,
+            };
+            if index as usize >= count {
+                return Err(FormulaError::Unknown { what, index: index as usize, count });
+            }
+        }
+        Ok(())
+    }
+
+    /// The values of all constant nodes for values of the parameters, with 0 for the others.
+    pub(crate) fn constants(&self, parameters: &[f64]) -> Vec<f64> {
+        let mut values: Vec<f64> = Vec::with_capacity(self.nodes.len());
+        for (node, inputs) in self.nodes.iter().zip(&self.inputs) {
+            let of = |id: Id| values.get(id.index()).copied().unwrap_or(0.0);
+            let value = match *node {
+                _ if *inputs != Inputs::NONE => 0.0,
+                Node::Number(bits) => f64::from_bits(bits),
+                Node::Parameter(i) => parameters.get(i as usize).copied().unwrap_or(f64::NAN),
+                Node::Unary(f, a) => f.value(of(a)),
+                Node::Binary(o, a, b) => o.value(of(a), of(b)),
+                Node::Powi(a, n) => of(a).powi(n),
+                Node::Select([a, b, c, d]) => contact_geom::Scalar::if_less(of(a), of(b), of(c), of(d)),
+                _ => 0.0,
+            };
+            values.push(value);
+        }
+        values
+    }
+}
+
+/// Whether products with a number are exact.
+fn is_power_of_two(x: f64) -> bool {
+    x.is_normal() && x.to_bits() << 12 == 0
+}

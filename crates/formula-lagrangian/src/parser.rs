@@ -1,0 +1,457 @@
+//! From a text to a node of a graph, by operator precedence (V. Pratt, "Top down operator precedence", 1973).
+
+use crate::functions::{FUNCTIONS, OPERATIONS};
+use crate::names::{Block, Names, is_reserved};
+use crate::token::{Token, Word, words};
+use crate::{Function, Graph, Id, Operation, ParseError};
+
+/// The longest text, in bytes.
+pub const LONGEST_TEXT: usize = 1 << 16;
+/// The deepest nesting of brackets and signs.
+pub const DEEPEST_NESTING: usize = 200;
+/// The most nodes that a text may give.
+pub const MOST_NODES: usize = 20_000;
+/// The words that may be read in all, those of sums as often as there are terms.
+const MOST_WORDS: usize = 1_000_000;
+
+/// How strongly operators bind: sums, products, signs, powers.
+const SUM: u8 = 1;
+const PRODUCT: u8 = 3;
+const SIGN: u8 = 5;
+const POWER: u8 = 8;
+
+/// A text that is being read.
+pub(crate) struct Parser<'a> {
+    text: &'a str,
+    words: Vec<Word<'a>>,
+    at: usize,
+    names: &'a Names,
+    graph: &'a mut Graph,
+    /// Definitions and the indices of sums, the innermost last.
+    locals: Vec<(&'a str, Id)>,
+    depth: usize,
+    read: usize,
+    /// Inside of brackets lines do not end.
+    brackets: usize,
+}
+
+type Parsed<T> = Result<T, ParseError>;
+
+impl<'a> Parser<'a> {
+    /// The node of a text over a graph: definitions, one a line, and at the end the value, with `L =` before it or without.
+    pub fn parse(text: &'a str, names: &'a Names, graph: &'a mut Graph) -> Parsed<Id> {
+        if text.len() > LONGEST_TEXT {
+            let message = format!("the text has {} bytes, where {LONGEST_TEXT} are possible", text.len());
+            return Err(ParseError::at(text, (0, 0), message));
+        }
+        let words = words(text)?;
+        let mut parser =
+            Parser { text, words, at: 0, names, graph, locals: Vec::new(), depth: 0, read: 0, brackets: 0 };
+        parser.program()
+    }
+
+    fn program(&mut self) -> Parsed<Id> {
+        loop {
+            self.skip_lines();
+            let (first, second) = (self.word(0), self.word(1));
+            if let (Token::Name(name), Token::Sign('=')) = (first.token, second.token) {
+                self.at += 2;
+                // A value that has a name is the last one.
+                let value = self.expression(0)?;
+                let more = self.ends_line()?;
+                if !more {
+                    return if name == "L" {
+                        Ok(value)
+                    } else {
+                        Err(self.error(self.word(0), format!("after the definition of `{name}` a value is expected")))
+                    };
+                }
+                self.define(name, first, value)?;
+                continue;
+            }
+            let value = self.expression(0)?;
+            if self.ends_line()? {
+                let word = self.word(0);
+                let message = "only one value is possible, and it is the last; a definition has the form `name = ...`";
+                return Err(self.error(word, message));
+            }
+            return Ok(value);
+        }
+    }
+
+    /// The end of a line: whether there is more after it.
+    fn ends_line(&mut self) -> Parsed<bool> {
+        let word = self.word(0);
+        match word.token {
+            Token::Line => {
+                self.skip_lines();
+                Ok(self.word(0).token != Token::End)
+            }
+            Token::End => Ok(false),
+            _ => Err(self.unexpected(word, "an operator")),
+        }
+    }
+
+    fn define(&mut self, name: &'a str, word: Word<'a>, value: Id) -> Parsed<()> {
+        let taken = is_reserved(name)
+            || self.names.blocks.iter().any(|b| b.name == name)
+            || self.names.parameters.iter().any(|p| p == name)
+            || self.locals.iter().any(|(local, _)| *local == name);
+        if taken {
+            return Err(self.error(word, format!("the name `{name}` is taken; take another for this definition")));
+        }
+        self.locals.push((name, value));
+        Ok(())
+    }
+
+    fn word(&self, ahead: usize) -> Word<'a> {
+        let end = (self.text.len(), self.text.len());
+        let mut words = self.words.iter().skip(self.at);
+        let word =
+            if self.brackets == 0 { words.nth(ahead) } else { words.filter(|w| w.token != Token::Line).nth(ahead) };
+        word.copied().unwrap_or(Word { token: Token::End, span: end })
+    }
+
+    /// Takes the next word.
+    fn next(&mut self) -> Parsed<Word<'a>> {
+        if self.brackets > 0 {
+            self.skip_lines();
+        }
+        let word = self.word(0);
+        self.at = (self.at + 1).min(self.words.len());
+        self.read += 1;
+        if self.read > MOST_WORDS || self.graph.len() > MOST_NODES {
+            let message = format!("the formula has more than {MOST_NODES} parts, its sums written out");
+            return Err(self.error(word, message));
+        }
+        Ok(word)
+    }
+
+    fn skip_lines(&mut self) {
+        while self.words.get(self.at).is_some_and(|w| w.token == Token::Line) {
+            self.at += 1;
+        }
+    }
+
+    /// Takes a sign that has to be there.
+    fn expect(&mut self, sign: char) -> Parsed<()> {
+        let word = self.word(0);
+        if word.token == Token::Sign(sign) {
+            self.next()?;
+            return Ok(());
+        }
+        Err(self.unexpected(word, &format!("`{sign}`")))
+    }
+
+    fn error(&self, word: Word<'a>, message: impl Into<String>) -> ParseError {
+        ParseError::at(self.text, word.span, message)
+    }
+
+    fn unexpected(&self, word: Word<'a>, wanted: &str) -> ParseError {
+        let before = self.at.checked_sub(1).and_then(|i| self.words.get(i)).map(|w| w.token);
+        let hint = match (before, word.token) {
+            (Some(Token::Number(_) | Token::Name(_) | Token::Sign(')' | ']')), Token::Name(_) | Token::Number(_))
+            | (Some(Token::Number(_) | Token::Sign(')' | ']')), Token::Sign('(')) => "; a product is written with `*`",
+            (Some(Token::Number(_)), Token::Sign(',')) if wanted == "an operator" => {
+                "; numbers have a point, not a comma"
+            }
+            _ => "",
+        };
+        self.error(word, format!("{} where {wanted} is expected{hint}", word.shown()))
+    }
+
+    /// An expression whose operators bind more strongly than `weakest`.
+    fn expression(&mut self, weakest: u8) -> Parsed<Id> {
+        if self.depth >= DEEPEST_NESTING {
+            let message = format!("nested more than {DEEPEST_NESTING} deep; give a part a name");
+            return Err(self.error(self.word(0), message));
+        }
+        self.depth += 1;
+        let value = self.operators(weakest);
+        self.depth -= 1;
+        value
+    }
+
+    fn operators(&mut self, weakest: u8) -> Parsed<Id> {
+        let mut left = self.operand()?;
+        loop {
+            let word = self.word(0);
+            let Token::Sign(sign) = word.token else { return Ok(left) };
+            let (operation, strength, right) = match sign {
+                '+' => (Operation::Add, SUM, SUM),
+                '-' => (Operation::Sub, SUM, SUM),
+                '*' => (Operation::Mul, PRODUCT, PRODUCT),
+                '/' => (Operation::Div, PRODUCT, PRODUCT),
+                // To the right.
+                '^' => (Operation::Power, POWER, POWER - 1),
+                _ => return Ok(left),
+            };
+            if strength <= weakest {
+                return Ok(left);
+            }
+            self.next()?;
+            self.after_operator();
+            let other = self.expression(right)?;
+            left = self.graph.binary(operation, left, other);
+            self.check_number(left, word)?;
+        }
+    }
+
+    /// A line does not end with an operator.
+    fn after_operator(&mut self) {
+        self.skip_lines();
+    }
+
+    /// Refuses numbers that are not finite, such as `1/0`.
+    fn check_number(&self, id: Id, word: Word<'a>) -> Parsed<()> {
+        match self.graph.as_number(id) {
+            Some(x) if !x.is_finite() => Err(self.error(word, format!("this is {x}, where a finite number is needed"))),
+            _ => Ok(()),
+        }
+    }
+
+    fn operand(&mut self) -> Parsed<Id> {
+        let word = self.next()?;
+        match word.token {
+            Token::Number(x) => Ok(self.graph.number(x)),
+            Token::Sign('-') => {
+                let value = self.expression(SIGN)?;
+                Ok(self.graph.unary(Function::Neg, value))
+            }
+            Token::Sign('+') => self.expression(SIGN),
+            Token::Sign('(') => self.bracketed(|parser| parser.expression(0), ')'),
+            Token::Name(name) => self.named(name, word),
+            _ => {
+                self.at = self.at.saturating_sub(1);
+                Err(self.unexpected(word, "a value"))
+            }
+        }
+    }
+
+    /// What stands in brackets, of which the first is taken.
+    fn bracketed<T>(&mut self, inside: impl FnOnce(&mut Self) -> Parsed<T>, close: char) -> Parsed<T> {
+        self.brackets += 1;
+        let value = inside(self).and_then(|value| self.expect(close).map(|()| value));
+        self.brackets -= 1;
+        value
+    }
+
+    /// A value that begins with a name.
+    fn named(&mut self, name: &'a str, word: Word<'a>) -> Parsed<Id> {
+        if self.word(0).token == Token::Sign('(') && !self.is_value(name) {
+            return self.call(name, word);
+        }
+        if let Some((_, value)) = self.locals.iter().rev().find(|(local, _)| *local == name) {
+            return Ok(*value);
+        }
+        if let Some(block) = self.names.blocks.iter().find(|b| b.name == name) {
+            return self.coordinate(block, word);
+        }
+        if let Some(i) = self.names.parameters.iter().position(|p| p == name) {
+            return Ok(self.graph.parameter(i as u32));
+        }
+        let all = Block { name: name.to_owned(), first: 0, count: Some(self.names.dimension) };
+        match name {
+            "t" => Ok(self.graph.time()),
+            "z" => Ok(self.graph.action()),
+            "pi" => Ok(self.graph.number(std::f64::consts::PI)),
+            "n" => Ok(self.graph.number(self.names.dimension as f64)),
+            "q" if self.word(0).token == Token::Sign('[') => self.coordinate(&all, word),
+            "v" if self.word(0).token == Token::Sign('[') => {
+                let i = self.index(&all)?;
+                Ok(self.graph.velocity(i))
+            }
+            _ if is_reserved(name) => Err(self.error(word, format!("`{name}` is a function: write `{name}(...)`"))),
+            _ => Err(self.unknown(name, word, "name")),
+        }
+    }
+
+    /// Whether a name has a value, so that a bracket after it is a forgotten product.
+    fn is_value(&self, name: &str) -> bool {
+        let known = self.names.blocks.iter().map(|b| b.name.as_str());
+        let known = known.chain(self.names.parameters.iter().map(String::as_str)).chain(["t", "z", "pi", "n"]);
+        known.chain(self.locals.iter().map(|(local, _)| *local)).any(|k| k == name)
+    }
+
+    fn unknown(&self, name: &str, word: Word<'a>, kind: &str) -> ParseError {
+        let locals: Vec<String> = self.locals.iter().map(|(local, _)| (*local).to_owned()).collect();
+        let mut error = self.error(word, format!("unknown {kind} `{name}`"));
+        error.nearest = self.names.nearest(name, &locals);
+        error
+    }
+
+    /// A coordinate, or with a prime its velocity.
+    fn coordinate(&mut self, block: &Block, word: Word<'a>) -> Parsed<Id> {
+        let mut prime = self.takes_prime(word)?;
+        let index = match block.count {
+            Some(_) => self.index(block)?,
+            None if self.word(0).token == Token::Sign('[') => {
+                return Err(self.error(self.word(0), format!("`{}` is one number and has no entries", block.name)));
+            }
+            None => block.first as u32,
+        };
+        prime |= self.takes_prime(word)?;
+        Ok(if prime { self.graph.velocity(index) } else { self.graph.position(index) })
+    }
+
+    /// Takes a prime, if there is one.
+    fn takes_prime(&mut self, word: Word<'a>) -> Parsed<bool> {
+        let sign = Token::Sign('\'');
+        if self.word(0).token != sign {
+            return Ok(false);
+        }
+        self.next()?;
+        if self.word(0).token == sign {
+            let message = "a second derivative, which no Lagrangian of Herglotz' principle has";
+            return Err(self.error(word, message));
+        }
+        Ok(true)
+    }
+
+    /// The index of an entry in brackets, as that of a coordinate: a number when the formula is read.
+    fn index(&mut self, block: &Block) -> Parsed<u32> {
+        let (name, count) = (&block.name, block.count.unwrap_or(1));
+        let open = self.word(0);
+        if open.token != Token::Sign('[') {
+            return Err(self.error(open, format!("`{name}` has {count} entries: write `{name}[0]`")));
+        }
+        self.next()?;
+        let word = self.word(0);
+        let index = self.bracketed(|parser| parser.whole(), ']')?;
+        match usize::try_from(index) {
+            Ok(i) if i < count => Ok((block.first + i) as u32),
+            _ => Err(self.error(word, format!("entry {index} of `{name}`, which has the entries 0 to {}", count - 1))),
+        }
+    }
+
+    /// An integer that is known when the formula is read.
+    fn whole(&mut self) -> Parsed<i64> {
+        let word = self.word(0);
+        let id = self.expression(0)?;
+        match self.graph.as_number(id) {
+            Some(x) if x.fract() == 0.0 && x.abs() <= 1e9 => Ok(x as i64),
+            Some(x) => Err(self.error(word, format!("{x} where an integer is expected"))),
+            None => Err(self.error(word, "an integer is expected that does not depend on parameters or on the state")),
+        }
+    }
+
+    /// A function with its arguments.
+    fn call(&mut self, name: &'a str, word: Word<'a>) -> Parsed<Id> {
+        if name == "sum" {
+            self.next()?;
+            return self.bracketed(|parser| parser.sum(), ')');
+        }
+        if name == "if" {
+            self.next()?;
+            return self.bracketed(|parser| parser.choice(), ')');
+        }
+        let function = FUNCTIONS.iter().find(|f| f.0 == name).map(|f| f.1);
+        let operation = OPERATIONS.iter().find(|o| o.0 == name).map(|o| o.1);
+        let inverse = matches!(name, "asin" | "acos");
+        if function.is_none() && operation.is_none() && !inverse {
+            return Err(self.unknown(name, word, "function"));
+        }
+        self.next()?;
+        let arguments = self.bracketed(|parser| parser.arguments(), ')')?;
+        let value = match (function, operation, arguments.as_slice()) {
+            (Some(function), _, [a]) => self.graph.unary(function, *a),
+            (_, Some(operation @ (Operation::Min | Operation::Max)), [first, others @ ..]) if !others.is_empty() => {
+                others.iter().fold(*first, |least, a| self.graph.binary(operation, least, *a))
+            }
+            (_, Some(operation), [a, b]) => self.graph.binary(operation, *a, *b),
+            (None, None, [a]) => self.inverse(name == "asin", *a),
+            (_, operation, found) => {
+                let wanted = if operation.is_some() { "two" } else { "one" };
+                let message = format!("`{name}` has {wanted} of arguments, not {}", found.len());
+                return Err(self.error(word, message.replace("one of arguments", "one argument").replace(" of ", " ")));
+            }
+        };
+        self.check_number(value, word)?;
+        Ok(value)
+    }
+
+    fn arguments(&mut self) -> Parsed<Vec<Id>> {
+        let mut arguments = vec![self.expression(0)?];
+        while self.word(0).token == Token::Sign(',') {
+            self.next()?;
+            arguments.push(self.expression(0)?);
+        }
+        Ok(arguments)
+    }
+
+    /// `asin x`, or `acos x`, by the angle of the point `(sqrt((1 - x)(1 + x)), x)`, or of that with its coordinates exchanged.
+    fn inverse(&mut self, sine: bool, x: Id) -> Id {
+        let one = self.graph.number(1.0);
+        let (below, above) = (self.graph.sub(one, x), self.graph.add(x, one));
+        let square = self.graph.mul(below, above);
+        let root = self.graph.unary(Function::Sqrt, square);
+        let (y, x) = if sine { (x, root) } else { (root, x) };
+        self.graph.binary(Operation::Atan2, y, x)
+    }
+
+    /// `if(a < b, then, otherwise)`.
+    fn choice(&mut self) -> Parsed<Id> {
+        let a = self.expression(0)?;
+        let word = self.next()?;
+        let Token::Sign(sign @ ('<' | '>')) = word.token else {
+            self.at = self.at.saturating_sub(1);
+            return Err(self.unexpected(word, "`<` or `>`"));
+        };
+        let b = self.expression(0)?;
+        self.expect(',')?;
+        let then = self.expression(0)?;
+        self.expect(',')?;
+        let otherwise = self.expression(0)?;
+        let (a, b) = if sign == '<' { (a, b) } else { (b, a) };
+        Ok(self.graph.select([a, b, then, otherwise]))
+    }
+
+    /// `sum(i, first, last, term)`: the term is read anew for each index.
+    fn sum(&mut self) -> Parsed<Id> {
+        let word = self.next()?;
+        let Token::Name(index) = word.token else {
+            self.at = self.at.saturating_sub(1);
+            return Err(self.unexpected(word, "the name of an index, as in `sum(i, 0, n-1, q[i]^2)`,"));
+        };
+        if is_reserved(index) || self.is_value(index) {
+            return Err(self.error(word, format!("the name `{index}` is taken; take another for the index")));
+        }
+        self.expect(',')?;
+        let first = self.whole()?;
+        self.expect(',')?;
+        let last = self.whole()?;
+        self.expect(',')?;
+        if last < first {
+            self.skip_argument();
+            return Ok(self.graph.number(0.0));
+        }
+        let (begin, mut sum) = (self.at, None);
+        for i in first..=last {
+            self.at = begin;
+            let number = self.graph.number(i as f64);
+            self.locals.push((index, number));
+            let term = self.expression(0);
+            self.locals.pop();
+            let term = term?;
+            sum = Some(match sum {
+                None => term,
+                Some(sum) => self.graph.add(sum, term),
+            });
+        }
+        Ok(sum.unwrap_or_else(|| self.graph.number(0.0)))
+    }
+
+    /// Goes on to the bracket that closes the present one: an empty sum has no term that could be read.
+    fn skip_argument(&mut self) {
+        let mut open = 0_usize;
+        while let Some(word) = self.words.get(self.at) {
+            match word.token {
+                Token::Sign('(' | '[') => open += 1,
+                Token::Sign(')' | ']') if open == 0 => return,
+                Token::Sign(')' | ']') => open -= 1,
+                _ => {}
+            }
+            self.at += 1;
+        }
+    }
+}

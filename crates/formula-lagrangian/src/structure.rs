@@ -1,0 +1,121 @@
+//! What a graph proves of a Lagrangian.
+
+use crate::graph::Inputs;
+use crate::{Graph, Id, Node, Operation};
+use contact_geom::Structure;
+
+/// The derivatives of L that proofs look at, each in the order of coordinates.
+pub(crate) struct Partials<'a> {
+    pub value: Id,
+    pub q: &'a [Id],
+    pub v: &'a [Id],
+    pub z: Id,
+    /// Second derivatives by any two of q and v.
+    pub second: &'a [Id],
+    /// Second derivatives by two velocities.
+    pub mass: &'a [Id],
+}
+
+/// The claims that hold for all values of the parameters, and those that the present value of `L_z` gives.
+///
+/// Each is read off what derivatives depend on, as they are written: what is not seen is not claimed. A derivative hides a jump, so
+/// nothing is claimed of coordinates on which one depends.
+pub(crate) fn proved(graph: &mut Graph, l: &Partials<'_>, constants: &[f64]) -> Structure {
+    use Inputs as In;
+    let on = |ids: &[Id]| ids.iter().fold(In::NONE, |all, id| all.and(graph.inputs(*id)));
+    let (rate, rate_inputs) = (l.z, graph.inputs(l.z));
+    let (time, state) = (In::TIME, In::POSITION.and(In::VELOCITY).and(In::ACTION));
+    let inputs = graph.inputs(l.value);
+    let kinks = kinks(graph, l.value);
+    let smooth_in = |coordinates: Inputs| !kinks.meets(coordinates);
+
+    let no_action = inputs.within(time.and(In::POSITION).and(In::VELOCITY));
+    let no_rate = smooth_in(In::ACTION) && rate_inputs == In::NONE && value(graph, rate, constants) == Some(0.0);
+    let z_affine = no_action || smooth_in(In::ACTION) && rate_inputs.within(time);
+    let constant_rate = no_action || z_affine && rate_inputs == In::NONE;
+    let constant_mass = smooth_in(In::VELOCITY) && on(l.mass) == In::NONE;
+    let quadratic = z_affine && smooth_in(state) && on(l.second).within(time);
+    let split = on(l.q).within(time.and(In::POSITION))
+        && on(l.v).within(In::VELOCITY)
+        && rate_inputs.within(time.and(In::ACTION))
+        && kinks.within(time.and(In::POSITION));
+    let separable = constant_mass && split && {
+        let at_rest = l.v.iter().map(|p| graph.at_rest(*p)).collect::<Vec<_>>();
+        at_rest.into_iter().all(|p| graph.as_number(p) == Some(0.0))
+    };
+    Structure {
+        autonomous: inputs.within(state),
+        z_free: no_action || no_rate,
+        z_affine,
+        constant_rate,
+        separable,
+        quadratic,
+        constant_mass,
+        proved: true,
+    }
+}
+
+/// The value of a constant node.
+fn value(graph: &Graph, id: Id, constants: &[f64]) -> Option<f64> {
+    graph.as_number(id).or_else(|| constants.get(id.index()).copied())
+}
+
+/// The inputs of all kinks and jumps of a node.
+pub(crate) fn kinks(graph: &Graph, of: Id) -> Inputs {
+    let needed = graph.needed(of);
+    let all = (0..=of.index()).filter(|i| needed[*i]).map(|i| Id(i as u32));
+    all.fold(Inputs::NONE, |kinks, id| match graph.node(id) {
+        Node::Unary(f, a) if !f.is_smooth() => kinks.and(graph.inputs(a)),
+        Node::Binary(Operation::Min | Operation::Max, a, b) => kinks.and(graph.inputs(a)).and(graph.inputs(b)),
+        // It jumps on half an axis, and has no derivative at the origin.
+        Node::Binary(Operation::Atan2 | Operation::Hypot, a, b) => kinks.and(graph.inputs(a)).and(graph.inputs(b)),
+        Node::Select([a, b, ..]) => kinks.and(graph.inputs(a)).and(graph.inputs(b)),
+        _ => kinks,
+    })
+}
+
+impl Graph {
+    /// Which nodes up to `of` it is made of.
+    pub(crate) fn needed(&self, of: Id) -> Vec<bool> {
+        let mut needed = vec![false; of.index() + 1];
+        if let Some(last) = needed.last_mut() {
+            *last = true;
+        }
+        for i in (0..=of.index()).rev() {
+            if needed[i] {
+                self.node(Id(i as u32)).operands().for_each(|a| needed[a.index()] = true);
+            }
+        }
+        needed
+    }
+
+    /// The node with all velocities 0, simplified.
+    pub(crate) fn at_rest(&mut self, of: Id) -> Id {
+        let needed = self.needed(of);
+        let mut images: Vec<Id> = Vec::with_capacity(needed.len());
+        for (i, needed) in needed.into_iter().enumerate() {
+            let id = Id(i as u32);
+            let image = |a: Id| images.get(a.index()).copied().unwrap_or(a);
+            let at_rest = match self.node(id) {
+                _ if !needed => id,
+                Node::Velocity(_) => self.number(0.0),
+                Node::Unary(f, a) => {
+                    let a = image(a);
+                    self.unary(f, a)
+                }
+                Node::Binary(o, a, b) => {
+                    let (a, b) = (image(a), image(b));
+                    self.binary(o, a, b)
+                }
+                Node::Powi(a, n) => {
+                    let a = image(a);
+                    self.powi(a, n)
+                }
+                Node::Select(all) => self.select(all.map(image)),
+                _ => id,
+            };
+            images.push(at_rest);
+        }
+        images.last().copied().unwrap_or(of)
+    }
+}

@@ -1,0 +1,266 @@
+//! Formulas that a program builds, with the operators of numbers.
+
+use crate::names::Names;
+use crate::{Formula, FormulaError, Function, Graph, Id, Operation};
+use std::cell::RefCell;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::rc::Rc;
+
+/// A graph under construction.
+#[derive(Debug, Default)]
+struct Shared {
+    graph: Graph,
+    /// Whether an operation had a symbol of another graph.
+    mixed: bool,
+}
+
+/// The coordinates, velocities and parameters of a formula that a program builds.
+///
+/// ```
+/// use formula_lagrangian::Symbols;
+/// // A chain of five masses between springs.
+/// let symbols = Symbols::new(&["q[5]"], &[("k", 2.0), ("gamma", -0.1)])?;
+/// let (k, gamma) = (symbols.parameter("k")?, symbols.parameter("gamma")?);
+/// let mut l = gamma * symbols.action();
+/// for i in 0..5 {
+///     let v = symbols.velocity(i);
+///     l = l + 0.5 * (&v * &v);
+/// }
+/// for i in 1..5 {
+///     l = l - &k * (1.0 - (symbols.position(i) - symbols.position(i - 1)).cos());
+/// }
+/// assert!(symbols.formula(&l)?.lagrangian::<5>()?.proved().separable);
+/// # Ok::<(), formula_lagrangian::FormulaError>(())
+/// ```
+#[derive(Debug)]
+pub struct Symbols {
+    shared: Rc<RefCell<Shared>>,
+    names: Names,
+    values: Vec<f64>,
+}
+
+impl Symbols {
+    /// The symbols of a formula over coordinates and parameters, which are given as to [`Formula::parse`].
+    ///
+    /// # Errors
+    /// [`FormulaError::Name`], [`FormulaError::Dimension`], [`FormulaError::ParameterValue`].
+    pub fn new(coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
+        let values = parameters.iter().map(|(_, value)| *value).collect();
+        Ok(Symbols { shared: Rc::default(), names: Names::new(coordinates, parameters)?, values })
+    }
+
+    fn symbol(&self, node: impl FnOnce(&mut Graph) -> Id) -> Symbol {
+        let id = node(&mut self.shared.borrow_mut().graph);
+        Symbol { shared: self.shared.clone(), id }
+    }
+
+    /// The coordinate of an index. One that is not there is an error of [`formula`](Self::formula).
+    pub fn position(&self, index: u32) -> Symbol {
+        self.symbol(|graph| graph.position(index))
+    }
+
+    /// The velocity of a coordinate.
+    pub fn velocity(&self, index: u32) -> Symbol {
+        self.symbol(|graph| graph.velocity(index))
+    }
+
+    /// The action z.
+    pub fn action(&self) -> Symbol {
+        self.symbol(Graph::action)
+    }
+
+    /// The time t.
+    pub fn time(&self) -> Symbol {
+        self.symbol(Graph::time)
+    }
+
+    /// A number.
+    pub fn number(&self, x: f64) -> Symbol {
+        self.symbol(|graph| graph.number(x))
+    }
+
+    /// A parameter by its name.
+    ///
+    /// # Errors
+    /// [`FormulaError::UnknownParameter`].
+    pub fn parameter(&self, name: &str) -> Result<Symbol, FormulaError> {
+        let index = crate::formula::index(&self.names, name, 0.0)?;
+        Ok(self.symbol(|graph| graph.parameter(index as u32)))
+    }
+
+    /// The formula whose Lagrangian is a symbol.
+    ///
+    /// # Errors
+    /// [`FormulaError::Mixed`] where the symbol, or one that it was made of, is of other [`Symbols`]; [`FormulaError::TooLarge`];
+    /// [`FormulaError::Unknown`] where a coordinate is not there.
+    pub fn formula(&self, lagrangian: &Symbol) -> Result<Formula, FormulaError> {
+        let shared = self.shared.borrow();
+        if shared.mixed || !Rc::ptr_eq(&self.shared, &lagrangian.shared) {
+            return Err(FormulaError::Mixed);
+        }
+        Formula::named(shared.graph.clone(), lagrangian.id, self.names.clone(), self.values.clone())
+    }
+}
+
+/// An expression of [`Symbols`], on which operators and functions work as on a number; cloning is cheap.
+#[derive(Clone, Debug)]
+pub struct Symbol {
+    shared: Rc<RefCell<Shared>>,
+    id: Id,
+}
+
+/// What can stand beside a symbol: another one, or a number.
+pub trait Operand {
+    /// The node of the operand in the graph of a symbol.
+    #[doc(hidden)]
+    fn node(&self, beside: &Symbol) -> Id;
+}
+
+impl Operand for Symbol {
+    fn node(&self, beside: &Symbol) -> Id {
+        if !Rc::ptr_eq(&self.shared, &beside.shared) {
+            // Said where the formula is made: operators cannot fail.
+            self.shared.borrow_mut().mixed = true;
+            beside.shared.borrow_mut().mixed = true;
+            return beside.id;
+        }
+        self.id
+    }
+}
+
+impl Operand for &Symbol {
+    fn node(&self, beside: &Symbol) -> Id {
+        (**self).node(beside)
+    }
+}
+
+impl Operand for f64 {
+    fn node(&self, beside: &Symbol) -> Id {
+        beside.shared.borrow_mut().graph.number(*self)
+    }
+}
+
+impl Symbol {
+    fn with(&self, node: impl FnOnce(&mut Graph) -> Id) -> Symbol {
+        let id = node(&mut self.shared.borrow_mut().graph);
+        Symbol { shared: self.shared.clone(), id }
+    }
+
+    fn operate(&self, operation: Operation, other: &impl Operand) -> Symbol {
+        let other = other.node(self);
+        self.with(|graph| graph.binary(operation, self.id, other))
+    }
+
+    fn operate_from(&self, operation: Operation, first: f64) -> Symbol {
+        self.with(|graph| {
+            let first = graph.number(first);
+            graph.binary(operation, first, self.id)
+        })
+    }
+
+    /// A function of it.
+    pub fn apply(&self, function: Function) -> Symbol {
+        self.with(|graph| graph.unary(function, self.id))
+    }
+
+    /// An integer power.
+    pub fn powi(&self, n: i32) -> Symbol {
+        self.with(|graph| graph.powi(self.id, n))
+    }
+
+    /// A power; `e^(b ln a)` where the exponent b depends on the state.
+    pub fn pow(&self, exponent: impl Operand) -> Symbol {
+        self.operate(Operation::Power, &exponent)
+    }
+
+    /// The smaller of two.
+    pub fn min(&self, other: impl Operand) -> Symbol {
+        self.operate(Operation::Min, &other)
+    }
+
+    /// The larger of two.
+    pub fn max(&self, other: impl Operand) -> Symbol {
+        self.operate(Operation::Max, &other)
+    }
+
+    /// The angle of the point `(x, self)`.
+    pub fn atan2(&self, x: impl Operand) -> Symbol {
+        self.operate(Operation::Atan2, &x)
+    }
+
+    /// `sqrt(self^2 + other^2)` without overflow.
+    pub fn hypot(&self, other: impl Operand) -> Symbol {
+        self.operate(Operation::Hypot, &other)
+    }
+
+    /// `then` where it is less than another, else `otherwise`.
+    pub fn if_less(&self, than: impl Operand, then: impl Operand, otherwise: impl Operand) -> Symbol {
+        let [than, then, otherwise] = [than.node(self), then.node(self), otherwise.node(self)];
+        self.with(|graph| graph.select([self.id, than, then, otherwise]))
+    }
+}
+
+/// The functions of one number as methods.
+macro_rules! functions {
+    ($($name:ident $function:ident)*) => {
+        impl Symbol {
+            $(
+                #[doc = concat!("[`Function::", stringify!($function), "`] of it.")]
+                pub fn $name(&self) -> Symbol {
+                    self.apply(Function::$function)
+                }
+            )*
+        }
+    };
+}
+functions! {
+    recip Recip sqrt Sqrt abs Abs signum Sign sin Sin cos Cos tan Tan versine Versine atan Atan sinh Sinh cosh Cosh tanh Tanh
+    asinh Asinh acosh Acosh atanh Atanh exp Exp exp_m1 ExpM1 ln Ln ln_1p Ln1p
+}
+
+/// The operators between symbols and numbers, owned or not.
+macro_rules! operators {
+    ($($trait:ident $method:ident;)*) => {
+        $(
+            impl<O: Operand> $trait<O> for Symbol {
+                type Output = Symbol;
+                fn $method(self, other: O) -> Symbol {
+                    self.operate(Operation::$trait, &other)
+                }
+            }
+            impl<O: Operand> $trait<O> for &Symbol {
+                type Output = Symbol;
+                fn $method(self, other: O) -> Symbol {
+                    self.operate(Operation::$trait, &other)
+                }
+            }
+            impl $trait<Symbol> for f64 {
+                type Output = Symbol;
+                fn $method(self, other: Symbol) -> Symbol {
+                    other.operate_from(Operation::$trait, self)
+                }
+            }
+            impl $trait<&Symbol> for f64 {
+                type Output = Symbol;
+                fn $method(self, other: &Symbol) -> Symbol {
+                    other.operate_from(Operation::$trait, self)
+                }
+            }
+        )*
+    };
+}
+operators! { Add add; Sub sub; Mul mul; Div div; }
+
+impl Neg for Symbol {
+    type Output = Symbol;
+    fn neg(self) -> Symbol {
+        self.apply(Function::Neg)
+    }
+}
+
+impl Neg for &Symbol {
+    type Output = Symbol;
+    fn neg(self) -> Symbol {
+        self.apply(Function::Neg)
+    }
+}

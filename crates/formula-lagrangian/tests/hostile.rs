@@ -1,0 +1,147 @@
+//! Random texts and random changes of good ones: an answer or an error, and nothing else.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
+
+use formula_lagrangian::Formula;
+
+/// Numbers without pattern (G. Marsaglia, "Xorshift RNGs", 2003).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as usize % n
+    }
+}
+
+const WORDS: [&str; 48] = [
+    "x",
+    "y",
+    "x'",
+    "y'",
+    "z",
+    "t",
+    "a",
+    "gamma",
+    "pi",
+    "n",
+    "q[",
+    "v[",
+    "]",
+    "(",
+    ")",
+    "+",
+    "-",
+    "*",
+    "/",
+    "^",
+    "**",
+    ",",
+    "=",
+    "<",
+    ">",
+    "'",
+    ";",
+    "\n",
+    "#",
+    "0",
+    "1",
+    "2",
+    "0.5",
+    "1e308",
+    "1e-308",
+    "3.5",
+    "sum(i,0,3,",
+    "sum(",
+    "i",
+    "sin(",
+    "sqrt(",
+    "ln(",
+    "atan2(",
+    "if(",
+    "min(",
+    "\u{3b8}",
+    "\u{1f600}",
+    ".",
+];
+
+const GOOD: [&str; 6] = [
+    "(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2) + gamma*z",
+    "r = hypot(x, y)\nr'2 = 3; x'^2",
+    "sum(i, 0, n-1, v[i]^2)/2 - sum(i, 1, n-1, (q[i] - q[i-1])^4)",
+    "x'^2*(2 + sin(y)) - if(x < y, x^2, a^y) + max(x, y, 3)",
+    "exp(-x^2)*tanh(y') + atan2(x, y)^3 - asin(0.1*x)",
+    "# comment\nu = x^-1.5 ; w = u**2 \n L = w*x'^2 - log1p(abs(y)) + y'^2*cosh(t)",
+];
+
+/// Reads a text and does with what it gives all that can be done.
+fn attack(text: &str) -> bool {
+    match Formula::parse(text, &["x", "y"], &[("a", 1.5), ("gamma", -0.1)]) {
+        Ok(formula) => {
+            let lagrangian = formula.lagrangian::<2>().unwrap();
+            assert!(lagrangian.proved().proved);
+            lagrangian.to_rust("System").unwrap();
+            let _ = formula.expression(text).unwrap().at(0.3, &[0.5, -0.25], &[1.0, 2.0], 0.1);
+            true
+        }
+        Err(error) => {
+            assert!(error.to_string().len() < 1000, "{error}");
+            false
+        }
+    }
+}
+
+#[test]
+fn random_words() {
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut good = 0;
+    for _ in 0..50_000 {
+        let length = 1 + random.below(12);
+        let text: String = (0..length).map(|_| WORDS[random.below(WORDS.len())]).collect();
+        good += usize::from(attack(&text));
+    }
+    // Not all are refused at the first word.
+    assert!(good > 500, "{good}");
+}
+
+#[test]
+fn changes_of_good_texts() {
+    let mut random = Random(0xd1b5_4a32_d192_ed03);
+    let mut good = 0;
+    for k in 0..50_000 {
+        let mut text: Vec<char> = GOOD[k % GOOD.len()].chars().collect();
+        for _ in 0..1 + random.below(3) {
+            let (at, from) = (random.below(text.len()), random.below(text.len()));
+            match random.below(5) {
+                0 => drop(text.remove(at)),
+                1 => text.insert(at, text[from]),
+                2 => text.swap(at, from),
+                3 => text[at] = char::from_u32(random.below(0x300) as u32).unwrap_or('\u{fffd}'),
+                _ => {
+                    let word = WORDS[random.below(WORDS.len())];
+                    text.splice(at..at, word.chars());
+                }
+            }
+        }
+        good += usize::from(attack(&text.into_iter().collect::<String>()));
+    }
+    assert!(good > 2_000, "{good}");
+}
+
+/// Bytes of any kind, most of them no text.
+#[test]
+fn random_bytes() {
+    let mut random = Random(0x1234_5678_9abc_def1);
+    let mut good = 0;
+    for _ in 0..50_000 {
+        let length = random.below(24);
+        // Half of them printable, so that some are read beyond the first.
+        let byte = |random: &mut Random| if random.below(2) == 0 { random.below(256) } else { 32 + random.below(95) };
+        let bytes: Vec<u8> = (0..length).map(|_| byte(&mut random) as u8).collect();
+        good += usize::from(attack(&String::from_utf8_lossy(&bytes)));
+    }
+    // Single digits and names at least.
+    assert!(good > 10, "{good}");
+}

@@ -1,0 +1,220 @@
+//! What texts mean, and what is said of those that mean nothing.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
+
+use formula_lagrangian::{Formula, FormulaError, ParseError};
+
+/// The value of a text over x, y with parameter a = 3, at x = 2, y = -1, x' = 0.5, y' = 4, z = 7, t = 0.25.
+fn value(text: &str) -> f64 {
+    let formula = Formula::parse("x'^2 + y'^2", &["x", "y"], &[("a", 3.0)]).unwrap();
+    let expression = formula.expression(text).unwrap_or_else(|e| panic!("{text}: {e}"));
+    expression.at(0.25, &[2.0, -1.0], &[0.5, 4.0], 7.0)
+}
+
+fn error(text: &str) -> ParseError {
+    match Formula::parse(text, &["x", "y"], &[("a", 3.0), ("gamma", -0.1)]) {
+        Err(FormulaError::Parse(error)) => error,
+        other => panic!("{text}: {other:?}"),
+    }
+}
+
+#[test]
+fn values_are_those_of_the_same_operations() {
+    let (x, y, a): (f64, f64, f64) = (2.0, -1.0, 3.0);
+    let table: &[(&str, f64)] = &[
+        ("-x^2", -4.0),
+        ("2^3^2", 512.0),
+        ("2**3", 8.0),
+        ("2^-1", 0.5),
+        ("-2^-x^2", -0.0625),
+        ("1 - 2 - 3", -4.0),
+        ("12/3/2", 2.0),
+        ("2*x' + y'", 5.0),
+        ("z - t", 6.75),
+        ("- - x", 2.0),
+        ("+x", 2.0),
+        ("a*x + y", 5.0),
+        ("0.1 + 0.2", 0.1 + 0.2),
+        ("1e-3*x", 2e-3),
+        (".5*x", 1.0),
+        ("5.*x", 10.0),
+        // A number to its last digit.
+        ("0.1000000000000000055511151231257827021181583404541015625", 0.1),
+        ("2.2250738585072011e-308", 2.225_073_858_507_201e-308),
+        ("x*3.141592653589793238462643383279502884", x * std::f64::consts::PI),
+        ("sqrt(x)", x.sqrt()),
+        ("abs(y) + sign(y) + sign(x - 2)", 0.0),
+        ("sin(x) + cos(y)", x.sin() + y.cos()),
+        ("tan(x)", x.tan()),
+        ("atan(x)", x.atan()),
+        ("sinh(x)", x.sinh()),
+        ("asinh(x) + asinh(-1e300*x)", x.asinh() - (1e300 * x).asinh()),
+        ("acosh(1 + x^2)", (1.0 + x * x).acosh()),
+        ("atanh(x/10) - atanh(-x/20)", (x / 10.0).atanh() + (x / 20.0).atanh()),
+        ("cosh(y)", y.cosh()),
+        ("tanh(y)", y.tanh()),
+        ("exp(x)", x.exp()),
+        ("expm1(y)", y.exp_m1()),
+        ("ln(x)", x.ln()),
+        ("log(x)", x.ln()),
+        ("log1p(x)", x.ln_1p()),
+        ("versine(x)", 2.0 * (0.5 * x).sin().powi(2)),
+        ("min(x, y, a)", -1.0),
+        ("max(x, y, a)", 3.0),
+        ("x^a", 8.0),
+        ("y^a", -1.0),
+        ("x^0.3", x.powf(0.3)),
+        ("pow(x, 3)", 8.0),
+        ("a^x", (x * a.ln()).exp()),
+        ("if(x < y, 1, 2)", 2.0),
+        ("if(x > y, 1, 2)", 1.0),
+        ("sum(i, 0, 3, i^2)", 14.0),
+        ("sum(i, 0, n-1, q[i])", 1.0),
+        ("sum(i, 1, n-1, (q[i] - q[i-1])^2)", 9.0),
+        ("sum(i, 1, 0, q[i+5])*x", 0.0),
+        ("sum(i, 0, 1, sum(j, 0, i, v[j]))", 5.0),
+        ("r2 = x^2 + y^2; r2/x", 2.5),
+        ("u = x + 1\nw = u*u # the square\n\nw -\n  1", 8.0),
+        ("L = x", 2.0),
+        ("(x\n+\ny)", 1.0),
+        ("pi*x", std::f64::consts::TAU),
+    ];
+    for (text, expected) in table {
+        assert_eq!(value(text), *expected, "{text}");
+    }
+    // Composed of others: some roundings.
+    let composed = [
+        ("atan2(y, x)", y.atan2(x)),
+        ("atan2(x, y)", x.atan2(y)),
+        ("atan2(-x, y)", (-x).atan2(y)),
+        ("atan2(y, -x)", y.atan2(-x)),
+        ("hypot(x, y)", x.hypot(y)),
+        ("hypot(1e200*x, 1e200)", 1e200 * 5f64.sqrt()),
+        ("asin(x/4)", 0.5f64.asin()),
+        ("acos(y/3)", (-1.0 / 3.0f64).acos()),
+        ("acos(x/4)", 0.5f64.acos()),
+        ("x^2.5", x.powf(2.5)),
+        ("x^-1.5", x.powf(-1.5)),
+    ];
+    for (text, expected) in composed {
+        let found = value(text);
+        assert!((found - expected).abs() <= 4.0 * f64::EPSILON * expected.abs(), "{text}: {found:e}, not {expected:e}");
+    }
+    assert_eq!(value("hypot(x - 2, y + 1)"), 0.0);
+}
+
+#[test]
+fn arrays_of_coordinates() {
+    let chain = "sum(i, 0, n-1, u'[i]^2)/2 - sum(i, 1, n-1, (u[i] - u[i-1])^2)/2 + z";
+    let formula = Formula::parse(chain, &["u[3]"], &[]).unwrap();
+    assert_eq!(formula.coordinates(), ["u[0]", "u[1]", "u[2]"]);
+    let l = formula.expression(chain).unwrap();
+    assert_eq!(l.at(0.0, &[1.0, 2.0, 4.0], &[1.0, 2.0, 3.0], 0.5), 7.0 - 2.5 + 0.5);
+    let primes = formula.expression("u[1]' + u'[2] + v[0]").unwrap();
+    assert_eq!(primes.at(0.0, &[0.0; 3], &[1.0, 2.0, 4.0], 0.0), 7.0);
+}
+
+#[test]
+fn errors_show_the_place_and_the_remedy() {
+    let table = [
+        ("x'^2 + gama*z", 1, 8, "unknown name `gama`"),
+        ("x'^2 +\n  sine(x)", 2, 3, "unknown function `sine`"),
+        ("2 x", 1, 3, "a product is written with `*`"),
+        ("2(x)", 1, 2, "a product is written with `*`"),
+        ("x(y)", 1, 2, "`(` where an operator is expected"),
+        ("0,5*x", 1, 2, "numbers have a point, not a comma"),
+        ("x +", 1, 4, "the end where a value is expected"),
+        ("(x + y", 1, 7, "the end where `)` is expected"),
+        ("x)", 1, 2, "`)` where an operator is expected"),
+        ("", 1, 1, "the end where a value is expected"),
+        ("x''", 1, 1, "a second derivative"),
+        ("x[0]", 1, 2, "`x` is one number"),
+        ("q[2]", 1, 3, "entry 2 of `q`, which has the entries 0 to 1"),
+        ("q[-1]", 1, 3, "entry -1 of `q`"),
+        ("q[0.5]", 1, 3, "0.5 where an integer is expected"),
+        ("q[a]", 1, 3, "does not depend on parameters"),
+        ("v", 1, 1, "unknown name `v`"),
+        ("sin", 1, 1, "`sin` is a function"),
+        ("sin(x, y)", 1, 1, "`sin` has one argument, not 2"),
+        ("atan2(x)", 1, 1, "`atan2` has two arguments, not 1"),
+        ("1/0 + x", 1, 2, "this is inf"),
+        ("ln(0)", 1, 1, "this is -inf"),
+        ("1e999", 1, 1, "too large"),
+        ("1.2.3", 1, 4, "the number 0.3 where an operator is expected"),
+        ("x $ y", 1, 3, "'$' has no meaning"),
+        ("r = x", 1, 6, "after the definition of `r` a value is expected"),
+        ("x = 3; y", 1, 1, "the name `x` is taken"),
+        ("r = 1; r = 2; r", 1, 8, "the name `r` is taken"),
+        ("x\ny", 2, 1, "only one value is possible"),
+        ("sum(x, 0, 1, x)", 1, 5, "the name `x` is taken"),
+        ("sum(2, 0, 1, x)", 1, 5, "the name of an index"),
+        ("sum(i, 0, 1e8, i)", 1, 16, "more than 20000 parts"),
+        ("if(x, y, 1)", 1, 5, "`<` or `>` is expected"),
+    ];
+    for (text, line, column, message) in table {
+        let found = error(text);
+        assert!(found.to_string().contains(message), "{text}: {found}");
+        assert_eq!((found.line, found.column), (line, column), "{text}: {found}");
+    }
+    assert_eq!(error("x'^2 + gama*z").nearest.as_deref(), Some("gamma"));
+    assert_eq!(error("sine(x)").nearest.as_deref(), Some("sin"));
+    assert_eq!(error("X'^2").nearest.as_deref(), Some("x"));
+    assert_eq!(error("unheard_of").nearest, None);
+    let shown = "line 1, column 8: unknown name `gama`; did you mean `gamma`?\n  x'^2 + gama*z\n         ^^^^";
+    assert_eq!(error("x'^2 + gama*z").to_string(), shown);
+    assert_eq!(
+        error("x'^2 + gama*z").moved_to(7, 13).to_string(),
+        shown.replace("line 1, column 8", "line 7, column 20")
+    );
+}
+
+#[test]
+fn names_and_values_that_are_none() {
+    let parse = |coordinates: &[&str], parameters: &[(&str, f64)]| {
+        Formula::parse("1", coordinates, parameters).map(|f| f.dimension())
+    };
+    assert_eq!(parse(&["x"; 1], &[]), Ok(1));
+    assert_eq!(parse(&["q[8]"], &[]), Ok(8));
+    for bad in ["", "2x", "x'", "a b", "sin", "t", "z", "q[0]", "q[x]", "q[", "x]"] {
+        assert!(matches!(parse(&[bad], &[]), Err(FormulaError::Name { .. })), "{bad}");
+    }
+    assert!(matches!(parse(&["x", "x"], &[]), Err(FormulaError::Name { .. })));
+    assert!(matches!(parse(&["x"], &[("x", 1.0)]), Err(FormulaError::Name { .. })));
+    assert!(matches!(parse(&["x"], &[("a", f64::NAN)]), Err(FormulaError::ParameterValue { .. })));
+    assert_eq!(parse(&[], &[]), Err(FormulaError::Dimension { found: 0 }));
+    assert_eq!(parse(&["q[9]"], &[]), Err(FormulaError::Dimension { found: 9 }));
+    assert!(matches!(parse(&["q[99999999999999999999]"], &[]), Err(FormulaError::Name { .. })));
+    let formula = Formula::parse("x'^2", &["x"], &[("a", 1.0)]).unwrap();
+    assert_eq!(formula.lagrangian::<2>().unwrap_err(), FormulaError::OtherDimension { found: 1, asked: 2 });
+    let mut lagrangian = formula.lagrangian::<1>().unwrap();
+    assert!(matches!(lagrangian.set("b", 1.0), Err(FormulaError::UnknownParameter { .. })));
+    assert!(matches!(lagrangian.set("a", f64::INFINITY), Err(FormulaError::ParameterValue { .. })));
+}
+
+/// Long, deep and wide texts end with an error, soon, and on a stack of ordinary size.
+#[test]
+fn texts_without_measure() {
+    let deep = [
+        format!("{}x{}", "(".repeat(5000), ")".repeat(5000)),
+        format!("{}x", "-".repeat(5000)),
+        format!("{}x", "x^".repeat(5000)),
+        format!("{}x{}", "sin(".repeat(5000), ")".repeat(5000)),
+    ];
+    for text in deep {
+        assert!(error(&text).message.contains("nested more than"), "{}", error(&text));
+    }
+    assert!(error(&"x+".repeat(40_000)).message.contains("bytes"));
+    // A long sum is one level deep.
+    let long = format!("x'^2 + y'^2 {}", "+ x*y'".repeat(5000));
+    Formula::parse(&long, &["x", "y"], &[]).unwrap().lagrangian::<2>().unwrap();
+    let nested = "sum(i, 1, 1000, sum(j, 1, 1000, sum(k, 1, 1000, x*i*j*k)))";
+    assert!(error(nested).message.contains("more than 20000 parts"));
+    // So many words, and no more nodes than a few.
+    assert!(error("sum(i, 1, 100000000, sum(j, 1, 100000000, 0))").message.contains("more than 20000 parts"));
+    // Exponentially many paths in a small graph.
+    let doubled: String = (0..300).map(|i| format!("a{} = sin(a{i}) * (a{i} + 1)\n", i + 1)).collect();
+    Formula::parse(&format!("a0 = x\n{doubled}x'^2 + y'^2 + a300"), &["x", "y"], &[])
+        .unwrap()
+        .lagrangian::<2>()
+        .unwrap();
+}

@@ -1,0 +1,57 @@
+//! A formula and its derivatives are evaluated without an allocation. A counting allocator is global to its binary, so this test stands
+//! alone.
+
+#![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
+
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Derivatives, Dual, Lagrangian, VelocityPoint};
+use formula_lagrangian::{Formula, FormulaLagrangian};
+use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
+use std::cell::Cell;
+
+thread_local! {
+    /// The allocations of this thread: the test runner's own threads do not count.
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+#[allow(unsafe_code)] // An allocator cannot be written without.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let _ = COUNT.try_with(|c| c.set(c.get() + 1));
+        unsafe { SystemAllocator.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { SystemAllocator.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(action: impl FnOnce()) -> usize {
+    let before = COUNT.with(Cell::get);
+    action();
+    COUNT.with(Cell::get) - before
+}
+
+#[test]
+fn nothing_is_allocated() {
+    // The counter counts.
+    assert_eq!(allocations(|| drop(Box::new(1.0))), 1);
+    // Eight coordinates, each coupled to its neighbours, in a curved kinetic energy: two hundred second derivatives.
+    let text =
+        "sum(i, 0, n-1, v[i]^2*(2 + sin(q[i])))/2 - sum(i, 1, n-1, cos(q[i] - q[i-1])*v[i]*v[i-1]) - exp(-a*t)*z";
+    let l: FormulaLagrangian<8> = Formula::parse(text, &["q[8]"], &[("a", 0.1)]).unwrap().lagrangian().unwrap();
+    let x = VelocityPoint::new([0.3; 8], [0.7; 8], 0.1);
+    let moving = |x: f64| Dual { re: x, d: SVector::<f64, 2>::new(1.0, 2.0) };
+    let y = VelocityPoint { q: x.q.map(moving), v: x.v.map(moving), z: moving(x.z) };
+    let mut sum = 0.0;
+    let count = allocations(|| {
+        sum += l.value(0.5, &x.q, &x.v, x.z) + l.with_gradient(0.5, &x).1.z + l.gradient(moving(0.5), &y).x[0].d[1];
+        sum += l.force(0.5, &x)[7] + l.mass_matrix(0.5, &x)[(6, 7)] + l.hessian(0.5, &x).vv[(1, 1)];
+    });
+    assert!(sum.is_finite());
+    assert_eq!(count, 0);
+}

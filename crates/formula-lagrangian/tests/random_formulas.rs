@@ -1,0 +1,151 @@
+//! Random formulas: derivatives against duals, claims against probes.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
+
+use contact_geom::VelocityPoint;
+use formula_lagrangian::{Formula, FormulaLagrangian};
+
+/// Numbers without pattern (G. Marsaglia, "Xorshift RNGs", 2003).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as usize % n
+    }
+    fn number(&mut self) -> f64 {
+        0.2 + self.below(1 << 20) as f64 / (1 << 20) as f64
+    }
+    fn pick(&mut self, words: &[&str]) -> String {
+        words[self.below(words.len())].to_owned()
+    }
+
+    /// An expression of so many levels over given leaves; with kinks or without.
+    fn expression(&mut self, depth: usize, leaves: &[&str], kinks: bool) -> String {
+        if depth == 0 || self.below(6) == 0 {
+            return match self.below(5) {
+                0 => format!("{:.3}", self.number()),
+                _ => self.pick(leaves),
+            };
+        }
+        let a = self.expression(depth - 1, leaves, kinks);
+        match self.below(if kinks { 20 } else { 17 }) {
+            0..4 => format!("({a} + {})", self.expression(depth - 1, leaves, kinks)),
+            4..6 => format!("({a} - {})", self.expression(depth - 1, leaves, kinks)),
+            6..10 => format!("({a} * {})", self.expression(depth - 1, leaves, kinks)),
+            10 => format!("({a} / (2.5 + ({})^2))", self.expression(depth - 1, leaves, kinks)),
+            11..13 => format!("({a})^{}", 2 + self.below(4)),
+            13 => format!("sqrt(1 + ({a})^2)"),
+            14 => format!("(1.5 + ({a})^2)^{}", self.pick(&["-1", "-0.5", "-1.5", "0.3", "a", "-2"])),
+            15..17 => {
+                let form = self.pick(&[
+                    "sin(_)",
+                    "cos(_)",
+                    "tanh(_)",
+                    "atan(_)",
+                    "versine(_)",
+                    "-_",
+                    "exp(-1 - _^2)",
+                    "log1p(2 + _^2)",
+                    "asinh(_)",
+                    "acosh(2 + _^2)",
+                    "atanh(_/(2 + _^2))",
+                ]);
+                form.replace('_', &format!("({a})"))
+            }
+            17 => format!("{}({a})", self.pick(&["abs", "sign"])),
+            18 => format!(
+                "{}({a}, {})",
+                self.pick(&["min", "max", "hypot", "atan2"]),
+                self.expression(depth - 1, leaves, kinks)
+            ),
+            _ => {
+                let [b, c, d] = [0; 3].map(|_| self.expression(depth - 1, leaves, kinks));
+                format!("if({a} < {b}, {c}, {d})")
+            }
+        }
+    }
+
+    /// A Lagrangian that has some structure, as a rule.
+    fn lagrangian(&mut self, kinks: bool) -> String {
+        let part = |random: &mut Random| {
+            let leaves: &[&str] = match random.below(9) {
+                0 => &["x", "y", "a"],
+                1 => &["x'", "y'"],
+                2 => &["z", "a"],
+                3 => &["t"],
+                4 => &["x", "y'", "t"],
+                5 => &["x", "y", "x'", "y'", "z", "t", "a"],
+                6 => return format!("{:.2}*z", random.number()),
+                7 => {
+                    return random.pick(&[
+                        "x*y'",
+                        "x*y",
+                        "x'*y'/2",
+                        "a*x^2",
+                        "t*z",
+                        "x'",
+                        "z^2",
+                        "0*z",
+                        "t*x^2",
+                        "sign(t)*z",
+                    ]);
+                }
+                _ => &["x", "t"],
+            };
+            let depth = 1 + random.below(4);
+            random.expression(depth, leaves, kinks)
+        };
+        let start = self.pick(&["(x'^2 + y'^2)/2", "x'^2 + 0.3*y'^2 + 0.1*x'*y'", "(2 + sin(x))*x'^2 + y'^2", "0"]);
+        (0..1 + self.below(3)).fold(start, |sum, _| format!("{sum} + {}", part(self)))
+    }
+}
+
+fn lagrangian(text: &str) -> FormulaLagrangian<2> {
+    let formula = Formula::parse(text, &["x", "y"], &[("a", 1.25)]).unwrap_or_else(|e| panic!("{text}: {e}"));
+    formula.lagrangian().unwrap()
+}
+
+/// Each claim that is proved holds to round-off where the derivatives, found by automatic differentiation, are compared with it; and the
+/// closed derivatives are those, to four units of round-off of their terms (to which each function adds one, each operation half a unit).
+fn compare(seed: u64, count: usize, kinks: bool) -> [usize; 3] {
+    let mut random = Random(seed);
+    let (mut compared, mut claims) = (0, 0);
+    let mut worst = [0.0_f64; 2];
+    for _ in 0..count {
+        let text = random.lagrangian(kinks);
+        let l = lagrangian(&text);
+        let mut coordinate = || 2.0 * random.number() - 1.3;
+        let x = VelocityPoint::new([coordinate(), coordinate()], [coordinate(), coordinate()], coordinate());
+        let t = coordinate();
+        let Some(defects) = l.proved().defects(&l, t, &x) else { continue };
+        compared += 1;
+        for defect in defects {
+            let derivative = defect.claim.starts_with("closed");
+            claims += usize::from(!derivative);
+            if derivative {
+                let kind = usize::from(defect.claim == "closed_hessian");
+                worst[kind] = f64::max(worst[kind], defect.size);
+            }
+            let bound = if derivative { 4.0 * f64::EPSILON } else { 1e-13 };
+            assert!(defect.size <= bound, "{text}\n at t = {t}, {x:?}: {defect:?}\n {:?}", l.proved());
+        }
+    }
+    println!("largest defects of gradients and Hessians: {worst:?}");
+    [compared, claims, count]
+}
+
+#[test]
+fn smooth_formulas() {
+    let [compared, claims, count] = compare(0x2545_f491_4f6c_dd1d, 70_000, false);
+    // Most formulas are defined at most points, and have some structure.
+    assert!(compared > count * 9 / 10 && claims > count, "{compared} {claims} of {count}");
+}
+
+#[test]
+fn formulas_with_kinks() {
+    let [compared, claims, count] = compare(0x5851_f42d_4c95_7f2d, 30_000, true);
+    assert!(compared > count * 8 / 10 && claims > count / 2, "{compared} {claims} of {count}");
+}

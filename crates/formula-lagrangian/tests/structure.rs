@@ -1,0 +1,140 @@
+//! What is proved of formulas.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
+
+use contact_geom::{Lagrangian, OneParameterGroup, Structure, Symmetry, VelocityPoint};
+use discrete_herglotz::{Problem, Steps, Until};
+use formula_lagrangian::{Formula, FormulaLagrangian};
+
+fn lagrangian(text: &str) -> FormulaLagrangian<2> {
+    Formula::parse(text, &["x", "y"], &[("a", 0.5)]).unwrap().lagrangian().unwrap()
+}
+
+/// The claims in the order autonomous, z_free, z_affine, constant_rate, separable, quadratic, constant_mass, by their first letters.
+fn claims(text: &str) -> String {
+    let s = lagrangian(text).structure();
+    assert!(s.proved);
+    let all = [
+        (s.autonomous, 'a'),
+        (s.z_free, 'f'),
+        (s.z_affine, 'z'),
+        (s.constant_rate, 'r'),
+        (s.separable, 's'),
+        (s.quadratic, 'q'),
+        (s.constant_mass, 'm'),
+    ];
+    all.iter().filter(|(made, _)| *made).map(|(_, letter)| *letter).collect()
+}
+
+#[test]
+fn claims_are_those_that_hold() {
+    let table = [
+        ("(x'^2 + y'^2)/2 + cos(x) - a*z", "azrsm"),
+        ("(x'^2 + y'^2)/2 - x^2 - x*y - a*z", "azrsqm"),
+        ("(x'^2 + y'^2)/2 - x^2", "afzrsqm"),
+        ("(x'^2 + x'*y' + a*y'^2)/2 - x^4", "afzrsm"),
+        ("(x'^2 + y'^2)/2 - x^2 - a*z^2", "asm"),
+        ("(x'^2 + y'^2)/2 - x^2 - x*z", "am"),
+        ("(x'^2 + y'^2)/2 - t*x^2 - a*z", "zrsqm"),
+        ("(x'^2 + y'^2)/2 - x^2 - t*z", "zsqm"),
+        // A term linear in a velocity: a field, or a total derivative.
+        ("(x'^2 + y'^2)/2 + x*y'", "afzrqm"),
+        ("(x'^2 + y'^2)/2 + x' + x^3", "afzrm"),
+        ("t*(x'^2 + y'^2)/2", "fzrq"),
+        ("(2 + cos(x))*x'^2 + y'^2", "afzr"),
+        // Kinks: derivatives hide them.
+        ("(x'^2 + y'^2)/2 - abs(x)", "afzrsm"),
+        ("(x'^2 + y'^2)/2 - abs(x')", "afzr"),
+        ("(x'^2 + y'^2)/2 - abs(z)", "am"),
+        ("(x'^2 + y'^2)/2 - sign(z)*x", "am"),
+        ("(x'^2 + y'^2)/2 - if(y' < 1, x, 2*x)", "afzr"),
+        ("(x'^2 + y'^2)/2 - sign(t)*z", "zsqm"),
+        // What vanishes is not there.
+        ("(x'^2 + y'^2)/2 - x + 0*z^2 + (z - z)*x", "afzrsqm"),
+    ];
+    for (text, expected) in table {
+        assert_eq!(claims(text), expected, "{text}");
+    }
+}
+
+#[test]
+fn a_rate_of_zero_is_seen_in_the_value_of_its_parameter() {
+    let mut l = lagrangian("(x'^2 + y'^2)/2 + a*z");
+    assert!(!l.structure().z_free);
+    l.set("a", 0.0).unwrap();
+    assert!(l.structure().z_free);
+    l.set("a", -1.0).unwrap();
+    assert!(!l.structure().z_free);
+}
+
+#[test]
+fn coordinates_that_are_not_there_are_symmetries() {
+    let along_y = lagrangian("(x'^2 + x^2*y'^2)/2 + 1/x").symmetries();
+    assert!(matches!(along_y.as_slice(), [Symmetry::Translation(d)] if d[0] == 0.0 && d[1] == 1.0));
+    assert!(lagrangian("x'^2 + y'^2 + x*y").symmetries().is_empty());
+    assert!(lagrangian("x'^2").is_smooth() && !lagrangian("max(x, y)").is_smooth());
+}
+
+/// Whether the rotation of x and y is seen, and whether it is a symmetry, by the derivative of L along it at a point without
+/// symmetry: round-off, to a few units for each of some ten terms, or not.
+fn rotation(text: &str) -> [bool; 2] {
+    let l = lagrangian(text);
+    let seen = l.symmetries().iter().any(|s| matches!(s, Symmetry::Rotation(0, 1)));
+    let x = VelocityPoint::new([0.3, 0.71], [-0.4, 0.93], 0.2);
+    let defect = Symmetry::<2>::Rotation(0, 1).symmetry_defect(&l, 0.6, &x);
+    [seen, defect < 1e-14]
+}
+
+#[test]
+fn rotations_are_seen_where_they_are_symmetries() {
+    let symmetric = [
+        "(x'^2 + y'^2)/2 + a/sqrt(x^2 + y^2) + t*z",
+        "a*x'^2/2 + x^2 + cos(t) + y^2 + a*y'^2/2",
+        "(x'^2 + y'^2)/2 + a*(x*y' - y*x')/2",
+        "(x'^2 + y'^2)/2 - (x*x' + y*y')^2/(1 + hypot(x, y))",
+        "r = sqrt(x^2 + y^2)\n (x'^2 + y'^2)*(1 + r^3) - sin(r) - z*(x^2 + y^2)/a",
+    ];
+    for text in symmetric {
+        assert_eq!(rotation(text), [true, true], "{text}");
+    }
+    let others = [
+        "(x'^2 + 2*y'^2)/2 + x^2 + y^2",
+        "(x'^2 - y'^2)/2",
+        "(x'^2 + y'^2)/2 + x*y' + y*x'",
+        "(x'^2 + y'^2)/2 + x*y",
+        "(x'^2 + y'^2)/2 + x",
+        "(x'^2 + y'^2)/2 + a*x^2 + t*y^2",
+        "(x'^2 + y'^2)/2 + x^2/a + y^2*a",
+        "(x'^2 + y'^2)/2 + sqrt(x^2 + y'^2)",
+        "(x'^2 + y'^2)/2 + x*x' - y*y'",
+        "(x'^2 + y'^2)/2 + hypot(x, y')",
+        "(x'^2 + y'^2)/2 + x^2*y^2",
+    ];
+    for text in others {
+        assert_eq!(rotation(text), [false, false], "{text}");
+    }
+    // Not seen, though it is one.
+    assert_eq!(rotation("x'^2 + y'^2 + (x + y)^2 + (x - y)^2"), [false, true]);
+    // In space, each of three.
+    let text = "(x'^2 + y'^2 + w'^2)/2 + 1/sqrt(x^2 + y^2 + w^2)";
+    let space = Formula::parse(text, &["x", "y", "w"], &[]).unwrap().lagrangian::<3>().unwrap();
+    assert_eq!(space.symmetries().len(), 3);
+}
+
+#[test]
+fn a_plan_says_that_the_structure_is_proved() {
+    let l = lagrangian("(x'^2 + y'^2)/2 + cos(x) - a*z");
+    let problem = Problem::new(&l, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 1.0], 0.0)).unwrap();
+    let plan = problem.steps(Steps::Size(0.1)).plan(Until::Time(1.0)).unwrap().to_string();
+    assert!(plan.contains("probes of the structure: it is proved from the formula of L"), "{plan}");
+    assert_eq!(*problem.structure(), Structure { proved: true, ..l.structure() });
+}
+
+/// Not regular, or not defined at the start: typed errors.
+#[test]
+fn bad_starts_are_refused() {
+    let start = VelocityPoint::new([1.0, 0.0], [0.0, 1.0], 0.0);
+    for bad in ["x'^2/2 + y'", "x'^2 + y'^2 + ln(y)", "x'^2 + y'^2 + 1/y", "x'*y + y'*x"] {
+        assert!(Problem::new(&lagrangian(bad), 0.0, start).is_err(), "{bad}");
+    }
+}
