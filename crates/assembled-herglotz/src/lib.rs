@@ -21,6 +21,7 @@
 
 mod aligned;
 mod blocks;
+mod drag;
 mod elements;
 mod error;
 mod implicit;

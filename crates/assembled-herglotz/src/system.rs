@@ -1,6 +1,7 @@
 //! A Lagrangian as a sum of local terms.
 
 use crate::blocks::{self, BLOCK};
+use crate::drag::Drag;
 use crate::elements::{ElementData, Elements};
 use crate::kernels::{Kind, PotentialList, Weight};
 use crate::local::{First, LocalKind, LocalList, Place};
@@ -9,7 +10,7 @@ use crate::{AssemblyError, LocalLagrangian, Potential};
 /// The most unknowns that a system can have: places are counted in 32 bits, with a fixed one at each end.
 const MOST: usize = u32::MAX as usize - 2;
 
-/// A system of any size, `L = sum_i m_i v_i^2/2 - sum_e V_e(t, q_e; c_e) + gamma z + sum_e l_e(t, q_e, v_e, z; c_e)`.
+/// A system of any size, `L = sum_i m_i v_i^2/2 - sum_e V_e(t, q_e; c_e) + gamma(t) z + sum_e l_e(t, q_e, v_e, z; c_e)`.
 ///
 /// Its dimension is known at run time. Each potential is a [`Potential`] with its list of elements, each general term a
 /// [`LocalLagrangian`] with its own. Without general terms all integrators take the system; with them, [`AssembledGauss`](crate::AssembledGauss).
@@ -36,7 +37,7 @@ const MOST: usize = u32::MAX as usize - 2;
 pub struct AssembledSystem {
     unknowns: usize,
     pub(crate) masses: Masses,
-    gamma: f64,
+    pub(crate) drag: Drag,
     pub(crate) potentials: Vec<Box<dyn PotentialList>>,
     pub(crate) locals: Vec<Box<dyn LocalList>>,
 }
@@ -62,7 +63,7 @@ impl AssembledSystem {
         Ok(AssembledSystem {
             unknowns,
             masses: Masses::Same(0.0),
-            gamma: 0.0,
+            drag: Drag::Constant(0.0),
             potentials: Vec::new(),
             locals: Vec::new(),
         })
@@ -80,7 +81,22 @@ impl AssembledSystem {
 
     /// With the drag `gamma z`: negative for dissipation.
     pub fn with_drag(self, gamma: f64) -> Self {
-        AssembledSystem { gamma, ..self }
+        AssembledSystem { drag: Drag::Constant(gamma), ..self }
+    }
+
+    /// With a drag `gamma(t) z` whose rate depends on time, periodically or else: a smooth function, since splittings integrate it along a drift by
+    /// a Gauss formula of order 12. Instead of [`with_drag`](Self::with_drag).
+    ///
+    /// ```
+    /// use assembled_herglotz::systems::OuterSolarSystem;
+    /// let year = 365.25;
+    /// let solar = OuterSolarSystem::system(5, 0.0)?
+    ///     .with_timed_drag(move |t| -1e-8 * (1.0 + 0.5 * (std::f64::consts::TAU * t / year).cos()));
+    /// assert_eq!(solar.rate(0.0), -1.5e-8);
+    /// # Ok::<(), assembled_herglotz::AssemblyError>(())
+    /// ```
+    pub fn with_timed_drag(self, rate: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Self {
+        AssembledSystem { drag: Drag::Timed(Box::new(rate)), ..self }
     }
 
     /// With a potential for each of a list of elements.
@@ -130,9 +146,9 @@ impl AssembledSystem {
         self.unknowns
     }
 
-    /// The rate `gamma` of the drag.
-    pub fn gamma(&self) -> f64 {
-        self.gamma
+    /// The rate `gamma(t)` of the drag.
+    pub fn rate(&self, t: f64) -> f64 {
+        self.drag.rate(t)
     }
 
     /// The energy `E_L = v.L_v - L`; without general terms `sum m_i v_i^2/2 + V - gamma z`, which decays as `e^(gamma t)` where V does not
@@ -153,7 +169,7 @@ impl AssembledSystem {
     /// L and its first derivatives; without general terms the value of L only where it is asked for.
     pub(crate) fn first(&self, at: Place, value: bool, sums: &mut First) {
         let First { l, q, v, z } = sums;
-        (*l, *z) = (0.0, self.gamma);
+        (*l, *z) = (0.0, self.rate(at.t));
         for (block, force) in q.chunks_mut(BLOCK).enumerate() {
             force.fill(0.0);
             for list in &self.potentials {
@@ -167,7 +183,7 @@ impl AssembledSystem {
         if value || !self.locals.is_empty() {
             let velocities = at.v.iter().skip(1);
             let twice_kinetic: f64 = v.iter().zip(velocities).map(|(p, v)| p * v).sum();
-            *l = 0.5 * twice_kinetic - self.potential(at.t, at.q) + self.gamma * at.z;
+            *l = 0.5 * twice_kinetic - self.potential(at.t, at.q) + *z * at.z;
         }
         for list in &self.locals {
             list.first(at, sums);

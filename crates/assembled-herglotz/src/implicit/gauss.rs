@@ -93,7 +93,7 @@ impl<'a> AssembledGauss<'a> {
         start.check(system)?;
         let general = !system.locals.is_empty();
         system.check_masses(general)?;
-        AssembledSystem::check_number("gamma", system.gamma())?;
+        AssembledSystem::check_number("gamma", system.rate(start.t))?;
         let (n, limit) = (system.unknowns(), limit(memory));
         let len = n.checked_mul(stages).ok_or(AssemblyError::Unknowns { found: n, most: usize::MAX / stages })?;
         let assembly = Assembly::new(system)?;

@@ -65,8 +65,8 @@ impl<'a> AssembledMidpoint<'a> {
         start.check(system)?;
         system.check_separable()?;
         system.check_masses(false)?;
-        AssembledSystem::check_number("gamma", system.gamma())?;
-        let half = 0.5 * system.gamma() * h;
+        AssembledSystem::check_number("gamma", system.rate(start.t))?;
+        let half = 0.5 * h * system.rate(start.t + 0.5 * h);
         if half.abs() >= 1.0 {
             return Err(InputError::Sigma { sigma: (1.0 + half) / (1.0 - half) }.into());
         }
@@ -116,8 +116,8 @@ impl<'a> AssembledMidpoint<'a> {
     /// Takes steps.
     ///
     /// # Errors
-    /// [`Halt`] with the steps taken before and the cause: [`StepError::NotConverged`], [`StepError::Singular`] or
-    /// [`StepError::NonFinite`]. The state is that before the step which failed.
+    /// [`Halt`] with the steps taken before and the cause: [`StepError::NotConverged`], [`StepError::Singular`],
+    /// [`StepError::NonFinite`], or [`StepError::SigmaVanished`] of a rate that has grown beyond `|gamma h| < 2`. The state is that before the step which failed.
     pub fn advance(&mut self, steps: usize) -> Result<(), Halt> {
         for taken in 0..steps {
             self.step().map_err(|cause| Halt { taken, cause })?;
@@ -131,10 +131,15 @@ impl<'a> AssembledMidpoint<'a> {
         State { t: self.t0 + self.taken as f64 * self.h, q: &self.q[1..=n], v: &self.v, z: self.z }
     }
 
-    /// `sigma_d` of a step.
+    /// `sigma_d` of the last step; before the first one, of that.
     pub fn sigma(&self) -> f64 {
-        let half = 0.5 * self.system.gamma() * self.h;
+        let half = self.half(self.taken.saturating_sub(1));
         (1.0 + half) / (1.0 - half)
+    }
+
+    /// `gamma h/2` in the middle of a step.
+    fn half(&self, step: usize) -> f64 {
+        0.5 * self.h * self.system.rate(self.t0 + (step as f64 + 0.5) * self.h)
     }
 
     /// The numeric factorisations made.
@@ -150,7 +155,11 @@ impl<'a> AssembledMidpoint<'a> {
     fn step(&mut self) -> Result<(), StepError> {
         let (h, n) = (self.h, self.system.unknowns());
         let t = self.t0 + (self.taken as f64 + 0.5) * h;
-        let half = 0.5 * self.system.gamma() * h;
+        let half = self.half(self.taken);
+        // A rate that depends on time may have become too large for the step.
+        if half.is_nan() || half.abs() >= 1.0 {
+            return Err(StepError::SigmaVanished { sigma: (1.0 + half) / (1.0 - half) });
+        }
         // The guess continues the mean velocities linearly; `before` holds it.
         for ((before, u), v) in self.before.iter_mut().zip(&self.u).zip(&self.v) {
             *before = if self.taken == 0 { *v } else { 2.0 * u - *before };
