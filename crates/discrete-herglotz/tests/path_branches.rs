@@ -146,7 +146,7 @@ fn mixed_ends_have_a_fold() {
         }
         let highest = paths.iter().map(|(span, _)| *span).fold(0.0, f64::max);
         // Where shooting finds two starts and where it finds none.
-        assert!(highest >= 1.1 && highest < 1.2, "{highest}");
+        assert!((1.1..1.2).contains(&highest), "{highest}");
     }
     // From a short span the branch goes around this fold, back, and around another one to the path far away.
     let paths = branch(mixed, [0.6, 1.5], 0.05, 200).unwrap();

@@ -204,6 +204,7 @@ impl<const N: usize> Formula<N> {
             separable: mass && !matches!(self.rate, Rate::Region { .. }),
             quadratic: mass && linear && affine,
             constant_mass: mass,
+            ..Structure::default()
         }
     }
 
