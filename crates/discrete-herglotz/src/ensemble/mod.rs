@@ -46,7 +46,7 @@ pub enum InLanes {
     Gauss(GaussCollocation),
 }
 
-/// The members that are computed, kept and handed on together: whole packs of one, two or three registers of at most eight lanes.
+/// The members that are computed, kept and handed on together: whole packs of one to four registers of at most eight lanes.
 const SHARD: usize = 384;
 
 /// The members of an ensemble that get all checks of a run before it begins.

@@ -91,7 +91,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 /// The registers of a pack: as many as hide the latency of a sum of products, and leave room for what else a step holds.
 const fn registers(n: usize) -> usize {
     match n {
-        1 => 3,
+        1 => 4,
         2 => 2,
         _ => 1,
     }
@@ -112,7 +112,7 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, 
     fn with_simd<S: Simd>(self, _simd: S) {
         let All { packs, lanes, stride } = self;
         match const { registers(N) } {
-            3 => packs.all::<S, 3, ACTION>(lanes, stride),
+            4 => packs.all::<S, 4, ACTION>(lanes, stride),
             2 => packs.all::<S, 2, ACTION>(lanes, stride),
             _ => packs.all::<S, 1, ACTION>(lanes, stride),
         }
