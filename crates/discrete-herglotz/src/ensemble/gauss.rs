@@ -3,7 +3,7 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use super::lane::Lane;
+use super::lane::{Lane, Wants};
 use super::pack::Pack;
 use super::twofold::{Pair, Summed};
 use crate::gauss::FEW;
@@ -110,8 +110,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 
     /// Takes all steps of some motions, in place, with a state recorded after each `rows` of them. One whose steps could not be solved, or
     /// that is not finite, is not finite then.
-    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, rows: Option<usize>) {
-        let stride = rows.unwrap_or(self.steps);
+    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: Wants) {
+        let stride = wants.rows.unwrap_or(self.steps);
         if action {
             instructions.dispatch(All::<_, N, true> { packs: self, lanes, stride });
         } else {

@@ -3,6 +3,15 @@
 use crate::Row;
 use contact_geom::PhasePoint;
 
+/// What is wanted of members in lanes beside their ends.
+#[derive(Clone, Copy)]
+pub(super) struct Wants {
+    /// A row after each so many steps.
+    pub rows: Option<usize>,
+    /// Marks where steps do not resolve the motion.
+    pub watched: bool,
+}
+
 /// A member on its way in a lane.
 #[derive(Clone, Debug)]
 pub(super) struct Lane<const N: usize> {

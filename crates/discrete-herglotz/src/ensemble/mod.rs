@@ -30,7 +30,7 @@ use crate::{GaussCollocation, InputError, Integrator, Observer, Rows, SplittingS
 use accuracy::Length;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
 use gauss::GaussPacks;
-use lane::Lane;
+use lane::{Lane, Wants};
 use single::Common;
 use splitting::SplittingPacks;
 use std::num::NonZeroUsize;
@@ -297,11 +297,11 @@ enum Kernel<'a, L, const N: usize> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> Kernel<'_, L, N> {
-    fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, rows: Option<usize>) {
+    fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: Wants) {
         match self {
             Kernel::OneByOne => {}
-            Kernel::Splitting(packs) => packs.run(instructions, lanes, action, rows),
-            Kernel::Gauss(packs) => packs.run(instructions, lanes, action, rows),
+            Kernel::Splitting(packs) => packs.run(instructions, lanes, action, wants),
+            Kernel::Gauss(packs) => packs.run(instructions, lanes, action, wants),
         }
     }
 }
@@ -435,15 +435,16 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         }
         let mut done = [false; SHARD];
         let mut in_lanes = 0;
+        let wants = Wants { rows, watched: self.watched };
         forget_branches();
         if let Some(wanted) = length.wanted() {
             let at_start = lanes.iter().map(|lane: &Lane<N>| Lane::new(t0, lane.state, None, false));
             let mut ends: Vec<Lane<N>> = at_start.collect();
-            finer.run(self.instructions, &mut ends, false, None);
-            kernel.run(self.instructions, &mut lanes, action, rows);
+            finer.run(self.instructions, &mut ends, false, Wants { rows: None, watched: false });
+            kernel.run(self.instructions, &mut lanes, action, wants);
             accuracy::refuse_beyond(wanted, &mut lanes, &ends);
         } else {
-            kernel.run(self.instructions, &mut lanes, action, rows);
+            kernel.run(self.instructions, &mut lanes, action, wants);
         }
         if !branched() {
             for (place, Lane { state, rows, doubtful, .. }) in places.into_iter().zip(lanes) {

@@ -1,6 +1,6 @@
 //! Splittings with trajectories in lanes.
 
-use super::lane::Lane;
+use super::lane::{Lane, Wants};
 use super::pack::Pack;
 use crate::gauss::instructions::Instructions;
 use crate::run::watch::ROUNDED;
@@ -78,12 +78,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 
     /// Takes all steps of some motions, in place, with a state recorded after each `rows` of them. One that is not finite at its start or
     /// its end is not finite then.
-    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, rows: Option<usize>) {
-        let stride = rows.unwrap_or(self.steps);
-        if action {
-            instructions.dispatch(All::<_, N, true> { packs: self, lanes, stride });
-        } else {
-            instructions.dispatch(All::<_, N, false> { packs: self, lanes, stride });
+    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: Wants) {
+        let stride = wants.rows.unwrap_or(self.steps);
+        match (action, wants.watched) {
+            (true, true) => instructions.dispatch(All::<_, N, true, true> { packs: self, lanes, stride }),
+            (true, false) => instructions.dispatch(All::<_, N, true, false> { packs: self, lanes, stride }),
+            (false, true) => instructions.dispatch(All::<_, N, false, true> { packs: self, lanes, stride }),
+            (false, false) => instructions.dispatch(All::<_, N, false, false> { packs: self, lanes, stride }),
         }
     }
 }
@@ -98,23 +99,25 @@ const fn registers(n: usize) -> usize {
 }
 
 /// All motions of a slice in the lanes of one instruction set.
-struct All<'s, 'a, L, const N: usize, const ACTION: bool> {
+struct All<'s, 'a, L, const N: usize, const ACTION: bool, const WATCH: bool> {
     packs: &'s SplittingPacks<'a, L, N>,
     lanes: &'s mut [Lane<N>],
     /// The steps from one state that is recorded to the next.
     stride: usize,
 }
 
-impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, '_, L, N, ACTION> {
+impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const WATCH: bool> WithSimd
+    for All<'_, '_, L, N, ACTION, WATCH>
+{
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         let All { packs, lanes, stride } = self;
         match const { registers(N) } {
-            4 => packs.all::<S, 4, ACTION>(lanes, stride),
-            2 => packs.all::<S, 2, ACTION>(lanes, stride),
-            _ => packs.all::<S, 1, ACTION>(lanes, stride),
+            4 => packs.all::<S, 4, ACTION, WATCH>(lanes, stride),
+            2 => packs.all::<S, 2, ACTION, WATCH>(lanes, stride),
+            _ => packs.all::<S, 1, ACTION, WATCH>(lanes, stride),
         }
     }
 }
@@ -144,7 +147,11 @@ impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
 
 impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
     #[inline(always)]
-    fn all<S: Simd, const K: usize, const ACTION: bool>(&self, lanes: &mut [Lane<N>], stride: usize) {
+    fn all<S: Simd, const K: usize, const ACTION: bool, const WATCH: bool>(
+        &self,
+        lanes: &mut [Lane<N>],
+        stride: usize,
+    ) {
         let zero = Pack::<S, K>::splat(0.0);
         for some in lanes.chunks_mut(Pack::<S, K>::COUNT) {
             // What is beyond the last repeats it.
@@ -156,7 +163,7 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
             let z = Pack::from_lanes(|i| some[i.min(last)].state.z);
             let m =
                 Moving { q, p, carry: SVector::from_element(zero), z, force: q, value: zero, fast: zero, doubt: zero };
-            self.take_steps::<S, K, ACTION>(m, stride, |t, at| {
+            self.take_steps::<S, K, ACTION, WATCH>(m, stride, |t, at| {
                 for (i, lane) in some.iter_mut().enumerate() {
                     lane.reach(t, at.state(i));
                     lane.doubtful = at.doubt.lanes()[i] != 0.0;
@@ -167,7 +174,7 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
 
     /// The operations of a single run, in its order. What is reached after each stride, and at the end, is handed on.
     #[inline(always)]
-    fn take_steps<S: Simd, const K: usize, const ACTION: bool>(
+    fn take_steps<S: Simd, const K: usize, const ACTION: bool, const WATCH: bool>(
         &self,
         mut m: Moving<S, K, N>,
         stride: usize,
@@ -183,6 +190,13 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
                 let t = t0 + k as f64 * h;
                 self.set_time(&mut table, t);
                 let stages = if k == 0 { &table.first } else { &table.joined };
+                if !WATCH {
+                    for stage in stages {
+                        self.kick_and_drift::<S, K, ACTION>(&mut m, stage);
+                        self.take_force(&mut m, t + stage.time);
+                    }
+                    continue;
+                }
                 // The drift that is looked at by itself: along the others no register is held for the look.
                 let (ahead, from) = stages.split_at(self.look.stage);
                 let (looked_at, after) = from.split_at(1);
