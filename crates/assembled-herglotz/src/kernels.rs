@@ -33,6 +33,9 @@ pub(crate) trait PotentialList: Send + Sync {
 
     /// Adds the second derivatives, times a factor, to the entries of the matrix.
     fn hessian(&self, t: f64, q: &[f64], factor: f64, places: &[u32], entries: &mut [f64]);
+
+    /// Adds the product of the second derivatives with a vector x; q, x and the product begin with a fixed place and end with one.
+    fn hessian_times(&self, t: f64, q: &[f64], x: &[f64], product: &mut [f64]);
 }
 
 /// A potential with its elements.
@@ -104,6 +107,10 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> PotentialList for Kind<
 
     fn hessian(&self, t: f64, q: &[f64], factor: f64, places: &[u32], entries: &mut [f64]) {
         self.add_second(t, q, factor, places, entries);
+    }
+
+    fn hessian_times(&self, t: f64, q: &[f64], x: &[f64], product: &mut [f64]) {
+        self.add_product(t, q, x, product);
     }
 }
 

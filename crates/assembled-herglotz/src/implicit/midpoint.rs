@@ -1,14 +1,13 @@
 //! The implicit midpoint rule for assembled systems.
 
 use super::corrections::{Corrections, Verdict};
-use super::factors::Factors;
+use super::krylov::Krylov;
 use super::largest;
-use super::pattern::Pattern;
+use super::sparse::Sparse;
 use crate::AssemblyError;
 use crate::blocks::BLOCK;
 use crate::kernels::Weight;
-use crate::memory::limit;
-use crate::system::{AssembledSystem, Masses, State};
+use crate::system::{AssembledSystem, State};
 use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError};
 
 /// The symmetric midpoint rule on `L = sum m_i v_i^2/2 - V(t, q) + gamma z`: the discrete Herglotz equations of
@@ -23,11 +22,7 @@ use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError};
 /// solves would cost more, and stops where the next correction is below round-off.
 pub struct AssembledMidpoint<'a> {
     system: &'a AssembledSystem,
-    pub(super) factors: Factors,
-    /// The entries of each list's elements.
-    places: Vec<Vec<u32>>,
-    diagonal: Vec<u32>,
-    pub(super) entries: Vec<f64>,
+    pub(super) linear: Linear,
     h: f64,
     t0: f64,
     taken: usize,
@@ -46,6 +41,14 @@ pub struct AssembledMidpoint<'a> {
     change: Vec<f64>,
 }
 
+/// How a correction is solved for.
+pub(super) enum Linear {
+    /// By factors of the sparse matrix.
+    Sparse(Box<Sparse>),
+    /// By products with it.
+    Krylov(Krylov),
+}
+
 impl<'a> AssembledMidpoint<'a> {
     /// From a state, without the action. Factors and workspace of more than `memory` bytes are refused; with `None` of more than the system
     /// has available (Linux' `MemAvailable`; elsewhere there is no limit then).
@@ -59,6 +62,37 @@ impl<'a> AssembledMidpoint<'a> {
         start: State,
         memory: Option<usize>,
     ) -> Result<Self, AssemblyError> {
+        Self::with(system, h, start, || Ok(Linear::Sparse(Box::new(Sparse::new(system, memory)?))))
+    }
+
+    /// The same steps by Newton's method with conjugate gradients, for systems whose matrix is full, as that of bodies in space: it is not
+    /// formed, and products with it are derivatives of the forces along a vector. The memory is a few vectors.
+    ///
+    /// `M + (h^2/4) V_qq` must be positive definite: so it is for steps that are short beside the motion.
+    ///
+    /// ```
+    /// use assembled_herglotz::systems::OuterSolarSystem;
+    /// use assembled_herglotz::{AssembledMidpoint, State};
+    /// let (planets, q, v) =
+    ///     (OuterSolarSystem::system(5, -1e-6)?, OuterSolarSystem::positions(5), OuterSolarSystem::velocities(5));
+    /// let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    /// let mut motion = AssembledMidpoint::matrix_free(&planets, 10.0, start)?; // days
+    /// assert!(motion.advance(10).is_ok());
+    /// # Ok::<(), assembled_herglotz::AssemblyError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn matrix_free(system: &'a AssembledSystem, h: f64, start: State) -> Result<Self, AssemblyError> {
+        Self::with(system, h, start, || Ok(Linear::Krylov(Krylov::new(system)?)))
+    }
+
+    fn with(
+        system: &'a AssembledSystem,
+        h: f64,
+        start: State,
+        linear: impl FnOnce() -> Result<Linear, AssemblyError>,
+    ) -> Result<Self, AssemblyError> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h }.into());
         }
@@ -71,20 +105,13 @@ impl<'a> AssembledMidpoint<'a> {
             return Err(InputError::Sigma { sigma: (1.0 + half) / (1.0 - half) }.into());
         }
         let n = system.unknowns();
-        let pattern = Pattern::new(n, |f| system.potentials.iter().for_each(|list| list.visit(f)))?;
-        let places = system.potentials.iter().map(|list| list.entries(&pattern)).collect();
-        let diagonal = (1..=n).map(|i| pattern.entry(i, i)).collect();
-        let entries = vec![0.0; pattern.rows.len()];
-        let factors = Factors::new(pattern, limit(memory))?;
+        let linear = linear()?;
         let mut q = vec![0.0; n + 2];
         q[1..=n].copy_from_slice(start.q);
         let zeros = vec![0.0; n];
         let mut midpoint = AssembledMidpoint {
             system,
-            factors,
-            places,
-            diagonal,
-            entries,
+            linear,
             h,
             t0: start.t,
             taken: 0,
@@ -145,6 +172,11 @@ impl<'a> AssembledMidpoint<'a> {
     /// The numeric factorisations made.
     pub fn factorisations(&self) -> u64 {
         self.factorisations
+    }
+
+    /// The products of the matrix with a vector that conjugate gradients have made.
+    pub fn products(&self) -> u64 {
+        if let Linear::Krylov(krylov) = &self.linear { krylov.products() } else { 0 }
     }
 
     /// The iterations made, each a solve and a force.
@@ -211,16 +243,10 @@ impl<'a> AssembledMidpoint<'a> {
             if !size.is_finite() {
                 return Err(StepError::NonFinite);
             }
-            let fresh = !self.factorised;
-            if fresh {
-                self.factorise(t)?;
+            if !self.factorised && matches!(self.linear, Linear::Sparse(_)) {
                 corrections.forget();
             }
-            self.change.copy_from_slice(&self.residual);
-            self.factors.solve(&mut self.change)?;
-            if fresh {
-                self.check_factors()?;
-            }
+            self.correct(t)?;
             for (u, change) in self.before.iter_mut().zip(&self.change) {
                 *u -= change;
             }
@@ -251,36 +277,34 @@ impl<'a> AssembledMidpoint<'a> {
         }
     }
 
-    /// Factorises `M + (h^2/4) V_qq` at the middle.
-    pub(super) fn factorise(&mut self, t: f64) -> Result<(), StepError> {
-        self.entries.fill(0.0);
-        for (i, at) in self.diagonal.iter().enumerate() {
-            self.entries[*at as usize] = match &self.system.masses {
-                Masses::Same(m) => *m,
-                Masses::Each(masses) => masses[i],
-            };
-        }
+    /// Solves for the correction of this residual.
+    fn correct(&mut self, t: f64) -> Result<(), StepError> {
         let factor = 0.25 * self.h * self.h;
-        for (list, places) in self.system.potentials.iter().zip(&self.places) {
-            list.hessian(t, &self.middle, factor, places, &mut self.entries);
+        self.change.copy_from_slice(&self.residual);
+        if let Linear::Krylov(krylov) = &mut self.linear {
+            return krylov.solve(self.system, (t, &self.middle), factor, &mut self.change);
         }
-        self.factors.factorise(&self.entries)?;
-        self.factorised = true;
-        self.factorisations += 1;
+        let fresh = !self.factorised;
+        if fresh {
+            self.factorise(t)?;
+        }
+        let Linear::Sparse(sparse) = &mut self.linear else { return Ok(()) };
+        sparse.factors.solve(&mut self.change)?;
+        let n = self.change.len();
+        if fresh && !sparse.solves(&self.change, &self.residual, &mut self.middle[1..=n]) {
+            self.factorised = false;
+            return Err(StepError::Singular { pivot: 0.0 });
+        }
         Ok(())
     }
 
-    /// Whether new factors solve: faer does not say where they are singular.
-    fn check_factors(&mut self) -> Result<(), StepError> {
-        let AssembledMidpoint { factors, entries, change, residual, middle, .. } = self;
-        let n = change.len();
-        let (left, size) = factors.residual(entries, change, residual, &mut middle[1..=n]);
-        // Half of the digits: Newton's method makes up for the rest.
-        if left <= f64::EPSILON.sqrt() * (size + largest(residual)) {
-            Ok(())
-        } else {
-            self.factorised = false;
-            Err(StepError::Singular { pivot: 0.0 })
+    /// Factorises `M + (h^2/4) V_qq` at the middle.
+    pub(super) fn factorise(&mut self, t: f64) -> Result<(), StepError> {
+        if let Linear::Sparse(sparse) = &mut self.linear {
+            sparse.factorise(self.system, (t, &self.middle), 0.25 * self.h * self.h)?;
+            self.factorised = true;
+            self.factorisations += 1;
         }
+        Ok(())
     }
 }

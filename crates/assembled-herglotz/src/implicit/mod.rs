@@ -4,10 +4,12 @@ mod border;
 mod corrections;
 mod factors;
 mod gauss;
+mod krylov;
 mod lu;
 mod midpoint;
 mod pattern;
 mod second;
+mod sparse;
 mod stages;
 #[cfg(test)]
 mod tests;

@@ -32,6 +32,43 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         }
     }
 
+    /// See [`PotentialList::hessian_times`](crate::kernels::PotentialList::hessian_times).
+    pub(crate) fn add_product(&self, t: f64, q: &[f64], x: &[f64], product: &mut [f64]) {
+        let t = Lanes::splat(t);
+        for run in &self.elements.runs {
+            for e in (0..run.len).step_by(LANES) {
+                let count = LANES.min(run.len - e);
+                let (c, at) = (self.elements.parameters_part(run, e, count), |y| unknowns_part(y, run, e, count));
+                let along = self.along(t, &at(q), &at(x), &c);
+                for (start, slot) in run.start.iter().zip(along) {
+                    for (sum, part) in product[start + e..].iter_mut().zip(&slot.to_array()[..count]) {
+                        *sum += part;
+                    }
+                }
+            }
+        }
+        let loose = self.elements.loose.len();
+        for e in (0..loose).step_by(LANES) {
+            let count = LANES.min(loose - e);
+            let (at, c) = self.elements.gathered(q, count, |lane| e + lane);
+            let (direction, _) = self.elements.gathered(x, count, |lane| e + lane);
+            let along = self.along(t, &at, &direction, &c).map(Lanes::to_array);
+            for (lane, places) in self.elements.loose[e..e + count].iter().enumerate() {
+                for (place, slot) in places.iter().zip(&along) {
+                    product[*place as usize] += slot[lane];
+                }
+            }
+        }
+    }
+
+    /// The derivative of the gradient of eight elements along a direction.
+    #[inline(always)]
+    fn along(&self, t: Lanes, x: &SVector<Lanes, K>, direction: &SVector<Lanes, K>, c: &[Lanes; P]) -> [Lanes; K] {
+        let lifted = std::array::from_fn(|i| Dual { re: x[i], d: SVector::<Lanes, 1>::from([direction[i]]) });
+        let gradient = self.term.gradient(Dual::constant(t), &column(lifted), &c.map(Dual::constant));
+        std::array::from_fn(|i| gradient[i].d[0])
+    }
+
     /// The second derivatives of eight elements, by one more dual over the gradient.
     #[inline(always)]
     fn second(&self, t: Lanes, x: &SVector<Lanes, K>, c: &[Lanes; P]) -> [SVector<Lanes, K>; K] {

@@ -1,0 +1,152 @@
+//! Conjugate gradients on the matrix of a midpoint step, which is not formed.
+
+use crate::AssemblyError;
+use crate::system::AssembledSystem;
+use discrete_herglotz::StepError;
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::matrix_free::conjugate_gradient::{CgError, CgParams, conjugate_gradient, conjugate_gradient_scratch};
+use faer::matrix_free::{IdentityPrecond, InitialGuessStatus, LinOp};
+use faer::{MatMut, MatRef, Par};
+use std::sync::{Mutex, PoisonError};
+
+/// What a solution may leave of the right side: Newton's method makes up for the rest.
+const LEFT: f64 = 1e-8;
+
+/// The most products of one solution. A step that needs more is far too long for its forces.
+const MOST: u32 = 1000;
+
+/// faer's conjugate gradients for `(M + (h^2/4) V_qq) x = b`, in the variables `M^(1/2) x`: there the matrix is the identity and what the
+/// forces add to it, whatever the masses.
+pub(super) struct Krylov {
+    /// `M^(-1/2)`.
+    roots: Vec<f64>,
+    /// A vector and its product, between fixed places.
+    padded: Mutex<[Vec<f64>; 2]>,
+    scaled: Vec<f64>,
+    scratch: MemBuffer,
+    products: u64,
+}
+
+impl Krylov {
+    /// For a system with a mass for each unknown.
+    ///
+    /// # Errors
+    /// [`AssemblyError::Memory`].
+    pub fn new(system: &AssembledSystem) -> Result<Self, AssemblyError> {
+        let n = system.unknowns();
+        let roots = (0..n).map(|i| system.mass(i).sqrt().recip()).collect();
+        let request =
+            conjugate_gradient_scratch::<f64>(IdentityPrecond { dim: n }, IdentityPrecond { dim: n }, 1, Par::Seq);
+        let too_much = |_| AssemblyError::Memory { needed: request.size_bytes(), limit: usize::MAX };
+        Ok(Krylov {
+            roots,
+            padded: Mutex::new([vec![0.0; n + 2], vec![0.0; n + 2]]),
+            scaled: vec![0.0; n],
+            scratch: MemBuffer::try_new(request).map_err(too_much)?,
+            products: 0,
+        })
+    }
+
+    /// The products of the matrix with a vector that were made.
+    pub fn products(&self) -> u64 {
+        self.products
+    }
+
+    /// Solves at positions between fixed places, with `factor = h^2/4`; b becomes the solution.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] where the matrix is not positive definite, [`StepError::NotConverged`] with what is left of b.
+    pub fn solve(
+        &mut self,
+        system: &AssembledSystem,
+        (t, q): (f64, &[f64]),
+        factor: f64,
+        b: &mut [f64],
+    ) -> Result<(), StepError> {
+        let Krylov { roots, padded, scaled, scratch, products } = self;
+        let n = b.len();
+        for ((y, b), root) in scaled.iter_mut().zip(b.iter_mut()).zip(roots.iter()) {
+            (*y, *b) = (*b * root, 0.0);
+        }
+        let matrix = Scaled { system, t, q, factor, roots, padded };
+        let params = CgParams {
+            // With `Zero` faer 0.24.4 takes a residual that it has not set.
+            initial_guess: InitialGuessStatus::MaybeNonZero,
+            rel_tolerance: LEFT,
+            max_iters: MOST as usize,
+            ..CgParams::default()
+        };
+        let outcome = conjugate_gradient(
+            MatMut::from_column_major_slice_mut(b, n, 1),
+            IdentityPrecond { dim: n },
+            &matrix,
+            MatRef::from_column_major_slice(scaled, n, 1),
+            params,
+            |_| {},
+            Par::Seq,
+            MemStack::new(scratch),
+        );
+        match outcome {
+            Ok(info) => *products += info.iter_count as u64,
+            Err(CgError::NoConvergence { abs_residual, .. }) => {
+                return Err(StepError::NotConverged { residual: abs_residual, iterations: MOST });
+            }
+            Err(_) => return Err(StepError::Singular { pivot: 0.0 }),
+        }
+        for (x, root) in b.iter_mut().zip(roots.iter()) {
+            *x *= root;
+        }
+        if b.iter().sum::<f64>().is_finite() { Ok(()) } else { Err(StepError::NonFinite) }
+    }
+}
+
+/// `1 + (h^2/4) M^(-1/2) V_qq M^(-1/2)`, by the derivatives of forces along a vector.
+struct Scaled<'a> {
+    system: &'a AssembledSystem,
+    t: f64,
+    q: &'a [f64],
+    factor: f64,
+    roots: &'a [f64],
+    padded: &'a Mutex<[Vec<f64>; 2]>,
+}
+
+impl std::fmt::Debug for Scaled<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Scaled").field("unknowns", &self.roots.len()).finish()
+    }
+}
+
+impl LinOp<f64> for Scaled<'_> {
+    fn apply_scratch(&self, _rhs_ncols: usize, _par: Par) -> StackReq {
+        StackReq::EMPTY
+    }
+
+    fn nrows(&self) -> usize {
+        self.roots.len()
+    }
+
+    fn ncols(&self) -> usize {
+        self.roots.len()
+    }
+
+    fn apply(&self, mut out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
+        let mut padded = self.padded.lock().unwrap_or_else(PoisonError::into_inner);
+        let [x, product] = &mut *padded;
+        for j in 0..rhs.ncols() {
+            product.fill(0.0);
+            for (i, root) in self.roots.iter().enumerate() {
+                x[i + 1] = rhs[(i, j)] * root;
+            }
+            for list in &self.system.potentials {
+                list.hessian_times(self.t, self.q, x, product);
+            }
+            for (i, root) in self.roots.iter().enumerate() {
+                out[(i, j)] = rhs[(i, j)] + self.factor * root * product[i + 1];
+            }
+        }
+    }
+
+    fn conj_apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
+        self.apply(out, rhs, par, stack);
+    }
+}
