@@ -4,7 +4,7 @@ use crate::Attack;
 use crate::numbers::{Everything, HOSTILE, Report};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Pendulum;
-use discrete_herglotz::{BoundaryPath, CriticalPath, DiscretePath, End, InputError, Midpoint, continuation};
+use discrete_herglotz::{BoundaryPath, CriticalPath, DiscretePath, End, InputError, Midpoint, branch, continuation};
 
 pub const ATTACKS: &[Attack] = &[Attack {
     on: &[
@@ -20,6 +20,7 @@ pub const ATTACKS: &[Attack] = &[Attack {
         "CriticalPath::action",
         "CriticalPath::path",
         "continuation",
+        "branch",
     ],
     run: paths,
 }];
@@ -79,4 +80,24 @@ fn paths(report: &mut Report) {
         let refused = BoundaryPath::new(&ld, steps, [at(0.3), at(0.4)]).is_err();
         report.check(refused && BoundaryPath::periodic(&ld, steps, [0.0].into()).is_err(), || format!("{steps} steps"));
     }
+    // Along the end of a pendulum's path.
+    let pendulum = Midpoint::new(Pendulum::default(), 0.1).unwrap();
+    let problem = |q: f64| BoundaryPath::new(&pendulum, 4, [at(0.0), at(q)]);
+    for value in HOSTILE {
+        for range in [[value, 0.4], [0.1, value]] {
+            let found = branch(problem, range, 0.1, 8);
+            let good = |paths: &Vec<(f64, CriticalPath<1>)>| {
+                paths.iter().all(|(q, path)| q.is_finite() && path.points.iter().all(|q| q[0].is_finite()))
+            };
+            report.check(found.as_ref().map_or(true, good), || format!("a branch over {range:?}: {found:?}"));
+            report.check(found.is_err() || value.is_finite(), || format!("a branch over {range:?}"));
+        }
+        if !(value > 0.0 && value < 1e-3) {
+            let found = branch(problem, [0.1, 0.4], value, 8);
+            report.check(found.is_err() || value > 0.0 && value.is_finite(), || {
+                format!("a branch by {value}: {found:?}")
+            });
+        }
+    }
+    report.check(branch(problem, [0.1, 0.4], 0.1, 1).is_err(), || "a branch of one path".into());
 }

@@ -6,27 +6,46 @@ use crate::numbers::{Claiming, HOSTILE, Report, places, triples};
 use contact_geom::VelocityPoint;
 use discrete_herglotz::{Ensemble, EnsembleError, Member, Problem, Rows, Status, Steps, Tally, Until};
 
-pub const ATTACKS: &[Attack] = &[Attack {
-    on: &[
-        "Ensemble::new",
-        "Ensemble::of",
-        "Ensemble::by",
-        "Ensemble::steps",
-        "Ensemble::threads",
-        "Ensemble::without_action",
-        "Ensemble::checkpoint",
-        "Ensemble::progress",
-        "Ensemble::run",
-        "Ensemble::rows_every",
-        "Ensemble::accuracy",
-        "Ensemble::unwatched",
-        "Ensemble::observe",
-        "ObservedEnsemble::run",
-        "Problem::ensemble",
-        "Integrator::in_lanes",
-    ],
-    run: ensembles,
-}];
+pub const ATTACKS: &[Attack] = &[
+    Attack {
+        on: &[
+            "Ensemble::new",
+            "Ensemble::of",
+            "Ensemble::by",
+            "Ensemble::steps",
+            "Ensemble::threads",
+            "Ensemble::without_action",
+            "Ensemble::checkpoint",
+            "Ensemble::progress",
+            "Ensemble::run",
+            "Ensemble::rows_every",
+            "Ensemble::accuracy",
+            "Ensemble::unwatched",
+            "Ensemble::observe",
+            "ObservedEnsemble::run",
+            "Problem::ensemble",
+            "Integrator::in_lanes",
+        ],
+        run: ensembles,
+    },
+    Attack {
+        on: &[
+            "Ensemble::in_shards",
+            "Ensemble::merge",
+            "ShardedEnsemble::compute",
+            "ShardedEnsemble::count",
+            "ShardedEnsemble::fingerprint",
+            "Merge::add",
+            "Merge::resume",
+            "Merge::has",
+            "Merge::handed_on",
+            "Merge::is_complete",
+            "Merge::bound",
+            "Merge::tally",
+        ],
+        run: shards,
+    },
+];
 
 /// The members at their ends.
 fn ends(ensemble: &Ensemble<'_, Claiming, 1>, until: Until) -> Result<(Tally, Vec<Member<1>>), EnsembleError> {
@@ -95,4 +114,58 @@ fn ensembles(report: &mut Report) {
     let folder = std::env::temp_dir();
     report.check(ends(&of(1).checkpoint(folder), until).is_err(), || "a folder for a checkpoint".into());
     report.check(ends(&of(1).progress(|part| assert!(part == 1.0)), until).is_ok(), || "progress".into());
+}
+
+/// Shards that the ensemble does not have, and words that are none of its shards.
+fn shards(report: &mut Report) {
+    let tame = VelocityPoint::from(triples()[0]);
+    let Some(by) = BY.into_iter().flatten().next() else { return };
+    let of = |t, count| Ensemble::new(&Claiming, t, count, |_| tame).by(by).steps(Steps::Count(3));
+    for number in HOSTILE {
+        let ensemble = of(number, 400);
+        let sharded = ensemble.in_shards(Until::After(0.5));
+        report.check(sharded.is_err() || number.is_finite(), || format!("shards from the time {number}"));
+    }
+    report.check(of(0.4, 0).in_shards(Until::After(0.5)).is_err(), || "shards of no member".into());
+    let (ensemble, other) = (of(0.4, 400), of(0.5, 400));
+    let (Ok(sharded), Ok(foreign)) = (ensemble.in_shards(Until::After(0.5)), other.in_shards(Until::After(0.5))) else {
+        return report.check(false, || "shards of a good ensemble".into());
+    };
+    report.check(sharded.fingerprint() != foreign.fingerprint(), || "one fingerprint of two ensembles".into());
+    let Ok(mut merge) = ensemble.merge(&sharded) else {
+        return report.check(false, || "a merge of a good ensemble".into());
+    };
+    let mut indices = Vec::new();
+    let mut fold = |member: &Member<1>| indices.push(member.index);
+    let good: Vec<Vec<u64>> = (0..sharded.count()).map(|shard| sharded.compute(shard)).collect();
+    let mut bad = vec![Vec::new(), vec![0], vec![u64::MAX; 4], vec![0; 1000]];
+    bad.extend([sharded.count(), usize::MAX].map(|shard| sharded.compute(shard)));
+    for words in &good {
+        bad.push(words[..words.len() - 1].to_vec());
+        bad.push(words.iter().copied().chain([0]).collect());
+        for place in 0..3 {
+            for value in [u64::MAX, 1 << 40, words[place] + 1] {
+                let mut changed = words.clone();
+                changed[place] = value;
+                // A number of members in lanes is what it says.
+                if place != 1 {
+                    bad.push(changed);
+                }
+            }
+        }
+    }
+    // The words of one shard with the number of the other are refused by their length.
+    for words in &bad {
+        let refused = matches!(merge.add(words, &mut fold), Err(EnsembleError::ForeignShard));
+        report.check(refused, || format!("{:?}.. of {} words", words.iter().take(3).collect::<Vec<_>>(), words.len()));
+    }
+    report.check(merge.handed_on() == 0 && !merge.is_complete() && merge.tally().members == 0, || "taken in".into());
+    report
+        .check(merge.bound(0) > 0 && merge.bound(usize::MAX) == usize::MAX, || "the bound of no worker, of all".into());
+    for words in good.iter().rev().chain(&good) {
+        report.check(merge.add(words, &mut fold).is_ok() && merge.resume(&mut fold).is_ok(), || "a good shard".into());
+    }
+    let all = (0..sharded.count()).all(|shard| merge.has(shard)) && !merge.has(usize::MAX);
+    report.check(all && merge.is_complete() && merge.tally().members == 400, || format!("{:?}", merge.tally()));
+    report.check(indices.iter().copied().eq(0..400), || "members in another order".into());
 }

@@ -24,6 +24,7 @@ pub const ATTACKS: &[Attack] = &[
             "Derivatives::along",
             "Derivatives::with_gradient",
             "Derivatives::with_force",
+            "Derivatives::force",
             "Derivatives::mass_matrix",
             "Derivatives::gradient",
             "Derivatives::hessian",
@@ -82,6 +83,7 @@ fn lagrangians(report: &mut Report) {
         report.formula(&(t, x), fine(l.value(t, &at.q, &at.v, at.z)));
         report.formula(&(t, x), fine(l.with_gradient(t, &at)));
         report.formula(&(t, x), fine(l.with_force(t, &at)));
+        report.formula(&(t, x), fine(l.force(t, &at)));
         report.formula(&(t, x), fine(l.mass_matrix(t, &at)));
         report.formula(&(t, x), fine(l.gradient(t, &at)));
         report.formula(&(t, x), fine(derived_gradient(&l, t, &at)));

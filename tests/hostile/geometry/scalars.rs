@@ -33,6 +33,7 @@ pub const ATTACKS: &[Attack] = &[
     Attack {
         on: &[
             "Scalar::re",
+            "Scalar::apart",
             "Scalar::pivot_size",
             "Scalar::abs",
             "Scalar::signum",
@@ -171,7 +172,8 @@ fn functions(report: &mut Report) {
     type D = Dual<f64, SVector<f64, 1>>;
     type Function = fn(D) -> D;
     // On the whole line.
-    let whole: [(&str, Function); 18] = [
+    let whole: [(&str, Function); 19] = [
+        ("apart", |x| D::apart(|| x.exp())),
         ("abs", |x| x.abs()),
         ("signum", |x| x.signum()),
         ("max", |x| x.max(D::from(0.5))),
