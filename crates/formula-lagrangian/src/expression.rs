@@ -2,6 +2,7 @@
 
 use crate::evaluation::At;
 use crate::formula::index;
+use crate::graph::Inputs;
 use crate::names::Names;
 use crate::parser::{MOST_NODES, Parser};
 use crate::tape::Tape;
@@ -23,6 +24,7 @@ pub struct Expression {
     graph: Graph,
     tape: Tape,
     values: Vec<f64>,
+    inputs: Inputs,
 }
 
 impl Expression {
@@ -31,7 +33,8 @@ impl Expression {
         let mut graph = Graph::new();
         let root = Parser::parse(text, &names, &mut graph)?;
         let tape = Tape::new(&graph, &[root], names.dimension).ok_or(FormulaError::TooLarge { limit: MOST_NODES })?;
-        let mut expression = Expression { names, graph, tape, values };
+        let inputs = graph.inputs(root);
+        let mut expression = Expression { names, graph, tape, values, inputs };
         expression.tape.set_constants(&expression.graph.constants(&expression.values));
         Ok(expression)
     }
@@ -44,6 +47,16 @@ impl Expression {
             self.tape.evaluate(At { q, v, z, t }, &mut [std::slice::from_mut(&mut value)]);
         }
         value
+    }
+
+    /// Whether it depends on velocities.
+    pub fn has_velocity(&self) -> bool {
+        self.inputs.meets(Inputs::VELOCITY)
+    }
+
+    /// Whether it depends on the action.
+    pub fn has_action(&self) -> bool {
+        self.inputs.meets(Inputs::ACTION)
     }
 
     /// Gives a parameter another value, without reading the text anew.

@@ -76,5 +76,6 @@ pub use expression::Expression;
 pub use formula::Formula;
 pub use graph::{Function, Graph, Id, Node, Operation};
 pub use lagrangian::FormulaLagrangian;
+pub use names::nearest_name;
 pub use parser::{DEEPEST_NESTING, LONGEST_TEXT, MOST_NODES};
 pub use symbol::{Operand, Symbol, Symbols};

@@ -82,10 +82,20 @@ impl Names {
         let known = self.blocks.iter().map(|b| b.name.as_str()).chain(self.parameters.iter().map(String::as_str));
         let known = known.chain(others.iter().map(String::as_str)).chain(RESERVED).chain(["pi", "q", "v", "n"]);
         let known = known.chain(FUNCTIONS.iter().map(|f| f.0)).chain(OPERATIONS.iter().map(|o| o.0));
-        let near = known.map(|other| (distance(name, other), other)).min_by_key(|(distance, _)| *distance);
-        let limit = name.chars().count().div_ceil(3).min(3);
-        near.filter(|(distance, _)| *distance <= limit).map(|(_, other)| other.to_owned())
+        nearest_name(name, known).map(str::to_owned)
     }
+}
+
+/// The one of some names that is nearest to another, where it is near enough to be meant: at most three letters differ, and at most a third.
+///
+/// ```
+/// assert_eq!(formula_lagrangian::nearest_name("keplr", ["pendulum", "kepler"]), Some("kepler"));
+/// assert_eq!(formula_lagrangian::nearest_name("lattice", ["pendulum", "kepler"]), None);
+/// ```
+pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let near = known.into_iter().map(|other| (distance(name, other), other)).min_by_key(|(distance, _)| *distance);
+    let limit = name.chars().count().div_ceil(3).min(3);
+    near.filter(|(distance, _)| *distance <= limit).map(|(_, other)| other)
 }
 
 /// Whether a name has a meaning of its own everywhere.

@@ -74,8 +74,12 @@ impl Interrupted {
         Some(Interrupted { fingerprint, taken, log_factor, suspicion, words: from.to_vec() })
     }
 
-    /// To a file that is there whole or not at all.
-    fn write(&self, path: &Path) -> std::io::Result<()> {
+    /// To a file that is there whole or not at all, for [`read`](Self::read).
+    ///
+    /// # Errors
+    /// Those of the file.
+    pub fn write(&self, path: impl AsRef<Path>) -> std::io::Result<()> {
+        let path = path.as_ref();
         let mut body = vec![self.fingerprint];
         self.taken.save(&mut body);
         self.log_factor.save(&mut body);

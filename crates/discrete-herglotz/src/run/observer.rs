@@ -135,8 +135,16 @@ impl<'r, const N: usize> Moment<'r, N> {
         self.motion.velocity(self.t, &self.state)
     }
 
-    /// The run as it would go on from here; `None` where its stepper cannot be saved.
-    pub(super) fn interrupted(&self) -> Option<Interrupted> {
+    /// The velocity that belongs to another state of the motion.
+    ///
+    /// # Errors
+    /// Those of [`velocity`](Self::velocity).
+    pub fn velocity_at(&self, t: f64, state: &PhasePoint<N>) -> Result<SVector<f64, N>, StepError> {
+        self.motion.velocity(t, state)
+    }
+
+    /// The run as it would go on from here, for [`Run::resume`](super::Run::resume); `None` where its stepper cannot be saved.
+    pub fn interrupted(&self) -> Option<Interrupted> {
         let (fingerprint, words) = (self.motion.fingerprint(), self.stepper.save()?);
         let (taken, suspicion) = (self.k, self.suspicion);
         Some(Interrupted { fingerprint, taken, log_factor: self.log_factor.unwrap_or(0.0), suspicion, words })

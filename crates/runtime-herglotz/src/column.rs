@@ -1,0 +1,73 @@
+//! What a row of a motion has.
+
+use crate::RuntimeError;
+use formula_lagrangian::{Expression, Formula};
+
+/// A number of a row.
+#[derive(Clone, Debug)]
+pub enum Column {
+    /// The time.
+    Time,
+    /// A coordinate by its index.
+    Position(usize),
+    /// Its velocity.
+    Velocity(usize),
+    /// Its momentum `L_v`.
+    Momentum(usize),
+    /// The action z.
+    Action,
+    /// The energy `E_L = v.p - L`.
+    Energy,
+    /// The logarithm of the conformal factor since the start.
+    LogFactor,
+    /// An expression of time and state.
+    Expression(Box<Expression>),
+}
+
+impl Column {
+    /// Reads a column over the names of a formula: `t`, `x`, `x'`, `z`; `p_x` for the momentum of `x` (`p_q[0]` in an array), `energy`,
+    /// `log_factor`, unless a coordinate or a parameter has the name; else any expression.
+    ///
+    /// # Errors
+    /// [`RuntimeError::Formula`] with the place in the text.
+    pub fn parse(text: &str, formula: &Formula) -> Result<Self, RuntimeError> {
+        let name = text.trim();
+        let coordinates = formula.coordinates();
+        let index = |of: &str| coordinates.iter().position(|c| c == of);
+        if let Some(i) = index(name) {
+            return Ok(Column::Position(i));
+        }
+        if let Some(i) = coordinates.iter().position(|c| velocity_name(c) == name) {
+            return Ok(Column::Velocity(i));
+        }
+        let taken = formula.parameters().any(|(parameter, _)| parameter == name);
+        match name {
+            "t" => return Ok(Column::Time),
+            "z" => return Ok(Column::Action),
+            "energy" if !taken => return Ok(Column::Energy),
+            "log_factor" if !taken => return Ok(Column::LogFactor),
+            _ => {}
+        }
+        if !taken && let Some(i) = name.strip_prefix("p_").and_then(index) {
+            return Ok(Column::Momentum(i));
+        }
+        Ok(Column::Expression(Box::new(formula.expression(text)?)))
+    }
+
+    /// All that a state has: `t`, the coordinates, the velocities and `z`, with their names.
+    pub fn state(formula: &Formula) -> Vec<(String, Column)> {
+        let names = formula.coordinates();
+        let positions = names.iter().cloned().enumerate().map(|(i, name)| (name, Column::Position(i)));
+        let velocities = names.iter().enumerate().map(|(i, name)| (velocity_name(name), Column::Velocity(i)));
+        let (t, z) = (("t".to_owned(), Column::Time), ("z".to_owned(), Column::Action));
+        [t].into_iter().chain(positions).chain(velocities).chain([z]).collect()
+    }
+}
+
+/// The name of a coordinate's velocity: `x'`, or `q'[0]`.
+pub fn velocity_name(coordinate: &str) -> String {
+    match coordinate.split_once('[') {
+        Some((name, index)) => format!("{name}'[{index}"),
+        None => format!("{coordinate}'"),
+    }
+}

@@ -1,0 +1,150 @@
+//! Steps of a motion as maps.
+
+use super::Sized;
+use crate::{Check, MomentumThere, Motion, Place, RuntimeError, Stated, Way};
+use contact_geom::{DiscretePoint, OneParameterGroup, PhasePoint, Symmetry, Triple, larger, largest};
+use discrete_herglotz::{
+    AnyIntegrator, DiscreteLagrangian, Gauss, InputError, Method, Midpoint, Problem, Start, Steps, Until, statements,
+};
+use formula_lagrangian::FormulaLagrangian;
+
+/// The distance of differences, relative to the size of a state.
+const DISTANCE: f64 = 1e-3;
+
+/// The places at which the theorems are evaluated.
+const PLACES: usize = 3;
+
+/// The statements' discrete Lagrangian by collocation.
+const STAGES: usize = 4;
+
+/// One step from a state, and its conformal factor.
+fn step<const N: usize>(
+    lagrangian: &FormulaLagrangian<N>,
+    (by, h, count): (AnyIntegrator, f64, usize),
+    t: f64,
+    from: &PhasePoint<N>,
+) -> Result<(PhasePoint<N>, f64), RuntimeError> {
+    let problem = Problem::new(lagrangian, t, Start::from(*from))?;
+    let plan = problem.by(by).steps(Steps::Count(count)).plan(Until::After(h))?;
+    let mut stepper = plan.stepper()?;
+    stepper.advance(count).map_err(|halt| halt.cause)?;
+    Ok((stepper.state(), stepper.sigma()))
+}
+
+/// How far the pullback of `dz - p dq` by a step is from `sigma` times it.
+fn contact_defect<const N: usize>(
+    lagrangian: &FormulaLagrangian<N>,
+    way: (AnyIntegrator, f64, usize),
+    t: f64,
+    at: &PhasePoint<N>,
+) -> Result<f64, RuntimeError> {
+    let from = Triple::from(*at);
+    let (end, sigma) = step(lagrangian, way, t, at)?;
+    let size = |x: f64| if x > 0.0 { x } else { 1.0 };
+    let sizes = [size(at.q.amax()), size(at.p.amax()), size(at.z.abs())];
+    let mut differences = Vec::with_capacity(2 * N + 1);
+    for k in 0..=2 * N {
+        let distance = DISTANCE * sizes[k / N.max(1)];
+        let moved = |by: f64| -> Result<Triple<N>, RuntimeError> {
+            let there = Triple::<N>::from_fn(|i| from.component(i) + if i == k { by * distance } else { 0.0 });
+            Ok(step(lagrangian, way, t, &there.into())?.0.into())
+        };
+        let (near, far) = (moved(1.0)?.minus(moved(-1.0)?), moved(2.0)?.minus(moved(-2.0)?));
+        let derivative = near.scale(8.0).minus(far).scale(1.0 / (12.0 * distance));
+        let pulled_back = derivative.z - end.p.dot(&derivative.x);
+        let eta = match k {
+            k if k < N => -at.p[k],
+            k if k < 2 * N => 0.0,
+            _ => 1.0,
+        };
+        // In units of the coordinates.
+        differences.push(((pulled_back - sigma * eta) * sizes[k / N.max(1)], pulled_back * sizes[k / N.max(1)]));
+    }
+    let apart = largest(differences.iter().map(|d| d.0));
+    Ok(if apart == 0.0 { 0.0 } else { apart / largest(differences.iter().map(|d| d.1)) })
+}
+
+/// How far a step is from the motion, relative to its size, for a unit of time.
+fn herglotz_defect<const N: usize>(
+    lagrangian: &FormulaLagrangian<N>,
+    way: (AnyIntegrator, f64, usize),
+    t: f64,
+    at: &PhasePoint<N>,
+) -> Result<f64, RuntimeError> {
+    let exact = (AnyIntegrator::Gauss { stages: 16 }, way.1, 2);
+    let (a, b) = (Triple::from(step(lagrangian, way, t, at)?.0), Triple::from(step(lagrangian, exact, t, at)?.0));
+    Ok(a.minus(b).amax() / larger(b.amax(), Triple::from(*at).amax()) / way.1.abs())
+}
+
+pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: usize) -> Result<Check, RuntimeError> {
+    let plan = super::run::plan(system, motion)?;
+    let by = match motion.way {
+        Way::Steps { by, .. } | Way::Accuracy { by: Some(by), .. } => by,
+        Way::Accuracy { by: None, .. } => {
+            let unknown = |_| InputError::NoIntegrator;
+            plan.integrator.name.parse().map_err(unknown)?
+        }
+    };
+    let (h, lagrangian, symmetries) = (plan.step_size, &system.0, system.0.symmetries());
+    let problem = system.problem(&motion.start)?;
+    let steps = Steps::Count(plan.steps);
+    let stride = plan.steps.div_ceil(places.max(1));
+    let momenta = |x: &PhasePoint<N>| symmetries.iter().map(|s| s.momentum(&x.q, &x.p)).collect::<Vec<f64>>();
+    let first = momenta(problem.state());
+    let mut states: Vec<(f64, PhasePoint<N>, f64)> = vec![(motion.start.t, *problem.state(), 0.0)];
+    let mut seen = |at: &discrete_herglotz::Moment<'_, N>| {
+        if at.k.is_multiple_of(stride) && !at.last {
+            states.push((at.t, at.state, at.log_factor.unwrap_or(f64::NAN)));
+        }
+        std::ops::ControlFlow::Continue(())
+    };
+    problem.by(by).steps(steps).with_conformal_factor().observe(&mut seen).run(Until::Time(motion.end))?;
+    let way = (by, h, 1);
+    let mut along = Vec::with_capacity(states.len());
+    for (t, x, log_factor) in &states {
+        let there = momenta(x).into_iter().zip(&first);
+        let momenta =
+            there.map(|(momentum, first)| MomentumThere { momentum, predicted: first * log_factor.exp() }).collect();
+        along.push(Place {
+            t: *t,
+            sigma: step(lagrangian, way, *t, x)?.1,
+            log_factor: *log_factor,
+            contact_defect: contact_defect(lagrangian, way, *t, x)?,
+            herglotz_defect: herglotz_defect(lagrangian, way, *t, x)?,
+            momenta,
+        });
+    }
+    let of_statements: Vec<_> = states.iter().step_by(states.len().div_ceil(PLACES)).collect();
+    let gauss = Gauss::new::<N>(lagrangian, STAGES, h)?;
+    let mut stated = Vec::new();
+    evaluate(&gauss, &format!("gauss_{STAGES}"), lagrangian, &symmetries, (h, &of_statements), &mut stated)?;
+    let midpoint = Midpoint::new(lagrangian, h)?;
+    evaluate(&midpoint, Method::Midpoint.name(), lagrangian, &symmetries, (h, &of_statements), &mut stated)?;
+    Ok(Check { integrator: plan.integrator.name.to_string(), step_size: h, places: along, statements: stated })
+}
+
+/// The theorems for a discrete Lagrangian, worst of some places.
+fn evaluate<const N: usize>(
+    ld: &impl DiscreteLagrangian<N>,
+    method: &str,
+    lagrangian: &FormulaLagrangian<N>,
+    symmetries: &[Symmetry<N>],
+    (h, places): (f64, &[&(f64, PhasePoint<N>, f64)]),
+    to: &mut Vec<Stated>,
+) -> Result<(), RuntimeError> {
+    let near = (AnyIntegrator::Gauss { stages: STAGES }, h, 1);
+    for statement in statements::STATEMENTS {
+        let mut worst: Option<f64> = None;
+        for (t, x, _) in places {
+            let q1 = step(lagrangian, near, *t, x)?.0.q;
+            let point = DiscretePoint { q0: x.q, q1, z0: x.z };
+            if let Some(residual) = statements::residual(statement, ld, symmetries, *t, &point)? {
+                worst = Some(worst.map_or(residual, |worst| larger(worst, residual)));
+            }
+        }
+        if let Some(residual) = worst {
+            to.push(Stated { statement, method: method.into(), residual });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,152 @@
+//! One kernel for each dimension: all that is compiled with a number of coordinates is in this module.
+
+mod check;
+mod ensemble;
+mod geometry;
+mod recorder;
+mod run;
+
+use crate::{
+    Check, Ensemble, EnsembleWatch, Geometry, Motion, Outcome, Plan, Rate, RuntimeError, SeenSymmetry, Start, Watch,
+};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, PhasePoint, Structure, Symmetry, VelocityPoint};
+use discrete_herglotz::{AnyIntegrator, InputError, Interrupted, Problem, StepError, Tally};
+use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
+use std::sync::Arc;
+
+/// A system without its dimension.
+pub(crate) trait Kernel: Send + Sync {
+    fn formula(&self) -> &Formula;
+    fn structure(&self) -> Structure;
+    fn is_smooth(&self) -> bool;
+    fn symmetries(&self) -> Vec<SeenSymmetry>;
+    fn to_rust(&self, name: &str) -> Result<String, FormulaError>;
+    fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError>;
+    fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError>;
+    fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError>;
+    fn run(&self, motion: &Motion, watch: &mut dyn Watch, from: Option<Interrupted>) -> Result<Outcome, RuntimeError>;
+    fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleWatch) -> Result<Tally, RuntimeError>;
+    fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError>;
+    fn check(&self, motion: &Motion, places: usize) -> Result<Check, RuntimeError>;
+}
+
+/// The kernel of a formula.
+pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, FormulaError> {
+    macro_rules! of {
+        ($($n:literal)*) => {
+            match formula.dimension() {
+                $($n => Ok(Arc::new(Sized(formula.lagrangian::<$n>()?)) as Arc<dyn Kernel>),)*
+                found => Err(FormulaError::Dimension { found }),
+            }
+        };
+    }
+    of!(1 2 3 4 5 6 7 8)
+}
+
+/// A system with its dimension.
+struct Sized<const N: usize>(FormulaLagrangian<N>);
+
+impl<const N: usize> Sized<N> {
+    /// A vector of so many numbers as there are coordinates, all finite.
+    fn vector(&self, what: &'static str, numbers: &[f64]) -> Result<SVector<f64, N>, RuntimeError> {
+        if numbers.len() != N {
+            return Err(RuntimeError::Length { what, found: numbers.len(), expected: N });
+        }
+        match numbers.iter().enumerate().find(|(_, x)| !x.is_finite()) {
+            Some((i, value)) => Err(RuntimeError::NotFinite { what: format!("{what}[{i}]"), value: *value }),
+            None => Ok(SVector::from_column_slice(numbers)),
+        }
+    }
+
+    fn start(&self, start: &Start) -> Result<discrete_herglotz::Start<N>, RuntimeError> {
+        for (what, value) in [("t", start.t), ("z", start.z)] {
+            if !value.is_finite() {
+                return Err(RuntimeError::NotFinite { what: what.into(), value });
+            }
+        }
+        let q = self.vector("q", &start.q)?;
+        Ok(match &start.rate {
+            Rate::Velocity(v) => VelocityPoint { q, v: self.vector("v", v)?, z: start.z }.into(),
+            Rate::Momentum(p) => PhasePoint { q, p: self.vector("p", p)?, z: start.z }.into(),
+        })
+    }
+
+    /// The problem of a start, checked.
+    fn problem(&self, start: &Start) -> Result<Problem<'_, FormulaLagrangian<N>, N>, RuntimeError> {
+        let at = self.start(start)?;
+        Problem::new(&self.0, start.t, at).map_err(|error| self.explained(error, start.t, &at))
+    }
+
+    /// A singular start with the velocities in which L is linear, where it is for those.
+    fn explained(&self, error: InputError, t: f64, at: &discrete_herglotz::Start<N>) -> RuntimeError {
+        if let (InputError::FirstStep(StepError::Singular { .. }), discrete_herglotz::Start::Velocity(x)) = (&error, at)
+        {
+            let w = self.0.closed_hessian(t, x).map(|h| h.vv);
+            let names = self.formula().coordinates();
+            let flat = |i: &usize| w.is_some_and(|w| w.row(*i).iter().all(|e| *e == 0.0));
+            let flat: Vec<String> = (0..N).filter(flat).map(|i| crate::velocity_name(&names[i])).collect();
+            if !flat.is_empty() {
+                return RuntimeError::NotRegular { velocities: flat.join(", ") };
+            }
+        }
+        error.into()
+    }
+}
+
+impl<const N: usize> Kernel for Sized<N> {
+    fn formula(&self) -> &Formula {
+        self.0.formula()
+    }
+
+    fn structure(&self) -> Structure {
+        *self.0.proved()
+    }
+
+    fn is_smooth(&self) -> bool {
+        self.0.is_smooth()
+    }
+
+    fn symmetries(&self) -> Vec<SeenSymmetry> {
+        let seen = |symmetry: &Symmetry<N>| match symmetry {
+            Symmetry::Translation(a) => a.iter().position(|x| *x != 0.0).map(SeenSymmetry::Translation),
+            Symmetry::Rotation(i, j) => Some(SeenSymmetry::Rotation(*i, *j)),
+            _ => None,
+        };
+        self.0.symmetries().iter().filter_map(seen).collect()
+    }
+
+    fn to_rust(&self, name: &str) -> Result<String, FormulaError> {
+        self.0.to_rust(name)
+    }
+
+    fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError> {
+        let mut lagrangian = self.0.clone();
+        values.iter().try_for_each(|(name, value)| lagrangian.set(name, *value))?;
+        Ok(Arc::new(Sized(lagrangian)))
+    }
+
+    fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError> {
+        integrator.check(&self.0)
+    }
+
+    fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError> {
+        run::plan(self, motion)
+    }
+
+    fn run(&self, motion: &Motion, watch: &mut dyn Watch, from: Option<Interrupted>) -> Result<Outcome, RuntimeError> {
+        run::run(self, motion, watch, from)
+    }
+
+    fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleWatch) -> Result<Tally, RuntimeError> {
+        ensemble::run(self, ensemble, watch)
+    }
+
+    fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError> {
+        geometry::at(self, at)
+    }
+
+    fn check(&self, motion: &Motion, places: usize) -> Result<Check, RuntimeError> {
+        check::check(self, motion, places)
+    }
+}

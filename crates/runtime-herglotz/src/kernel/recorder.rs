@@ -1,0 +1,214 @@
+//! The one observer of a motion: rows, events, nodes, and whether it is to go on.
+
+use crate::{Column, Crossing, Direction, Motion, RuntimeError, Watch, When};
+use contact_geom::PhasePoint;
+use contact_geom::nalgebra::SVector;
+use discrete_herglotz::{
+    Course, Event, Events, InputError, Moment, Needs, Observer, Row, Rows, Stop, legendre_inverse,
+};
+use formula_lagrangian::{Expression, FormulaLagrangian};
+use std::cell::Cell;
+use std::ops::ControlFlow;
+
+/// The steps between two polls.
+const POLL: usize = 256;
+
+/// Sees a motion for a [`Watch`].
+pub(super) struct Recorder<'r, const N: usize> {
+    rows: Option<Rows<'r, N>>,
+    columns: &'r [Column],
+    /// The numbers of a row.
+    numbers: Vec<f64>,
+    events: Option<Events<'r, N>>,
+    nodes: bool,
+    needs: Needs,
+    course: Option<Course>,
+    watch: &'r mut dyn Watch,
+}
+
+impl<'r, const N: usize> Recorder<'r, N> {
+    pub fn new(
+        lagrangian: &'r FormulaLagrangian<N>,
+        motion: &'r Motion,
+        watch: &'r mut dyn Watch,
+    ) -> Result<Self, RuntimeError> {
+        let columns = motion.columns.as_slice();
+        let rows = motion.rows.as_ref().map(|when| rows(when, columns)).transpose()?;
+        let events = motion.events.iter().map(|event| of(lagrangian, event));
+        let events = (!motion.events.is_empty()).then(|| Events::new(events));
+        // Expressions and events may have the action in them.
+        let of_rows = rows.as_ref().map(|rows| rows.needs()).unwrap_or_default();
+        let action = motion.nodes || motion.events.iter().any(|event| event.function.has_action());
+        let of_all = Needs { action, conformal_factor: false, saved: motion.resumable };
+        Ok(Recorder {
+            rows,
+            columns,
+            numbers: Vec::with_capacity(columns.len()),
+            events,
+            nodes: motion.nodes,
+            needs: of_rows.and(of_all),
+            course: None,
+            watch,
+        })
+    }
+
+    /// Hands on the rows up to a time, if one is given.
+    fn hand_on(&mut self, until: Option<f64>) -> ControlFlow<Stop<N>> {
+        let Some(rows) = &mut self.rows else { return ControlFlow::Continue(()) };
+        let backward = self.course.is_some_and(|course| course.t_end < course.t0);
+        let beyond = |t: f64| until.is_some_and(|end| if backward { t < end } else { t > end });
+        for row in rows.rows.drain(..).filter(|row| !beyond(row.t)) {
+            self.numbers.clear();
+            self.numbers.extend(self.columns.iter().map(|column| number(column, &row)));
+            if self.watch.row(&self.numbers).is_break() {
+                return ControlFlow::Break(Stop::here("its watch"));
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn see(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        if self.nodes {
+            let PhasePoint { q, p, z } = &at.state;
+            self.watch.node(at.t, q.as_slice(), p.as_slice(), *z);
+        }
+        if at.k.is_multiple_of(POLL)
+            && let Some(Course { t0, t_end, .. }) = self.course
+            && self.watch.poll((at.t - t0) / (t_end - t0)).is_break()
+        {
+            if let Some(interrupted) = at.interrupted().filter(|_| self.needs.saved) {
+                self.watch.interrupted(interrupted);
+            }
+            return ControlFlow::Break(Stop::here("its watch"));
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// The rows that columns need.
+pub(super) fn rows<'r, const N: usize>(when: &When, columns: &[Column]) -> Result<Rows<'r, N>, InputError> {
+    let rows = match when {
+        When::Every(stride) => Rows::every(*stride)?,
+        When::At(times) => Rows::at(times.iter().copied())?,
+    };
+    let any = |of: fn(&Column) -> bool| columns.iter().any(of);
+    let velocity = any(|c| match c {
+        Column::Velocity(_) => true,
+        Column::Expression(e) => e.has_velocity(),
+        _ => false,
+    });
+    let action = any(|c| match c {
+        Column::Action => true,
+        Column::Expression(e) => e.has_action(),
+        _ => false,
+    });
+    let rows = if velocity { rows.with_velocity() } else { rows };
+    let rows = if any(|c| matches!(c, Column::Energy)) { rows.with_energy() } else { rows };
+    let rows = if any(|c| matches!(c, Column::LogFactor)) { rows.with_conformal_factor() } else { rows };
+    Ok(if action { rows } else { rows.without_action() })
+}
+
+/// A number of a row; not a number where the row has it not.
+pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
+    let of = |vector: Option<&SVector<f64, N>>, i: usize| vector.and_then(|v| v.get(i)).copied().unwrap_or(f64::NAN);
+    match column {
+        Column::Time => row.t,
+        Column::Position(i) => of(Some(&row.q), *i),
+        Column::Velocity(i) => of(row.v.as_ref(), *i),
+        Column::Momentum(i) => of(Some(&row.p), *i),
+        Column::Action => row.z.unwrap_or(f64::NAN),
+        Column::Energy => row.energy.unwrap_or(f64::NAN),
+        Column::LogFactor => row.log_factor.unwrap_or(f64::NAN),
+        Column::Expression(e) => {
+            // Neither is in an expression that does not have it.
+            let v = row.v.unwrap_or_else(SVector::zeros);
+            e.at(row.t, row.q.as_slice(), v.as_slice(), row.z.unwrap_or(0.0))
+        }
+    }
+}
+
+/// The value of an expression at states `(q, p, z)`.
+fn at_states<'r, const N: usize>(
+    lagrangian: &'r FormulaLagrangian<N>,
+    function: &'r Expression,
+) -> impl FnMut(f64, &PhasePoint<N>) -> f64 + 'r {
+    // The last velocity is near the next.
+    let last = Cell::new(SVector::<f64, N>::zeros());
+    move |t, state| {
+        if function.has_velocity() {
+            match legendre_inverse(lagrangian, t, state, &last.get()) {
+                Ok(x) => last.set(x.v),
+                Err(_) => return f64::NAN,
+            }
+        }
+        function.at(t, state.q.as_slice(), last.get().as_slice(), state.z)
+    }
+}
+
+fn of<'r, const N: usize>(lagrangian: &'r FormulaLagrangian<N>, event: &'r crate::Event) -> Event<'r, N> {
+    let found = Event::new(at_states(lagrangian, &event.function));
+    let found = match event.direction {
+        Direction::Rising => found.rising(),
+        Direction::Falling => found.falling(),
+        Direction::Both => found,
+    };
+    if event.terminal { found.terminal() } else { found }
+}
+
+impl<const N: usize> Observer<N> for Recorder<'_, N> {
+    fn needs(&self) -> Needs {
+        self.needs
+    }
+
+    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+        self.course = Some(*course);
+        if let Some(rows) = &mut self.rows {
+            rows.prepare(course)?;
+        }
+        self.events.as_mut().map_or(Ok(()), |events| events.prepare(course))
+    }
+
+    fn next(&self, taken: usize) -> usize {
+        if self.nodes || self.events.is_some() {
+            return taken + 1;
+        }
+        let poll = (taken / POLL + 1) * POLL;
+        self.rows.as_ref().map_or(poll, |rows| rows.next(taken).min(poll))
+    }
+
+    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        if let Some(rows) = &mut self.rows {
+            rows.start(at)?;
+        }
+        if let Some(events) = &mut self.events {
+            events.start(at)?;
+        }
+        self.hand_on(None)?;
+        self.see(at)
+    }
+
+    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        if let Some(rows) = &mut self.rows {
+            rows.step(at)?;
+        }
+        if let Some(events) = &mut self.events {
+            let ended = events.step(at);
+            for crossing in events.crossings.drain(..) {
+                let PhasePoint { q, p, z } = crossing.state;
+                // The velocity of the step's end is near enough to find it from.
+                let v = at.velocity_at(crossing.t, &crossing.state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
+                let [q, v, p] = [q, v, p].map(|x| x.as_slice().to_vec());
+                let crossing = Crossing { t: crossing.t, event: crossing.event, q, v, p, z };
+                if self.watch.crossing(&crossing).is_break() {
+                    return ControlFlow::Break(Stop::here("its watch"));
+                }
+            }
+            if let ControlFlow::Break(stop) = ended {
+                self.hand_on(stop.at.map(|(t, _)| t))?;
+                return ControlFlow::Break(stop);
+            }
+        }
+        self.hand_on(None)?;
+        self.see(at)
+    }
+}

@@ -1,0 +1,65 @@
+//! One motion.
+
+use super::Sized;
+use super::recorder::Recorder;
+use crate::{Motion, Outcome, Plan, RuntimeError, Watch, Way};
+use discrete_herglotz::{Interrupted, Problem, Run, Until};
+use formula_lagrangian::FormulaLagrangian;
+
+/// The run of a motion, without its observer.
+fn of<'p, 'o, const N: usize>(
+    problem: &'p Problem<'p, FormulaLagrangian<N>, N>,
+    motion: &Motion,
+) -> Run<'p, 'o, FormulaLagrangian<N>, N> {
+    let run = match motion.way {
+        Way::Accuracy { wanted, by: None } => problem.accuracy(wanted),
+        Way::Accuracy { wanted, by: Some(by) } => problem.by(by).accuracy(wanted),
+        Way::Steps { by, steps } => problem.by(by).steps(steps),
+    };
+    let run = if motion.action { run } else { run.without_action() };
+    if motion.conformal_factor { run.with_conformal_factor() } else { run }
+}
+
+pub(super) fn plan<const N: usize>(system: &Sized<N>, motion: &Motion) -> Result<Plan, RuntimeError> {
+    let problem = system.problem(&motion.start)?;
+    let mut unwatched = ();
+    let mut recorder = Recorder::new(&system.0, motion, &mut unwatched)?;
+    let run = of(&problem, motion).observe(&mut recorder);
+    let plan = run.plan(Until::Time(motion.end))?;
+    Ok(Plan {
+        text: plan.to_string(),
+        integrator: plan.integrator().clone(),
+        step_size: plan.step_size(),
+        steps: plan.count(),
+        error: plan.error(),
+        items: plan.items(),
+    })
+}
+
+pub(super) fn run<const N: usize>(
+    system: &Sized<N>,
+    motion: &Motion,
+    watch: &mut dyn Watch,
+    from: Option<Interrupted>,
+) -> Result<Outcome, RuntimeError> {
+    let problem = system.problem(&motion.start)?;
+    let mut recorder = Recorder::new(&system.0, motion, watch)?;
+    let run = of(&problem, motion).observe(&mut recorder);
+    let run = match from {
+        Some(from) => run.resume(from),
+        None => run,
+    };
+    let outcome = run.run(Until::Time(motion.end))?;
+    Ok(Outcome {
+        status: outcome.status,
+        suspicion: outcome.suspicion,
+        steps: outcome.steps,
+        t: outcome.t,
+        q: outcome.q.as_slice().to_vec(),
+        p: outcome.p.as_slice().to_vec(),
+        v: outcome.v.map(|v| v.as_slice().to_vec()),
+        z: outcome.z,
+        log_factor: outcome.log_factor,
+        evaluations: outcome.evaluations,
+    })
+}

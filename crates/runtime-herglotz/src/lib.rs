@@ -1,0 +1,48 @@
+//! Motions of Lagrangians whose formula and dimension are known when the program runs.
+//!
+//! The libraries below are generic in the number of coordinates and in the Lagrangian; here is one type for all formulas of 1 to 8
+//! coordinates, behind which they are compiled once. [`System`] is a formula with its integrators, [`Motion`] what is asked of a
+//! motion, [`Ensemble`] of many.
+//!
+//! ```
+//! use runtime_herglotz::{Column, Motion, Start, System, Way, When};
+//!
+//! let pendulum = System::parse("theta'^2/2 + cos(theta) + gamma*z", &["theta"], &[("gamma", -0.1)])?;
+//! let motion = Motion {
+//!     rows: Some(When::At((0..=10).map(f64::from).collect())),
+//!     columns: vec![Column::Time, Column::parse("theta", pendulum.formula())?, Column::Energy],
+//!     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, Way::Accuracy { wanted: 1e-10, by: None })
+//! };
+//! let (outcome, rows) = pendulum.record(&motion)?;
+//! println!("{}: {rows:?}", outcome.status);
+//! # Ok::<(), runtime_herglotz::RuntimeError>(())
+//! ```
+
+mod catalogue;
+mod check;
+mod column;
+mod compare;
+mod ensemble;
+mod error;
+mod geometry;
+mod kernel;
+mod outcome;
+mod request;
+mod system;
+
+pub use catalogue::{CATALOGUE, CatalogueEntry};
+pub use check::{CONTACT, Check, MomentumThere, Place, Stated};
+pub use column::{Column, velocity_name};
+pub use compare::{Comparison, Work};
+pub use ensemble::{Ending, Ensemble, EnsembleWatch, MemberEnd, Varied};
+pub use error::RuntimeError;
+pub use geometry::Geometry;
+pub use outcome::{Crossing, Outcome, Plan, Watch};
+pub use request::{Direction, Event, Motion, Rate, Start, Way, When};
+pub use system::{SeenSymmetry, System};
+
+pub use contact_geom::{Statement, Structure};
+pub use discrete_herglotz::{
+    AnyIntegrator, Facts, InputError, Interrupted, Item, Status, Steps, Suspicion, Tally, UnknownIntegrator,
+};
+pub use formula_lagrangian::{Expression, Formula, FormulaError, Graph, ParseError, Symbol, Symbols, nearest_name};

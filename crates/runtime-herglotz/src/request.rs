@@ -1,0 +1,141 @@
+//! What is asked of a motion.
+
+use crate::Column;
+use discrete_herglotz::{AnyIntegrator, Steps};
+use formula_lagrangian::Expression;
+
+/// What a motion starts with beside its position.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Rate {
+    /// The velocities.
+    Velocity(Vec<f64>),
+    /// The momenta `L_v`.
+    Momentum(Vec<f64>),
+}
+
+/// Where a motion starts: as many numbers in each vector as there are coordinates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Start {
+    /// The time.
+    pub t: f64,
+    /// The position.
+    pub q: Vec<f64>,
+    /// The velocity, or the momentum.
+    pub rate: Rate,
+    /// The action.
+    pub z: f64,
+}
+
+impl Start {
+    /// At a time, a position, a velocity and an action.
+    pub fn new(t: f64, q: impl Into<Vec<f64>>, v: impl Into<Vec<f64>>, z: f64) -> Self {
+        Start { t, q: q.into(), rate: Rate::Velocity(v.into()), z }
+    }
+}
+
+/// How a motion is advanced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Way {
+    /// To a relative error of (q, p), by this integrator, or by one that is chosen for it.
+    Accuracy {
+        /// The error.
+        wanted: f64,
+        /// The integrator.
+        by: Option<AnyIntegrator>,
+    },
+    /// By given steps.
+    Steps {
+        /// The integrator.
+        by: AnyIntegrator,
+        /// Their length or number.
+        steps: Steps,
+    },
+}
+
+/// Which states are recorded.
+#[derive(Clone, Debug, PartialEq)]
+pub enum When {
+    /// The start, every so many steps, and the end.
+    Every(usize),
+    /// These times, in the order of the motion.
+    At(Vec<f64>),
+}
+
+/// Which changes of sign of an event count, in the sense of the motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Direction {
+    /// From negative to positive.
+    Rising,
+    /// From positive to negative.
+    Falling,
+    /// Both.
+    #[default]
+    Both,
+}
+
+/// A function of the state whose changes of sign are to be found.
+#[derive(Clone, Debug)]
+pub struct Event {
+    /// The function.
+    pub function: Expression,
+    /// Which changes count.
+    pub direction: Direction,
+    /// Whether the first one ends the motion.
+    pub terminal: bool,
+}
+
+/// A motion to be computed, with all that is to be recorded of it.
+///
+/// ```
+/// use runtime_herglotz::{Column, Motion, Start, System, Way, When};
+/// let system = System::parse("x'^2/2 - x^2/2 + gamma*z", &["x"], &[("gamma", -0.1)])?;
+/// let motion = Motion {
+///     rows: Some(When::At(vec![0.0, 5.0, 10.0])),
+///     columns: vec![Column::Time, Column::Position(0), Column::Energy],
+///     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, Way::Accuracy { wanted: 1e-9, by: None })
+/// };
+/// let (outcome, rows) = system.record(&motion)?;
+/// assert_eq!((outcome.t, rows.len()), (10.0, 3));
+/// # Ok::<(), runtime_herglotz::RuntimeError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// Where it starts.
+    pub start: Start,
+    /// The time at which it ends, before or after that of the start.
+    pub end: f64,
+    /// How it is advanced.
+    pub way: Way,
+    /// The states that are recorded, as rows of the columns.
+    pub rows: Option<When>,
+    /// What a row has.
+    pub columns: Vec<Column>,
+    /// The changes of sign that are to be found.
+    pub events: Vec<Event>,
+    /// Whether the outcome has the action.
+    pub action: bool,
+    /// Whether the outcome has the conformal factor.
+    pub conformal_factor: bool,
+    /// Whether every step is handed to [`Watch::node`](crate::Watch::node).
+    pub nodes: bool,
+    /// Whether the motion can be interrupted and [resumed](crate::System::resume).
+    pub resumable: bool,
+}
+
+impl Motion {
+    /// From a start to a time, with nothing recorded but the end.
+    pub fn new(start: Start, end: f64, way: Way) -> Self {
+        Motion {
+            start,
+            end,
+            way,
+            rows: None,
+            columns: Vec::new(),
+            events: Vec::new(),
+            action: true,
+            conformal_factor: false,
+            nodes: false,
+            resumable: false,
+        }
+    }
+}
