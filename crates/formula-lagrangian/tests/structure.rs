@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
-use contact_geom::{Lagrangian, OneParameterGroup, Structure, Symmetry, VelocityPoint};
+use contact_geom::{Lagrangian, OneParameterGroup, Symmetry, VelocityPoint};
 use discrete_herglotz::{Problem, Steps, Until};
 use formula_lagrangian::{Formula, FormulaLagrangian};
 

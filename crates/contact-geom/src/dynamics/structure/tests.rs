@@ -130,7 +130,7 @@ fn a_true_claim_holds_to_the_rounding_of_its_terms() {
         separable: true,
         quadratic: true,
         constant_mass: true,
-        };
+    };
     for term in [Term::Nothing, Term::Cancelling] {
         for units in all_units() {
             let (t, x) = point(units, 1.3);
