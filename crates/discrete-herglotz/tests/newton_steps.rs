@@ -1,7 +1,7 @@
 //! Steps that are solved by Newton's method on all stages at once, with the feature `faer` or without: `.ci/run` runs both.
 
 use contact_geom::systems::HarmonicOscillator;
-use contact_geom::{Triple, VelocityPoint, largest, legendre};
+use contact_geom::{DiscretePoint, Triple, VelocityPoint, largest, legendre};
 use discrete_herglotz::{DiscreteLagrangian, Gauss, Solver};
 
 /// Eight steps of order 24 by Newton's method on the stages meet the closed form, to the rounding of eight sums.
@@ -19,4 +19,21 @@ fn newton_steps_of_gauss_collocation() {
     let off = Triple::from(state).minus(expected.into());
     let off = largest([off.x[0], off.y[0], off.z]);
     assert!(off <= 8.0 * 4.0 * f64::EPSILON, "{off:e}");
+}
+
+/// A momentum that vanishes has no size of its own to be found to: a motion from rest, between its points.
+#[test]
+fn points_of_a_motion_that_starts_at_rest_tell_it() {
+    let damped = HarmonicOscillator { gamma: -0.1 };
+    let x = VelocityPoint::new([1.0], [0.0], 0.2);
+    let start = legendre(&damped, 0.0, &x);
+    for stages in 2..=16 {
+        for h in [0.1, 0.09375, 0.4] {
+            let ld = Gauss::new::<1>(&damped, stages, h).unwrap();
+            let end = ld.forward(0.0, &start, &x.v, &mut Solver::default()).unwrap().end;
+            let jet = ld.jet(0.0, &DiscretePoint { q0: x.q, q1: end.q, z0: x.z }).unwrap();
+            // p0 = -D1 / sigma_d; its condition is that of a velocity from two positions.
+            assert!(jet.d1[0].abs() <= 16.0 * f64::EPSILON / h, "{stages} stages, h = {h}: {}", jet.d1[0]);
+        }
+    }
 }

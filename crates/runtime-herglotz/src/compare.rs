@@ -1,6 +1,22 @@
 //! Run time against error on a motion, for all integrators that apply.
 
-use crate::{Motion, RuntimeError, System};
+use crate::{Motion, Outcome, RuntimeError, System, Way};
+use contact_geom::largest;
+use discrete_herglotz::{AnyIntegrator, InputError, Steps};
+use std::time::{Duration, Instant};
+
+/// The errors that are asked of the reference, until one is had.
+const REFERENCES: [f64; 5] = [1e-13, 1e-12, 1e-10, 1e-8, 1e-6];
+
+/// No integrator is tried with shorter steps after a run that took so long.
+const LONGEST: Duration = Duration::from_millis(500);
+
+/// A run is repeated for so long, and so often, for the least time.
+const REPEATED: Duration = Duration::from_millis(10);
+const REPETITIONS: usize = 5;
+
+/// The halvings of the step of an integrator.
+const HALVINGS: u32 = 20;
 
 /// One run of a [`Comparison`].
 #[derive(Clone, Debug, PartialEq)]
@@ -15,9 +31,9 @@ pub struct Work {
     pub steps: usize,
     /// The evaluations of forces or gradients.
     pub evaluations: u64,
-    /// The error of (q, p) at the end, relative to its size there.
+    /// The error of (q, p) at the end, relative to its size there, and not less than that of the reference.
     pub error: f64,
-    /// The seconds that it took, the least of a few runs.
+    /// The seconds that it took with all checks of a run, the least of a few.
     pub seconds: f64,
 }
 
@@ -26,10 +42,14 @@ pub struct Work {
 pub struct Comparison {
     /// All runs, by integrator and falling step.
     pub rows: Vec<Work>,
-    /// How the reference was computed, and the error that is estimated of it.
+    /// How the reference was computed.
     pub reference: String,
+    /// The error of the reference: its distance from a run by half as many steps.
+    pub reference_error: f64,
     /// Integrators that do not apply, and why.
     pub left_out: Vec<(String, String)>,
+    /// Whether it was ended before all integrators were tried.
+    pub ended: bool,
 }
 
 impl Comparison {
@@ -39,17 +59,111 @@ impl Comparison {
     }
 }
 
+/// The distance of the ends of two runs in (q, p), relative to the size of the second.
+fn apart(a: &Outcome, b: &Outcome) -> f64 {
+    let pairs = || a.q.iter().chain(&a.p).zip(b.q.iter().chain(&b.p));
+    let square = pairs().map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    let size = pairs().map(|(_, b)| b.powi(2)).sum::<f64>();
+    if square == 0.0 { 0.0 } else { (square / size).sqrt() }
+}
+
 impl System {
     /// Runs a motion by all integrators that apply, with steps from long to short, and measures time and error of each. Of `motion` the start
-    /// and the end are taken. `progress` is told the part that is done; `false` ends it there.
+    /// and the end are taken. `progress` is told the part that is done; `false` ends it there. Steps are halved until round-off, or until a
+    /// run takes half a second.
     ///
     /// # Errors
-    /// Those of the reference, which is by contact Gauss collocation.
-    pub fn compare(
-        &self,
-        _motion: &Motion,
-        _progress: &mut dyn FnMut(f64) -> bool,
-    ) -> Result<Comparison, RuntimeError> {
-        Ok(Comparison { rows: Vec::new(), reference: String::new(), left_out: Vec::new() })
+    /// Those of the reference, which is by contact Gauss collocation with 16 stages.
+    pub fn compare(&self, motion: &Motion, progress: &mut dyn FnMut(f64) -> bool) -> Result<Comparison, RuntimeError> {
+        let bare = |way: Way| Motion { action: false, ..Motion::new(motion.start.clone(), motion.end, way) };
+        let by = AnyIntegrator::Gauss { stages: 16 };
+        let mut count = Err(RuntimeError::from(InputError::NoSteps));
+        for wanted in REFERENCES {
+            let plan = self.plan(&bare(Way::Accuracy { wanted, by: Some(by) }));
+            let refused = matches!(plan, Err(RuntimeError::Input(InputError::Accuracy { .. })));
+            count = plan.map(|plan| plan.steps);
+            if !refused {
+                break;
+            }
+        }
+        let (count, span) = (count?, motion.end - motion.start.t);
+        let run =
+            |by: AnyIntegrator, count: usize| self.run(&bare(Way::Steps { by, steps: Steps::Count(count) }), &mut ());
+        let (coarse, reference) = (run(by, count)?, run(by, 2 * count)?);
+        let reference_error = apart(&coarse, &reference);
+        let mut comparison = Comparison {
+            rows: Vec::new(),
+            reference: format!("{by} in {} steps", 2 * count),
+            reference_error,
+            left_out: Vec::new(),
+            ended: false,
+        };
+        let all = AnyIntegrator::all();
+        for (i, by) in all.iter().copied().enumerate() {
+            if !progress(i as f64 / all.len() as f64) {
+                comparison.ended = true;
+                return Ok(comparison);
+            }
+            if let Err(why) = self.check_integrator(by) {
+                comparison.left_out.push((by.to_string(), why.to_string()));
+                continue;
+            }
+            // So long that the reference would need as many evaluations.
+            let first = count.div_ceil(8).max(1);
+            work_of(by, (first, span), &run, &reference, &mut comparison);
+        }
+        progress(1.0);
+        Ok(comparison)
+    }
+}
+
+/// One integrator with steps from long to short.
+fn work_of(
+    by: AnyIntegrator,
+    (first, span): (usize, f64),
+    run: &dyn Fn(AnyIntegrator, usize) -> Result<Outcome, RuntimeError>,
+    reference: &Outcome,
+    to: &mut Comparison,
+) {
+    let (mut least, mut worse) = (f64::INFINITY, 0);
+    for halving in 0..HALVINGS {
+        let Some(count) = first.checked_shl(halving) else { break };
+        let begin = Instant::now();
+        let outcome = run(by, count);
+        let mut seconds = begin.elapsed();
+        let whole = outcome.ok().filter(|outcome| outcome.t == reference.t);
+        if let Some(outcome) = whole {
+            let error = largest([apart(&outcome, reference), to.reference_error]);
+            let mut spent = seconds;
+            for _ in 1..REPETITIONS {
+                if spent > REPEATED {
+                    break;
+                }
+                let begin = Instant::now();
+                let _ = run(by, count);
+                spent += begin.elapsed();
+                seconds = seconds.min(begin.elapsed());
+            }
+            if error < 1.0 {
+                to.rows.push(Work {
+                    integrator: by.to_string(),
+                    order: by.order(),
+                    step_size: span / count as f64,
+                    steps: outcome.steps,
+                    evaluations: outcome.evaluations,
+                    error,
+                    seconds: seconds.as_secs_f64(),
+                });
+            }
+            // Round-off: halving the step does not better it.
+            worse = if error > 0.5 * least { worse + 1 } else { 0 };
+            least = least.min(error);
+            if error <= to.reference_error || worse == 2 && least < 1e-9 {
+                break;
+            }
+        }
+        if seconds > LONGEST {
+            break;
+        }
     }
 }

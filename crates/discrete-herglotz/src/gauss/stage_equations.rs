@@ -287,8 +287,9 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         }
     }
 
-    /// The size of a correction: the largest, each in units of the largest of its kind.
-    fn size<T: Scalar>(&self, x: &StageUnknowns<N, T>, change: &DVector<T>) -> f64 {
+    /// The size of a correction: the largest, each in units of the largest of its kind. The momenta `L_v` of the stages are of the kind of
+    /// that of the start, which vanishes where a motion starts at rest.
+    fn size<T: Scalar>(&self, x: &StageUnknowns<N, T>, l: &[Dual<T, Triple<N, T>>], change: &DVector<T>) -> f64 {
         let s = self.products.s;
         let mut worst = 0.0f64;
         let mut see = |change: f64, size: f64| {
@@ -304,7 +305,8 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         see(of(0..s * N), x.v.iter().flatten().fold(0.0, |m, v| larger(m, v.extent())));
         see(of(s * N..s * (N + 1)), x.z.iter().fold(0.0, |m, z| larger(m, z.extent())));
         see(of(s * (N + 1)..s * (N + 2)), x.rho.iter().fold(1.0, |m, r| larger(m, r.extent())));
-        see(of(s * (N + 2)..change.len()), x.p0.iter().fold(0.0, |m, p| larger(m, p.extent())));
+        let momenta = l.iter().flat_map(|l| l.d.y.iter()).chain(x.p0.iter());
+        see(of(s * (N + 2)..change.len()), momenta.fold(0.0, |m, p| larger(m, p.extent())));
         worst
     }
 
@@ -345,8 +347,8 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                 self.stages(given, x, l);
                 self.residual(given, x, l, residual);
                 next.copy_from(residual);
-                let after = if lu.solve(next.as_mut_slice()).is_ok() { self.size(x, next) } else { f64::NAN };
-                change = self.size(x, correction);
+                let after = if lu.solve(next.as_mut_slice()).is_ok() { self.size(x, l, next) } else { f64::NAN };
+                change = self.size(x, l, correction);
                 // With half of the digits there is no need of damping.
                 match damping.judge(change, after, f64::EPSILON.sqrt()) {
                     Verdict::Taken => break after,
@@ -417,7 +419,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                 change[i] = (0..n).fold(T::zero(), |sum, j| sum + residual[j] * inverse[(i, j)]);
             }
             self.add(&mut x, &change, 1.0);
-            let size = self.size(&x, &change);
+            let size = self.size(&x, &l, &change);
             // The iteration ends in finitely many steps but for round-off.
             if size <= f64::EPSILON || (size >= 0.5 * before && size <= 1e-10) {
                 self.stages(given, &x, &mut l);

@@ -1,0 +1,341 @@
+//! Systems that are known when the program runs, against the types of the libraries.
+
+use contact_geom::systems as typed;
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, herglotz_field};
+use discrete_herglotz::{AnyIntegrator, InputError, Interrupted, Problem, Status, Steps, Until};
+use formula_lagrangian::Formula;
+use runtime_herglotz::{
+    CATALOGUE, CatalogueEntry, Column, Crossing, Direction, Ensemble, Event, MemberEnd, Motion, RuntimeError,
+    SeenSymmetry, Start, System, Varied, Watch, Way, When,
+};
+use std::ops::ControlFlow;
+
+const GAUSS: AnyIntegrator = AnyIntegrator::Gauss { stages: 8 };
+
+fn by_steps(count: usize) -> Way {
+    Way::Steps { by: GAUSS, steps: Steps::Count(count) }
+}
+
+fn accurate(wanted: f64) -> Way {
+    Way::Accuracy { wanted, by: None }
+}
+
+fn pendulum() -> System {
+    System::parse("theta'^2/2 + cos(theta) + gamma*z", &["theta"], &[("gamma", -0.1)]).unwrap()
+}
+
+fn start_of(entry: &CatalogueEntry) -> Start {
+    Start::new(entry.t, entry.q, entry.v, 0.2)
+}
+
+/// The Herglotz field of an entry is that of the type.
+fn same<const N: usize>(name: &str, lagrangian: &impl Lagrangian<N>) {
+    let entry = CatalogueEntry::find(name).unwrap();
+    let system = System::new(&entry.formula().unwrap()).unwrap();
+    let x = VelocityPoint::<N>::from_slices(entry.q, entry.v, 0.2).unwrap();
+    let field = herglotz_field(lagrangian, entry.t, &x).unwrap().to_vector();
+    let geometry = system.geometry(&start_of(entry)).unwrap();
+    let size = field.amax();
+    for (found, expected) in geometry.herglotz_field.iter().zip(&field) {
+        assert!((found - expected).abs() <= 16.0 * f64::EPSILON * size, "{name}: {found} and {expected}");
+    }
+    let rate = lagrangian.gradient(entry.t, &x).z;
+    assert!((geometry.rate - rate).abs() <= 16.0 * f64::EPSILON, "{name}: {}", geometry.rate);
+}
+
+#[test]
+fn the_catalogue_has_the_formulas_of_the_types() {
+    same("free_particle", &typed::FreeParticle { gamma: -0.1 });
+    same("uniform_field", &typed::UniformField::<2> { field: [0.0, -1.0], gamma: -0.1 });
+    same("harmonic_oscillator", &typed::HarmonicOscillator { gamma: -0.1 });
+    same("pendulum", &typed::Pendulum { gamma: -0.1 });
+    same("duffing", &typed::Duffing { alpha: -1.0, beta: 1.0, force: 0.3, omega: 1.2, gamma: -0.3 });
+    same("quadratic_in_z", &typed::QuadraticInZ { c: 0.1 });
+    same("coupled_in_z", &typed::CoupledInZ { a: 0.5, b: 0.1, gamma: -0.1 });
+    same("relativistic", &typed::Relativistic { gamma: -0.1 });
+    same("lane_emden", &typed::LaneEmden { n: 5 });
+    same("kepler", &typed::Kepler::<2> { mu: 1.0, gamma: -0.01 });
+    same("kepler_in_space", &typed::Kepler::<3> { mu: 1.0, gamma: -0.01 });
+    same("perturbed_kepler", &typed::PerturbedKepler { mu: 1.0, alpha: 0.01, theta: std::f64::consts::PI });
+    same("charged_particle", &typed::ChargedParticle { b: 1.0, k: 0.5, gamma: -0.1 });
+    same("double_pendulum", &typed::DoublePendulum { masses: [1.0; 2], lengths: [1.0; 2], gamma: -0.1 });
+    same("spherical_pendulum", &typed::SphericalPendulum { gamma: -0.1 });
+    same("coupled_plane", &typed::CoupledPlane { a: 0.3, b: 0.4, c: 0.3 });
+    same("chain", &typed::Chain::<6> { ends: typed::Ends::Fixed, beta: 0.5, gamma: -0.1 });
+    assert_eq!(CATALOGUE.len(), 17, "each is compared above");
+}
+
+#[test]
+fn every_entry_runs_and_its_steps_are_contact() {
+    for entry in CATALOGUE {
+        let system = System::new(&entry.formula().unwrap()).unwrap();
+        let motion = Motion::new(start_of(entry), entry.t + 3.0, accurate(1e-9));
+        let outcome = system.run(&motion, &mut ()).unwrap();
+        assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None), "{}", entry.name);
+        let check = system.check(&motion, 3).unwrap_or_else(|error| panic!("{}: {error}", entry.name));
+        assert!(check.is_contact(), "{}: {:e}", entry.name, check.contact_defect());
+        assert!(check.momentum_defect() <= 1e-11, "{}: {:e}", entry.name, check.momentum_defect());
+        for place in &check.places {
+            // A step to 1e-9 of a whole motion is nearer to the motion than that.
+            assert!(place.herglotz_defect <= 1e-8, "{}: {:e}", entry.name, place.herglotz_defect);
+        }
+        assert!(check.statements.len() >= 12, "{}", entry.name);
+        for stated in &check.statements {
+            assert!(stated.residual <= 1e-9, "{}: {:?} {:e}", entry.name, stated.statement, stated.residual);
+        }
+    }
+}
+
+/// In any number of coordinates the energy decays as the conformal factor, to the accuracy that was asked for.
+#[test]
+fn one_to_eight_coordinates() {
+    for n in 1..=8 {
+        let text = "sum(i, 0, n-1, v[i]^2 - q[i]^2)/2 - sum(i, 1, n-1, (q[i] - q[i-1])^4)/4 + gamma*z";
+        let system = System::parse(text, &[&format!("x[{n}]")], &[("gamma", -0.2)]).unwrap();
+        assert_eq!(system.dimension(), n);
+        let motion = Motion {
+            rows: Some(When::Every(usize::MAX)),
+            columns: vec![Column::Energy, Column::LogFactor],
+            ..Motion::new(Start::new(0.0, vec![0.7; n], vec![0.1; n], 0.0), 5.0, accurate(1e-10))
+        };
+        let (outcome, rows) = system.record(&motion).unwrap();
+        let ([first, last], [from, to]) = ([rows[0][0], rows[1][0]], [rows[0][1], rows[1][1]]);
+        assert_eq!((outcome.status, from), (Status::Completed, 0.0));
+        assert!((to + 1.0).abs() < 1e-14, "the factor is e^(gamma t): {to}");
+        assert!((last / (first * to.exp()) - 1.0).abs() < 1e-9, "{n}: {first} to {last}");
+    }
+    let error = System::parse("q[0]", &["q[9]"], &[]).err().unwrap();
+    assert!(error.to_string().contains("1 to 8"), "{error}");
+}
+
+/// What is watched of a motion.
+#[derive(Default)]
+struct Seen {
+    rows: Vec<Vec<f64>>,
+    crossings: Vec<Crossing>,
+    nodes: usize,
+    /// The polls after which the motion is ended.
+    polls: Option<usize>,
+    interrupted: Option<Interrupted>,
+}
+
+impl Watch for Seen {
+    fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
+        self.rows.push(numbers.to_vec());
+        ControlFlow::Continue(())
+    }
+    fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
+        self.crossings.push(crossing.clone());
+        ControlFlow::Continue(())
+    }
+    fn node(&mut self, _t: f64, _q: &[f64], _p: &[f64], _z: f64) {
+        self.nodes += 1;
+    }
+    fn poll(&mut self, _part: f64) -> ControlFlow<()> {
+        match &mut self.polls {
+            Some(0) => ControlFlow::Break(()),
+            Some(left) => {
+                *left -= 1;
+                ControlFlow::Continue(())
+            }
+            None => ControlFlow::Continue(()),
+        }
+    }
+    fn interrupted(&mut self, at: Interrupted) {
+        self.interrupted = Some(at);
+    }
+}
+
+#[test]
+fn a_run_is_that_of_the_typed_formula() {
+    let system = pendulum();
+    let formula = system.formula();
+    let motion = Motion {
+        rows: Some(When::At(vec![0.0, 2.5, 5.0, 20.0])),
+        columns: ["t", "theta", "theta'", "p_theta", "z", "energy", "exp(-gamma*t)*theta*theta'"]
+            .map(|text| Column::parse(text, formula).unwrap())
+            .into(),
+        events: vec![Event {
+            function: formula.expression("theta'").unwrap(),
+            direction: Direction::Rising,
+            terminal: false,
+        }],
+        nodes: true,
+        ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 20.0, by_steps(50))
+    };
+    let mut seen = Seen::default();
+    let outcome = system.run(&motion, &mut seen).unwrap();
+
+    let typed = formula.lagrangian::<1>().unwrap();
+    let problem = Problem::new(&typed, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let expected = problem.by(GAUSS).steps(Steps::Count(50)).run(Until::Time(20.0)).unwrap();
+    assert_eq!((outcome.q[0], outcome.p[0], outcome.z), (expected.q[0], expected.p[0], expected.z));
+    assert_eq!((seen.nodes, seen.rows.len()), (51, 4));
+    let last = &seen.rows[3];
+    assert_eq!([last[0], last[1], last[3]], [20.0, expected.q[0], expected.p[0]]);
+    assert_eq!(last[6], (2.0f64).exp() * last[1] * last[2]);
+    // theta' rises through 0 at the left turning points.
+    assert!(seen.crossings.len() == 3, "{:?}", seen.crossings);
+    for crossing in &seen.crossings {
+        assert!(crossing.v[0].abs() < 1e-14 && crossing.q[0] < 0.0, "{crossing:?}");
+    }
+}
+
+#[test]
+fn a_terminal_event_ends_the_rows_too() {
+    let system = pendulum();
+    let event =
+        Event { function: system.formula().expression("theta").unwrap(), direction: Direction::Both, terminal: true };
+    let motion = Motion {
+        rows: Some(When::At((0..=40).map(|k| 0.1 * f64::from(k)).collect())),
+        columns: vec![Column::Time, Column::Position(0)],
+        events: vec![event],
+        ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 4.0, by_steps(4))
+    };
+    let mut seen = Seen::default();
+    let outcome = system.run(&motion, &mut seen).unwrap();
+    assert!(matches!(outcome.status, Status::Stopped { .. }) && outcome.q[0].abs() < 1e-15, "{outcome:?}");
+    // All rows before it, and none after it.
+    let times: Vec<f64> = seen.rows.iter().map(|row| row[0]).collect();
+    let expected = (0..=40).map(|k| 0.1 * f64::from(k)).filter(|t| *t <= outcome.t).collect::<Vec<_>>();
+    assert_eq!(times, expected);
+    assert!(seen.rows.iter().all(|row| row[1] > 0.0));
+}
+
+#[test]
+fn an_interrupted_motion_goes_on_to_the_last_bit() {
+    let system = pendulum();
+    let motion = Motion {
+        rows: Some(When::Every(100)),
+        columns: vec![Column::Time, Column::Position(0), Column::Action],
+        resumable: true,
+        ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 100.0, by_steps(2000))
+    };
+    let mut whole = Seen::default();
+    let expected = system.run(&motion, &mut whole).unwrap();
+    let mut first = Seen { polls: Some(3), ..Seen::default() };
+    let ended = system.run(&motion, &mut first).unwrap();
+    assert!(matches!(ended.status, Status::Stopped { .. }) && ended.t < 100.0, "{ended:?}");
+    let mut rest = Seen::default();
+    let outcome = system.resume(&motion, first.interrupted.unwrap(), &mut rest).unwrap();
+    assert_eq!(outcome, expected);
+    let rows: Vec<_> = first.rows.into_iter().chain(rest.rows).collect();
+    assert_eq!(rows, whole.rows);
+}
+
+/// The members of an ensemble, in their order.
+fn members(system: &System, ensemble: &Ensemble<'_>) -> Vec<MemberEnd> {
+    let mut all = Vec::new();
+    let mut keep = |member| {
+        all.push(member);
+        ControlFlow::Continue(())
+    };
+    let tally = system.ensemble(ensemble, &mut keep).unwrap();
+    assert_eq!(tally.members, ensemble.count);
+    all
+}
+
+#[test]
+fn members_are_single_runs_whatever_the_threads() {
+    let system = pendulum();
+    let start = |i: usize| Start::new(0.0, [0.1 + 0.01 * i as f64], [0.0], 0.0);
+    // One of them has no value.
+    let values = |i: usize| vec![if i == 7 { f64::NAN } else { -0.05 - 0.001 * i as f64 }];
+    let columns = [Column::Position(0), Column::Energy];
+    let of = |threads| Ensemble {
+        count: 20,
+        start: &start,
+        t0: 0.0,
+        varied: Some(Varied { names: &["gamma"], values: &values }),
+        end: 10.0,
+        way: by_steps(40),
+        rows: None,
+        columns: &columns,
+        threads: Some(threads),
+    };
+    let (one, three) = (members(&system, &of(1)), members(&system, &of(3)));
+    for (i, (a, b)) in one.iter().zip(&three).enumerate() {
+        // As text: what is not a number is not equal to itself.
+        assert_eq!((a.index, format!("{:?}", a.ending)), (i, format!("{:?}", b.ending)));
+        let Ok(ending) = &a.ending else {
+            assert_eq!(i, 7);
+            continue;
+        };
+        let own = system.with_parameters(&[("gamma", values(i)[0])]).unwrap();
+        let outcome = own.run(&Motion::new(start(i), 10.0, by_steps(40)), &mut ()).unwrap();
+        // Lanes have a sine of their own: some units in the last place, grown by a motion that grows nothing.
+        let near = |x: f64, y: f64| (x - y).abs() < 1e-14;
+        assert!(near(ending.q[0], outcome.q[0]) && near(ending.p[0], outcome.p[0]), "{i}: {ending:?} {outcome:?}");
+        assert_eq!(ending.columns[0], ending.q[0]);
+    }
+    assert!(one[7].ending.is_err());
+
+    // Rows: those of a run of its own.
+    let recorded = Ensemble { rows: Some(When::At(vec![0.0, 5.0, 10.0])), varied: None, ..of(2) };
+    let all = members(&system, &recorded);
+    let motion =
+        Motion { rows: recorded.rows.clone(), columns: columns.to_vec(), ..Motion::new(start(4), 10.0, by_steps(40)) };
+    assert_eq!(all[4].rows, system.record(&motion).unwrap().1);
+    // To an accuracy.
+    let accurate = Ensemble { way: accurate(1e-8), ..of(2) };
+    for (a, b) in members(&system, &accurate).iter().zip(&one) {
+        if let (Ok(a), Ok(b)) = (&a.ending, &b.ending) {
+            assert!((a.q[0] - b.q[0]).abs() < 1e-8, "{a:?} {b:?}");
+        }
+    }
+}
+
+/// The orders show, and the best is the fastest of those that are exact enough.
+#[test]
+fn a_comparison_ranks_integrators() {
+    let system = System::new(&CatalogueEntry::find("quadratic_in_z").unwrap().formula().unwrap()).unwrap();
+    let motion = Motion::new(Start::new(0.0, [1.0], [0.0], 1.0), 5.0, accurate(1e-9));
+    // What comes first in the table is enough.
+    let comparison = system.compare(&motion, &mut |part| part < 0.2).unwrap();
+    assert!(comparison.ended && comparison.reference_error < 1e-13, "{comparison:?}");
+    for (name, order) in [("midpoint", 2), ("gauss_2", 4), ("gauss_3", 6)] {
+        let rows: Vec<_> = comparison.rows.iter().filter(|row| row.integrator == name).collect();
+        let resolved = |error: f64| (1e-11..1e-3).contains(&error);
+        let slopes = rows.windows(2).filter(|pair| pair.iter().all(|row| resolved(row.error)));
+        let slopes: Vec<f64> = slopes.map(|pair| (pair[0].error / pair[1].error).log2()).collect();
+        let last = slopes.last().copied().unwrap_or(f64::NAN);
+        assert!((last - f64::from(order)).abs() < 0.15, "{name}: {slopes:?}");
+    }
+    let best = comparison.best(1e-6).unwrap();
+    assert!(best.error <= 1e-6 && comparison.rows.iter().all(|row| row.error > 1e-6 || row.seconds >= best.seconds));
+}
+
+#[test]
+fn bad_input_says_what_is_wrong() {
+    let system = pendulum();
+    let run = |start: Start, way: Way| system.run(&Motion::new(start, 1.0, way), &mut ()).unwrap_err().to_string();
+    let good = || Start::new(0.0, [1.0], [0.0], 0.0);
+    assert!(run(Start::new(0.0, [1.0, 2.0], [0.0], 0.0), by_steps(1)).contains("`q` has 2 numbers"));
+    assert!(run(Start::new(0.0, [1.0], [f64::NAN], 0.0), by_steps(1)).contains("`v[0]` is NaN"));
+    assert!(run(Start::new(0.0, [1.0], [0.0], f64::INFINITY), by_steps(1)).contains("`z` is inf"));
+    assert!(run(good(), accurate(-1.0)).contains("relative error is -1"));
+    assert!(run(good(), by_steps(0)).contains("at least 1"));
+    let linear = System::parse("x'^2/2 + x*y'", &["x", "y"], &[]).unwrap();
+    let error =
+        linear.run(&Motion::new(Start::new(0.0, [1.0; 2], [0.0; 2], 0.0), 1.0, by_steps(1)), &mut ()).unwrap_err();
+    assert!(matches!(&error, RuntimeError::NotRegular { velocities } if velocities == "y'"), "{error}");
+    let unknown = CatalogueEntry::find("keplr").unwrap_err().to_string();
+    assert!(unknown.contains("did you mean \"kepler\""), "{unknown}");
+    let needs_separable = AnyIntegrator::Splitting(discrete_herglotz::SplittingScheme::BLANES_MOAN_6);
+    let coupled = System::new(&CatalogueEntry::find("coupled_in_z").unwrap().formula().unwrap()).unwrap();
+    assert_eq!(coupled.check_integrator(needs_separable), Err(InputError::Unclaimed { claim: "separable" }));
+    assert!(Column::parse("thetta", system.formula()).unwrap_err().to_string().contains("did you mean `theta`"));
+    let formula = Formula::parse("v[0]^2/2", &["x"], &[("energy", 1.0)]).unwrap();
+    assert!(matches!(Column::parse("energy", &formula), Ok(Column::Expression(_))));
+}
+
+#[test]
+fn symmetries_and_source() {
+    let kepler = System::new(&CatalogueEntry::find("kepler").unwrap().formula().unwrap()).unwrap();
+    assert_eq!(kepler.symmetries(), [SeenSymmetry::Rotation(0, 1)]);
+    let free = System::new(&CatalogueEntry::find("free_particle").unwrap().formula().unwrap()).unwrap();
+    assert_eq!(free.symmetries(), [SeenSymmetry::Translation(0)]);
+    assert!(free.structure().separable && free.is_smooth());
+    assert!(free.to_rust("Free").unwrap().contains("impl Lagrangian<1> for Free"));
+    assert!(free.to_rust("not a type").is_err());
+}
