@@ -285,7 +285,13 @@ impl Run {
         interrupted: bool,
     ) -> Result<(), Failure> {
         let end = end_of(scene, outcome);
-        let status = if interrupted { "interrupted".to_owned() } else { outcome.status.to_string() };
+        let status = match outcome.status {
+            _ if interrupted => "interrupted".to_owned(),
+            // Why is told as an error.
+            Status::Failed { .. } if !self.json => "failed".to_owned(),
+            Status::FalseClaim { .. } if !self.json => "unreliable".to_owned(),
+            status => status.to_string(),
+        };
         let Outcome { t, steps, evaluations, .. } = outcome;
         if self.json {
             let end: serde_json::Map<_, _> = end.iter().map(|(name, x)| (name.clone(), json(*x))).collect();

@@ -33,6 +33,8 @@ pub struct Scene {
     pub events: Vec<(String, Event)>,
     /// What a sweep takes through its values.
     pub knobs: Vec<Knob>,
+    /// The formula's text.
+    lagrangian: String,
     start: Start,
     end: f64,
     way: Way,
@@ -121,6 +123,10 @@ impl Scene {
             knobs: sweep::read(text, &formula, &start, &file.sweep)?,
             rows: RowTimes::read(text, file.want.rows.as_ref(), (start.t, end))?,
             system: runs,
+            lagrangian: match (entry, &system.lagrangian) {
+                (Some(entry), _) => entry.lagrangian.to_owned(),
+                (None, own) => own.as_ref().map(|text| (**text).clone()).unwrap_or_default(),
+            },
             start,
             end,
             way,
@@ -174,7 +180,9 @@ impl Scene {
         let events: Vec<_> = self.events.iter().map(|(name, e)| (name, e.direction, e.terminal)).collect();
         let Scene { start, end, way, rows, conformal_factor, .. } = self;
         let formula = self.system.formula();
-        format!("{start:?} {end:?} {way:?} {rows:?} {conformal_factor} {columns:?} {events:?} {formula:?}")
+        let (names, values) = (formula.coordinates(), formula.parameters().collect::<Vec<_>>());
+        let of_system = format!("{} {names:?} {values:?}", self.lagrangian);
+        format!("{of_system} {start:?} {end:?} {way:?} {rows:?} {conformal_factor} {columns:?} {events:?}")
     }
 
     /// The place in the file that an error is about.
