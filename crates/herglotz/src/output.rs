@@ -131,3 +131,11 @@ impl Table {
         Ok(flushed.map_err(Failure::of_file(&self.path))?.len())
     }
 }
+
+/// The rows of a table that was written.
+pub(crate) fn read_numbers(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
+    let broken = |error: csv::Error| Failure::of_file(path)(error.into());
+    let mut reader = csv::Reader::from_path(path).map_err(broken)?;
+    let numbers = |row: csv::StringRecord| row.iter().map(|x| x.parse().unwrap_or(f64::NAN)).collect();
+    reader.records().map(|row| row.map(numbers).map_err(broken)).collect()
+}

@@ -2,7 +2,8 @@
 
 use super::SceneArguments;
 use crate::failure::Failure;
-use crate::output::{Directory, Table, exact, json, print, print_json, short};
+use crate::output::{Directory, Table, exact, json, print, print_json, read_numbers, short};
+use crate::plot;
 use clap::Args;
 use herglotz::Scene;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -32,6 +33,9 @@ pub(crate) struct Run {
     /// Go on where Ctrl-C interrupted the run.
     #[arg(long)]
     resume: bool,
+    /// Draw the columns against time, and phase portraits: columns.svg and phase.svg.
+    #[arg(long)]
+    plot: bool,
     /// Tell the end as JSON.
     #[arg(long)]
     json: bool,
@@ -118,7 +122,7 @@ impl Watch for Writer {
 }
 
 /// A flag that Ctrl-C sets; a second one ends the program.
-fn stop_flag() -> Arc<AtomicBool> {
+pub(crate) fn stop_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let set = flag.clone();
     let handler = move || {
@@ -215,6 +219,11 @@ impl Run {
         } else {
             directory.remove(BESIDE)?;
             directory.remove(CHECKPOINT)?;
+        }
+        if self.plot {
+            for (name, figure) in plot::of_rows(&scene, &read_numbers(&directory.file(ROWS))?) {
+                directory.write(&name, &figure)?;
+            }
         }
         self.tell(&scene, &plan, &outcome, (row_count, event_count), interrupted.is_some())
     }

@@ -1,10 +1,11 @@
 //! The scene file as it is written. The documentation of these types is that of the schema, which editors show.
 
 use super::at::{At, Named, Numbers};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
+use std::borrow::Cow;
 use std::fmt::Formatter;
 
 /// The version of scene files that this program reads.
@@ -16,6 +17,7 @@ pub(crate) const VERSION: i64 = 1;
 #[schemars(title = "Scene")]
 pub(crate) struct File {
     /// The version of the format: 1.
+    #[expect(dead_code, reason = "it is looked at before all else is read")]
     pub version: Option<At<i64>>,
     /// The Lagrangian: a formula, or one of the catalogue.
     pub system: At<SystemTable>,
@@ -28,10 +30,10 @@ pub(crate) struct File {
     /// What is recorded.
     #[serde(default)]
     pub want: WantTable,
-    /// Parameters, or values of the start such as `"start.theta"`, that `herglotz sweep` takes through their values. Of several, all pairs
+    /// Parameters, or values of the start such as `start.theta`, that `herglotz sweep` takes through their values. Of several, all pairs
     /// are taken, the last one fastest.
     #[serde(default)]
-    pub sweep: Named<Values>,
+    pub sweep: Swept,
 }
 
 /// The Lagrangian.
@@ -179,5 +181,62 @@ impl<'de> Deserialize<'de> for Values {
             }
         }
         deserializer.deserialize_any(ListOrRange)
+    }
+}
+
+/// Parameters and values of the start, with the values that they take.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Swept(pub Vec<(At<String>, At<Values>)>);
+
+/// The key of a table in it of values of the start.
+const START: &str = "start";
+
+impl<'de> Deserialize<'de> for Swept {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Table;
+        impl<'de> Visitor<'de> for Table {
+            type Value = Swept;
+
+            fn expecting(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a table")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Swept, A::Error> {
+                let mut all = Vec::new();
+                while let Some(key) = map.next_key::<At<String>>()? {
+                    if *key == START {
+                        let of_start: Named<Values> = map.next_value()?;
+                        let named =
+                            |(key, values): (At<String>, _)| (At::new(format!("{START}.{}", *key), key.span()), values);
+                        all.extend(of_start.0.into_iter().map(named));
+                    } else {
+                        all.push((key, map.next_value()?));
+                    }
+                }
+                // The reader of the file sorts tables by name.
+                all.sort_by_key(|(key, _)| key.span());
+                Ok(Swept(all))
+            }
+        }
+        deserializer.deserialize_map(Table)
+    }
+}
+
+impl JsonSchema for Swept {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Swept".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let values = Values::json_schema(generator);
+        json_schema!({
+            "type": "object",
+            "properties": { START: { "type": "object", "additionalProperties": values.clone() } },
+            "additionalProperties": values,
+        })
     }
 }

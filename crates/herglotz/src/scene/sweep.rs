@@ -1,8 +1,8 @@
 //! What a sweep takes through its values.
 
 use super::SceneError;
-use super::at::{At, Named};
-use super::file::{RangeTable, Spacing, Values};
+use super::at::At;
+use super::file::{RangeTable, Spacing, Swept, Values};
 use super::start::{Part, entry_of, single_names};
 use runtime_herglotz::{Formula, Rate, Start};
 
@@ -44,12 +44,7 @@ pub(crate) fn put(start: &mut Start, part: Part, entry: usize, value: f64) {
 }
 
 /// The knobs of a table, over a formula and its start.
-pub(crate) fn read(
-    text: &str,
-    formula: &Formula,
-    start: &Start,
-    table: &Named<Values>,
-) -> Result<Vec<Knob>, SceneError> {
+pub(crate) fn read(text: &str, formula: &Formula, start: &Start, table: &Swept) -> Result<Vec<Knob>, SceneError> {
     let mut knobs = Vec::new();
     let mut members: usize = 1;
     for (name, values) in &table.0 {
