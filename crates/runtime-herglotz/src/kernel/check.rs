@@ -15,6 +15,9 @@ const PLACES: usize = 3;
 /// The stages of the statements' discrete Lagrangian, where the motion's own has none.
 const STAGES: usize = 4;
 
+/// The part of a step at which the theorems are given up.
+const SHORTEST: f64 = 64.0;
+
 /// One step from a state, and its conformal factor.
 fn step<const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
@@ -114,7 +117,14 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
     }
     let of_statements: Vec<_> = states.iter().step_by(states.len().div_ceil(PLACES)).collect();
     let stages = plan.integrator.collocation.unwrap_or(STAGES);
-    let stated = evaluate(lagrangian, stages, &symmetries, (h, &of_statements))?;
+    let mut shorter = h;
+    let stated = loop {
+        match evaluate(lagrangian, stages, &symmetries, (shorter, &of_statements)) {
+            // The discrete Lagrangian is defined for points that are near enough.
+            Err(RuntimeError::Geometry(_) | RuntimeError::Step(_)) if (h / shorter) < SHORTEST => shorter *= 0.5,
+            ended => break ended?,
+        }
+    };
     Ok(Check { integrator: plan.integrator.name.to_string(), step_size: h, places: along, statements: stated })
 }
 
@@ -141,7 +151,7 @@ fn evaluate<const N: usize>(
             }
         }
         if let Some(residual) = worst {
-            stated.push(Stated { statement, method: by.to_string(), residual });
+            stated.push(Stated { statement, method: by.to_string(), step_size: h, residual });
         }
     }
     Ok(stated)
