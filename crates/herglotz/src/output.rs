@@ -133,9 +133,8 @@ impl Table {
 }
 
 /// The rows of a table that was written.
-pub(crate) fn read_numbers(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
+pub(crate) fn read_rows(path: &Path) -> Result<Vec<Vec<String>>, Failure> {
     let broken = |error: csv::Error| Failure::of_file(path)(error.into());
     let mut reader = csv::Reader::from_path(path).map_err(broken)?;
-    let numbers = |row: csv::StringRecord| row.iter().map(|x| x.parse().unwrap_or(f64::NAN)).collect();
-    reader.records().map(|row| row.map(numbers).map_err(broken)).collect()
+    reader.records().map(|row| row.map(|row| row.iter().map(str::to_owned).collect()).map_err(broken)).collect()
 }

@@ -1,11 +1,17 @@
 //! Figures of rows: columns against time, and phase portraits.
 
-use contact_figure::{Axis, Curve, Line, Panel, draw, draw_row};
+use contact_figure::{Axis, Curve, Line, Panel, draw, draw_grid};
 use herglotz::Scene;
-use runtime_herglotz::{Column, Comparison};
+use runtime_herglotz::{Column, Comparison, velocity_name};
 
 /// The most points of a curve: more are not seen.
 const POINTS: usize = 4000;
+
+/// The panels beside each other.
+const IN_A_ROW: usize = 3;
+
+/// The longest label of an axis, in characters.
+const LABEL: usize = 30;
 
 /// The figures of rows with their names: each column against time, and each velocity against its coordinate.
 pub(crate) fn of_rows(scene: &Scene, rows: &[Vec<f64>]) -> Vec<(String, String)> {
@@ -19,37 +25,65 @@ pub(crate) fn of_rows(scene: &Scene, rows: &[Vec<f64>]) -> Vec<(String, String)>
     let mut figures = Vec::new();
     if let Some(t) = place(&|column| matches!(column, Column::Time)) {
         let against = (0..scene.columns.len()).filter(|i| *i != t).map(|i| (i, of(t, i)));
-        let panels: Vec<Panel> = against.filter_map(|(i, points)| panel("t", name(i), points)).collect();
-        figures.extend((!panels.is_empty()).then(|| ("columns.svg".to_owned(), draw_row(&panels))));
+        let panels: Vec<Panel> = against.filter_map(|(i, points)| panel(("t", name(i)), Line::Solid, points)).collect();
+        figures.extend((!panels.is_empty()).then(|| ("columns.svg".to_owned(), grid(&panels))));
     }
     let portraits = (0..scene.system.dimension()).filter_map(|k| {
         let q = place(&|column| matches!(column, Column::Position(i) if *i == k))?;
         let v = place(&|column| matches!(column, Column::Velocity(i) if *i == k))?;
-        panel(name(q), name(v), of(q, v))
+        panel((name(q), name(v)), Line::Solid, of(q, v))
     });
     let panels: Vec<Panel> = portraits.collect();
-    figures.extend((!panels.is_empty()).then(|| ("phase.svg".to_owned(), draw_row(&panels))));
+    figures.extend((!panels.is_empty()).then(|| ("phase.svg".to_owned(), grid(&panels))));
+    let positions: Vec<usize> = (0..scene.system.dimension())
+        .filter_map(|k| place(&|column| matches!(column, Column::Position(i) if *i == k)))
+        .collect();
+    if let [x, y, ..] = positions.as_slice() {
+        let path = panel((name(*x), name(*y)), Line::Solid, of(*x, *y));
+        figures.extend(path.map(|panel| ("path.svg".to_owned(), draw(&panel))));
+    }
     figures
+}
+
+/// The figure of a section: velocities against coordinates where the first event changes its sign.
+pub(crate) fn of_section(scene: &Scene, crossings: &[(usize, Vec<f64>)]) -> Option<String> {
+    let names = scene.system.formula().coordinates();
+    let panels = names.iter().enumerate().filter_map(|(i, name)| {
+        // A row has the time, the coordinates, and their velocities.
+        let of = |(_, row): &(usize, Vec<f64>)| Some((*row.get(1 + i)?, *row.get(1 + names.len() + i)?));
+        let points: Vec<_> = crossings.iter().filter(|(event, _)| *event == 0).filter_map(of).collect();
+        let size = |of: fn(&(f64, f64)) -> f64| points.iter().map(|p| of(p).abs()).fold(0.0, f64::max);
+        // That the section is at one place needs no figure.
+        let shown = size(|p| p.0) > 1e-9 && size(|p| p.1) > 1e-9;
+        panel((name, &velocity_name(name)), Line::Discs, points).filter(|_| shown)
+    });
+    let panels: Vec<Panel> = panels.collect();
+    (!panels.is_empty()).then(|| grid(&panels))
 }
 
 /// The figure of one column of the members of a sweep against the swept value.
 pub(crate) fn of_sweep(knob: &str, column: &str, points: Vec<(f64, f64)>) -> Option<String> {
-    panel(knob, column, points).map(|panel| draw(&panel))
+    panel((knob, column), Line::Discs, points).map(|panel| draw(&panel))
+}
+
+/// Panels in rows; one alone needs no letter.
+fn grid(panels: &[Panel]) -> String {
+    match panels {
+        [one] => draw(one),
+        several => draw_grid(several, several.len().min(IN_A_ROW)),
+    }
 }
 
 /// One curve in axes that fit it.
-fn panel(x_label: &str, y_label: &str, points: Vec<(f64, f64)>) -> Option<Panel> {
+fn panel((x_label, y_label): (&str, &str), line: Line, points: Vec<(f64, f64)>) -> Option<Panel> {
+    let label = |name: &str| match name.char_indices().nth(LABEL) {
+        Some((end, _)) => format!("{}...", &name[..end]),
+        None => name.to_owned(),
+    };
+    let (x_label, y_label) = (label(x_label), label(y_label));
     let (x, y) = (axis(points.iter().map(|p| p.0))?, axis(points.iter().map(|p| p.1))?);
-    let curves = vec![Curve::unnamed(Line::Solid, points)];
-    Some(Panel {
-        x_label: x_label.into(),
-        y_label: y_label.into(),
-        x,
-        y,
-        legend: (0.0, 1.0),
-        curves,
-        marks: Vec::new(),
-    })
+    let curves = vec![Curve::unnamed(line, points)];
+    Some(Panel { x_label, y_label, x, y, legend: (0.0, 1.0), curves, marks: Vec::new() })
 }
 
 /// A linear axis around numbers, from a tick to a tick; none where there are none.
@@ -60,8 +94,8 @@ fn axis(numbers: impl Iterator<Item = f64>) -> Option<Axis> {
     }
     // What does not vary beyond round-off is shown as a line.
     let least = f64::EPSILON * 1e4 * low.abs().max(high.abs());
-    let span = if high - low > least { high - low } else { 2.0 * least.max(1e-3 * low.abs()).max(1e-12) };
-    let rough = span / 4.0;
+    let span = if high - low > least { high - low } else { low.abs().max(1e-12) };
+    let rough = span / 5.0;
     let power = 10f64.powf(rough.log10().floor());
     let step = power * [1.0, 2.0, 5.0].into_iter().find(|digit| digit * power >= rough).unwrap_or(10.0);
     let middle = 0.5 * (low + high);

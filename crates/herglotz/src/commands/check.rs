@@ -49,7 +49,10 @@ fn of_json(check: &runtime_herglotz::Check, momenta: &[String]) -> serde_json::V
     let stated = |stated: &runtime_herglotz::Stated| {
         let statement = stated.statement;
         let (number, title) = (statement.number(), statement.title());
-        serde_json::json!({ "number": number, "title": title, "method": stated.method, "residual": json(stated.residual) })
+        serde_json::json!({
+            "number": number, "title": title, "method": stated.method,
+            "step_size": stated.step_size, "residual": json(stated.residual),
+        })
     };
     serde_json::json!({
         "integrator": check.integrator,
@@ -90,7 +93,11 @@ fn in_words(check: &runtime_herglotz::Check, momenta: &[String]) -> String {
         parts.push(format!("the momenta are predicted to {:.1e} of their size", check.momentum_defect()));
     }
     if !check.statements.is_empty() {
-        let formula = "the theorems of the discrete theory for this system, worst of a few places:";
+        let step = check.statements.first().map_or(*step_size, |stated| stated.step_size);
+        let formula = format!(
+            "the theorems of the discrete theory for this system with h = {}, worst of a few places:",
+            short(step)
+        );
         parts.push(format!("{formula}\n{}", table(&statements)));
     }
 

@@ -2,7 +2,7 @@
 
 use super::SceneArguments;
 use crate::failure::Failure;
-use crate::output::{Directory, Table, exact, json, print, print_json, read_numbers, short};
+use crate::output::{Directory, Table, exact, json, print, print_json, read_rows, short};
 use crate::plot;
 use clap::Args;
 use herglotz::Scene;
@@ -33,7 +33,7 @@ pub(crate) struct Run {
     /// Go on where Ctrl-C interrupted the run.
     #[arg(long)]
     resume: bool,
-    /// Draw the columns against time, and phase portraits: columns.svg and phase.svg.
+    /// Draw the columns against time, and phase portraits: columns.svg, phase.svg, path.svg, section.svg.
     #[arg(long)]
     plot: bool,
     /// Tell the end as JSON.
@@ -224,6 +224,11 @@ impl Run {
             for (name, figure) in plot::of_rows(&scene, &read_numbers(&directory.file(ROWS))?) {
                 directory.write(&name, &figure)?;
             }
+            if !scene.events.is_empty()
+                && let Some(figure) = plot::of_section(&scene, &read_crossings(&scene, &directory.file(EVENTS))?)
+            {
+                directory.write("section.svg", &figure)?;
+            }
         }
         self.tell(&scene, &plan, &outcome, (row_count, event_count), interrupted.is_some())
     }
@@ -357,4 +362,21 @@ pub(crate) fn end_of(scene: &Scene, outcome: &Outcome) -> Vec<(String, f64)> {
     end.extend(outcome.z.map(|z| ("z".to_owned(), z)));
     end.extend(outcome.log_factor.map(|x| ("log_factor".to_owned(), x)));
     end
+}
+
+/// The events that were written: which one, and its numbers.
+fn read_crossings(scene: &Scene, path: &std::path::Path) -> Result<Vec<(usize, Vec<f64>)>, Failure> {
+    let index = |name: &str| scene.events.iter().position(|(known, _)| known == name).unwrap_or(usize::MAX);
+    let rows = read_rows(path)?;
+    let of = |row: Vec<String>| {
+        let (name, numbers) = row.split_first()?;
+        Some((index(name), numbers.iter().map(|x| x.parse().unwrap_or(f64::NAN)).collect()))
+    };
+    Ok(rows.into_iter().filter_map(of).collect())
+}
+
+/// The rows that were written.
+fn read_numbers(path: &std::path::Path) -> Result<Vec<Vec<f64>>, Failure> {
+    let number = |x: &String| x.parse().unwrap_or(f64::NAN);
+    Ok(read_rows(path)?.iter().map(|row| row.iter().map(number).collect()).collect())
 }

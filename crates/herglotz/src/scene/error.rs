@@ -72,8 +72,24 @@ impl SceneError {
             [name, known @ ..] if message.starts_with("unknown") => {
                 Self::unknown(text, span, name, known.iter().copied(), message.as_str())
             }
-            _ => Self::at(text, span, message),
+            _ => Self::at(text, span, message.clone() + remedy(text, span, &message)),
         }
+    }
+}
+
+/// What to do about what the reader of the format has found.
+fn remedy(text: &str, (start, _): Span, message: &str) -> &'static str {
+    let before = text.get(..start).and_then(|before| before.rsplit('\n').next()).unwrap_or_default();
+    let after = text.get(start..).and_then(|after| after.lines().next()).unwrap_or_default();
+    let value =
+        before.rsplit(['=', '[', ',']).next().map(str::trim_start).filter(|value| !value.is_empty()).unwrap_or(after);
+    let of_number = value.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+' || c == '.');
+    match message {
+        _ if message.starts_with("missing field") => "; add it",
+        _ if of_number && (message.starts_with("unexpected key") || message.starts_with("string values")) => {
+            "; a number has a point before its fraction, and neither comma nor unit"
+        }
+        _ => "",
     }
 }
 
@@ -85,7 +101,7 @@ fn first_line(text: &str, (start, end): Span) -> Span {
 
 /// A message of the format's reader without the names of types.
 fn plain(message: &str) -> String {
-    const PLAIN: [(&str, &str); 8] = [
+    const PLAIN: [(&str, &str); 9] = [
         ("expected f64", "expected a number"),
         ("expected i64", "expected a whole number"),
         ("expected usize", "expected a whole number, 0 or more"),
@@ -94,6 +110,7 @@ fn plain(message: &str) -> String {
         ("expected a boolean", "expected true or false"),
         ("floating point", "number"),
         ("unknown field", "unknown name"),
+        ("unknown variant", "unknown word"),
     ];
     let message = message.trim().lines().map(str::trim).collect::<Vec<_>>().join("; ");
     PLAIN.iter().fold(message, |message, (from, to)| message.replace(from, to))

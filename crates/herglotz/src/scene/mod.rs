@@ -114,7 +114,7 @@ impl Scene {
             Way::Steps { by, .. } => Some(by),
         };
         if let (Some(by), Some(name)) = (by, &run.integrator) {
-            let refused = |error: InputError| SceneError::at(text, name.span(), error.to_string());
+            let refused = |error: InputError| SceneError::at(text, name.span(), in_words(&error));
             runs.check_integrator(by).map_err(refused)?;
         }
         Ok(Scene {
@@ -204,7 +204,27 @@ impl Scene {
             RuntimeError::Length { .. } | RuntimeError::NotFinite { .. } | RuntimeError::Geometry(_) => places.start,
             _ => places.run,
         };
-        SceneError::at(&self.text, span, error.to_string())
+        let message = match error {
+            RuntimeError::Input(error) => in_words(error),
+            error => error.to_string(),
+        };
+        SceneError::at(&self.text, span, message)
+    }
+}
+
+/// What is wrong with a run, to those who have written a formula: what is proved of it cannot be claimed, and it states no clock.
+fn in_words(error: &InputError) -> String {
+    match error {
+        InputError::Unclaimed { claim } => {
+            let claim = claim.replace('_', " ");
+            format!(
+                "the formula is not {claim}, which this integrator needs; take another integrator, or another formula"
+            )
+        }
+        InputError::Hypothesis { hypothesis } if hypothesis.contains("HAS_CLOCK") => {
+            "a formula states no clock, which this integrator needs; take another integrator".into()
+        }
+        error => error.to_string(),
     }
 }
 
@@ -338,7 +358,7 @@ fn finite(text: &str, x: &At<f64>, name: &str) -> Result<f64, SceneError> {
     if x.is_finite() {
         return Ok(**x);
     }
-    Err(SceneError::at(text, x.span(), format!("`{name}` is {}, where a finite number is needed", **x)))
+    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}, where a finite number is needed", **x)))
 }
 
 /// A number that is positive and finite.
@@ -346,7 +366,7 @@ fn positive(text: &str, x: &At<f64>, name: &str) -> Result<f64, SceneError> {
     if **x > 0.0 {
         return finite(text, x, name);
     }
-    Err(SceneError::at(text, x.span(), format!("`{name}` is {}, where a positive number is needed", **x)))
+    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}, where a positive number is needed", **x)))
 }
 
 /// The JSON schema of scene files.

@@ -3,7 +3,7 @@
 use super::SceneError;
 use super::at::{At, Span};
 use super::file::{DirectionName, EventTable, RowsTable};
-use runtime_herglotz::{Column, Direction, Event, Formula, FormulaError, RuntimeError, When};
+use runtime_herglotz::{Column, Direction, Event, Formula, FormulaError, RuntimeError, When, nearest_name};
 
 /// The rows of a scene that asks for none.
 const DEFAULT_ROWS: usize = 1000;
@@ -102,9 +102,24 @@ pub(crate) fn columns(
     }
     let of = |name: &At<String>| match Column::parse(name, formula) {
         Ok(column) => Ok(((**name).clone(), column)),
-        Err(error) => Err(of_formula(text, name.span(), &error)),
+        Err(error) => Err(with_nearest(of_formula(text, name.span(), &error), formula)),
     };
     columns.iter().map(of).collect()
+}
+
+/// An unknown name of a column may be that of something else than a formula is made of.
+fn with_nearest(mut error: SceneError, formula: &Formula) -> SceneError {
+    let unknown = error.error.message.strip_prefix("unknown name `").and_then(|rest| rest.split('`').next());
+    if let (Some(name), None) = (unknown, &error.error.nearest) {
+        let momenta = formula.coordinates().into_iter().map(|name| format!("p_{name}"));
+        let known: Vec<String> = ["energy", "log_factor"].map(str::to_owned).into_iter().chain(momenta).collect();
+        error.error.nearest = nearest_name(name, known.iter().map(String::as_str)).map(str::to_owned);
+        if error.error.nearest.is_none() {
+            error.error.message += "; beside formulas there are the columns ";
+            error.error.message += &known.join(", ");
+        }
+    }
+    error
 }
 
 /// The events, with their names.
