@@ -57,11 +57,14 @@ pub(crate) fn table(rows: &[Vec<String>]) -> String {
 pub(crate) struct Directory(PathBuf);
 
 impl Directory {
-    /// The one that was asked for, or one beside nothing with the name of the scene.
-    pub fn new(wanted: Option<PathBuf>, scene: &Path) -> Result<Self, Failure> {
-        let path = wanted.unwrap_or_else(|| scene.file_stem().map(PathBuf::from).unwrap_or_else(|| "scene".into()));
-        std::fs::create_dir_all(&path).map_err(Failure::of_file(&path))?;
-        Ok(Directory(path))
+    /// The one that was asked for, or one in the present directory with the name of the scene.
+    pub fn new(wanted: Option<PathBuf>, scene: &Path) -> Self {
+        Directory(wanted.unwrap_or_else(|| scene.file_stem().map(PathBuf::from).unwrap_or_else(|| "scene".into())))
+    }
+
+    /// Makes it, when there is something to write.
+    pub fn create(&self) -> Result<(), Failure> {
+        std::fs::create_dir_all(&self.0).map_err(Failure::of_file(&self.0))
     }
 
     /// A file in it.

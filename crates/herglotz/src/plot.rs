@@ -5,7 +5,7 @@ use herglotz::Scene;
 use runtime_herglotz::{Column, Comparison, velocity_name};
 
 /// The most points of a curve: more are not seen.
-const POINTS: usize = 4000;
+const POINTS: usize = 2000;
 
 /// The panels beside each other.
 const IN_A_ROW: usize = 3;

@@ -262,12 +262,40 @@ const WORDS: [&str; 40] = [
     "\\u0041",
 ];
 
+const VALUES: [&str; 12] = [
+    "0",
+    "-1",
+    "1e300",
+    "inf",
+    "[]",
+    "[1, 2, 3]",
+    "{ every = 1e-6 }",
+    "\"x\"",
+    "\"gauss_9\"",
+    "[\"theta\"]",
+    "true",
+    "{ from = 1, to = 2, count = 1000000 }",
+];
+
 /// Changes good scenes, and reads them: a scene or an error of readable length. How many are scenes.
 fn attack(seed: u64, count: usize) -> usize {
     let (mut random, mut good) = (Random(seed), 0);
     for k in 0..count {
-        let mut text: Vec<char> = [GOOD, SEVERAL][k % 2].chars().collect();
-        for _ in 0..1 + random.below(3) {
+        // Half of them lose a line, or have one of the other or a value of their own elsewhere, so that most are read beyond the syntax.
+        let mut lines: Vec<&str> = [GOOD, SEVERAL][k % 2].lines().collect();
+        let others: Vec<&str> = [SEVERAL, GOOD][k % 2].lines().collect();
+        let (line, other) = (random.below(lines.len()), random.below(others.len()));
+        let with_value =
+            lines[line].split_once("= ").map(|(key, _)| format!("{key}= {}", VALUES[other % VALUES.len()]));
+        let by_lines = random.below(2) == 0;
+        match random.below(4) {
+            _ if !by_lines => {}
+            0 => drop(lines.remove(line)),
+            1 => lines.insert(line, others[other]),
+            _ => lines[line] = with_value.as_deref().unwrap_or(others[other]),
+        }
+        let mut text: Vec<char> = lines.join("\n").chars().collect();
+        for _ in 0..if by_lines { 0 } else { 1 + random.below(2) } {
             let (at, from) = (random.below(text.len()), random.below(text.len()));
             match random.below(6) {
                 0 => drop(text.remove(at)),

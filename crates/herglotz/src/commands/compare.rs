@@ -27,7 +27,7 @@ pub(crate) struct Compare {
 impl Compare {
     pub fn run(&self) -> Result<(), Failure> {
         let scene = self.scene.read()?;
-        let directory = Directory::new(self.out.clone(), &self.scene.file)?;
+        let directory = Directory::new(self.out.clone(), &self.scene.file);
         let bar = progress_bar(!self.json);
         let compared = scene.system.compare(&scene.bare_motion(), &mut |part| {
             bar.set_position((part * 1000.0) as u64);
@@ -35,6 +35,7 @@ impl Compare {
         });
         bar.finish_and_clear();
         let comparison = compared.map_err(|error| self.scene.explain(scene.explain(&error)))?;
+        directory.create()?;
         let header = ["integrator", "order", "step_size", "steps", "evaluations", "error", "seconds"];
         let mut csv = Table::new(directory.file("compare.csv"), header)?;
         for Work { integrator, order, step_size, steps, evaluations, error, seconds } in &comparison.rows {

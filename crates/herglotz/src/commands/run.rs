@@ -162,7 +162,7 @@ impl Run {
         let explain = |error: RuntimeError| self.scene.explain(scene.explain(&error));
         let mut motion = scene.motion();
         motion.resumable = true;
-        let directory = Directory::new(self.out.clone(), &self.scene.file)?;
+        let directory = Directory::new(self.out.clone(), &self.scene.file);
         let beside = if self.resume { Some(self.beside(&directory, &scene)?) } else { None };
         let plan = match &beside {
             // The steps are known: they are not looked for once more.
@@ -254,6 +254,7 @@ impl Run {
         motion: &mut Motion,
         beside: Option<&Beside>,
     ) -> Result<Writer, Failure> {
+        directory.create()?;
         let (rows_at, events_at) = (directory.file(ROWS), directory.file(EVENTS));
         let has_events = !scene.events.is_empty();
         let (rows, events) = match beside {

@@ -112,7 +112,8 @@ impl Sweep {
         let knobs = scene.knobs.iter().map(|knob| knob.name.as_str());
         let header =
             ["index"].into_iter().chain(knobs).chain(["status", "why", "steps", "t"]).chain(names.iter().copied());
-        let directory = Directory::new(self.out.clone(), &self.scene.file)?;
+        let directory = Directory::new(self.out.clone(), &self.scene.file);
+        directory.create()?;
         let mut writer = Writer {
             scene: &scene,
             csv: Table::new(directory.file("sweep.csv"), header)?,
