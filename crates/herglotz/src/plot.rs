@@ -70,7 +70,7 @@ pub(crate) fn of_sweep(knob: &str, column: &str, points: Vec<(f64, f64)>) -> Opt
 fn grid(panels: &[Panel]) -> String {
     match panels {
         [one] => draw(one),
-        several => draw_grid(several, several.len().min(IN_A_ROW)),
+        several => draw_grid(several, if several.len() == 4 { 2 } else { several.len().min(IN_A_ROW) }),
     }
 }
 
