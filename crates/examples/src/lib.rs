@@ -4,14 +4,13 @@
 
 mod checks;
 mod failure;
-mod figure;
 mod output;
 #[cfg(test)]
 mod tables;
 
 pub use checks::{Checks, Subject, TOLERANCE, fractions};
+pub use contact_figure::{Axis, Curve, Line, Panel, draw, draw_row};
 pub use failure::{Failure, finish};
-pub use figure::{Axis, Curve, Line, Panel, draw, draw_row};
 pub use output::{Directory, number, print};
 
 /// The tasks of the guide, compiled and run.

@@ -95,8 +95,8 @@ pub struct ParseError {
 const AROUND: usize = 60;
 
 impl ParseError {
-    /// The error at the bytes `start .. end` of a text.
-    pub(crate) fn at(source: &str, (start, end): (usize, usize), message: impl Into<String>) -> Self {
+    /// The error at the bytes `start .. end` of a text: for those, too, who read files in which formulas are.
+    pub fn at(source: &str, (start, end): (usize, usize), message: impl Into<String>) -> Self {
         let start = (0..=start.min(source.len())).rev().find(|i| source.is_char_boundary(*i)).unwrap_or(0);
         let (before, rest) = source.split_at(start);
         let head = before.rsplit('\n').next().unwrap_or("");

@@ -37,6 +37,8 @@ pub struct Stated {
     pub statement: Statement,
     /// The discrete Lagrangian, by the name of its method.
     pub method: String,
+    /// The time between its points: the step, or a part of it where points so far apart have no discrete Lagrangian.
+    pub step_size: f64,
     /// The residual, relative to the size of its terms: round-off times the condition of the matrices in it.
     pub residual: f64,
 }

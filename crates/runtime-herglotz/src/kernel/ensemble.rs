@@ -2,13 +2,14 @@
 
 use super::Sized;
 use super::recorder::{number, rows};
-use crate::{Column, Ending, EnsembleWatch, MemberEnd, RuntimeError, Way, When};
+use crate::{Column, Ending, EnsembleWatch, MemberEnd, RuntimeError, Varied, Way, When};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::{
     Ensemble, EnsembleError, InputError, Member, Row, Rows, Start, Tally, Until, legendre_inverse,
 };
 use formula_lagrangian::FormulaLagrangian;
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// The members between two polls: whole shards of the lanes.
@@ -114,6 +115,12 @@ impl<const N: usize> Block<'_, N> {
             Some(threads) => many.threads(threads),
             None => many,
         };
+        let own_columns = |i: usize| match &ensemble.varied {
+            Some(varied) if columns.iter().any(|c| matches!(c, Column::Expression(_))) => {
+                Cow::Owned(with_parameters(columns, varied, first + i))
+            }
+            _ => Cow::Borrowed(columns),
+        };
         let (watch, ended) = (&mut *self.watch, &mut self.ended);
         let mut hand_on = |member: &Member<N>, recorded: Vec<Row<N>>| {
             if *ended {
@@ -133,10 +140,11 @@ impl<const N: usize> Block<'_, N> {
                     v: row.v.unwrap_or_else(|| SVector::repeat(f64::NAN)).as_slice().to_vec(),
                     p: row.p.as_slice().to_vec(),
                     z: ending.state.z,
-                    columns: columns.iter().map(|column| number(column, &row)).collect(),
+                    columns: own_columns(member.index).iter().map(|column| number(column, &row)).collect(),
                 }
             });
             let rows = if ensemble.rows.is_some() { recorded } else { Vec::new() };
+            let columns = own_columns(member.index);
             let rows = rows.iter().map(|row| columns.iter().map(|column| number(column, row)).collect());
             let member = MemberEnd { index: first + member.index, ending, rows: rows.collect() };
             *ended = watch.member(member).is_break();
@@ -178,6 +186,20 @@ fn is_common(cause: &InputError) -> bool {
             | E::Unclaimed { .. }
             | E::Hypothesis { .. }
     )
+}
+
+/// The columns with the parameters of a member.
+fn with_parameters(columns: &[Column], varied: &Varied<'_>, index: usize) -> Vec<Column> {
+    let values = (varied.values)(index);
+    let mut own = columns.to_vec();
+    for column in &mut own {
+        let Column::Expression(expression) = column else { continue };
+        for (name, value) in varied.names.iter().zip(&values) {
+            // One that cannot be set has refused the member.
+            let _ = expression.set(name, *value);
+        }
+    }
+    own
 }
 
 /// No start, which a run refuses.

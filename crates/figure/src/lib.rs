@@ -281,9 +281,15 @@ fn numbered(svg: &str) -> String {
 
 /// A figure of panels side by side, marked a, b and so on, as SVG.
 pub fn draw_row(panels: &[Panel]) -> String {
+    draw_grid(panels, panels.len())
+}
+
+/// A figure of panels in rows of so many, marked a, b and so on, as SVG.
+pub fn draw_grid(panels: &[Panel], in_a_row: usize) -> String {
     let plots: Vec<Vec<Plot>> = panels.iter().map(Panel::plots).collect();
     let layouts = panels.iter().zip(&plots).map(|(panel, plots)| panel.layout(plots)).collect();
-    let scene = Figure::new(1, panels.len().max(1))
+    let in_a_row = in_a_row.max(1);
+    let scene = Figure::new(panels.len().div_ceil(in_a_row).max(1), in_a_row)
         .with_plots(plots)
         .with_layouts(layouts)
         .with_cell_size(SIZE.0, SIZE.1)

@@ -1,0 +1,105 @@
+//! `herglotz check`.
+
+use super::SceneArguments;
+use super::plan::momentum;
+use crate::failure::Failure;
+use crate::output::{json, print, print_json, short, table};
+use clap::Args;
+use runtime_herglotz::CONTACT;
+
+#[derive(Args)]
+pub(crate) struct Check {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// The number of places along the motion.
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    places: u16,
+    /// Write it as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Check {
+    pub fn run(&self) -> Result<(), Failure> {
+        let scene = self.scene.read()?;
+        let checked = scene.system.check(&scene.bare_motion(), self.places.into());
+        let check = checked.map_err(|error| self.scene.explain(scene.explain(&error)))?;
+        let momenta: Vec<String> = scene.system.symmetries().iter().map(|seen| momentum(&scene, *seen)).collect();
+        if self.json {
+            print_json(&of_json(&check, &momenta))?;
+        } else {
+            print(&in_words(&check, &momenta))?;
+        }
+        if check.is_contact() { Ok(()) } else { Err(Failure::Run("the steps are not contact".into())) }
+    }
+}
+
+fn of_json(check: &runtime_herglotz::Check, momenta: &[String]) -> serde_json::Value {
+    let place = |place: &runtime_herglotz::Place| {
+        let of = |(name, m): (&String, &runtime_herglotz::MomentumThere)| serde_json::json!({ "momentum": name, "value": json(m.momentum), "predicted": json(m.predicted) });
+        serde_json::json!({
+            "t": json(place.t),
+            "sigma_d": json(place.sigma),
+            "log_factor": json(place.log_factor),
+            "contact_defect": json(place.contact_defect),
+            "herglotz_defect": json(place.herglotz_defect),
+            "momenta": momenta.iter().zip(&place.momenta).map(of).collect::<Vec<_>>(),
+        })
+    };
+    let stated = |stated: &runtime_herglotz::Stated| {
+        let statement = stated.statement;
+        let (number, title) = (statement.number(), statement.title());
+        serde_json::json!({
+            "number": number, "title": title, "method": stated.method,
+            "step_size": stated.step_size, "residual": json(stated.residual),
+        })
+    };
+    serde_json::json!({
+        "integrator": check.integrator,
+        "step_size": check.step_size,
+        "contact": check.is_contact(),
+        "contact_defect": json(check.contact_defect()),
+        "momentum_defect": json(check.momentum_defect()),
+        "places": check.places.iter().map(place).collect::<Vec<_>>(),
+        "statements": check.statements.iter().map(stated).collect::<Vec<_>>(),
+    })
+}
+
+fn in_words(check: &runtime_herglotz::Check, momenta: &[String]) -> String {
+    let size = |x: f64| format!("{x:.1e}");
+    let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
+    let mut places = vec![words(&["t", "sigma_d", "log_factor", "contact", "Herglotz"])];
+    places[0].extend(momenta.iter().flat_map(|name| [name.clone(), "predicted".to_owned()]));
+    for place in &check.places {
+        let mut row = vec![short(place.t), short(place.sigma), short(place.log_factor)];
+        row.extend([size(place.contact_defect), size(place.herglotz_defect)]);
+        row.extend(place.momenta.iter().flat_map(|m| [short(m.momentum), short(m.predicted)]));
+        places.push(row);
+    }
+    let mut statements = vec![words(&["statement", "by", "residual"])];
+    for stated in &check.statements {
+        statements.push(vec![stated.statement.to_string(), stated.method.clone(), size(stated.residual)]);
+    }
+    let verdict = if check.is_contact() { "contact" } else { "not contact" };
+    let (defect, runtime_herglotz::Check { integrator, step_size, .. }) = (check.contact_defect(), check);
+    let mut parts = vec![
+        format!(
+            "{verdict}: the pullback of dz - p dq by a step of {} by {integrator} is sigma_d times it, to {defect:.1e} of {CONTACT:.0e}",
+            short(*step_size)
+        ),
+        table(&places),
+    ];
+    if !momenta.is_empty() {
+        parts.push(format!("the momenta are predicted to {:.1e} of their size", check.momentum_defect()));
+    }
+    if !check.statements.is_empty() {
+        let step = check.statements.first().map_or(*step_size, |stated| stated.step_size);
+        let formula = format!(
+            "the theorems of the discrete theory for this system with h = {}, worst of a few places:",
+            short(step)
+        );
+        parts.push(format!("{formula}\n{}", table(&statements)));
+    }
+
+    parts.join("\n\n")
+}

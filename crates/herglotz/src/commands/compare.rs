@@ -1,0 +1,82 @@
+//! `herglotz compare`.
+
+use super::SceneArguments;
+use super::run::progress_bar;
+use crate::failure::Failure;
+use crate::output::{Directory, Table, exact, json, print, print_json, short};
+use crate::plot;
+use clap::Args;
+use runtime_herglotz::{Comparison, Work};
+use std::path::PathBuf;
+
+/// The errors for which the best integrator is named.
+const ERRORS: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
+
+#[derive(Args)]
+pub(crate) struct Compare {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// The directory of compare.csv and compare.svg; that with the name of the scene otherwise.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Tell the best ones as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Compare {
+    pub fn run(&self) -> Result<(), Failure> {
+        let scene = self.scene.read()?;
+        let directory = Directory::new(self.out.clone(), &self.scene.file);
+        let bar = progress_bar(!self.json);
+        let compared = scene.system.compare(&scene.bare_motion(), &mut |part| {
+            bar.set_position((part * 1000.0) as u64);
+            true
+        });
+        bar.finish_and_clear();
+        let comparison = compared.map_err(|error| self.scene.explain(scene.explain(&error)))?;
+        directory.create()?;
+        let header = ["integrator", "order", "step_size", "steps", "evaluations", "error", "seconds"];
+        let mut csv = Table::new(directory.file("compare.csv"), header)?;
+        for Work { integrator, order, step_size, steps, evaluations, error, seconds } in &comparison.rows {
+            let counts = [order.to_string(), exact(*step_size), steps.to_string(), evaluations.to_string()];
+            csv.record([integrator.clone()].into_iter().chain(counts).chain([exact(*error), exact(*seconds)]))?;
+        }
+        csv.finish()?;
+        if let Some(figure) = plot::of_comparison(&comparison) {
+            directory.write("compare.svg", &figure)?;
+        }
+        if self.json { print_json(&of_json(&comparison)) } else { print(&in_words(&comparison)) }
+    }
+}
+
+fn of_json(comparison: &Comparison) -> serde_json::Value {
+    let best = |error: f64| {
+        let work = comparison.best(error)?;
+        Some(serde_json::json!({
+            "error": error,
+            "integrator": work.integrator,
+            "step_size": work.step_size,
+            "seconds": json(work.seconds),
+        }))
+    };
+    let left_out = comparison.left_out.iter().map(|(name, why)| serde_json::json!({ "integrator": name, "why": why }));
+    serde_json::json!({
+        "reference": comparison.reference,
+        "best": ERRORS.map(best),
+        "left_out": left_out.collect::<Vec<_>>(),
+    })
+}
+
+fn in_words(comparison: &Comparison) -> String {
+    let best = |error: f64| match comparison.best(error) {
+        Some(work) => {
+            format!("{error:.0e}: {} with h = {} in {:.2e} s", work.integrator, short(work.step_size), work.seconds)
+        }
+        None => format!("{error:.0e}: none"),
+    };
+    let mut lines = vec![format!("the reference: {}", comparison.reference)];
+    lines.extend(comparison.left_out.iter().map(|(name, why)| format!("left out: {name}: {why}")));
+    lines.push(format!("the best for {}", ERRORS.map(best).join("; ")));
+    lines.join("\n")
+}

@@ -1,0 +1,89 @@
+//! The commands of the program, one file each.
+
+mod check;
+mod compare;
+mod list;
+mod new;
+mod plan;
+mod run;
+mod sweep;
+
+use crate::Program;
+use crate::failure::Failure;
+use crate::output::{print, print_json};
+use clap::{Args, CommandFactory, Subcommand};
+use clap_complete::Shell;
+use herglotz::Scene;
+use std::path::PathBuf;
+
+/// What is to be done.
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// Run the motion of a scene: rows.csv, events.csv, and where it leads.
+    Run(run::Run),
+    /// Say what will be computed and what is skipped, and what is proved of the formula.
+    Plan(plan::Plan),
+    /// Say whether the motion is contact: sigma_d, momenta, Herglotz' equation, and the discrete theory's theorems; ends with 1 if not.
+    Check(check::Check),
+    /// Measure run time against error for all integrators that apply: compare.csv and compare.svg.
+    Compare(compare::Compare),
+    /// Run all members of a sweep over threads: sweep.csv.
+    Sweep(sweep::Sweep),
+    /// List the systems of the catalogue, or the integrators.
+    List(list::List),
+    /// Write a commented scene to begin with.
+    New(new::New),
+    /// Write the completions of a shell.
+    Completions {
+        /// The shell.
+        #[arg(value_enum)]
+        shell: Shell,
+    },
+    /// Write the JSON schema of scene files, for editors.
+    Schema,
+}
+
+impl Command {
+    pub fn run(self) -> Result<(), Failure> {
+        match self {
+            Command::Run(command) => command.run(),
+            Command::Plan(command) => command.run(),
+            Command::Check(command) => command.run(),
+            Command::Compare(command) => command.run(),
+            Command::Sweep(command) => command.run(),
+            Command::List(command) => command.run(),
+            Command::New(command) => command.run(),
+            Command::Completions { shell } => {
+                let mut text = Vec::new();
+                clap_complete::generate(shell, &mut Program::command(), "herglotz", &mut text);
+                print(&String::from_utf8_lossy(&text))
+            }
+            Command::Schema => print_json(&herglotz::schema()),
+        }
+    }
+}
+
+/// A scene file, with changes.
+#[derive(Args)]
+pub(crate) struct SceneArguments {
+    /// The scene file.
+    file: PathBuf,
+    /// Change a value of the scene: a parameter, start.NAME, run.time, run.accuracy or run.step.
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    changes: Vec<String>,
+}
+
+impl SceneArguments {
+    /// Reads the scene.
+    pub fn read(&self) -> Result<Scene, Failure> {
+        let text = std::fs::read(&self.file).map_err(Failure::of_file(&self.file))?;
+        let text = String::from_utf8(text)
+            .map_err(|_| Failure::Input(format!("{} is not a text in UTF-8; save it as such", self.file.display())))?;
+        Scene::read_with(&text, &self.changes).map_err(|error| self.explain(error))
+    }
+
+    /// An error with the name of the file.
+    pub fn explain(&self, error: herglotz::SceneError) -> Failure {
+        error.in_file(self.file.display().to_string()).into()
+    }
+}

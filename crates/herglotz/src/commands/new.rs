@@ -1,0 +1,91 @@
+//! `herglotz new`.
+
+use crate::failure::Failure;
+use crate::output::print;
+use clap::Args;
+use runtime_herglotz::{CatalogueEntry, velocity_name};
+
+#[derive(Args)]
+pub(crate) struct New {
+    /// A system of the catalogue, to begin with.
+    #[arg(default_value = "pendulum")]
+    name: String,
+}
+
+impl New {
+    pub fn run(&self) -> Result<(), Failure> {
+        let entry = CatalogueEntry::find(&self.name).map_err(|error| Failure::Input(error.to_string()))?;
+        print(&template(entry)?)
+    }
+}
+
+/// A number as TOML writes it.
+fn number(x: f64) -> String {
+    format!("{x:?}")
+}
+
+/// A key: in quotes, unless it has only letters, digits and `_`.
+fn key(name: &str) -> String {
+    let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    if bare { name.to_owned() } else { format!("\"{name}\"") }
+}
+
+/// A scene of a system, with comments.
+fn template(entry: &CatalogueEntry) -> Result<String, Failure> {
+    let formula = entry.formula().map_err(|error| Failure::Input(error.to_string()))?;
+    let names = formula.coordinates();
+    let blocks = entry.coordinates.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
+    let parameters = entry.parameters.iter().map(|(name, value)| format!("{name} = {}", number(*value)));
+    let parameters = parameters.collect::<Vec<_>>().join(", ");
+    let lagrangian = match entry.lagrangian {
+        several if several.contains('\n') => format!("\"\"\"\n{several}\"\"\""),
+        one => format!("\"{one}\""),
+    };
+    let start = |name: &dyn Fn(&str) -> String, numbers: &[f64]| {
+        let lines =
+            names.iter().zip(numbers).map(|(coordinate, x)| format!("{} = {}", key(&name(coordinate)), number(*x)));
+        lines.collect::<Vec<_>>().join("\n")
+    };
+    // Entries of an array are given one by one: a list would do, too.
+    let (q, v) = (start(&|name| name.to_owned(), entry.q), start(&velocity_name, entry.v));
+    let first = names.first().map(String::as_str).unwrap_or("x");
+    let swept = entry.parameters.last().map_or_else(
+        || format!("\"start.{first}\" = {{ from = 0.0, to = 1.0, count = 11 }}"),
+        |(name, value)| {
+            let (from, to) = (number(2.0 * value), number(0.0));
+            format!("{name} = {{ from = {from}, to = {to}, count = 11 }}  # or a list; spacing = \"log\"; \"start.{first}\" for the start")
+        },
+    );
+    Ok(format!(
+        r#"# {about}. Run it by `herglotz run FILE`; `herglotz plan FILE` says what will be computed.
+version = 1
+
+[system]
+coordinates = [{blocks}]
+# x' is the velocity of x, z the action, t the time; definitions are lines such as r = hypot(x, y).
+lagrangian = {lagrangian}
+parameters = {{ {parameters} }}
+
+[start]
+{q}
+{v}
+# p_{first} instead of a velocity starts from momenta; z and t are 0 if they are not given.
+
+[run]
+time = 100.0
+accuracy = 1e-9  # or integrator = "gauss_8", step = 0.5; `herglotz list integrators` lists them
+
+[want]
+# Rows by every = TIME, at = [TIMES] or every_step = STEPS. Columns are names and any formulas; without them, the whole state.
+rows = {{ every = 0.5, columns = ["t", "{first}", "{first_velocity}", "z", "energy", "log_factor", "{first}^2"] }}
+# The times at which a formula changes its sign: direction = "rising", "falling" or "both"; terminal = true ends the motion.
+events = [{{ when = "{first}", direction = "rising" }}]
+
+# For `herglotz sweep FILE`.
+[sweep]
+{swept}
+"#,
+        about = entry.about,
+        first_velocity = velocity_name(first),
+    ))
+}

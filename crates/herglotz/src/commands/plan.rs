@@ -1,0 +1,76 @@
+//! `herglotz plan`.
+
+use super::SceneArguments;
+use crate::failure::Failure;
+use crate::output::{print, print_json};
+use clap::Args;
+use herglotz::Scene;
+use runtime_herglotz::SeenSymmetry;
+
+#[derive(Args)]
+pub(crate) struct Plan {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Write it as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The momentum of a symmetry, as a formula.
+pub(crate) fn momentum(scene: &Scene, symmetry: SeenSymmetry) -> String {
+    let names = scene.system.formula().coordinates();
+    let name = |i: usize| names.get(i).map(String::as_str).unwrap_or_default();
+    match symmetry {
+        SeenSymmetry::Translation(i) => format!("p_{}", name(i)),
+        SeenSymmetry::Rotation(i, j) => format!("{x}*p_{y} - {y}*p_{x}", x = name(i), y = name(j)),
+    }
+}
+
+/// What is proved of a system, in words.
+fn proved(scene: &Scene) -> Vec<(&'static str, bool, &'static str)> {
+    let structure = scene.system.structure();
+    vec![
+        ("smooth", scene.system.is_smooth(), "neither kinks nor jumps"),
+        ("autonomous", structure.autonomous, "L does not depend on t"),
+        ("z_free", structure.z_free, "L does not depend on z: no dissipation"),
+        ("z_affine", structure.z_affine, "L = L0(t, q, v) + gamma(t) z"),
+        ("constant_rate", structure.has_constant_rate(), "L_z is one number"),
+        ("separable", structure.separable, "L = v.Mv/2 - V(t, q) + f(t, z), M constant"),
+        ("quadratic", structure.quadratic, "the motion is linear"),
+        ("constant_mass", structure.constant_mass, "W = L_vv is constant"),
+    ]
+}
+
+impl Plan {
+    pub fn run(&self) -> Result<(), Failure> {
+        let scene = self.scene.read()?;
+        let plan = scene.system.plan(&scene.motion()).map_err(|error| self.scene.explain(scene.explain(&error)))?;
+        let proved = proved(&scene);
+        let momenta: Vec<String> = scene.system.symmetries().iter().map(|seen| momentum(&scene, *seen)).collect();
+        if self.json {
+            let of = |item: &runtime_herglotz::Item| serde_json::json!({ "what": item.what, "computed": item.computed, "why": item.why });
+            let proved: serde_json::Map<_, _> =
+                proved.iter().map(|(name, holds, _)| ((*name).to_owned(), (*holds).into())).collect();
+            return print_json(&serde_json::json!({
+                "integrator": plan.integrator.name,
+                "order": plan.integrator.order,
+                "source": plan.integrator.source,
+                "step_size": plan.step_size,
+                "steps": plan.steps,
+                "estimated_error": plan.error,
+                "items": plan.items.iter().map(of).collect::<Vec<_>>(),
+                "proved": proved,
+                "momenta": momenta,
+                "members": scene.members().count(),
+            }));
+        }
+        let mut lines = vec![plan.text.trim_end().to_owned(), "proved of the formula:".to_owned()];
+        let holding = proved.iter().filter(|(_, holds, _)| *holds);
+        lines.extend(holding.map(|(name, _, meaning)| format!("  {name}: {meaning}")));
+        lines.extend(momenta.iter().map(|momentum| format!("  {momentum} decays as the conformal factor")));
+        if !scene.knobs.is_empty() {
+            lines.push(format!("a sweep has {} members", scene.members().count()));
+        }
+        print(&lines.join("\n"))
+    }
+}

@@ -1,0 +1,383 @@
+//! `herglotz run`.
+
+use super::SceneArguments;
+use crate::failure::Failure;
+use crate::output::{Directory, Table, exact, json, print, print_json, read_rows, short};
+use crate::plot;
+use clap::Args;
+use herglotz::Scene;
+use indicatif::{ProgressBar, ProgressStyle};
+use runtime_herglotz::{
+    AnyIntegrator, Crossing, Interrupted, Motion, Outcome, Plan, RuntimeError, Status, Steps, Watch, Way, When,
+    velocity_name,
+};
+use serde::{Deserialize, Serialize};
+use std::io::IsTerminal;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+const ROWS: &str = "rows.csv";
+const EVENTS: &str = "events.csv";
+const CHECKPOINT: &str = "checkpoint";
+const BESIDE: &str = "checkpoint.json";
+
+#[derive(Args)]
+pub(crate) struct Run {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// The directory of the results; that with the name of the scene otherwise.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Go on where Ctrl-C interrupted the run.
+    #[arg(long)]
+    resume: bool,
+    /// Draw the columns against time, and phase portraits: columns.svg, phase.svg, path.svg, section.svg.
+    #[arg(long)]
+    plot: bool,
+    /// Tell the end as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Interrupt the run as Ctrl-C does, once this part of it is done: for tests.
+    #[arg(long, hide = true)]
+    interrupt_at: Option<f64>,
+}
+
+/// What is known of the files when a run is interrupted.
+#[derive(Serialize, Deserialize)]
+struct Beside {
+    /// The scene, in words.
+    scene: String,
+    integrator: String,
+    count: usize,
+    by_clock: bool,
+    taken: usize,
+    rows: usize,
+    rows_bytes: u64,
+    events: usize,
+    events_bytes: u64,
+}
+
+/// Sees a motion, and writes what it sees.
+struct Writer {
+    rows: Table,
+    /// Where the scene has events.
+    events: Option<Table>,
+    names: Vec<String>,
+    row_count: usize,
+    event_count: usize,
+    /// Whether the next row is written already.
+    skip: bool,
+    bar: ProgressBar,
+    stop: Arc<AtomicBool>,
+    interrupt_at: Option<f64>,
+    interrupted: Option<Interrupted>,
+    failure: Option<Failure>,
+}
+
+impl Writer {
+    fn keep(&mut self, written: Result<(), Failure>) -> ControlFlow<()> {
+        match written {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(failure) => {
+                self.failure = Some(failure);
+                ControlFlow::Break(())
+            }
+        }
+    }
+}
+
+impl Watch for Writer {
+    fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
+        if std::mem::take(&mut self.skip) {
+            return ControlFlow::Continue(());
+        }
+        self.row_count += 1;
+        let written = self.rows.numbers(numbers);
+        self.keep(written)
+    }
+
+    fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
+        let (Some(table), Some(name)) = (&mut self.events, self.names.get(crossing.event)) else {
+            return ControlFlow::Continue(());
+        };
+        self.event_count += 1;
+        let Crossing { t, q, v, p, z, .. } = crossing;
+        let numbers = [*t].into_iter().chain(q.iter().chain(v).chain(p).copied()).chain([*z]).map(exact);
+        let written = table.record([name.clone()].into_iter().chain(numbers));
+        self.keep(written)
+    }
+
+    fn poll(&mut self, part: f64) -> ControlFlow<()> {
+        self.bar.set_position((part * 1000.0) as u64);
+        // At the end nothing is left to be interrupted.
+        let wanted = self.stop.load(Ordering::Relaxed) || self.interrupt_at.is_some_and(|at| part >= at);
+        if wanted && part < 1.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    fn interrupted(&mut self, at: Interrupted) {
+        self.interrupted = Some(at);
+    }
+}
+
+/// A flag that Ctrl-C sets; a second one ends the program.
+pub(crate) fn stop_flag() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let set = flag.clone();
+    let handler = move || {
+        if set.swap(true, Ordering::Relaxed) {
+            std::process::exit(1);
+        }
+    };
+    // Without a handler Ctrl-C ends the program at once.
+    if let Err(error) = ctrlc::set_handler(handler) {
+        eprintln!("warning: Ctrl-C will leave no checkpoint: {error}");
+    }
+    flag
+}
+
+/// A bar of thousandths on a terminal.
+pub(crate) fn progress_bar(shown: bool) -> ProgressBar {
+    if !(shown && std::io::stderr().is_terminal()) {
+        return ProgressBar::hidden();
+    }
+    let style =
+        ProgressStyle::with_template("{wide_bar} {percent}% {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(1000).with_style(style)
+}
+
+/// The columns of events.csv.
+fn header_of_events(scene: &Scene) -> Vec<String> {
+    let names = scene.system.formula().coordinates();
+    let velocities = names.iter().map(|name| velocity_name(name));
+    let momenta = names.iter().map(|name| format!("p_{name}"));
+    let first = ["event", "t"].map(str::to_owned).into_iter();
+    first.chain(names.iter().cloned()).chain(velocities).chain(momenta).chain(["z".to_owned()]).collect()
+}
+
+impl Run {
+    pub fn run(&self) -> Result<(), Failure> {
+        let scene = self.scene.read()?;
+        let explain = |error: RuntimeError| self.scene.explain(scene.explain(&error));
+        let mut motion = scene.motion();
+        motion.resumable = true;
+        let directory = Directory::new(self.out.clone(), &self.scene.file);
+        let beside = if self.resume { Some(self.beside(&directory, &scene)?) } else { None };
+        let plan = match &beside {
+            // The steps are known: they are not looked for once more.
+            Some(beside) if !beside.by_clock => {
+                motion.way = steps(&beside.integrator, beside.count).unwrap_or(motion.way);
+                scene.system.plan(&motion).map_err(explain)?
+            }
+            _ => scene.system.plan(&motion).map_err(explain)?,
+        };
+        // The same steps, found once.
+        if !plan.integrator.by_clock {
+            motion.way = steps(&plan.integrator.name, plan.steps).unwrap_or(motion.way);
+        }
+        let from = match &beside {
+            Some(_) => {
+                let path = directory.file(CHECKPOINT);
+                let read = Interrupted::read(&path);
+                Some(read.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?)
+            }
+            None => None,
+        };
+        let mut writer = self.writer(&directory, &scene, &mut motion, beside.as_ref())?;
+        if beside.is_none() {
+            directory.remove(BESIDE)?;
+            directory.remove(CHECKPOINT)?;
+        }
+        let outcome = match from {
+            Some(from) => scene.system.resume(&motion, from, &mut writer),
+            None => scene.system.run(&motion, &mut writer),
+        };
+        writer.bar.finish_and_clear();
+        let outcome = outcome.map_err(explain)?;
+        let Writer { rows, events, row_count, event_count, interrupted, failure, .. } = writer;
+        let rows_bytes = rows.finish()?;
+        let events_bytes = events.map(Table::finish).transpose()?.unwrap_or(0);
+        if let Some(failure) = failure {
+            return Err(failure);
+        }
+        if let Some(interrupted) = &interrupted {
+            let path = directory.file(CHECKPOINT);
+            interrupted.write(&path).map_err(Failure::of_file(&path))?;
+            let beside = Beside {
+                scene: scene.fingerprint(),
+                integrator: plan.integrator.name.to_string(),
+                count: plan.steps,
+                by_clock: plan.integrator.by_clock,
+                taken: outcome.steps,
+                rows: row_count,
+                rows_bytes,
+                events: event_count,
+                events_bytes,
+            };
+            directory.write(BESIDE, &serde_json::to_string(&beside).map_err(std::io::Error::from)?)?;
+        } else {
+            directory.remove(BESIDE)?;
+            directory.remove(CHECKPOINT)?;
+        }
+        if self.plot {
+            for (name, figure) in plot::of_rows(&scene, &read_numbers(&directory.file(ROWS))?) {
+                directory.write(&name, &figure)?;
+            }
+            if !scene.events.is_empty()
+                && let Some(figure) = plot::of_section(&scene, &read_crossings(&scene, &directory.file(EVENTS))?)
+            {
+                directory.write("section.svg", &figure)?;
+            }
+        }
+        self.tell(&scene, &plan, &outcome, (row_count, event_count), interrupted.is_some())
+    }
+
+    /// What was left beside the checkpoint.
+    fn beside(&self, directory: &Directory, scene: &Scene) -> Result<Beside, Failure> {
+        let path = directory.file(BESIDE);
+        let refuse = |why: &str| Failure::Input(format!("{}: {why}", path.display()));
+        let text = std::fs::read_to_string(&path)
+            .map_err(|_| refuse("there is no interrupted run in this directory; run without --resume"))?;
+        let beside: Beside = serde_json::from_str(&text).map_err(|_| refuse("it is damaged; run without --resume"))?;
+        if beside.scene != scene.fingerprint() {
+            return Err(refuse("the scene is not the one that was interrupted; run without --resume"));
+        }
+        Ok(beside)
+    }
+
+    /// The files, from their beginning or where they are to go on; of the rows of the motion those that are left.
+    fn writer(
+        &self,
+        directory: &Directory,
+        scene: &Scene,
+        motion: &mut Motion,
+        beside: Option<&Beside>,
+    ) -> Result<Writer, Failure> {
+        directory.create()?;
+        let (rows_at, events_at) = (directory.file(ROWS), directory.file(EVENTS));
+        let has_events = !scene.events.is_empty();
+        let (rows, events) = match beside {
+            Some(beside) => {
+                let events = has_events.then(|| Table::go_on(events_at, beside.events_bytes)).transpose()?;
+                (Table::go_on(rows_at, beside.rows_bytes)?, events)
+            }
+            None => {
+                let header = header_of_events(scene);
+                let header = || header.iter().map(String::as_str);
+                let events = has_events.then(|| Table::new(events_at, header())).transpose()?;
+                (Table::new(rows_at, scene.columns.iter().map(|(name, _)| name.as_str()))?, events)
+            }
+        };
+        if let (Some(beside), Some(When::At(times))) = (beside, &mut motion.rows) {
+            times.drain(..beside.rows.min(times.len()));
+        }
+        // Rows at steps begin with that at which the motion goes on.
+        let stride = scene.rows_every_step();
+        let skip = beside.zip(stride).is_some_and(|(beside, stride)| beside.taken.is_multiple_of(stride));
+        Ok(Writer {
+            rows,
+            events,
+            names: scene.events.iter().map(|(name, _)| name.clone()).collect(),
+            row_count: beside.map_or(0, |beside| beside.rows),
+            event_count: beside.map_or(0, |beside| beside.events),
+            skip,
+            bar: progress_bar(!self.json),
+            stop: stop_flag(),
+            interrupt_at: self.interrupt_at,
+            interrupted: None,
+            failure: None,
+        })
+    }
+
+    /// Tells where the motion has led.
+    fn tell(
+        &self,
+        scene: &Scene,
+        plan: &Plan,
+        outcome: &Outcome,
+        (rows, events): (usize, usize),
+        interrupted: bool,
+    ) -> Result<(), Failure> {
+        let end = end_of(scene, outcome);
+        let status = match outcome.status {
+            _ if interrupted => "interrupted".to_owned(),
+            // Why is told as an error.
+            Status::Failed { .. } if !self.json => "failed".to_owned(),
+            Status::FalseClaim { .. } if !self.json => "unreliable".to_owned(),
+            status => status.to_string(),
+        };
+        let Outcome { t, steps, evaluations, .. } = outcome;
+        if self.json {
+            let end: serde_json::Map<_, _> = end.iter().map(|(name, x)| (name.clone(), json(*x))).collect();
+            print_json(&serde_json::json!({
+                "status": status,
+                "suspicion": outcome.suspicion.map(|suspicion| suspicion.to_string()),
+                "integrator": plan.integrator.name,
+                "step_size": plan.step_size,
+                "steps": steps,
+                "evaluations": evaluations,
+                "estimated_error": plan.error,
+                "rows": rows,
+                "events": events,
+                "end": end,
+            }))?;
+        } else {
+            let Plan { integrator, step_size, .. } = plan;
+            let error = plan.error.map(|error| format!(", estimated error {error:.1e}")).unwrap_or_default();
+            let mut lines =
+                vec![format!("{status}: {steps} steps of {} by {}{error}", short(*step_size), integrator.name)];
+            let crossings = if scene.events.is_empty() { String::new() } else { format!(", {events} events") };
+            lines.push(format!("{rows} rows{crossings}; the end:"));
+            lines.extend(end.iter().map(|(name, x)| format!("  {name} = {}", short(*x))));
+            print(&lines.join("\n"))?;
+        }
+        if let Some(suspicion) = outcome.suspicion {
+            eprintln!("warning: {suspicion}");
+        }
+        match outcome.status {
+            _ if interrupted => {
+                Err(Failure::Run(format!("interrupted at t = {t}; the same command with --resume goes on from there")))
+            }
+            Status::Completed | Status::Stopped { .. } => Ok(()),
+            status => Err(Failure::Run(status.to_string())),
+        }
+    }
+}
+
+/// So many steps by the integrator of a name.
+fn steps(integrator: &str, count: usize) -> Option<Way> {
+    let by: AnyIntegrator = integrator.parse().ok()?;
+    Some(Way::Steps { by, steps: Steps::Count(count) })
+}
+
+/// The state at the end with its names.
+pub(crate) fn end_of(scene: &Scene, outcome: &Outcome) -> Vec<(String, f64)> {
+    let names = scene.system.formula().coordinates();
+    let mut end = vec![("t".to_owned(), outcome.t)];
+    end.extend(names.iter().cloned().zip(outcome.q.iter().copied()));
+    if let Some(v) = &outcome.v {
+        end.extend(names.iter().map(|name| velocity_name(name)).zip(v.iter().copied()));
+    }
+    end.extend(names.iter().map(|name| format!("p_{name}")).zip(outcome.p.iter().copied()));
+    end.extend(outcome.z.map(|z| ("z".to_owned(), z)));
+    end.extend(outcome.log_factor.map(|x| ("log_factor".to_owned(), x)));
+    end
+}
+
+/// The events that were written: which one, and its numbers.
+fn read_crossings(scene: &Scene, path: &std::path::Path) -> Result<Vec<(usize, Vec<f64>)>, Failure> {
+    let index = |name: &str| scene.events.iter().position(|(known, _)| known == name).unwrap_or(usize::MAX);
+    let rows = read_rows(path)?;
+    let of = |row: Vec<String>| {
+        let (name, numbers) = row.split_first()?;
+        Some((index(name), numbers.iter().map(|x| x.parse().unwrap_or(f64::NAN)).collect()))
+    };
+    Ok(rows.into_iter().filter_map(of).collect())
+}
+
+/// The rows that were written.
+fn read_numbers(path: &std::path::Path) -> Result<Vec<Vec<f64>>, Failure> {
+    let number = |x: &String| x.parse().unwrap_or(f64::NAN);
+    Ok(read_rows(path)?.iter().map(|row| row.iter().map(number).collect()).collect())
+}

@@ -1,0 +1,27 @@
+//! Motions of Lagrangians that depend on the action, from scene files.
+
+mod commands;
+mod failure;
+mod output;
+mod plot;
+
+use clap::Parser;
+use commands::Command;
+use std::process::ExitCode;
+
+/// Contact mechanics from a scene file: runs, plans, checks, comparisons and sweeps of motions by Herglotz' equation.
+///
+/// Begin with `herglotz new pendulum > pendulum.toml` and `herglotz run pendulum.toml`.
+#[derive(Parser)]
+#[command(name = "herglotz", version, about)]
+pub(crate) struct Program {
+    #[command(subcommand)]
+    command: Command,
+}
+
+fn main() -> ExitCode {
+    match Program::parse().command.run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.tell(),
+    }
+}

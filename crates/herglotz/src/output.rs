@@ -1,0 +1,143 @@
+//! Where results go: numbers with 17 digits, tables, JSON.
+
+use crate::failure::Failure;
+use serde_json::Value;
+use std::fs::{File, OpenOptions};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A number with the 17 digits from which it can be read back to the bit.
+pub(crate) fn exact(x: f64) -> String {
+    format!("{x:.16e}")
+}
+
+/// A number for readers.
+pub(crate) fn short(x: f64) -> String {
+    let size = x.abs();
+    if x == 0.0 || (1e-3..1e6).contains(&size) {
+        format!("{x:.10}").trim_end_matches('0').trim_end_matches('.').into()
+    } else {
+        format!("{x:.6e}")
+    }
+}
+
+/// A number as JSON: a text where it is not finite.
+pub(crate) fn json(x: f64) -> Value {
+    if x.is_finite() { x.into() } else { x.to_string().into() }
+}
+
+/// Writes a text to the standard output, with a line end.
+pub(crate) fn print(text: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.trim_end_matches('\n').as_bytes())?;
+    out.write_all(b"\n")?;
+    Ok(out.flush()?)
+}
+
+/// Writes a value to the standard output.
+pub(crate) fn print_json(value: &Value) -> Result<(), Failure> {
+    print(&format!("{value:#}"))
+}
+
+/// A table with columns as wide as their widest entry.
+pub(crate) fn table(rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width =
+        |i: usize| rows.iter().filter_map(|row| row.get(i)).map(|entry| entry.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let padded = row.iter().zip(&widths).map(|(entry, width)| format!("{entry:<width$}"));
+        padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    rows.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// The directory of the results.
+#[derive(Clone, Debug)]
+pub(crate) struct Directory(PathBuf);
+
+impl Directory {
+    /// The one that was asked for, or one in the present directory with the name of the scene.
+    pub fn new(wanted: Option<PathBuf>, scene: &Path) -> Self {
+        Directory(wanted.unwrap_or_else(|| scene.file_stem().map(PathBuf::from).unwrap_or_else(|| "scene".into())))
+    }
+
+    /// Makes it, when there is something to write.
+    pub fn create(&self) -> Result<(), Failure> {
+        std::fs::create_dir_all(&self.0).map_err(Failure::of_file(&self.0))
+    }
+
+    /// A file in it.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    /// Writes a file.
+    pub fn write(&self, name: &str, text: &str) -> Result<PathBuf, Failure> {
+        let path = self.file(name);
+        std::fs::write(&path, text).map_err(Failure::of_file(&path))?;
+        Ok(path)
+    }
+
+    /// Removes a file, if it is there.
+    pub fn remove(&self, name: &str) -> Result<(), Failure> {
+        let path = self.file(name);
+        match std::fs::remove_file(&path) {
+            Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => Err(Failure::of_file(&path)(cause)),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A table of numbers that is written as it comes.
+pub(crate) struct Table {
+    out: csv::Writer<BufWriter<File>>,
+    path: PathBuf,
+}
+
+impl Table {
+    /// A new file with a header.
+    pub fn new<'h>(path: PathBuf, header: impl IntoIterator<Item = &'h str>) -> Result<Self, Failure> {
+        let file = File::create(&path).map_err(Failure::of_file(&path))?;
+        let mut table = Table { out: csv::Writer::from_writer(BufWriter::new(file)), path };
+        table.record(header)?;
+        Ok(table)
+    }
+
+    /// Goes on with a file after so many bytes; what follows them is dropped.
+    pub fn go_on(path: PathBuf, bytes: u64) -> Result<Self, Failure> {
+        let open = || -> std::io::Result<File> {
+            let file = OpenOptions::new().append(true).open(&path)?;
+            if file.metadata()?.len() < bytes {
+                return Err(std::io::Error::other("it is shorter than it was when the run was interrupted; run anew"));
+            }
+            file.set_len(bytes)?;
+            Ok(file)
+        };
+        let file = open().map_err(Failure::of_file(&path))?;
+        Ok(Table { out: csv::Writer::from_writer(BufWriter::new(file)), path })
+    }
+
+    /// Writes a row.
+    pub fn record<T: AsRef<[u8]>>(&mut self, entries: impl IntoIterator<Item = T>) -> Result<(), Failure> {
+        self.out.write_record(entries).map_err(|error| Failure::of_file(&self.path)(error.into()))
+    }
+
+    /// Writes a row of numbers.
+    pub fn numbers(&mut self, numbers: &[f64]) -> Result<(), Failure> {
+        self.record(numbers.iter().map(|x| exact(*x)))
+    }
+
+    /// Writes all to the file, and tells its length.
+    pub fn finish(mut self) -> Result<u64, Failure> {
+        let flushed = self.out.flush().and_then(|()| std::fs::metadata(&self.path));
+        Ok(flushed.map_err(Failure::of_file(&self.path))?.len())
+    }
+}
+
+/// The rows of a table that was written.
+pub(crate) fn read_rows(path: &Path) -> Result<Vec<Vec<String>>, Failure> {
+    let broken = |error: csv::Error| Failure::of_file(path)(error.into());
+    let mut reader = csv::Reader::from_path(path).map_err(broken)?;
+    reader.records().map(|row| row.map(|row| row.iter().map(str::to_owned).collect()).map_err(broken)).collect()
+}

@@ -1,0 +1,136 @@
+//! Figures of rows: columns against time, and phase portraits.
+
+use contact_figure::{Axis, Curve, Line, Panel, draw, draw_grid};
+use herglotz::Scene;
+use runtime_herglotz::{Column, Comparison, velocity_name};
+
+/// The most points of a curve: more are not seen.
+const POINTS: usize = 2000;
+
+/// The panels beside each other.
+const IN_A_ROW: usize = 3;
+
+/// The longest label of an axis, in characters.
+const LABEL: usize = 30;
+
+/// The figures of rows with their names: each column against time, and each velocity against its coordinate.
+pub(crate) fn of_rows(scene: &Scene, rows: &[Vec<f64>]) -> Vec<(String, String)> {
+    let stride = rows.len().div_ceil(POINTS).max(1);
+    let of = |i: usize, j: usize| -> Vec<(f64, f64)> {
+        let points = rows.iter().step_by(stride).chain(rows.last());
+        points.filter_map(|row| Some((*row.get(i)?, *row.get(j)?))).filter(|(x, y)| (x + y).is_finite()).collect()
+    };
+    let place = |wanted: &dyn Fn(&Column) -> bool| scene.columns.iter().position(|(_, column)| wanted(column));
+    let name = |i: usize| scene.columns.get(i).map(|(name, _)| name.as_str()).unwrap_or_default();
+    let mut figures = Vec::new();
+    if let Some(t) = place(&|column| matches!(column, Column::Time)) {
+        let against = (0..scene.columns.len()).filter(|i| *i != t).map(|i| (i, of(t, i)));
+        let panels: Vec<Panel> = against.filter_map(|(i, points)| panel(("t", name(i)), Line::Solid, points)).collect();
+        figures.extend((!panels.is_empty()).then(|| ("columns.svg".to_owned(), grid(&panels))));
+    }
+    let portraits = (0..scene.system.dimension()).filter_map(|k| {
+        let q = place(&|column| matches!(column, Column::Position(i) if *i == k))?;
+        let v = place(&|column| matches!(column, Column::Velocity(i) if *i == k))?;
+        panel((name(q), name(v)), Line::Solid, of(q, v))
+    });
+    let panels: Vec<Panel> = portraits.collect();
+    figures.extend((!panels.is_empty()).then(|| ("phase.svg".to_owned(), grid(&panels))));
+    let positions: Vec<usize> = (0..scene.system.dimension())
+        .filter_map(|k| place(&|column| matches!(column, Column::Position(i) if *i == k)))
+        .collect();
+    if let [x, y, ..] = positions.as_slice() {
+        let path = panel((name(*x), name(*y)), Line::Solid, of(*x, *y));
+        figures.extend(path.map(|panel| ("path.svg".to_owned(), draw(&panel))));
+    }
+    figures
+}
+
+/// The figure of a section: velocities against coordinates where the first event changes its sign.
+pub(crate) fn of_section(scene: &Scene, crossings: &[(usize, Vec<f64>)]) -> Option<String> {
+    let names = scene.system.formula().coordinates();
+    let panels = names.iter().enumerate().filter_map(|(i, name)| {
+        // A row has the time, the coordinates, and their velocities.
+        let of = |(_, row): &(usize, Vec<f64>)| Some((*row.get(1 + i)?, *row.get(1 + names.len() + i)?));
+        let points: Vec<_> = crossings.iter().filter(|(event, _)| *event == 0).filter_map(of).collect();
+        let size = |of: fn(&(f64, f64)) -> f64| points.iter().map(|p| of(p).abs()).fold(0.0, f64::max);
+        // That the section is at one place needs no figure.
+        let shown = size(|p| p.0) > 1e-9 && size(|p| p.1) > 1e-9;
+        panel((name, &velocity_name(name)), Line::Discs, points).filter(|_| shown)
+    });
+    let panels: Vec<Panel> = panels.collect();
+    (!panels.is_empty()).then(|| grid(&panels))
+}
+
+/// The figure of one column of the members of a sweep against the swept value.
+pub(crate) fn of_sweep(knob: &str, column: &str, points: Vec<(f64, f64)>) -> Option<String> {
+    panel((knob, column), Line::Discs, points).map(|panel| draw(&panel))
+}
+
+/// Panels in rows; one alone needs no letter.
+fn grid(panels: &[Panel]) -> String {
+    match panels {
+        [one] => draw(one),
+        several => draw_grid(several, if several.len() == 4 { 2 } else { several.len().min(IN_A_ROW) }),
+    }
+}
+
+/// One curve in axes that fit it.
+fn panel((x_label, y_label): (&str, &str), line: Line, points: Vec<(f64, f64)>) -> Option<Panel> {
+    let label = |name: &str| match name.char_indices().nth(LABEL) {
+        Some((end, _)) => format!("{}...", &name[..end]),
+        None => name.to_owned(),
+    };
+    let (x_label, y_label) = (label(x_label), label(y_label));
+    let (x, y) = (axis(points.iter().map(|p| p.0))?, axis(points.iter().map(|p| p.1))?);
+    let curves = vec![Curve::unnamed(line, points)];
+    Some(Panel { x_label, y_label, x, y, legend: (0.0, 1.0), curves, marks: Vec::new() })
+}
+
+/// A linear axis around numbers, from a tick to a tick; none where there are none.
+fn axis(numbers: impl Iterator<Item = f64>) -> Option<Axis> {
+    let (low, high) = numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    if !(low <= high) {
+        return None;
+    }
+    // What does not vary beyond round-off is shown as a line.
+    let least = f64::EPSILON * 1e4 * low.abs().max(high.abs());
+    let span = if high - low > least { high - low } else { low.abs().max(1e-12) };
+    let rough = span / 5.0;
+    let power = 10f64.powf(rough.log10().floor());
+    let step = power * [1.0, 2.0, 5.0].into_iter().find(|digit| digit * power >= rough).unwrap_or(10.0);
+    let middle = 0.5 * (low + high);
+    let (low, high) = (low.min(middle - 0.5 * span), high.max(middle + 0.5 * span));
+    let rounding = 1e-9;
+    Some(Axis::Linear((low / step + rounding).floor() * step, (high / step - rounding).ceil() * step, step))
+}
+
+/// Run time against error, both in powers of ten.
+pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
+    let shown = || comparison.rows.iter().filter(|row| row.error > 0.0 && row.error.is_finite() && row.seconds > 0.0);
+    let range = |of: &dyn Fn(&runtime_herglotz::Work) -> f64| {
+        let powers = shown().map(of).map(f64::log10);
+        let (low, high) = powers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        (low <= high).then(|| (low.floor() as i32, (high.ceil() as i32).max(low.floor() as i32 + 1)))
+    };
+    let (fast, slow) = range(&|row| row.seconds)?;
+    let (best, worst) = range(&|row| row.error)?;
+    let mut names: Vec<&str> = Vec::new();
+    for row in shown() {
+        if !names.contains(&row.integrator.as_str()) {
+            names.push(&row.integrator);
+        }
+    }
+    let curve = |(number, name): (usize, &&str)| {
+        let points = shown().filter(|row| row.integrator == **name).map(|row| (row.seconds, row.error));
+        Curve::new(name, Line::Coloured(number), points)
+    };
+    Some(draw(&Panel {
+        x_label: "run time (s)".into(),
+        y_label: "relative error of (q, p)".into(),
+        x: Axis::Logarithmic(fast, slow, 1),
+        y: Axis::Logarithmic(best, worst, ((worst - best) / 8).max(1) as u32),
+        legend: (1.0, 1.0),
+        curves: names.iter().enumerate().map(curve).collect(),
+        marks: Vec::new(),
+    }))
+}

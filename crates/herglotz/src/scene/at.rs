@@ -1,0 +1,171 @@
+//! Values that know where in the file they are.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fmt::Formatter;
+use std::marker::PhantomData;
+use std::ops::{Deref, DerefMut, Range};
+use toml::Spanned;
+
+/// The bytes of a text from the first to the one after the last.
+pub(crate) type Span = (usize, usize);
+
+/// A value with its place in the file.
+#[derive(Clone, Debug)]
+pub(crate) struct At<T> {
+    value: T,
+    span: Span,
+}
+
+impl<T> At<T> {
+    /// A value that is at these bytes.
+    pub fn new(value: T, span: Span) -> Self {
+        At { value, span }
+    }
+
+    /// Where it is.
+    pub fn span(&self) -> Span {
+        self.span
+    }
+}
+
+impl<T> Deref for At<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.value
+    }
+}
+
+impl<T> DerefMut for At<T> {
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.value
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for At<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let read = Spanned::<T>::deserialize(deserializer)?;
+        let Range { start, end } = read.span();
+        Ok(At { value: read.into_inner(), span: (start, end) })
+    }
+}
+
+impl<T: JsonSchema> JsonSchema for At<T> {
+    fn inline_schema() -> bool {
+        T::inline_schema()
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        T::schema_name()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        T::json_schema(generator)
+    }
+}
+
+/// A table whose keys are names of the user's, in the order of the file.
+#[derive(Clone, Debug)]
+pub(crate) struct Named<T>(pub Vec<(At<String>, At<T>)>);
+
+impl<T> Default for Named<T> {
+    fn default() -> Self {
+        Named(Vec::new())
+    }
+}
+
+impl<T> Named<T> {
+    /// The value of a name.
+    pub fn get(&self, name: &str) -> Option<&At<T>> {
+        self.0.iter().find(|(key, _)| **key == name).map(|(_, value)| value)
+    }
+
+    /// Gives a name a value, instead of the one that it has.
+    pub fn set(&mut self, name: &str, value: At<T>) {
+        match self.0.iter_mut().find(|(key, _)| **key == name) {
+            Some((_, old)) => *old = value,
+            None => self.0.push((At::new(name.to_owned(), value.span()), value)),
+        }
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Named<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Table<T>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for Table<T> {
+            type Value = Named<T>;
+
+            fn expecting(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a table")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Named<T>, A::Error> {
+                let mut all = Vec::new();
+                while let Some(entry) = map.next_entry()? {
+                    all.push(entry);
+                }
+                // The reader of the file sorts tables by name.
+                all.sort_by_key(|(key, _): &(At<String>, At<T>)| key.span());
+                Ok(Named(all))
+            }
+        }
+        deserializer.deserialize_map(Table(PhantomData))
+    }
+}
+
+impl<T: JsonSchema> JsonSchema for Named<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        format!("Named{}", T::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        BTreeMap::<String, T>::json_schema(generator)
+    }
+}
+
+/// A number, or a list of numbers.
+#[derive(Clone, Debug, JsonSchema)]
+#[schemars(untagged, inline)]
+pub(crate) enum Numbers {
+    /// A number.
+    One(f64),
+    /// As many as an array has entries.
+    Many(Vec<At<f64>>),
+}
+
+impl<'de> Deserialize<'de> for Numbers {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OneOrMany;
+        impl<'de> Visitor<'de> for OneOrMany {
+            type Value = Numbers;
+
+            fn expecting(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a number or a list of numbers")
+            }
+
+            fn visit_f64<E>(self, x: f64) -> Result<Numbers, E> {
+                Ok(Numbers::One(x))
+            }
+
+            fn visit_i64<E>(self, x: i64) -> Result<Numbers, E> {
+                Ok(Numbers::One(x as f64))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Numbers, A::Error> {
+                let mut all = Vec::new();
+                while let Some(x) = list.next_element()? {
+                    all.push(x);
+                }
+                Ok(Numbers::Many(all))
+            }
+        }
+        deserializer.deserialize_any(OneOrMany)
+    }
+}

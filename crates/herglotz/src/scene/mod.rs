@@ -1,0 +1,375 @@
+//! A scene: a system, a start, and what is asked of the motion.
+
+mod at;
+mod change;
+mod error;
+mod file;
+mod members;
+mod start;
+mod sweep;
+mod want;
+
+pub use error::SceneError;
+pub use members::Members;
+pub use sweep::Knob;
+
+use at::{At, Span};
+use file::{File, RunTable, SystemTable, VERSION};
+use runtime_herglotz::{
+    AnyIntegrator, CatalogueEntry, Column, Event, Formula, FormulaError, InputError, Motion, RuntimeError, Start,
+    Steps, System, Way,
+};
+use serde::Deserialize;
+use want::RowTimes;
+
+/// A scene that has been read and checked.
+#[derive(Clone)]
+pub struct Scene {
+    /// The system.
+    pub system: System,
+    /// The columns with their names, in their order.
+    pub columns: Vec<(String, Column)>,
+    /// The events with the texts of their functions, in their order.
+    pub events: Vec<(String, Event)>,
+    /// What a sweep takes through its values.
+    pub knobs: Vec<Knob>,
+    /// The formula's text.
+    lagrangian: String,
+    start: Start,
+    end: f64,
+    way: Way,
+    rows: RowTimes,
+    conformal_factor: bool,
+    text: String,
+    places: Places,
+}
+
+/// Where in the file that is of which something may turn out to be wrong later.
+#[derive(Clone, Copy, Debug)]
+struct Places {
+    lagrangian: Span,
+    start: Span,
+    run: Span,
+    time: Span,
+    accuracy: Span,
+    integrator: Span,
+    step: Span,
+    rows: Span,
+}
+
+impl Scene {
+    /// Reads a scene file.
+    ///
+    /// ```
+    /// let scene = herglotz::Scene::read(r#"
+    ///     [system]
+    ///     coordinates = ["theta"]
+    ///     lagrangian = "theta'^2/2 + cos(theta) + gamma*z"
+    ///     parameters = { gamma = -0.1 }
+    ///     [start]
+    ///     theta = 1.0
+    ///     "theta'" = 0.0
+    ///     [run]
+    ///     time = 100.0
+    ///     accuracy = 1e-10
+    /// "#)?;
+    /// assert_eq!(scene.motion().end, 100.0);
+    /// # Ok::<(), herglotz::SceneError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`SceneError`] with the place in the text.
+    pub fn read(text: &str) -> Result<Self, SceneError> {
+        Self::read_with(text, &[])
+    }
+
+    /// Reads a scene file and changes some of its values: `gamma=-0.2` for a parameter, `start.x=1`, `run.time=10`, `run.accuracy=1e-6`,
+    /// `run.step=0.1`.
+    ///
+    /// # Errors
+    /// [`SceneError`] with the place in the text, or in the change.
+    pub fn read_with(text: &str, changes: &[String]) -> Result<Self, SceneError> {
+        check_version(text)?;
+        let mut file: File = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
+        let entry = entry(text, &file.system)?;
+        for text_of_change in changes {
+            change::apply(&mut file, entry, text_of_change)?;
+        }
+        let formula = formula(text, &file.system, entry)?;
+        let system = &file.system;
+        let lagrangian = system.lagrangian.as_ref().map_or(system.span(), At::span);
+        let runs = System::new(&formula).map_err(|error| want::of_formula(text, lagrangian, &error))?;
+        let run = &file.run;
+        let header = file.start.as_ref().map_or(system.span(), At::span);
+        let start = start::read(text, &formula, file.start.as_deref(), entry, header)?;
+        let end = finite(text, &run.time, "time")?;
+        if end == start.t {
+            let message =
+                format!("the motion ends at {end}, at which it starts; give a time after it, or before it to go back");
+            return Err(SceneError::at(text, run.time.span(), message));
+        }
+        let way = way(text, run)?;
+        let by = match way {
+            Way::Accuracy { by, .. } => by,
+            Way::Steps { by, .. } => Some(by),
+        };
+        if let (Some(by), Some(name)) = (by, &run.integrator) {
+            let refused = |error: InputError| SceneError::at(text, name.span(), in_words(&error));
+            runs.check_integrator(by).map_err(refused)?;
+        }
+        Ok(Scene {
+            columns: want::columns(text, &formula, file.want.rows.as_ref())?,
+            events: want::events(text, &formula, &file.want.events)?,
+            knobs: sweep::read(text, &formula, &start, &file.sweep)?,
+            rows: RowTimes::read(text, file.want.rows.as_ref(), (start.t, end))?,
+            system: runs,
+            lagrangian: match (entry, &system.lagrangian) {
+                (Some(entry), _) => entry.lagrangian.to_owned(),
+                (None, own) => own.as_ref().map(|text| (**text).clone()).unwrap_or_default(),
+            },
+            start,
+            end,
+            way,
+            conformal_factor: file.want.conformal_factor,
+            text: text.to_owned(),
+            places: Places {
+                lagrangian,
+                start: header,
+                run: run.span(),
+                time: run.time.span(),
+                accuracy: run.accuracy.as_ref().map_or(run.span(), At::span),
+                integrator: run.integrator.as_ref().map_or(run.span(), At::span),
+                step: run.step.as_ref().map(At::span).or(run.steps.as_ref().map(At::span)).unwrap_or(run.span()),
+                rows: file.want.rows.as_ref().map_or(run.span(), At::span),
+            },
+        })
+    }
+
+    /// The motion, with all that is to be recorded.
+    pub fn motion(&self) -> Motion {
+        Motion {
+            rows: Some(self.rows.when(self.start.t, self.end)),
+            columns: self.columns.iter().map(|(_, column)| column.clone()).collect(),
+            events: self.events.iter().map(|(_, event)| event.clone()).collect(),
+            conformal_factor: self.conformal_factor,
+            ..self.bare_motion()
+        }
+    }
+
+    /// The motion with nothing recorded but its end.
+    pub fn bare_motion(&self) -> Motion {
+        Motion::new(self.start.clone(), self.end, self.way)
+    }
+
+    /// The number of steps between two rows, where rows are counted in steps.
+    pub fn rows_every_step(&self) -> Option<usize> {
+        match self.rows {
+            RowTimes::EveryStep(steps) => Some(steps),
+            _ => None,
+        }
+    }
+
+    /// The members of its sweep.
+    pub fn members(&self) -> Members<'_> {
+        Members::new(&self.knobs, &self.start)
+    }
+
+    /// All that determines what is recorded, in words, for telling one scene from another.
+    pub fn fingerprint(&self) -> String {
+        let columns: Vec<&str> = self.columns.iter().map(|(name, _)| name.as_str()).collect();
+        let events: Vec<_> = self.events.iter().map(|(name, e)| (name, e.direction, e.terminal)).collect();
+        let Scene { start, end, way, rows, conformal_factor, .. } = self;
+        let formula = self.system.formula();
+        let (names, values) = (formula.coordinates(), formula.parameters().collect::<Vec<_>>());
+        let of_system = format!("{} {names:?} {values:?}", self.lagrangian);
+        format!("{of_system} {start:?} {end:?} {way:?} {rows:?} {conformal_factor} {columns:?} {events:?}")
+    }
+
+    /// The place in the file that an error is about.
+    pub fn explain(&self, error: &RuntimeError) -> SceneError {
+        use InputError as E;
+        let places = &self.places;
+        let span = match error {
+            RuntimeError::NotRegular { .. } | RuntimeError::Formula(_) => places.lagrangian,
+            RuntimeError::Input(error) => match error {
+                E::Step { .. } | E::NoSteps | E::TooMany { .. } | E::Count { .. } => places.step,
+                E::Span { .. } => places.time,
+                E::Tolerance { .. } | E::Accuracy { .. } => places.accuracy,
+                E::NoIntegrator | E::Unclaimed { .. } | E::Hypothesis { .. } | E::Stages { .. } => places.integrator,
+                E::FalseClaim { .. } => places.lagrangian,
+                E::Times { .. } => places.rows,
+                E::Undefined | E::FirstStep(_) | E::Sigma { .. } | E::Clock { .. } | E::EqualPoints => places.start,
+                _ => places.run,
+            },
+            RuntimeError::Length { .. } | RuntimeError::NotFinite { .. } | RuntimeError::Geometry(_) => places.start,
+            _ => places.run,
+        };
+        let message = match error {
+            RuntimeError::Input(error) => in_words(error),
+            error => error.to_string(),
+        };
+        SceneError::at(&self.text, span, message)
+    }
+}
+
+/// What is wrong with a run, to those who have written a formula: what is proved of it cannot be claimed, and it states no clock.
+fn in_words(error: &InputError) -> String {
+    match error {
+        InputError::Unclaimed { claim } => {
+            let claim = claim.replace('_', " ");
+            format!(
+                "the formula is not {claim}, which this integrator needs; take another integrator, or another formula"
+            )
+        }
+        InputError::Hypothesis { hypothesis } if hypothesis.contains("HAS_CLOCK") => {
+            "a formula states no clock, which this integrator needs; take another integrator".into()
+        }
+        error => error.to_string(),
+    }
+}
+
+/// Refuses a file of a later version before what is new in it is called unknown.
+fn check_version(text: &str) -> Result<(), SceneError> {
+    #[derive(Deserialize)]
+    struct Versioned {
+        version: Option<At<i64>>,
+    }
+    // What else is wrong is said by the whole file's reader.
+    let Ok(Versioned { version: Some(version) }) = toml::from_str(text) else { return Ok(()) };
+    if *version == VERSION {
+        return Ok(());
+    }
+    let found = *version;
+    let what = if found > VERSION { "is of a later program; take that" } else { "is not known" };
+    let message = format!("the version {found} of scene files {what}, or write the scene for version {VERSION}");
+    Err(SceneError::at(text, version.span(), message))
+}
+
+/// The entry of the catalogue that a scene names.
+fn entry(text: &str, system: &At<SystemTable>) -> Result<Option<&'static CatalogueEntry>, SceneError> {
+    let refuse = |span, message: &str| Err(SceneError::at(text, span, message));
+    match (&system.catalogue, &system.coordinates, &system.lagrangian) {
+        (Some(name), None, None) => match CatalogueEntry::find(name) {
+            Ok(entry) => Ok(Some(entry)),
+            Err(error) => Err(SceneError::at(text, name.span(), error.to_string())),
+        },
+        (Some(name), ..) => refuse(name.span(), "give a `catalogue` or a `lagrangian` with `coordinates`, not both"),
+        (None, Some(_), Some(_)) => Ok(None),
+        (None, Some(_), None) => refuse(system.span(), "the system has no `lagrangian`; add it as a text in quotes"),
+        (None, None, Some(_)) => {
+            refuse(system.span(), "the system has no `coordinates`; add their names, as in coordinates = [\"x\"]")
+        }
+        (None, None, None) => {
+            refuse(system.span(), "the system has no `lagrangian` with `coordinates`, and no `catalogue`; add either")
+        }
+    }
+}
+
+/// The formula of a scene.
+fn formula(
+    text: &str,
+    system: &At<SystemTable>,
+    entry: Option<&'static CatalogueEntry>,
+) -> Result<Formula, SceneError> {
+    for (name, value) in &system.parameters.0 {
+        finite(text, value, name)?;
+    }
+    let at_system = |error: FormulaError| SceneError::at(text, system.span(), error.to_string());
+    let Some(entry) = entry else {
+        let (Some(coordinates), Some(lagrangian)) = (&system.coordinates, &system.lagrangian) else {
+            return Err(SceneError::at(text, system.span(), "the system has no formula"));
+        };
+        let names: Vec<&str> = coordinates.iter().map(|name| name.as_str()).collect();
+        let values: Vec<(&str, f64)> =
+            system.parameters.0.iter().map(|(name, value)| (name.as_str(), **value)).collect();
+        return Formula::parse(lagrangian, &names, &values).map_err(|error| match error {
+            FormulaError::Parse(mut error) => {
+                if error.message.starts_with("unknown name") && error.nearest.is_none() {
+                    error.message += "; a parameter needs a value in `parameters` of [system]";
+                }
+                SceneError::in_string(text, lagrangian.span(), &error)
+            }
+            FormulaError::Name { ref name, .. } => {
+                let of_parameters = system.parameters.0.iter().map(|(key, _)| key);
+                let at = coordinates.iter().chain(of_parameters).rfind(|known| ***known == *name).map(At::span);
+                SceneError::at(text, at.unwrap_or(coordinates.span()), error.to_string())
+            }
+            FormulaError::Dimension { .. } => SceneError::at(text, coordinates.span(), error.to_string()),
+            error => at_system(error),
+        });
+    };
+    let mut formula = entry.formula().map_err(|error| SceneError::at(text, system.span(), error.to_string()))?;
+    for (name, value) in &system.parameters.0 {
+        let known = || entry.parameters.iter().map(|(parameter, _)| *parameter);
+        if let Err(error) = formula.set(name, **value) {
+            return Err(SceneError::unknown(text, name.span(), name, known(), error.to_string()));
+        }
+    }
+    Ok(formula)
+}
+
+/// How a motion is advanced.
+fn way(text: &str, run: &At<RunTable>) -> Result<Way, SceneError> {
+    let by = run.integrator.as_ref().map(|name| integrator(text, name)).transpose()?;
+    let steps = match (&run.step, &run.steps) {
+        (Some(_), Some(steps)) => {
+            return Err(SceneError::at(
+                text,
+                steps.span(),
+                "give the length of a step or the number of steps, not both",
+            ));
+        }
+        (Some(step), None) => Some(Steps::Size(positive(text, step, "step")?)),
+        (None, Some(steps)) if **steps == 0 => {
+            return Err(SceneError::at(text, steps.span(), "`steps` is 0, where at least 1 is needed"));
+        }
+        (None, Some(steps)) => Some(Steps::Count(**steps)),
+        (None, None) => None,
+    };
+    let refuse = |span, message: &str| Err(SceneError::at(text, span, message));
+    match (&run.accuracy, by, steps) {
+        (Some(accuracy), by, None) => Ok(Way::Accuracy { wanted: positive(text, accuracy, "accuracy")?, by }),
+        (None, Some(by), Some(steps)) => Ok(Way::Steps { by, steps }),
+        (Some(accuracy), _, Some(_)) => {
+            refuse(accuracy.span(), "give an `accuracy` or the steps, not both: the step is chosen for the accuracy")
+        }
+        (None, None, Some(_)) => refuse(
+            run.span(),
+            "the run has steps and no `integrator`; name one, or give an `accuracy` instead of the steps",
+        ),
+        (None, Some(_), None) => refuse(run.span(), "the run has neither a `step` nor an `accuracy`; add one of them"),
+        (None, None, None) => refuse(
+            run.span(),
+            "the run has no `accuracy`; add it, as in accuracy = 1e-9, or an `integrator` and a `step`",
+        ),
+    }
+}
+
+fn integrator(text: &str, name: &At<String>) -> Result<AnyIntegrator, SceneError> {
+    name.parse().map_err(|_| {
+        let all: Vec<String> = AnyIntegrator::all().iter().map(ToString::to_string).collect();
+        let message = format!("there is no integrator `{}`; `herglotz list integrators` lists them", **name);
+        SceneError::unknown(text, name.span(), name, all.iter().map(String::as_str), message)
+    })
+}
+
+/// A number that is finite.
+fn finite(text: &str, x: &At<f64>, name: &str) -> Result<f64, SceneError> {
+    if x.is_finite() {
+        return Ok(**x);
+    }
+    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}, where a finite number is needed", **x)))
+}
+
+/// A number that is positive and finite.
+fn positive(text: &str, x: &At<f64>, name: &str) -> Result<f64, SceneError> {
+    if **x > 0.0 {
+        return finite(text, x, name);
+    }
+    Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}, where a positive number is needed", **x)))
+}
+
+/// The JSON schema of scene files.
+pub fn schema() -> serde_json::Value {
+    schemars::schema_for!(File).to_value()
+}

@@ -1,0 +1,162 @@
+//! Where a motion starts.
+
+use super::SceneError;
+use super::at::{At, Named, Numbers, Span};
+use runtime_herglotz::{CatalogueEntry, Formula, Rate, Start, velocity_name};
+use std::ops::Range;
+
+/// A part of a start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    Position,
+    Velocity,
+    Momentum,
+    Action,
+    Time,
+}
+
+/// A name that may be in a start, and what it is: the entries of a part from one to another.
+struct Key {
+    name: String,
+    part: Part,
+    entries: Range<usize>,
+    is_list: bool,
+}
+
+/// All names that may be in a start.
+fn keys(formula: &Formula) -> Vec<Key> {
+    let names = formula.coordinates();
+    let mut arrays: Vec<(&str, Range<usize>)> = Vec::new();
+    for (i, name) in names.iter().enumerate() {
+        let Some((base, _)) = name.split_once('[') else { continue };
+        match arrays.last_mut() {
+            Some((last, entries)) if *last == base => entries.end = i + 1,
+            _ => arrays.push((base, i..i + 1)),
+        }
+    }
+    let single = names.iter().enumerate().map(|(i, name)| (name.as_str(), i..i + 1, false));
+    let arrays = arrays.into_iter().map(|(name, entries)| (name, entries, true));
+    let mut keys = Vec::new();
+    for (name, entries, is_list) in single.chain(arrays) {
+        let mut push = |name, part| keys.push(Key { name, part, entries: entries.clone(), is_list });
+        push(name.to_owned(), Part::Position);
+        push(velocity_name(name), Part::Velocity);
+        push(format!("p_{name}"), Part::Momentum);
+    }
+    for (name, part) in [("z", Part::Action), ("t", Part::Time)] {
+        keys.push(Key { name: name.into(), part, entries: 0..1, is_list: false });
+    }
+    keys
+}
+
+/// The part and the entry that a name of one number stands for.
+pub(crate) fn entry_of(formula: &Formula, name: &str) -> Option<(Part, usize)> {
+    let key = keys(formula).into_iter().find(|key| key.name == name && !key.is_list)?;
+    Some((key.part, key.entries.start))
+}
+
+/// The names of single numbers, for messages.
+pub(crate) fn single_names(formula: &Formula) -> Vec<String> {
+    keys(formula).into_iter().filter(|key| !key.is_list).map(|key| key.name).collect()
+}
+
+/// What a file says of a start.
+#[derive(Default)]
+struct Given {
+    q: Vec<Option<f64>>,
+    v: Vec<Option<f64>>,
+    p: Vec<Option<f64>>,
+    z: Option<f64>,
+    t: Option<f64>,
+}
+
+impl Given {
+    fn set(&mut self, part: Part, entry: usize, value: f64) {
+        let vector = match part {
+            Part::Position => &mut self.q,
+            Part::Velocity => &mut self.v,
+            Part::Momentum => &mut self.p,
+            Part::Action => return self.z = Some(value),
+            Part::Time => return self.t = Some(value),
+        };
+        if let Some(place) = vector.get_mut(entry) {
+            *place = Some(value);
+        }
+    }
+}
+
+/// The start of a table, completed by that of the catalogue.
+pub(crate) fn read(
+    text: &str,
+    formula: &Formula,
+    table: Option<&Named<Numbers>>,
+    entry: Option<&CatalogueEntry>,
+    at: Span,
+) -> Result<Start, SceneError> {
+    let (names, keys) = (formula.coordinates(), keys(formula));
+    let none = || vec![None; names.len()];
+    let mut given = Given { q: none(), v: none(), p: none(), ..Given::default() };
+    for (name, numbers) in table.map(|table| table.0.as_slice()).unwrap_or_default() {
+        let Some(key) = keys.iter().find(|key| key.name == **name) else {
+            let known = || keys.iter().map(|key| key.name.as_str());
+            let all = known().collect::<Vec<_>>().join(", ");
+            let message = format!("there is no `{}` in a start; there are {all}", **name);
+            return Err(SceneError::unknown(text, name.span(), name, known(), message));
+        };
+        let wrong_count = |found: &str| {
+            let wanted = match key.entries.len() {
+                _ if !key.is_list => "a number".to_owned(),
+                count => format!("a list of {count} numbers"),
+            };
+            SceneError::at(text, numbers.span(), format!("`{}` is {found}, where {wanted} is needed", **name))
+        };
+        let values: Vec<At<f64>> = match &**numbers {
+            Numbers::One(x) if !key.is_list => vec![At::new(*x, numbers.span())],
+            Numbers::One(_) => return Err(wrong_count("a number")),
+            Numbers::Many(list) if key.is_list && list.len() == key.entries.len() => list.clone(),
+            Numbers::Many(list) => return Err(wrong_count(&format!("a list of {}", list.len()))),
+        };
+        for (i, x) in key.entries.clone().zip(&values) {
+            given.set(key.part, i, super::finite(text, x, name)?);
+        }
+    }
+    complete(text, given, &names, entry, at)
+}
+
+/// All numbers that a motion needs.
+fn complete(
+    text: &str,
+    given: Given,
+    names: &[String],
+    entry: Option<&CatalogueEntry>,
+    at: Span,
+) -> Result<Start, SceneError> {
+    let of = |given: Vec<Option<f64>>, of_entry: Option<&[f64]>, what: &str, name: &dyn Fn(&str) -> String| {
+        let mut all = Vec::with_capacity(names.len());
+        for (i, coordinate) in names.iter().enumerate() {
+            let known = given.get(i).copied().flatten().or_else(|| of_entry?.get(i).copied());
+            all.push(known.ok_or_else(|| {
+                let name = name(coordinate);
+                // A key of a table may have letters, digits and _ without quotes.
+                let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+                let key = if bare { name.clone() } else { format!("\"{name}\"") };
+                let message =
+                    format!("the {what} `{name}` has no start; add `{key} = 0.0` to [start], or another value");
+                SceneError::at(text, at, message)
+            })?);
+        }
+        Ok(all)
+    };
+    let q = of(given.q, entry.map(|entry| entry.q), "coordinate", &|x| x.to_owned())?;
+    let by_momentum = given.p.iter().any(Option::is_some);
+    if by_momentum && given.v.iter().any(Option::is_some) {
+        let message = "the start has velocities and momenta; give one kind for all coordinates";
+        return Err(SceneError::at(text, at, message));
+    }
+    let rate = if by_momentum {
+        Rate::Momentum(of(given.p, None, "momentum", &|x| format!("p_{x}"))?)
+    } else {
+        Rate::Velocity(of(given.v, entry.map(|entry| entry.v), "velocity", &velocity_name)?)
+    };
+    Ok(Start { t: given.t.unwrap_or(0.0), q, rate, z: given.z.unwrap_or(0.0) })
+}

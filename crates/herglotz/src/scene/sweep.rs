@@ -1,0 +1,117 @@
+//! What a sweep takes through its values.
+
+use super::SceneError;
+use super::at::At;
+use super::file::{RangeTable, Spacing, Swept, Values};
+use super::start::{Part, entry_of, single_names};
+use runtime_herglotz::{Formula, Rate, Start};
+
+/// The largest number of members.
+const MOST: usize = 100_000_000;
+
+/// What is swept.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Slot {
+    /// A parameter.
+    Parameter,
+    /// A number of the start.
+    Start(Part, usize),
+}
+
+/// A parameter or a number of the start, with its values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Knob {
+    /// Its name: that of the parameter, or `start.x`.
+    pub name: String,
+    /// Its values.
+    pub values: Vec<f64>,
+    pub(crate) slot: Slot,
+}
+
+/// Puts a number into a start.
+pub(crate) fn put(start: &mut Start, part: Part, entry: usize, value: f64) {
+    let vector = match (part, &mut start.rate) {
+        (Part::Position, _) => &mut start.q,
+        (Part::Velocity, Rate::Velocity(v)) => v,
+        (Part::Momentum, Rate::Momentum(p)) => p,
+        (Part::Action, _) => return start.z = value,
+        (Part::Time, _) => return start.t = value,
+        (Part::Velocity | Part::Momentum, _) => return,
+    };
+    if let Some(place) = vector.get_mut(entry) {
+        *place = value;
+    }
+}
+
+/// The knobs of a table, over a formula and its start.
+pub(crate) fn read(text: &str, formula: &Formula, start: &Start, table: &Swept) -> Result<Vec<Knob>, SceneError> {
+    let mut knobs = Vec::new();
+    let mut members: usize = 1;
+    for (name, values) in &table.0 {
+        let slot = slot(text, formula, start, name)?;
+        let values_of = values_of(text, values)?;
+        members = members.saturating_mul(values_of.len());
+        if members > MOST {
+            let message = format!("the sweep has more than {MOST} members; take fewer values");
+            return Err(SceneError::at(text, values.span(), message));
+        }
+        knobs.push(Knob { name: (**name).clone(), values: values_of, slot });
+    }
+    Ok(knobs)
+}
+
+fn slot(text: &str, formula: &Formula, start: &Start, name: &At<String>) -> Result<Slot, SceneError> {
+    let refuse = |message: &str| Err(SceneError::at(text, name.span(), message));
+    let Some(of_start) = name.strip_prefix("start.") else {
+        if formula.parameters().any(|(parameter, _)| parameter == **name) {
+            return Ok(Slot::Parameter);
+        }
+        let known: Vec<String> = formula.parameters().map(|(parameter, _)| parameter.to_owned()).collect();
+        let starts: Vec<String> = single_names(formula).iter().map(|name| format!("start.{name}")).collect();
+        let all = known.iter().chain(&starts).map(String::as_str);
+        let listed = all.clone().collect::<Vec<_>>().join(", ");
+        let message = format!("there is no `{}` to be swept; there are {listed}", **name);
+        return Err(SceneError::unknown(text, name.span(), name, all, message));
+    };
+    match (entry_of(formula, of_start), &start.rate) {
+        (Some((Part::Time, _)), _) => refuse("all members start at one time; sweep another value"),
+        (Some((Part::Velocity, _)), Rate::Momentum(_)) => refuse("the start has momenta; sweep one of them"),
+        (Some((Part::Momentum, _)), Rate::Velocity(_)) => refuse("the start has velocities; sweep one of them"),
+        (Some((part, entry)), _) => Ok(Slot::Start(part, entry)),
+        (None, _) => {
+            let names = single_names(formula);
+            let message = format!("there is no `{of_start}` in a start; there are {}", names.join(", "));
+            Err(SceneError::unknown(text, name.span(), of_start, names.iter().map(String::as_str), message))
+        }
+    }
+}
+
+fn values_of(text: &str, values: &At<Values>) -> Result<Vec<f64>, SceneError> {
+    let refuse = |message: &str| Err(SceneError::at(text, values.span(), message));
+    let RangeTable { from, to, count, spacing } = match &**values {
+        Values::List(list) if list.is_empty() => return refuse("no values; give at least one"),
+        Values::List(list) => return list.iter().map(|x| super::finite(text, x, "a value")).collect(),
+        Values::Range(range) => range,
+    };
+    let (a, b) = (super::finite(text, from, "from")?, super::finite(text, to, "to")?);
+    let count = match **count {
+        0 => return Err(SceneError::at(text, count.span(), "no values; give a `count` of at least 1")),
+        count if count > MOST => return refuse("too many values; take fewer"),
+        count => count,
+    };
+    if *spacing == Spacing::Log && !(a * b > 0.0) {
+        return refuse("equal quotients need `from` and `to` of one sign, and not 0; take spacing = \"linear\"");
+    }
+    let last = count.saturating_sub(1).max(1) as f64;
+    let between = |k: usize| {
+        let part = k as f64 / last;
+        match spacing {
+            // The ends are met to the bit.
+            _ if k == 0 => a,
+            _ if k + 1 == count => b,
+            Spacing::Linear => a * (1.0 - part) + b * part,
+            Spacing::Log => a.signum() * (a.abs().ln() * (1.0 - part) + b.abs().ln() * part).exp(),
+        }
+    };
+    Ok((0..count).map(between).collect())
+}

@@ -1,0 +1,146 @@
+//! What is recorded of a motion.
+
+use super::SceneError;
+use super::at::{At, Span};
+use super::file::{DirectionName, EventTable, RowsTable};
+use runtime_herglotz::{Column, Direction, Event, Formula, FormulaError, RuntimeError, When, nearest_name};
+
+/// The rows of a scene that asks for none.
+const DEFAULT_ROWS: usize = 1000;
+
+/// The largest number of rows at times.
+const MOST_ROWS: f64 = 1e7;
+
+/// When there is a row.
+#[derive(Clone, Debug)]
+pub(crate) enum RowTimes {
+    /// Every so much time.
+    Every(f64),
+    /// So many equal parts of the span.
+    Parts(usize),
+    /// At these times.
+    At(Vec<f64>),
+    /// Every so many steps.
+    EveryStep(usize),
+}
+
+impl RowTimes {
+    /// The times of a motion from one to another.
+    pub fn when(&self, t0: f64, end: f64) -> When {
+        match self {
+            RowTimes::EveryStep(steps) => When::Every(*steps),
+            RowTimes::At(times) => When::At(times.clone()),
+            RowTimes::Parts(parts) => {
+                let of = |k: usize| if k == *parts { end } else { t0 + (end - t0) * (k as f64 / *parts as f64) };
+                When::At((0..=*parts).map(of).collect())
+            }
+            RowTimes::Every(every) => {
+                // A whole number of them fills the span but for its rounding.
+                let count = ((end - t0).abs() / every * (1.0 + 4.0 * f64::EPSILON)).floor();
+                let stride = every.copysign(end - t0);
+                let at = |k: usize| t0 + k as f64 * stride;
+                let inside = |t: f64| if end < t0 { t.max(end) } else { t.min(end) };
+                When::At((0..=count as usize).map(at).map(inside).collect())
+            }
+        }
+    }
+
+    pub fn read(text: &str, rows: Option<&At<RowsTable>>, (t0, end): (f64, f64)) -> Result<Self, SceneError> {
+        let Some(rows) = rows else { return Ok(RowTimes::Parts(DEFAULT_ROWS)) };
+        match (&rows.every, &rows.at, &rows.every_step) {
+            (Some(every), None, None) => {
+                let value = super::positive(text, every, "every")?;
+                if (end - t0).abs() / value > MOST_ROWS {
+                    let message = format!("these are more than {MOST_ROWS:e} rows; take a longer time between them");
+                    return Err(SceneError::at(text, every.span(), message));
+                }
+                Ok(RowTimes::Every(value))
+            }
+            (None, Some(times), None) => Self::at(text, times, (t0, end)),
+            (None, None, Some(steps)) if **steps == 0 => {
+                Err(SceneError::at(text, steps.span(), "`every_step` is 0, where at least 1 is needed"))
+            }
+            (None, None, Some(steps)) => Ok(RowTimes::EveryStep(**steps)),
+            (None, None, None) => Ok(RowTimes::Parts(DEFAULT_ROWS)),
+            _ => Err(SceneError::at(text, rows.span(), "give one of `every`, `at` and `every_step`")),
+        }
+    }
+
+    fn at(text: &str, times: &At<Vec<At<f64>>>, (t0, end): (f64, f64)) -> Result<Self, SceneError> {
+        let mut last: Option<f64> = None;
+        for time in times.iter() {
+            let t = super::finite(text, time, "a time")?;
+            if !(t0.min(end)..=t0.max(end)).contains(&t) {
+                let message =
+                    format!("the time {t} is not between {t0}, at which the motion starts, and its end, {end}");
+                return Err(SceneError::at(text, time.span(), message));
+            }
+            if last.is_some_and(|last| (t - last) * (end - t0) <= 0.0) {
+                let message =
+                    format!("the time {t} is not after the one before it, in the sense of the motion; sort them");
+                return Err(SceneError::at(text, time.span(), message));
+            }
+            last = Some(t);
+        }
+        Ok(RowTimes::At(times.iter().map(|t| **t).collect()))
+    }
+}
+
+/// The columns of a row, with their names.
+pub(crate) fn columns(
+    text: &str,
+    formula: &Formula,
+    rows: Option<&At<RowsTable>>,
+) -> Result<Vec<(String, Column)>, SceneError> {
+    let Some(columns) = rows.and_then(|rows| rows.columns.as_ref()) else { return Ok(Column::state(formula)) };
+    if columns.is_empty() {
+        return Err(SceneError::at(
+            text,
+            columns.span(),
+            "no columns; name some, or leave `columns` out for the whole state",
+        ));
+    }
+    let of = |name: &At<String>| match Column::parse(name, formula) {
+        Ok(column) => Ok(((**name).clone(), column)),
+        Err(error) => Err(with_nearest(of_formula(text, name.span(), &error), formula)),
+    };
+    columns.iter().map(of).collect()
+}
+
+/// An unknown name of a column may be that of something else than a formula is made of.
+fn with_nearest(mut error: SceneError, formula: &Formula) -> SceneError {
+    let unknown = error.error.message.strip_prefix("unknown name `").and_then(|rest| rest.split('`').next());
+    if let (Some(name), None) = (unknown, &error.error.nearest) {
+        let momenta = formula.coordinates().into_iter().map(|name| format!("p_{name}"));
+        let known: Vec<String> = ["energy", "log_factor"].map(str::to_owned).into_iter().chain(momenta).collect();
+        error.error.nearest = nearest_name(name, known.iter().map(String::as_str)).map(str::to_owned);
+        if error.error.nearest.is_none() {
+            error.error.message += "; beside formulas there are the columns ";
+            error.error.message += &known.join(", ");
+        }
+    }
+    error
+}
+
+/// The events, with their names.
+pub(crate) fn events(text: &str, formula: &Formula, tables: &[EventTable]) -> Result<Vec<(String, Event)>, SceneError> {
+    let of = |table: &EventTable| {
+        let EventTable { when, direction, terminal } = table;
+        let function = formula.expression(when).map_err(|error| of_formula(text, when.span(), &error.into()))?;
+        let direction = match direction {
+            DirectionName::Rising => Direction::Rising,
+            DirectionName::Falling => Direction::Falling,
+            DirectionName::Both => Direction::Both,
+        };
+        Ok(((**when).clone(), Event { function, direction, terminal: *terminal }))
+    };
+    tables.iter().map(of).collect()
+}
+
+/// An error in a text of the file that is a formula.
+pub(crate) fn of_formula(text: &str, span: Span, error: &RuntimeError) -> SceneError {
+    match error {
+        RuntimeError::Formula(FormulaError::Parse(error)) => SceneError::in_string(text, span, error),
+        error => SceneError::at(text, span, error.to_string()),
+    }
+}

@@ -1,0 +1,274 @@
+//! The program: what its commands write, and how they end.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const REPOSITORY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+
+/// A directory of a test, empty at its beginning and removed at its end.
+struct Directory(PathBuf);
+
+impl Directory {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("herglotz_{name}_{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).unwrap();
+        Directory(path)
+    }
+
+    fn write(&self, name: &str, text: &str) -> String {
+        std::fs::write(self.0.join(name), text).unwrap();
+        self.path(name)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().unwrap().to_owned()
+    }
+
+    fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.0.join(name)).unwrap()
+    }
+}
+
+impl Drop for Directory {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn herglotz(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_herglotz")).args(arguments).output().unwrap()
+}
+
+/// Runs it, and gives what it has written to the standard output.
+fn succeed(arguments: &[&str]) -> String {
+    let output = herglotz(arguments);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {told}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Runs it, and gives how it ends with what it has written to the standard error.
+fn fail(arguments: &[&str]) -> (Option<i32>, String) {
+    let output = herglotz(arguments);
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+/// The numbers of a column of a table.
+fn column(csv: &str, name: &str) -> Vec<f64> {
+    let i = csv.lines().next().unwrap().split(',').position(|column| column == name).unwrap();
+    csv.lines().skip(1).map(|line| line.split(',').nth(i).unwrap().parse().unwrap()).collect()
+}
+
+fn scene(name: &str) -> String {
+    format!("{REPOSITORY}/scenes/{name}.toml")
+}
+
+/// x'' = -x + gamma x' in closed form: what the tables say is checked against it.
+const OSCILLATOR: &str = r#"
+[system]
+coordinates = ["x"]
+lagrangian = "x'^2/2 - x^2/2 + gamma*z"
+parameters = { gamma = -0.2 }
+[start]
+x = 1.0
+"x'" = 0.0
+[run]
+time = 400.0
+integrator = "gauss_4"
+step = 0.25
+[want]
+rows = { every = 0.3, columns = ["t", "x", "exp(-gamma*t/2)*x"] }
+events = [{ when = "x", direction = "rising" }]
+[sweep]
+gamma = [-0.4, -0.2, 0.0]
+start.x = { from = 0.5, to = 1.0, count = 2 }
+"#;
+
+fn oscillation(gamma: f64, t: f64) -> f64 {
+    let omega = f64::sqrt(1.0 - gamma * gamma / 4.0);
+    f64::exp(gamma * t / 2.0) * (f64::cos(omega * t) - gamma / (2.0 * omega) * f64::sin(omega * t))
+}
+
+#[test]
+fn rows_and_events_are_those_of_the_motion() {
+    let at = Directory::new("rows");
+    let file = at.write("scene.toml", OSCILLATOR);
+    let said = succeed(&["run", &file, "--out", &at.path("out"), "--set", "run.time=30", "--plot"]);
+    assert!(said.starts_with("completed: 120 steps of 0.25 by gauss_4\n101 rows, 4 events"), "{said}");
+    let rows = at.read("out/rows.csv");
+    assert!(rows.starts_with("t,x,exp(-gamma*t/2)*x\n0.0000000000000000e0,1.0000000000000000e0,"), "{rows}");
+    for (t, x) in column(&rows, "t").iter().zip(column(&rows, "x")) {
+        assert!((x - oscillation(-0.2, *t)).abs() < 1e-9, "{t}: {x}");
+    }
+    // A period apart.
+    let times = column(&at.read("out/events.csv"), "t");
+    let period = std::f64::consts::TAU / f64::sqrt(0.99);
+    assert!(times.len() == 4 && times.windows(2).all(|t| (t[1] - t[0] - period).abs() < 1e-9), "{times:?}");
+    assert!(at.read("out/columns.svg").contains("<svg"));
+    // A sum of what JSON says.
+    let said = succeed(&["run", &file, "--out", &at.path("out"), "--set", "run.time=30", "--json"]);
+    let told: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!((&told["status"], &told["rows"], &told["events"]), (&"completed".into(), &101.into(), &4.into()));
+    assert!((told["end"]["x"].as_f64().unwrap() - oscillation(-0.2, 30.0)).abs() < 1e-9);
+}
+
+/// Interrupted runs go on to the last byte, whatever rows they have and wherever they stop.
+#[test]
+fn resumed_runs_are_those_that_were_not_interrupted() {
+    let at = Directory::new("resume");
+    // Rows at all steps, too, at some of which the run is interrupted.
+    for (i, rows) in ["every = 0.3", "every_step = 7", "every_step = 256", "at = [0.5, 399.9]"].iter().enumerate() {
+        let file = at.write(&format!("{i}.toml"), &OSCILLATOR.replace("every = 0.3", rows));
+        let (whole, parts) = (format!("whole_{i}"), format!("parts_{i}"));
+        succeed(&["run", &file, "--out", &at.path(&whole)]);
+        let first = ["run", &file, "--out", &at.path(&parts), "--interrupt-at", "0.3"];
+        let (code, told) = fail(&first);
+        assert_eq!(code, Some(1), "{told}");
+        assert!(told.contains("--resume"), "{told}");
+        let rest = ["run", &file, "--out", &at.path(&parts), "--resume"];
+        assert_eq!(fail(&[rest.as_slice(), &["--interrupt-at", "0.7"]].concat()).0, Some(1));
+        // What a program that was killed has written beyond its checkpoint.
+        let written = at.read(&format!("{parts}/rows.csv"));
+        at.write(&format!("{parts}/rows.csv"), &(written.clone() + "1.0e0,2.0e"));
+        succeed(&rest);
+        for table in ["rows.csv", "events.csv"] {
+            assert_eq!(at.read(&format!("{whole}/{table}")), at.read(&format!("{parts}/{table}")), "{rows}: {table}");
+        }
+        assert!(written.len() < at.read(&format!("{whole}/rows.csv")).len() || i == 3);
+        // It has ended: there is nothing to resume.
+        let (code, told) = fail(&rest);
+        assert!(code == Some(2) && told.contains("there is no interrupted run"), "{told}");
+    }
+    // Another scene does not go on with it.
+    let file = at.path("0.toml");
+    fail(&["run", &file, "--out", &at.path("parts_0"), "--interrupt-at", "0.3"]);
+    let (code, told) = fail(&["run", &file, "--out", &at.path("parts_0"), "--resume", "--set", "gamma=-0.3"]);
+    assert!(code == Some(2) && told.contains("the scene is not the one"), "{told}");
+}
+
+#[test]
+fn sweeps_do_not_depend_on_threads() {
+    let at = Directory::new("sweep");
+    let file = at.write("scene.toml", OSCILLATOR);
+    let run = |out: &str, threads: &str| {
+        succeed(&["sweep", &file, "--out", &at.path(out), "--threads", threads, "--set", "run.time=20", "--plot"])
+    };
+    let said = run("one", "1");
+    assert!(said.starts_with("6 members: 6 completed"), "{said}");
+    run("three", "3");
+    let table = at.read("one/sweep.csv");
+    assert_eq!(table, at.read("three/sweep.csv"));
+    assert!(table.starts_with("index,gamma,start.x,status,why,steps,t,x,exp(-gamma*t/2)*x\n"), "{table}");
+    let (gamma, start, x) = (column(&table, "gamma"), column(&table, "start.x"), column(&table, "x"));
+    let scaled = column(&table, "exp(-gamma*t/2)*x");
+    assert_eq!((gamma.len(), gamma[1], start[1], gamma[4]), (6, -0.4, 1.0, 0.0));
+    for i in 0..6 {
+        let expected = start[i] * oscillation(gamma[i], 20.0);
+        assert!((x[i] - expected).abs() < 1e-9, "member {i}: {} {expected}", x[i]);
+        // The column has the member's own parameter.
+        assert!((scaled[i] - x[i] * f64::exp(-gamma[i] * 10.0)).abs() < 1e-12 * scaled[i].abs(), "member {i}");
+    }
+    assert!(at.read("one/sweep_0.svg").contains("<svg"));
+}
+
+/// A member that fails is a row with its status, and the others are there.
+#[test]
+fn members_that_fail_are_rows() {
+    let at = Directory::new("fail");
+    let text = OSCILLATOR.replace("- x^2/2", "- sqrt(x)").replace("[-0.4, -0.2, 0.0]", "[-0.1]");
+    let file =
+        at.write("scene.toml", &text.replace("from = 0.5, to = 1.0, count = 2", "from = -1.0, to = 50.0, count = 3"));
+    succeed(&["sweep", &file, "--out", &at.path("out"), "--set", "run.time=2"]);
+    let table = at.read("out/sweep.csv");
+    let rows: Vec<&str> = table.lines().skip(1).collect();
+    assert!(rows.len() == 3 && rows[0].contains(",refused,") && rows[2].contains(",completed,"), "{table}");
+}
+
+#[test]
+fn endings_are_told_by_the_code() {
+    let at = Directory::new("codes");
+    // The motion leaves the domain of its Lagrangian: 1.
+    let file = at.write("fall.toml", &OSCILLATOR.replace("- x^2/2", "- sqrt(x)"));
+    let (code, told) = fail(&["run", &file, "--out", &at.path("out")]);
+    assert!(code == Some(1) && told.contains("failed in step"), "{told}");
+    // What was recorded before is there.
+    assert!(at.read("out/rows.csv").lines().count() > 2);
+    // Input: 2, with file, line and column.
+    let file = at.write("bad.toml", &OSCILLATOR.replace("x^2/2", "y^2/2"));
+    let (code, told) = fail(&["run", &file, "--out", &at.path("out")]);
+    assert!(code == Some(2) && told.contains(&format!("{file}, line 4, column 24: unknown name `y`")), "{told}");
+    for arguments in [["run", &at.path("none.toml")], ["new", "kepplr"], ["list", "things"]] {
+        assert_eq!(fail(&arguments).0, Some(2), "{arguments:?}");
+    }
+    assert!(fail(&["new", "keplr"]).1.contains("did you mean \"kepler\"?"));
+    // A terminal event ends a run well.
+    let said = succeed(&["run", &scene("landing"), "--out", &at.path("landing")]);
+    assert!(said.starts_with("stopped by an event at t = 2.60"), "{said}");
+}
+
+#[test]
+fn plans_and_checks_say_what_holds() {
+    let said = succeed(&["plan", &scene("kepler")]);
+    for part in ["proved of the formula", "separable", "x*p_y - y*p_x decays as the conformal factor"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let told: serde_json::Value = serde_json::from_str(&succeed(&["plan", &scene("nonlinear"), "--json"])).unwrap();
+    assert_eq!((&told["proved"]["z_affine"], &told["proved"]["separable"]), (&false.into(), &true.into()));
+    let told: serde_json::Value =
+        serde_json::from_str(&succeed(&["check", &scene("kepler"), "--places", "3", "--json"])).unwrap();
+    assert_eq!((&told["contact"], &told["places"].as_array().unwrap().len()), (&true.into(), &3));
+    let place = &told["places"][2];
+    let (value, predicted) = (&place["momenta"][0]["value"], &place["momenta"][0]["predicted"]);
+    assert!((value.as_f64().unwrap() - predicted.as_f64().unwrap()).abs() < 1e-12, "{place}");
+    assert!(told["statements"].as_array().unwrap().iter().all(|s| s["residual"].as_f64().unwrap() < 1e-12), "{told}");
+    assert!(succeed(&["check", &scene("pendulum")]).starts_with("contact: "));
+}
+
+#[test]
+fn lists_templates_and_completions_are_complete() {
+    let systems: serde_json::Value = serde_json::from_str(&succeed(&["list", "systems", "--json"])).unwrap();
+    let at = Directory::new("new");
+    for system in systems.as_array().unwrap() {
+        let name = system["name"].as_str().unwrap();
+        // A template is a scene.
+        let file = at.write(&format!("{name}.toml"), &succeed(&["new", name]));
+        herglotz::Scene::read(&std::fs::read_to_string(file).unwrap()).unwrap_or_else(|e| panic!("{name}: {e}"));
+    }
+    let integrators = succeed(&["list", "integrators"]);
+    assert!(integrators.lines().any(|line| line.starts_with("gauss_12 ")), "{integrators}");
+    assert!(succeed(&["completions", "bash"]).contains("--resume"));
+    assert!(succeed(&["schema"]).contains("every_step"));
+}
+
+/// All scenes of the repository run; each has its picture in the documents.
+#[test]
+fn scenes_run() {
+    let at = Directory::new("scenes");
+    let page = std::fs::read_to_string(format!("{REPOSITORY}/docs/scenes.md")).unwrap();
+    let mut names = Vec::new();
+    for file in std::fs::read_dir(Path::new(REPOSITORY).join("scenes")).unwrap() {
+        let path = file.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let (name, path) = (path.file_stem().unwrap().to_str().unwrap().to_owned(), path.to_str().unwrap());
+        let said = succeed(&["run", path, "--out", &at.path(&name)]);
+        assert!(said.starts_with("completed: ") || said.starts_with("stopped by an event"), "{name}: {said}");
+        let rows = at.read(&format!("{name}/rows.csv"));
+        assert!(rows.lines().count() > 100 && !rows.contains("NaN"), "{name}");
+        assert!(page.contains(&format!("(scenes/{name}.svg)")), "{name} is not in docs/scenes.md");
+        assert!(Path::new(REPOSITORY).join(format!("docs/scenes/{name}.svg")).exists(), "{name}");
+        names.push(name);
+    }
+    assert_eq!(names.len(), 10, "{names:?}");
+    // What two of them are about: a momentum that decays as the conformal factor, and a factor in closed form.
+    let kept = column(&at.read("kepler/rows.csv"), "exp(-gamma*t)*(x*y' - y*x')");
+    assert!(kept.iter().all(|x| (x - 1.1).abs() < 1e-10));
+    let field = at.read("field/rows.csv");
+    for (t, log_factor) in column(&field, "t").iter().zip(column(&field, "log_factor")) {
+        assert!((log_factor + 2.0 * t.ln()).abs() < 1e-9, "{t}");
+    }
+}
