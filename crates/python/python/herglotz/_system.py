@@ -1,0 +1,65 @@
+"""Systems of what a user may call a Lagrangian."""
+
+from . import _core
+
+_SYSTEMS = {}
+# Systems of texts that are kept, so that a text is read once.
+_MOST = 256
+
+
+def system(L, coordinates=None, parameters=None, *, n=None):
+    """The system of a Lagrangian.
+
+    Parameters
+    ----------
+    L : function, str, SymPy expression or System
+        ``L(t, q, v, z)``, or ``L(t, q, v, z, gamma)`` with a parameter gamma; a formula; the name of a system of the
+        catalogue.
+    coordinates : list of str, optional
+        Their names; ``"q[3]"`` stands for three. That of a function and the default of a formula is ``"q[n]"``.
+    parameters : dict of float, optional
+        Their values by name.
+    n : int, optional
+        The number of coordinates, where they have no names.
+
+    Returns
+    -------
+    System
+    """
+    if isinstance(L, _core.System):
+        return L.with_parameters(parameters) if parameters else L
+    if isinstance(coordinates, str):
+        coordinates = [coordinates]
+    if isinstance(L, str):
+        return _of_text(L, coordinates, parameters, n)
+    raise TypeError(f"L is a {type(L).__name__}, where a function, a formula, a SymPy expression or a System is needed")
+
+
+def names(coordinates, n):
+    """The names of coordinates, with those that they have by default."""
+    if coordinates is not None:
+        return list(coordinates)
+    if n is None:
+        raise ValueError("`coordinates` is not given: their names, as [\"x\", \"y\"], or \"q[3]\" for three")
+    return [f"q[{n}]"]
+
+
+def _of_text(text, coordinates, parameters, n):
+    if coordinates is None and text.isidentifier():
+        for name, _, coordinates, formula, values, _, _ in _core.catalogue():
+            if name == text:
+                return system(formula, coordinates, dict(values) | dict(parameters or {}))
+    coordinates = names(coordinates, n)
+    try:
+        key = (text, tuple(coordinates), tuple(parameters.items()) if parameters else ())
+        found = _SYSTEMS.get(key)
+    except TypeError:
+        # What cannot be hashed is no number, and refused below.
+        key = found = None
+    if found is None:
+        found = _core.System(text, coordinates, parameters)
+        if len(_SYSTEMS) >= _MOST:
+            _SYSTEMS.clear()
+        if key is not None:
+            _SYSTEMS[key] = found
+    return found
