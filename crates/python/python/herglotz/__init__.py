@@ -18,5 +18,6 @@ from ._core import System
 from ._solution import Crossings, Interrupted, Plan, Solution
 from ._solve import Event, solve
 from ._system import system
+from ._trace import array, where
 
-__all__ = ["Crossings", "Event", "Interrupted", "Plan", "Solution", "System", "solve", "system"]
+__all__ = ["Crossings", "Event", "Interrupted", "Plan", "Solution", "System", "array", "solve", "system", "where"]

@@ -2,7 +2,7 @@
 
 from . import _core
 from ._solution import Interrupted, Solution
-from ._system import system
+from ._system import expression, system
 
 
 def solve(
@@ -51,7 +51,7 @@ def solve(
         Rows at the ends of so many steps, in place of those at `t`.
     events : str, Event, or a list or dict of them
         Functions of the state whose changes of sign are found.
-    observe : dict of str, optional
+    observe : dict of str or functions, optional
         Expressions by name: columns beside the state, ``sol["name"]``.
     conformal_factor : bool
         Whether `Solution.log_factor` is computed.
@@ -80,8 +80,8 @@ def solve(
         t,
         every,
         (accuracy, integrator, step, steps),
-        events_of(events) if events else [],
-        list(observe.values()) if observe else [],
+        events_of(events, L) if events else [],
+        [expression(column, L) for column in observe.values()] if observe else [],
         conformal_factor,
     )
     motion = _core.Motion(L, *request)
@@ -114,8 +114,9 @@ class Event:
 
     Parameters
     ----------
-    when : str
-        The function, an expression as the formula of a Lagrangian: ``"theta"``, ``"x'*y - 1"``.
+    when : str or function
+        An expression, written as the formula of a Lagrangian: ``"theta"``, ``"x'*y - 1"``; or a function of
+        (t, q, v, z), which is traced.
     direction : {"both", "rising", "falling"}
         Which changes count, in the sense of the motion.
     terminal : bool
@@ -131,17 +132,15 @@ class Event:
         return f"Event({self.when!r}, {self.direction!r}, terminal={self.terminal})"
 
 
-def events_of(events):
+def events_of(events, L):
     """Events as the core reads them."""
-    if isinstance(events, (str, Event)):
+    if isinstance(events, (str, Event)) or callable(events):
         events = [events]
     elif isinstance(events, dict):
         events = events.values()
     result = []
     for event in events:
-        if isinstance(event, str):
+        if not isinstance(event, Event):
             event = Event(event)
-        if not isinstance(event, Event) or not isinstance(event.when, str):
-            raise ValueError(f"`events` has {event!r}, where an expression or an `Event` is needed")
-        result.append((event.when, event.direction, bool(event.terminal)))
+        result.append((expression(event.when, L), event.direction, bool(event.terminal)))
     return result

@@ -1,6 +1,8 @@
 """Systems of what a user may call a Lagrangian."""
 
-from . import _core
+import functools
+
+from . import _core, _trace
 
 _SYSTEMS = {}
 # Systems of texts that are kept, so that a text is read once.
@@ -32,7 +34,28 @@ def system(L, coordinates=None, parameters=None, *, n=None):
         coordinates = [coordinates]
     if isinstance(L, str):
         return _of_text(L, coordinates, parameters, n)
+    if callable(L) and not hasattr(L, "free_symbols"):
+        coordinates = names(coordinates, n)
+        of = (*_velocity_names(tuple(coordinates)), tuple(parameters or ()))
+        return _of_text(_trace.formula_of(L, of), coordinates, parameters, n)
+    if hasattr(L, "free_symbols"):
+        from ._sympy import formula_of_expression
+
+        return _of_text(*formula_of_expression(L, coordinates, parameters), parameters, n)
     raise TypeError(f"L is a {type(L).__name__}, where a function, a formula, a SymPy expression or a System is needed")
+
+
+_velocity_names = functools.lru_cache(256)(lambda coordinates: tuple(map(tuple, _core.velocity_names(list(coordinates)))))
+
+
+def expression(of, system):
+    """The text of an expression beside a Lagrangian: itself, or that of a function (t, q, v, z, **parameters)."""
+    if isinstance(of, str):
+        return of
+    if callable(of):
+        names = system.coordinates
+        return _trace.formula_of(of, (names, _core.velocity_names(system.given_coordinates)[1], list(system.parameters)))
+    raise ValueError(f"{of!r} is no expression: give a text, or a function of (t, q, v, z)")
 
 
 def names(coordinates, n):
