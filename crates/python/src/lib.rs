@@ -3,6 +3,10 @@
 
 mod arrays;
 mod condition;
+mod contact;
+mod dense;
+mod ensemble;
+mod looks;
 mod motion;
 mod run;
 mod signals;
@@ -16,6 +20,14 @@ use runtime_herglotz::{AnyIntegrator, CATALOGUE};
 /// The extension module.
 #[pymodule]
 mod _core {
+    #[pymodule_export]
+    use crate::contact::conformality;
+    #[pymodule_export]
+    use crate::dense::{Dense, nodes};
+    #[pymodule_export]
+    use crate::ensemble::{EnsembleRecord, run_ensemble};
+    #[pymodule_export]
+    use crate::looks::{check, compare, geometry};
     #[pymodule_export]
     use crate::motion::Motion;
     #[pymodule_export]

@@ -10,21 +10,19 @@ use runtime_herglotz::{AnyIntegrator, Column, Direction, Event, Rate, Start, Ste
 pub struct Motion {
     pub system: runtime_herglotz::System,
     pub motion: runtime_herglotz::Motion,
-    /// The number of columns of its own that every row begins with.
+    /// Whether the rows have the conformal factor.
     pub conformal_factor: bool,
 }
 
+/// The arguments accuracy, integrator, step and steps.
+pub type GivenWay<'py> = (Option<Bound<'py, PyAny>>, Option<String>, Option<Bound<'py, PyAny>>, Option<usize>);
+
 /// The way that arguments say.
-pub fn way(
-    accuracy: Option<&Bound<'_, PyAny>>,
-    integrator: Option<&str>,
-    step: Option<&Bound<'_, PyAny>>,
-    steps: Option<usize>,
-) -> PyResult<Way> {
+pub fn way((accuracy, integrator, step, steps): &GivenWay<'_>) -> PyResult<Way> {
     /// What is computed to where nothing is said.
     const ACCURACY: f64 = 1e-9;
-    let by = integrator.map(|name| name.parse::<AnyIntegrator>().map_err(value_error)).transpose()?;
-    let given = match (step, steps) {
+    let by = integrator.as_deref().map(|name| name.parse::<AnyIntegrator>().map_err(value_error)).transpose()?;
+    let given = match (step, *steps) {
         (Some(_), Some(_)) => return Err(value_error("`step` and `steps` are both given: give one of them")),
         (Some(step), None) => Some(Steps::Size(number("step", step)?)),
         (None, Some(count)) => Some(Steps::Count(count)),
@@ -82,7 +80,7 @@ impl Motion {
         start: (Bound<'_, PyAny>, Bound<'_, PyAny>, bool, Bound<'_, PyAny>),
         t: Bound<'_, PyAny>,
         every: Option<usize>,
-        way: (Option<Bound<'_, PyAny>>, Option<String>, Option<Bound<'_, PyAny>>, Option<usize>),
+        way: GivenWay<'_>,
         events: Vec<(String, String, bool)>,
         columns: Vec<String>,
         conformal_factor: bool,
@@ -107,8 +105,7 @@ impl Motion {
         let times = times(&t)?;
         let (Some(&first), Some(&end)) = (times.first(), times.last()) else { return Err(no_times()) };
         let rows = Some(every.map_or(When::At(times), When::Every));
-        let (accuracy, integrator, step, steps) = way;
-        let way = self::way(accuracy.as_ref(), integrator.as_deref(), step.as_ref(), steps)?;
+        let way = self::way(&way)?;
         let mut all = self::columns(expected, conformal_factor);
         for text in &columns {
             all.push(named("the column", text, Column::parse(text, formula))?);

@@ -56,6 +56,9 @@ impl Watch for Kept {
     }
 }
 
+/// A crossing: the index of the event, t, q, v, p and z.
+type Crossed = (usize, f64, Vec<f64>, Vec<f64>, Vec<f64>, f64);
+
 /// What a motion has led to, by rows.
 #[pyclass(frozen, get_all, module = "herglotz._core")]
 pub struct Record {
@@ -68,7 +71,7 @@ pub struct Record {
     log_factor: Option<Py<PyArray1<f64>>>,
     /// A column for each that was asked for.
     columns: Option<Py<PyArray2<f64>>>,
-    crossings: Vec<(usize, f64, Vec<f64>, Vec<f64>, Vec<f64>, f64)>,
+    crossings: Vec<Crossed>,
     /// The end, whether it is a row or not: t, q, p, z.
     end: (f64, Vec<f64>, Vec<f64>, Option<f64>),
     status: String,

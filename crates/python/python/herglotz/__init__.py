@@ -14,10 +14,49 @@ A Lagrangian L(t, q, v, z) that depends on its own action z has friction in it: 
 ((1001, 1), 'completed')
 """
 
-from ._core import System
-from ._solution import Crossings, Interrupted, Plan, Solution
+from ._core import System, catalogue as _catalogue, integrators as _integrators
+from ._ensemble import Ensemble, ensemble
+from ._looks import Check, Comparison, Contact, Geometry, check, compare, geometry, is_contact
+from ._solution import Crossings, Interrupted, Plan, Solution, States
 from ._solve import Event, solve
 from ._system import system
 from ._trace import array, where
 
-__all__ = ["Crossings", "Event", "Interrupted", "Plan", "Solution", "System", "array", "solve", "system", "where"]
+__version__ = "0.1.0"
+
+
+def integrators():
+    """The names of all integrators with their orders: a dict."""
+    return dict(_integrators())
+
+
+def catalogue():
+    """The systems that are known by name, with what they are: a dict."""
+    return {name: about for name, about, *_ in _catalogue()}
+
+
+__all__ = [
+    "Check",
+    "Comparison",
+    "Contact",
+    "Crossings",
+    "Ensemble",
+    "Event",
+    "Geometry",
+    "Interrupted",
+    "Plan",
+    "Solution",
+    "States",
+    "System",
+    "array",
+    "catalogue",
+    "check",
+    "compare",
+    "ensemble",
+    "geometry",
+    "integrators",
+    "is_contact",
+    "solve",
+    "system",
+    "where",
+]

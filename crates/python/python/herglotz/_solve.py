@@ -84,12 +84,17 @@ def solve(
         [expression(column, L) for column in observe.values()] if observe else [],
         conformal_factor,
     )
-    motion = _core.Motion(L, *request)
-    record = _core.run(motion)
-    sol = Solution(L, request, record, events, tuple(observe) if observe else ())
+    event_names = tuple(events) if isinstance(events, dict) else len(request[4])
+    return run(L, request, event_names, tuple(observe) if observe else ())
+
+
+def run(L, request, event_names, observed):
+    """The solution of a request."""
+    record = _core.run(_core.Motion(L, *request))
+    sol = Solution(L, request, record, event_names, observed)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
-            raise Interrupted(sol) from None
+            raise Interrupted(sol)
         raise record.interrupted
     return sol
 

@@ -212,6 +212,20 @@ def formula_of(function, names):
     return value_text(function(t, _vector(q), _vector(v), z, **given), function, names)
 
 
+def components_of(function, n):
+    """The formulas of the components of a map (q, p, z) -> (q, p, z), with v for p."""
+    names = velocity_names([f"q[{n}]"])
+    _, q, p, z, _ = symbols(n, 0)
+    found = function(_vector(q), _vector(p), z)
+    if not isinstance(found, (tuple, list)) or len(found) != 3:
+        raise ValueError(f"{_name(function)} gives {found!r}, where a tuple (q, p, z) is needed")
+    found = list(np.ravel(np.array(found[0], dtype=object))), list(np.ravel(np.array(found[1], dtype=object))), found[2]
+    for what, x in (("q", found[0]), ("p", found[1])):
+        if len(x) != n:
+            raise ValueError(f"{_name(function)} gives a {what} of {len(x)} numbers, where there are {n} coordinates")
+    return [value_text(x, function, (*names, [])) for x in (*found[0], *found[1], found[2])]
+
+
 def _name(function):
     return getattr(function, "__name__", "the function")
 
