@@ -64,8 +64,8 @@ pub enum FormulaError {
         /// Its value.
         value: f64,
     },
-    /// The formula, or its gradient, is too large.
-    #[error("the formula or its gradient has more than {limit} parts; write it in Rust, or take a smaller one")]
+    /// The formula, or one of its derivatives, is too large.
+    #[error("the formula with its derivatives has more than {limit} parts; write it in Rust, or take a smaller one")]
     TooLarge {
         /// The bound.
         limit: usize,

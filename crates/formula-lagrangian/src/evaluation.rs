@@ -66,14 +66,15 @@ impl Tape {
     /// Evaluates it and writes the results to slices, one after the other.
     #[inline(always)]
     pub fn evaluate<T: Scalar>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
-        if self.registers <= SMALL {
+        // One copy of the code for each kind of dual numbers is enough: nothing that takes many steps evaluates them.
+        if T::NESTED || self.registers > LARGE {
+            T::apart(|| self.run(at, OnHeap(vec![T::zero(); self.registers]), results));
+        } else if self.registers <= SMALL {
             T::apart(|| self.run(at, [T::zero(); SMALL], results));
         } else if self.registers <= MIDDLE {
             T::apart(|| self.run(at, [T::zero(); MIDDLE], results));
-        } else if self.registers <= LARGE {
-            T::apart(|| self.run(at, [T::zero(); LARGE], results));
         } else {
-            T::apart(|| self.run(at, OnHeap(vec![T::zero(); self.registers]), results));
+            T::apart(|| self.run(at, [T::zero(); LARGE], results));
         }
     }
 

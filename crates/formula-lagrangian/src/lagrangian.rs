@@ -9,8 +9,7 @@ use crate::{Formula, FormulaError, Graph, Id};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Hessian, Lagrangian, Scalar, Structure, Symmetry, Triple, VelocityPoint};
 
-/// The most nodes that a formula has with its gradient, and with its second derivatives; those of formulas with more are found by
-/// automatic differentiation of the gradient.
+/// The most nodes that a formula has with its gradient, and with its second derivatives.
 const WITH_GRADIENT: usize = 10 * MOST_NODES;
 const WITH_HESSIAN: usize = 20 * MOST_NODES;
 
@@ -48,8 +47,10 @@ pub struct FormulaLagrangian<const N: usize> {
     gradient: Tape,
     /// `L_q`, `L_v`, `L_z`, and the value.
     with_gradient: Tape,
-    /// `W` by columns, and all second derivatives in the order qq, qv, vv, qz, vz, zz.
-    second: Option<[Tape; 2]>,
+    /// `W` by columns.
+    mass: Tape,
+    /// All second derivatives in the order qq, qv, vv, qz, vz, zz.
+    second: Tape,
 }
 
 impl<const N: usize> FormulaLagrangian<N> {
@@ -73,24 +74,24 @@ impl<const N: usize> FormulaLagrangian<N> {
         let all: Vec<Id> = partials.iter().copied().chain([root]).collect();
         let with_gradient = tape(&graph, &all)?;
 
-        let second = second_derivatives(&mut graph, &partials, &variables);
-        let (mut structure, mut tapes) = (Structure { proved: true, ..Structure::default() }, None);
+        let second = second_derivatives(&mut graph, &partials, &variables).ok_or(too_large.clone())?;
         let constants = graph.constants(&formula.values);
-        if let Some(second) = &second {
-            let size = 2 * N + 1;
-            let entry = |i: usize, j: usize| second.get(i * size + j).copied().unwrap_or(root);
-            let pairs = |a: usize, b: usize| (0..N * N).map(move |k| entry(a + k % N, b + k / N));
-            let mass: Vec<Id> = pairs(N, N).collect();
-            let in_order = pairs(0, 0).chain(pairs(0, N)).chain(pairs(N, N));
-            let all: Vec<Id> = in_order.chain((0..size).map(|i| entry(i, 2 * N))).collect();
-            let of_motion: Vec<Id> = (0..4 * N * N).map(|k| entry(k / (2 * N), k % (2 * N))).collect();
-            let (q, v) = partials.split_at(N);
-            let (v, z) = v.split_at(N);
-            let z = z.first().copied().unwrap_or(root);
+        let size = 2 * N + 1;
+        let entry = |i: usize, j: usize| second.get(i * size + j).copied().unwrap_or(root);
+        let pairs = |a: usize, b: usize| (0..N * N).map(move |k| entry(a + k % N, b + k / N));
+        let mass: Vec<Id> = pairs(N, N).collect();
+        let in_order = pairs(0, 0).chain(pairs(0, N)).chain(pairs(N, N));
+        let all: Vec<Id> = in_order.chain((0..size).map(|i| entry(i, 2 * N))).collect();
+        let of_motion: Vec<Id> = (0..4 * N * N).map(|k| entry(k / (2 * N), k % (2 * N))).collect();
+        let (q, v) = partials.split_at(N);
+        let (v, z) = v.split_at(N);
+        let z = z.first().copied().unwrap_or(root);
+        let structure = {
             let partials = Partials { value: root, q, v, z, second: &of_motion, mass: &mass };
-            structure = proved(&mut graph, &partials, &constants);
-            tapes = Tape::new(&graph, &mass, N).zip(Tape::new(&graph, &all, N)).map(|(mass, all)| [mass, all]);
-        }
+            proved(&mut graph, &partials, &constants)
+        };
+        let (mass, second) = (Tape::new(&graph, &mass, N), Tape::new(&graph, &all, N));
+        let (Some(mass), Some(second)) = (mass, second) else { return Err(too_large) };
         let needed = graph.needed(root);
         let cyclic = std::array::from_fn(|i| {
             let position = graph.position(i as u32);
@@ -109,7 +110,8 @@ impl<const N: usize> FormulaLagrangian<N> {
             with_force,
             gradient,
             with_gradient,
-            second: tapes,
+            mass,
+            second,
         };
         lagrangian.set_constants();
         Ok(lagrangian)
@@ -135,9 +137,8 @@ impl<const N: usize> FormulaLagrangian<N> {
 
     fn set_constants(&mut self) {
         let constants = self.formula.graph.constants(&self.formula.values);
-        let FormulaLagrangian { value, force, with_force, gradient, with_gradient, second, .. } = &mut *self;
-        let first = [value, force, with_force, gradient, with_gradient];
-        for tape in first.into_iter().chain(second.iter_mut().flatten()) {
+        let FormulaLagrangian { value, force, with_force, gradient, with_gradient, mass, second, .. } = &mut *self;
+        for tape in [value, force, with_force, gradient, with_gradient, mass, second] {
             tape.set_constants(&constants);
         }
         let rate = self.partials.last().filter(|_| self.structure.constant_rate);
@@ -191,6 +192,8 @@ fn second_derivatives(graph: &mut Graph, partials: &[Id], variables: &[Id]) -> O
 }
 
 impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
+    const PROVED: bool = true;
+
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         let mut value = T::zero();
@@ -232,20 +235,18 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
 
     #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
-        let [mass, _] = self.second.as_ref()?;
         let mut w: SMatrix<T, N, N> = SMatrix::from_element(x.z);
-        mass.evaluate(At::new(t, &x.q, &x.v, x.z), &mut [w.as_mut_slice()]);
+        self.mass.evaluate(At::new(t, &x.q, &x.v, x.z), &mut [w.as_mut_slice()]);
         Some(w)
     }
 
     #[inline(always)]
     fn closed_hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
-        let [_, second] = self.second.as_ref()?;
         let matrix = SMatrix::from_element(x.z);
         let mut h = Hessian { qq: matrix, qv: matrix, vv: matrix, qz: x.q, vz: x.v, zz: x.z };
         let [qq, qv, vv] = [&mut h.qq, &mut h.qv, &mut h.vv].map(|m| m.as_mut_slice());
         let results = &mut [qq, qv, vv, h.qz.as_mut_slice(), h.vz.as_mut_slice(), std::slice::from_mut(&mut h.zz)];
-        second.evaluate(At::new(t, &x.q, &x.v, x.z), results);
+        self.second.evaluate(At::new(t, &x.q, &x.v, x.z), results);
         Some(h)
     }
 

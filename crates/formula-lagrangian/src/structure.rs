@@ -51,7 +51,6 @@ pub(crate) fn proved(graph: &mut Graph, l: &Partials<'_>, constants: &[f64]) -> 
         separable,
         quadratic,
         constant_mass,
-        proved: true,
     }
 }
 

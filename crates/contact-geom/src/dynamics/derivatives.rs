@@ -42,22 +42,25 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
     #[inline(always)]
     fn along<T: Scalar, D: Module<T>>(&self, t: T, x: &VelocityPoint<N, Dual<T, D>>) -> Dual<T, D> {
         let base = VelocityPoint { q: x.q.map(|a| a.re), v: x.v.map(|a| a.re), z: x.z.re };
-        match self.closed_gradient(t, &base) {
-            None => self.value(Dual::constant(t), &x.q, &x.v, x.z),
-            Some(g) => {
-                let mut d = x.z.d.each(|a| a * g.z);
-                for i in 0..N {
-                    d = d.join(x.q[i].d, |sum, a| sum + a * g.x[i]).join(x.v[i].d, |sum, a| sum + a * g.y[i]);
-                }
-                Dual { re: self.value(t, &base.q, &base.v, base.z), d }
-            }
+        let g = match self.closed_gradient(t, &base) {
+            Some(g) => g,
+            None if const { Self::PROVED } => missing(),
+            None => return self.value(Dual::constant(t), &x.q, &x.v, x.z),
+        };
+        let mut d = x.z.d.each(|a| a * g.z);
+        for i in 0..N {
+            d = d.join(x.q[i].d, |sum, a| sum + a * g.x[i]).join(x.v[i].d, |sum, a| sum + a * g.y[i]);
         }
+        Dual { re: self.value(t, &base.q, &base.v, base.z), d }
     }
 
     #[inline(always)]
     fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, Triple<N, T>) {
         if let Some(both) = self.closed_with_gradient(t, x) {
             return both;
+        }
+        if const { Self::PROVED } {
+            return (T::from(f64::NAN), missing());
         }
         if const { N > BLOCK } {
             return blocks::with_gradient(self, t, x);
@@ -78,6 +81,9 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
     fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>) {
         if let Some(both) = self.closed_with_force(t, x) {
             return both;
+        }
+        if const { Self::PROVED } {
+            return (T::from(f64::NAN), missing::<T, N>().x);
         }
         if const { N > BLOCK } {
             return blocks::with_force(self, t, x);
@@ -102,6 +108,9 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
     fn mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SMatrix<T, N, N> {
         if let Some(w) = self.closed_mass_matrix(t, x) {
             return w;
+        }
+        if const { Self::PROVED } {
+            return SMatrix::from_element(T::from(f64::NAN));
         }
         if const { N > BLOCK } {
             return blocks::mass_matrix(self, t, x);
@@ -128,13 +137,32 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
 
     #[inline]
     fn gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Triple<N, T> {
-        self.closed_gradient(t, x).unwrap_or_else(|| derived_gradient(self, t, x))
+        match self.closed_gradient(t, x) {
+            Some(gradient) => gradient,
+            None if const { Self::PROVED } => missing(),
+            None => derived_gradient(self, t, x),
+        }
     }
 
     #[inline]
     fn hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Hessian<N, T> {
-        self.closed_hessian(t, x).unwrap_or_else(|| derived_hessian(self, t, x))
+        match self.closed_hessian(t, x) {
+            Some(hessian) => hessian,
+            None if const { Self::PROVED } => {
+                let Triple { x, y, z } = missing();
+                let matrix = SMatrix::from_element(z);
+                Hessian { qq: matrix, qv: matrix, vv: matrix, qz: x, vz: y, zz: z }
+            }
+            None => derived_hessian(self, t, x),
+        }
     }
+}
+
+/// The gradient that a Lagrangian promises, and has not: no number.
+#[cold]
+fn missing<T: Scalar, const N: usize>() -> Triple<N, T> {
+    let none = || SVector::from_fn(|_, _| T::from(f64::NAN));
+    Triple { x: none(), y: none(), z: T::from(f64::NAN) }
 }
 
 /// Coordinates that no direction moves.

@@ -31,6 +31,10 @@ pub trait Lagrangian<const N: usize> {
     /// and compiled only then.
     const HAS_CLOCK: bool = false;
 
+    /// Whether [`structure`](Self::structure) and all closed derivatives are there and follow from the formula of L, as those of the crate
+    /// `formula-lagrangian` do: they are not probed, and no other derivatives are compiled.
+    const PROVED: bool = false;
+
     /// The value `L(t, q, v, z)`.
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T;
 
@@ -104,6 +108,7 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<L> {
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
     const HAS_CLOCK: bool = L::HAS_CLOCK;
+    const PROVED: bool = L::PROVED;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {

@@ -23,9 +23,6 @@ pub struct Structure {
     pub quadratic: bool,
     /// `W = L_vv` is constant.
     pub constant_mass: bool,
-    /// These claims follow from the formula of L, as those of the crate `formula-lagrangian` do: no integrator probes them. The closed
-    /// derivatives follow from it too.
-    pub proved: bool,
 }
 
 /// One claim on a Lagrangian with the size of what it says is zero.

@@ -183,6 +183,8 @@ macro_rules! arithmetic {
         }
 
         impl<T: Scalar, D: Module<T>> Scalar for $Dual<T, D> {
+            const NESTED: bool = true;
+
             #[$inline]
             fn re(self) -> f64 {
                 self.re.re()

@@ -128,6 +128,9 @@ pub trait Scalar:
     fn tanh(self) -> Self;
     /// The arc tangent.
     fn atan(self) -> Self;
+    /// Whether it is a number with derivatives, so large that many of them are better kept in memory than on the stack.
+    const NESTED: bool = false;
+
     /// Does a piece of work over these numbers as a function of its own, with the instructions that they need: for programs that are
     /// too long to become a part of each kernel that calls them, such as interpreters. What the work calls is marked
     /// `#[inline(always)]`.

@@ -1,7 +1,7 @@
 //! What a plan computes and skips, in words.
 
 use super::Plan;
-use contact_geom::Lagrangian;
+use contact_geom::{Lagrangian, Structure};
 use std::borrow::Cow;
 use std::fmt::{Display, Formatter};
 
@@ -50,8 +50,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         });
         let structure = self.problem.structure;
         let what = "probes of the structure";
-        items.push(if structure.proved {
+        items.push(if const { L::PROVED } {
             Item::skipped(what, "it is proved from the formula of L")
+        } else if structure == Structure::default() {
+            Item::skipped(what, "nothing is claimed of L")
         } else {
             Item::computed(what, "it is claimed: at the start, and along the run")
         });

@@ -14,13 +14,13 @@ pub(crate) const PROBE: f64 = 1e-12;
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold; [`InputError::Geometry`] where L is defined at neither
 /// point.
-pub fn verified<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
+pub fn verified<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
     t: f64,
     start: &VelocityPoint<N>,
 ) -> Result<Structure, InputError> {
     let structure = lagrangian.structure();
-    if structure.proved {
+    if const { L::PROVED } {
         let value = lagrangian.value(t, &start.q, &start.v, start.z);
         let undefined = GeometryError::Undefined { what: "the Lagrangian" };
         return if value.is_finite() { Ok(structure) } else { Err(undefined.into()) };
@@ -44,16 +44,16 @@ pub fn verified<const N: usize>(
 
 /// The first claim that is false at a state `(q, p, z)` of a motion; `guess` is a guess of its velocity. `None` too where L is not
 /// defined, or no velocity belongs to the momentum: nothing is said there.
-pub(crate) fn refuted<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
+pub(crate) fn refuted<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
     t: f64,
     state: &PhasePoint<N>,
     guess: &SVector<f64, N>,
 ) -> Option<Defect> {
-    let structure = lagrangian.structure();
-    if structure.proved {
+    if const { L::PROVED } {
         return None;
     }
+    let structure = lagrangian.structure();
     let x = legendre_inverse(lagrangian, t, state, guess).ok()?;
     structure.defects(lagrangian, t, &x)?.find(|d| d.size > PROBE)
 }
@@ -62,17 +62,17 @@ pub(crate) fn refuted<const N: usize>(
 ///
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold.
-pub(crate) fn verified_over<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
+pub(crate) fn verified_over<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
     t0: f64,
     span: f64,
     start: &VelocityPoint<N>,
     times: usize,
 ) -> Result<(), InputError> {
-    let structure = lagrangian.structure();
-    if structure.proved {
+    if const { L::PROVED } {
         return Ok(());
     }
+    let structure = lagrangian.structure();
     for i in 1..=times {
         // Fractions without a period, so that they do not meet the zeros of what is periodic.
         let t = t0 + span * (i as f64 * 0.618_033_988_749_894_9).fract();

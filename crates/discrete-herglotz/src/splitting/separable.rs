@@ -33,7 +33,10 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if !structure.separable {
             return Err(InputError::Unclaimed { claim: "separable" });
         }
-        for x in probes(state).into_iter().filter(|_| !structure.proved) {
+        for x in probes(state) {
+            if const { L::PROVED } {
+                break;
+            }
             // A state beside the given one may be outside of the domain.
             let mut defects = structure.defects(&lagrangian, t, &x).into_iter().flatten();
             if let Some(Defect { claim, size }) = defects.find(|d| d.size > PROBE) {
@@ -55,6 +58,10 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         let structure = self.lagrangian.structure();
         if structure.autonomous || structure.has_constant_rate() {
             return Ok(());
+        }
+        // It is known of one that is proved.
+        if const { L::PROVED } {
+            return Err(InputError::Hypothesis { hypothesis: "a drag L_z that does not depend on time" });
         }
         for i in 0..3 {
             let still = VelocityPoint {

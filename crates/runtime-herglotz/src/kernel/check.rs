@@ -3,9 +3,7 @@
 use super::Sized;
 use crate::{Check, MomentumThere, Motion, Place, RuntimeError, Stated, Way};
 use contact_geom::{DiscretePoint, OneParameterGroup, PhasePoint, Symmetry, Triple, larger, largest};
-use discrete_herglotz::{
-    AnyIntegrator, DiscreteLagrangian, Gauss, InputError, Method, Midpoint, Problem, Start, Steps, Until, statements,
-};
+use discrete_herglotz::{AnyIntegrator, Gauss, InputError, Problem, Start, Steps, Until, statements};
 use formula_lagrangian::FormulaLagrangian;
 
 /// The distance of differences, relative to the size of a state.
@@ -14,7 +12,7 @@ const DISTANCE: f64 = 1e-3;
 /// The places at which the theorems are evaluated.
 const PLACES: usize = 3;
 
-/// The statements' discrete Lagrangian by collocation.
+/// The stages of the statements' discrete Lagrangian, where the motion's own has none.
 const STAGES: usize = 4;
 
 /// One step from a state, and its conformal factor.
@@ -115,36 +113,36 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
         });
     }
     let of_statements: Vec<_> = states.iter().step_by(states.len().div_ceil(PLACES)).collect();
-    let gauss = Gauss::new::<N>(lagrangian, STAGES, h)?;
-    let mut stated = Vec::new();
-    evaluate(&gauss, &format!("gauss_{STAGES}"), lagrangian, &symmetries, (h, &of_statements), &mut stated)?;
-    let midpoint = Midpoint::new(lagrangian, h)?;
-    evaluate(&midpoint, Method::Midpoint.name(), lagrangian, &symmetries, (h, &of_statements), &mut stated)?;
+    let stages = plan.integrator.collocation.unwrap_or(STAGES);
+    let stated = evaluate(lagrangian, stages, &symmetries, (h, &of_statements))?;
     Ok(Check { integrator: plan.integrator.name.to_string(), step_size: h, places: along, statements: stated })
 }
 
-/// The theorems for a discrete Lagrangian, worst of some places.
+/// The theorems for the discrete Lagrangian of contact Gauss collocation, worst of some places.
 fn evaluate<const N: usize>(
-    ld: &impl DiscreteLagrangian<N>,
-    method: &str,
     lagrangian: &FormulaLagrangian<N>,
+    stages: usize,
     symmetries: &[Symmetry<N>],
     (h, places): (f64, &[&(f64, PhasePoint<N>, f64)]),
-    to: &mut Vec<Stated>,
-) -> Result<(), RuntimeError> {
-    let near = (AnyIntegrator::Gauss { stages: STAGES }, h, 1);
+) -> Result<Vec<Stated>, RuntimeError> {
+    let gauss = Gauss::new::<N>(lagrangian, stages, h)?;
+    let by = AnyIntegrator::Gauss { stages };
+    let mut points = Vec::with_capacity(places.len());
+    for (t, x, _) in places {
+        let q1 = step(lagrangian, (by, h, 1), *t, x)?.0.q;
+        points.push((*t, DiscretePoint { q0: x.q, q1, z0: x.z }));
+    }
+    let mut stated = Vec::new();
     for statement in statements::STATEMENTS {
         let mut worst: Option<f64> = None;
-        for (t, x, _) in places {
-            let q1 = step(lagrangian, near, *t, x)?.0.q;
-            let point = DiscretePoint { q0: x.q, q1, z0: x.z };
-            if let Some(residual) = statements::residual(statement, ld, symmetries, *t, &point)? {
+        for (t, point) in &points {
+            if let Some(residual) = statements::residual(statement, &gauss, symmetries, *t, point)? {
                 worst = Some(worst.map_or(residual, |worst| larger(worst, residual)));
             }
         }
         if let Some(residual) = worst {
-            to.push(Stated { statement, method: method.into(), residual });
+            stated.push(Stated { statement, method: by.to_string(), residual });
         }
     }
-    Ok(())
+    Ok(stated)
 }

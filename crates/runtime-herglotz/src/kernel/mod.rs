@@ -41,7 +41,7 @@ pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, FormulaErr
             }
         };
     }
-    of!(1 2 3 4 5 6 7 8)
+    of!(2)
 }
 
 /// A system with its dimension.
