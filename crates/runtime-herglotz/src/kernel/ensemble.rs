@@ -119,6 +119,14 @@ impl<const N: usize> Block<'_, N> {
             if *ended {
                 return;
             }
+            // Expressions have the parameters of the member.
+            let of_member = ensemble.varied.as_ref().and_then(|varied| {
+                let values = (varied.values)(first + member.index);
+                let pairs = || varied.names.iter().copied().zip(values.iter().copied());
+                let is_expression = |column: &Column| matches!(column, Column::Expression(_));
+                columns.iter().any(is_expression).then(|| columns.iter().map(|c| with(c, pairs())).collect::<Vec<_>>())
+            });
+            let columns = of_member.as_deref().unwrap_or(columns);
             let last = recorded.last();
             let ending = member.ending.as_ref().map_err(|cause| *cause);
             let ending = ending.map(|ending| {
@@ -178,6 +186,18 @@ fn is_common(cause: &InputError) -> bool {
             | E::Unclaimed { .. }
             | E::Hypothesis { .. }
     )
+}
+
+/// A column with other values of parameters.
+fn with<'v>(column: &Column, values: impl Iterator<Item = (&'v str, f64)>) -> Column {
+    let mut column = column.clone();
+    if let Column::Expression(expression) = &mut column {
+        for (name, value) in values {
+            // A member whose parameters are no numbers does not begin.
+            let _ = expression.set(name, value);
+        }
+    }
+    column
 }
 
 /// No start, which a run refuses.
