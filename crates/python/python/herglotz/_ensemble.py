@@ -1,0 +1,112 @@
+"""Many motions of one Lagrangian."""
+
+import numpy as np
+
+from . import _core
+from ._solve import system_and_start
+from ._system import expression
+
+
+def ensemble(
+    L,
+    q0,
+    v0=None,
+    t=None,
+    *,
+    p0=None,
+    z0=0.0,
+    accuracy=None,
+    integrator=None,
+    step=None,
+    steps=None,
+    observe=None,
+    coordinates=None,
+    parameters=None,
+    threads=None,
+):
+    """M motions of one Lagrangian over threads; the result does not depend on their number.
+
+    Parameters
+    ----------
+    L : function, str, SymPy expression or System
+        As of `solve`.
+    q0, v0 : arrays of shape (M, n)
+        Positions and velocities of the starts.
+    t : float or array of shape (k,)
+        The end, of motions from 0, or start and end: then the ends of the motions are told. With more than two times,
+        the states at all of them.
+    p0 : array of shape (M, n), optional
+        The momenta of the starts, in place of `v0`.
+    z0 : float or array of shape (M,)
+    parameters : dict of float or arrays of shape (M,), optional
+        Those that are arrays differ among members.
+    threads : int, optional
+        As many as there are processors, if nothing is said.
+    accuracy, integrator, step, steps, observe, coordinates
+        As of `solve`.
+
+    Returns
+    -------
+    Ensemble
+    """
+    parameters = dict(parameters or {})
+    varied = {name: value for name, value in parameters.items() if np.ndim(value)}
+    # Any value of these will do for the formula.
+    fixed = {name: float(np.ravel(value)[0]) if name in varied and np.size(value) else value for name, value in parameters.items()}
+    if np.ndim(q0) != 2:
+        raise ValueError(f"`q0` has {np.ndim(q0)} dimensions, where the shape (M, n) is needed: a row for each member")
+    system, _, _ = system_and_start(L, np.zeros(np.shape(q0)[1]), v0, p0, coordinates, fixed)
+    if t is None:
+        raise ValueError("`t` is not given: the end, or times")
+    if (v0 is None) == (p0 is None):
+        raise ValueError("give `v0` or `p0`, one of them")
+    record = _core.run_ensemble(
+        system,
+        (q0, v0, False, z0) if p0 is None else (q0, p0, True, z0),
+        t,
+        (accuracy, integrator, step, steps),
+        list(varied),
+        list(varied.values()),
+        [expression(column, system) for column in observe.values()] if observe else [],
+        threads,
+    )
+    return Ensemble(system, record, tuple(observe or ()))
+
+
+class Ensemble:
+    """M motions of n coordinates; made by `ensemble`.
+
+    Attributes
+    ----------
+    q, v, p : arrays of shape (M, n), or (M, k, n) at k times
+    z : array of shape (M,) or (M, k)
+    t : array of shape (M,)
+        The times that were reached.
+    times : array of shape (k,) or None
+    steps : array of int of shape (M,)
+    success : array of bool of shape (M,)
+    troubles : dict of str
+        What went wrong or is in doubt, by the index of the member; what was not computed is not a number.
+    in_lanes : int
+        How many members were advanced together in vector registers.
+    """
+
+    def __init__(self, system, record, observed):
+        self.system = system
+        self.t, self.steps, self.success, self.times = record.t, record.steps, record.success, record.times
+        self.troubles, self.in_lanes = dict(record.troubles), record.in_lanes
+        count, n = len(record.t), system.dimension
+        many = () if self.times is None else (len(self.times),)
+        self.q, self.v, self.p = (x.reshape(count, *many, n) for x in (record.q, record.v, record.p))
+        self.z = record.z.reshape(count, *many)
+        self._observed = {name: record.columns[:, i].reshape(count, *many) for i, name in enumerate(observed)}
+
+    def __len__(self):
+        return len(self.t)
+
+    def __getitem__(self, name):
+        """An observed column: of shape (M,) or (M, k)."""
+        return self._observed[name]
+
+    def __repr__(self):
+        return f"<Ensemble: {len(self)} members, {int(np.sum(~self.success))} without success>"

@@ -1,0 +1,203 @@
+"""What is looked at beside a motion: geometry, contact maps, checks and comparisons."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from . import _core, _trace
+from ._solve import system_and_start
+from ._system import system
+
+
+class Geometry(NamedTuple):
+    """The contact geometry of L at a time and a point of TQ x R, of n coordinates; vectors there in the order q, v, z."""
+
+    lagrangian: float
+    momentum: np.ndarray  # (n,)
+    energy: float
+    rate: float
+    mass: np.ndarray  # (n, n)
+    condition: float
+    eta: np.ndarray  # (2n + 1,)
+    reeb: np.ndarray  # (2n + 1,)
+    volume: float
+    herglotz_field: np.ndarray  # (2n + 1,)
+
+
+def geometry(L, t, q, v, z=0.0, *, coordinates=None, parameters=None):
+    """The contact geometry of a Lagrangian at a point.
+
+    Parameters
+    ----------
+    L, coordinates, parameters
+        As of `solve`.
+    t, z : float
+    q, v : arrays of shape (n,)
+
+    Returns
+    -------
+    Geometry
+        L, the momentum L_v (the Legendre transformation is (q, v, z) -> (q, p, z)), the energy v.p - L, the rate L_z,
+        the mass matrix W = L_vv and its condition, the contact form eta = dz - L_v dq, its Reeb field, the volume
+        eta ^ (d eta)^n, and the Herglotz field (v, a, L).
+    """
+    of = system(L, coordinates, parameters, n=np.size(q))
+    found = _core.geometry(of, (t, q, v, z))
+    return Geometry(**{name: np.array(x) if isinstance(x, list) else x for name, x in found.items()})
+
+
+class Contact(NamedTuple):
+    """How a map (q, p, z) -> (q, p, z) pulls back dz - p dq."""
+
+    is_contact: bool
+    sigma: float
+    defect: float
+    image: np.ndarray  # (2n + 1,)
+    jacobian: np.ndarray  # (2n + 1, 2n + 1)
+
+    def __bool__(self):
+        return self.is_contact
+
+    def __str__(self):
+        if self.is_contact:
+            return f"contact: F*(dz - p dq) = sigma (dz - p dq), sigma = {self.sigma!r}, to {self.defect:.1e}"
+        return f"not contact: F*(dz - p dq) departs from {self.sigma!r} (dz - p dq) by {self.defect:.1e} of its size"
+
+
+def is_contact(map, at, *, tolerance=1e-9):
+    """Whether a map (q, p, z) -> (q, p, z) is contact at a point.
+
+    The map is called once with tracers, and its derivatives are exact: the defect of a contact map is round-off, that
+    of a step of a method of Runge and Kutta the size of its error.
+
+    Parameters
+    ----------
+    map : function (q, p, z) -> (q, p, z)
+        q and p have the shape (n,).
+    at : tuple (q, p, z)
+        The point.
+    tolerance : float
+        The largest defect of a map that is called contact.
+
+    Returns
+    -------
+    Contact
+        True or false, the conformal factor sigma, and the largest component of F*eta - sigma eta, relative to F*eta.
+    """
+    try:
+        q, p, z = at
+    except (TypeError, ValueError):
+        raise ValueError("`at` must be a point (q, p, z)") from None
+    n = np.size(q)
+    if n == 0:
+        raise ValueError("`at` has a q without coordinates")
+    components = _trace.components_of(map, n)
+    sigma, defect, image, jacobian = _core.conformality(components, (q, p, z))
+    # Not a number is no contact map.
+    return Contact(bool(defect <= tolerance), sigma, defect, image, jacobian)
+
+
+class Place(NamedTuple):
+    """A step of a motion that was looked at."""
+
+    t: float
+    sigma: float
+    log_factor: float
+    contact_defect: float
+    herglotz_defect: float
+    momenta: list  # (momentum, what the theorem of Noether predicts) of each symmetry
+
+
+class Check(NamedTuple):
+    """Whether the steps of a motion are contact, and the theorems of the discrete theory on it."""
+
+    is_contact: bool
+    integrator: str
+    step: float
+    places: list
+    statements: list  # (statement, discrete Lagrangian, residual)
+
+    def __bool__(self):
+        return self.is_contact
+
+
+def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters):
+    L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters)
+    if (v0 is None) == (p0 is None):
+        raise ValueError("give `v0` or `p0`, one of them")
+    start = (q0, v0, False, z0) if p0 is None else (q0, p0, True, z0)
+    if t is None:
+        raise ValueError("`t` is not given: the end of the motion")
+    return _core.Motion(L, start, t, None, way, [], [], False)
+
+
+def check(
+    L, q0=None, v0=None, t=None, *, p0=None, z0=0.0, places=10, accuracy=None, integrator=None, step=None, steps=None,
+    coordinates=None, parameters=None,
+):
+    """Whether the steps of a motion are contact: sigma, defects and momenta at some places, and the discrete theorems.
+
+    The arguments are those of `solve`; `places` is the number of steps that are looked at.
+
+    Returns
+    -------
+    Check
+    """
+    way = accuracy, integrator, step, steps
+    motion = _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters)
+    integrator, step, found, statements, contact = _core.check(motion, places)
+    return Check(contact, integrator, step, [Place(*place) for place in found], statements)
+
+
+class Work(NamedTuple):
+    """A run of a comparison."""
+
+    integrator: str
+    order: int
+    step: float
+    steps: int
+    evaluations: int
+    error: float
+    seconds: float
+
+
+class Comparison:
+    """Run time against error; made by `compare`."""
+
+    def __init__(self, rows, reference, left_out):
+        self.rows = [Work(*row) for row in rows]
+        self.reference, self.left_out = reference, dict(left_out)
+
+    def best(self, error):
+        """The fastest run with at most this error; None where there is none."""
+        return min((row for row in self.rows if row.error <= error), key=lambda row: row.seconds, default=None)
+
+    def to_pandas(self):
+        """The runs as a `pandas.DataFrame`."""
+        import pandas
+
+        return pandas.DataFrame(self.rows, columns=Work._fields)
+
+    def plot(self, ax=None):
+        """Draws seconds against error with matplotlib."""
+        import matplotlib.pyplot
+
+        ax = matplotlib.pyplot.gca() if ax is None else ax
+        for name in dict.fromkeys(row.integrator for row in self.rows):
+            mine = [row for row in self.rows if row.integrator == name]
+            ax.loglog([row.error for row in mine], [row.seconds for row in mine], ".-", label=name)
+        ax.set_xlabel("error")
+        ax.set_ylabel("seconds")
+        ax.legend(fontsize="x-small")
+        return ax
+
+
+def compare(L, q0=None, v0=None, t=None, *, p0=None, z0=0.0, coordinates=None, parameters=None):
+    """Run time against error of all integrators that apply to a motion; the arguments are those of `solve`.
+
+    Returns
+    -------
+    Comparison
+    """
+    motion = _motion(L, q0, v0, t, p0, z0, (None, None, None, None), coordinates, parameters)
+    return Comparison(*_core.compare(motion))

@@ -1,0 +1,245 @@
+"""What a motion has led to."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from . import _core
+
+
+class Crossings(NamedTuple):
+    """The changes of sign of an event: m of them."""
+
+    t: np.ndarray  # (m,)
+    q: np.ndarray  # (m, n)
+    v: np.ndarray  # (m, n)
+    p: np.ndarray  # (m, n)
+    z: np.ndarray  # (m,)
+
+
+class States(NamedTuple):
+    """States at m times, or at one."""
+
+    t: np.ndarray  # (m,) or a number
+    q: np.ndarray  # (m, n) or (n,)
+    v: np.ndarray  # (m, n) or (n,)
+    p: np.ndarray  # (m, n) or (n,)
+    z: np.ndarray  # (m,) or a number
+    energy: np.ndarray  # (m,) or a number
+
+
+class Plan:
+    """What a run computes and skips; printed, in words."""
+
+    __slots__ = ("text", "integrator", "step", "steps", "error")
+
+    def __init__(self, text, integrator, step, steps, error):
+        self.text, self.integrator, self.step, self.steps, self.error = text, integrator, step, steps, error
+
+    def __str__(self):
+        return self.text
+
+    def __repr__(self):
+        return f"<Plan: {self.steps} steps of {self.step} by {self.integrator}>"
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run that Ctrl-C has ended: ``solution`` has what was computed, and `Solution.resume` goes on with it."""
+
+    def __init__(self, solution):
+        super().__init__(f"interrupted at t = {solution.t_end}")
+        self.solution = solution
+
+    def __reduce__(self):
+        return Interrupted, (self.solution,)
+
+
+class Solution:
+    """A motion of n coordinates with k rows; made by `solve`.
+
+    Attributes
+    ----------
+    t : array of shape (k,)
+    q, v, p : arrays of shape (k, n)
+        Position, velocity and momentum.
+    z, energy : arrays of shape (k,)
+        The action, and the energy v.p - L.
+    log_factor : array of shape (k,) or None
+        The logarithm of the conformal factor since the start, where it was asked for.
+    events : list or dict of Crossings
+        The changes of sign of the events, in their order or by their names.
+    status : str
+        How the run ended; ``success`` says whether as it was asked to.
+    suspicion : str or None
+        The first step that was seen not to resolve the motion.
+    steps, evaluations : int
+        The steps taken, and the evaluations of forces or gradients.
+    t_end : float
+        The time reached.
+    """
+
+    def __init__(self, system, request, record, event_names, observed):
+        self.system = system
+        self._request = request
+        self.t, self.q, self.v, self.p, self.z = record.t, record.q, record.v, record.p, record.z
+        self.energy, self.log_factor = record.energy, record.log_factor
+        self.status, self.success, self.suspicion = record.status, record.success, record.suspicion
+        self.steps, self.evaluations = record.steps, record.evaluations
+        self._end = record.end
+        self._observed = observed
+        self._columns = record.columns
+        self.events = _crossings(record.crossings, event_names, system.dimension) if event_names else []
+        self._event_names = event_names
+        self._plan = self._dense = None
+
+    @property
+    def t_end(self):
+        return self._end[0]
+
+    @property
+    def plan(self):
+        """What was computed and what was skipped; ``print(sol.plan)``."""
+        if self._plan is None:
+            self._plan = Plan(*_core.Motion(self.system, *self._request).plan())
+        return self._plan
+
+    def __getitem__(self, name):
+        """A column: one that was observed, by its name, or the state's: a coordinate, its velocity ``x'``, ``t``, ``z``."""
+        if name in self._observed:
+            return self._columns[:, self._observed.index(name)]
+        names = self.system.coordinates
+        for array, of in ((self.q, names), (self.v, _core.velocity_names(self.system.given_coordinates)[1])):
+            if name in of:
+                return array[:, of.index(name)]
+        if name in ("t", "z", "energy", "log_factor"):
+            return getattr(self, name)
+        raise KeyError(f"{name!r}: give it to `solve` as observe={{{name!r}: ...}}; there are {self._names()}")
+
+    def _names(self):
+        return [*self.system.coordinates, *_core.velocity_names(self.system.given_coordinates)[1], *self._observed]
+
+    def __call__(self, t):
+        """The states at any times of the motion, as exact as its steps.
+
+        The first call runs the motion again and keeps the ends of its steps; a state inside of a step is by a step of
+        the same integrator.
+
+        Parameters
+        ----------
+        t : float or array of shape (m,)
+
+        Returns
+        -------
+        States
+            t, q, v, p, z, energy: of shapes (m, n) and (m,), or (n,) and () for one time.
+        """
+        if self._dense is None:
+            self._dense = _core.nodes(_core.Motion(self.system, *self._request), self.t_end)
+        times = np.atleast_1d(np.asarray(t))
+        q, v, p, z, energy, columns = self._dense.at(times, [])
+        if np.ndim(t) == 0:
+            return States(float(t), q[0], v[0], p[0], float(z[0]), float(energy[0]))
+        return States(times.astype(float), q, v, p, z, energy)
+
+    def resume(self, t):
+        """Goes on from the end of the motion, as it was asked for, with its own events and columns.
+
+        Parameters
+        ----------
+        t : float or array
+            The new end; or the times of the rows, beyond the end of this motion, of which the first may be that end.
+
+        Returns
+        -------
+        Solution
+            From the end of this motion on.
+        """
+        from ._solve import run
+
+        at, q, p, z = self._end
+        if z is None:
+            raise ValueError("the motion has no action to go on from")
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        if len(times) == 0 or times[0] != at:
+            times = np.concatenate([[at], times])
+        _, _, every, way, events, columns, conformal_factor = self._request
+        if way[3] is not None:
+            # So many steps were of another span.
+            way = (None, way[1], self.plan.step, None)
+        request = (q, p, True, z), times, every, way, events, columns, conformal_factor
+        return run(self.system, request, self._event_names, self._observed)
+
+    @property
+    def momenta(self):
+        """The momenta of the symmetries that are seen, by name: arrays of shape (k,).
+
+        They decay as the conformal factor: a momentum over exp(log_factor) stays what it was.
+        """
+        names, found = self.system.coordinates, {}
+        for which in self.system.symmetries:
+            if len(which) == 1:
+                found[f"translation of {names[which[0]]}"] = self.p[:, which[0]].copy()
+            else:
+                i, j = which
+                name = f"rotation of {names[i]}, {names[j]}"
+                found[name] = self.q[:, i] * self.p[:, j] - self.q[:, j] * self.p[:, i]
+        return found
+
+    def to_xarray(self):
+        """The rows as an `xarray.Dataset` over time and coordinate."""
+        import xarray
+
+        names = self.system.coordinates
+        data = {name: (("t", "coordinate"), getattr(self, name)) for name in ("q", "v", "p")}
+        data |= {"z": ("t", self.z), "energy": ("t", self.energy)}
+        if self.log_factor is not None:
+            data["log_factor"] = ("t", self.log_factor)
+        data |= {name: ("t", self[name]) for name in self._observed}
+        attributes = {"lagrangian": self.system.lagrangian, "status": self.status}
+        return xarray.Dataset(data, {"t": self.t, "coordinate": names}, attributes)
+
+    def to_pandas(self):
+        """The rows as a `pandas.DataFrame` with t for its index."""
+        import pandas
+
+        columns = {name: self[name] for name in self._names()}
+        columns |= {"z": self.z, "energy": self.energy}
+        if self.log_factor is not None:
+            columns["log_factor"] = self.log_factor
+        return pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
+
+    def plot(self, *names, ax=None):
+        """Draws columns over time with matplotlib: those named, or the coordinates.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        import matplotlib.pyplot
+
+        ax = matplotlib.pyplot.gca() if ax is None else ax
+        for name in names or self.system.coordinates:
+            ax.plot(self.t, self[name], label=name)
+        ax.set_xlabel("t")
+        ax.legend()
+        return ax
+
+    def __getstate__(self):
+        # The ends of steps are found again.
+        return self.__dict__ | {"_dense": None, "_plan": None}
+
+    def __repr__(self):
+        return f"<Solution: {len(self.t)} rows, t = {self.t_end}, {self.steps} steps, {self.status}>"
+
+
+def _crossings(found, names, n):
+    """The crossings of each event: by names, or as many as a number says."""
+
+    def of(index):
+        mine = [crossing for crossing in found if crossing[0] == index]
+        numbers = [np.array([crossing[k] for crossing in mine]) for k in range(1, 6)]
+        return Crossings(*(x.reshape(-1, n) if k in (1, 2, 3) else x for k, x in enumerate(numbers)))
+
+    if isinstance(names, int):
+        return [of(index) for index in range(names)]
+    return {name: of(index) for index, name in enumerate(names)}

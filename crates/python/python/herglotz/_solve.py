@@ -1,0 +1,151 @@
+"""One motion: what is asked of it, and its run."""
+
+from . import _core
+from ._solution import Interrupted, Solution
+from ._system import expression, system
+
+
+def solve(
+    L,
+    q0=None,
+    v0=None,
+    t=None,
+    *,
+    p0=None,
+    z0=0.0,
+    accuracy=None,
+    integrator=None,
+    step=None,
+    steps=None,
+    every=None,
+    events=(),
+    observe=None,
+    conformal_factor=False,
+    coordinates=None,
+    parameters=None,
+):
+    """The motion of a Lagrangian by Herglotz' equation, d/dt L_v = L_q + L_z L_v with dz/dt = L.
+
+    Parameters
+    ----------
+    L : function, str, SymPy expression or System
+        ``L(t, q, v, z)``, which is called once with tracers; a formula; the name of a system of the catalogue, with its
+        start; or what `system` has made of one of these.
+    q0, v0 : array of shape (n,)
+        Position and velocity of the start.
+    t : float or array of shape (k,)
+        The times of the rows: the first is that of the start, the last the end, in either direction. One number is the
+        end, of a motion from 0.
+    p0 : array of shape (n,), optional
+        The momentum of the start, in place of `v0`.
+    z0 : float
+        The action of the start.
+    accuracy : float, optional
+        The relative error of (q, p) that is wanted, 1e-9 if nothing is said. The step is chosen for it, and the
+        integrator where none is named.
+    integrator : str, optional
+        One of `integrators`.
+    step, steps : float, int, optional
+        The length or the number of steps of `integrator`, in place of an accuracy.
+    every : int, optional
+        Rows at the ends of so many steps, in place of those at `t`.
+    events : str, Event, or a list or dict of them
+        Functions of the state whose changes of sign are found.
+    observe : dict of str or functions, optional
+        Expressions by name: columns beside the state, ``sol["name"]``.
+    conformal_factor : bool
+        Whether `Solution.log_factor` is computed.
+    coordinates, parameters
+        As of `system`.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    ValueError
+        For all that is wrong with an argument.
+    Interrupted
+        A `KeyboardInterrupt` with the solution up to there.
+    """
+    if type(L) is not _core.System or parameters is not None or q0 is None:
+        L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters)
+    if t is None:
+        raise ValueError("`t` is not given: the end, or the times of the rows")
+    if (v0 is None) == (p0 is None):
+        raise ValueError("give `v0` or `p0`, one of them")
+    request = (
+        (q0, v0, False, z0) if p0 is None else (q0, p0, True, z0),
+        t,
+        every,
+        (accuracy, integrator, step, steps),
+        events_of(events, L) if events else [],
+        [expression(column, L) for column in observe.values()] if observe else [],
+        conformal_factor,
+    )
+    event_names = tuple(events) if isinstance(events, dict) else len(request[4])
+    return run(L, request, event_names, tuple(observe) if observe else ())
+
+
+def run(L, request, event_names, observed):
+    """The solution of a request."""
+    record = _core.run(_core.Motion(L, *request))
+    sol = Solution(L, request, record, event_names, observed)
+    if record.interrupted is not None:
+        if isinstance(record.interrupted, KeyboardInterrupt):
+            raise Interrupted(sol)
+        raise record.interrupted
+    return sol
+
+
+def system_and_start(L, q0, v0, p0, coordinates, parameters):
+    """The system of an argument, and the start, where the catalogue has it."""
+    if isinstance(L, str) and L in CATALOGUE:
+        entry = CATALOGUE[L]
+        if q0 is None and v0 is None and p0 is None:
+            q0, v0 = entry[5], entry[6]
+    if q0 is None:
+        raise ValueError("`q0` is not given: the position of the start")
+    n = len(q0) if hasattr(q0, "__len__") else 1
+    return system(L, coordinates, parameters, n=n), q0, v0
+
+
+CATALOGUE = {entry[0]: entry for entry in _core.catalogue()}
+
+
+class Event:
+    """A function of the state whose changes of sign are found.
+
+    Parameters
+    ----------
+    when : str or function
+        An expression, written as the formula of a Lagrangian: ``"theta"``, ``"x'*y - 1"``; or a function of
+        (t, q, v, z), which is traced.
+    direction : {"both", "rising", "falling"}
+        Which changes count, in the sense of the motion.
+    terminal : bool
+        Whether the first one ends the motion.
+    """
+
+    __slots__ = ("when", "direction", "terminal")
+
+    def __init__(self, when, direction="both", terminal=False):
+        self.when, self.direction, self.terminal = when, direction, terminal
+
+    def __repr__(self):
+        return f"Event({self.when!r}, {self.direction!r}, terminal={self.terminal})"
+
+
+def events_of(events, L):
+    """Events as the core reads them."""
+    if isinstance(events, (str, Event)) or callable(events):
+        events = [events]
+    elif isinstance(events, dict):
+        events = events.values()
+    result = []
+    for event in events:
+        if not isinstance(event, Event):
+            event = Event(event)
+        result.append((expression(event.when, L), event.direction, bool(event.terminal)))
+    return result

@@ -1,0 +1,88 @@
+"""Systems of what a user may call a Lagrangian."""
+
+import functools
+
+from . import _core, _trace
+
+_SYSTEMS = {}
+# Systems of texts that are kept, so that a text is read once.
+_MOST = 256
+
+
+def system(L, coordinates=None, parameters=None, *, n=None):
+    """The system of a Lagrangian.
+
+    Parameters
+    ----------
+    L : function, str, SymPy expression or System
+        ``L(t, q, v, z)``, or ``L(t, q, v, z, gamma)`` with a parameter gamma; a formula; the name of a system of the
+        catalogue.
+    coordinates : list of str, optional
+        Their names; ``"q[3]"`` stands for three. That of a function and the default of a formula is ``"q[n]"``.
+    parameters : dict of float, optional
+        Their values by name.
+    n : int, optional
+        The number of coordinates, where they have no names.
+
+    Returns
+    -------
+    System
+    """
+    if isinstance(L, _core.System):
+        return L.with_parameters(parameters) if parameters else L
+    if isinstance(coordinates, str):
+        coordinates = [coordinates]
+    if isinstance(L, str):
+        return _of_text(L, coordinates, parameters, n)
+    if callable(L) and not hasattr(L, "free_symbols"):
+        coordinates = names(coordinates, n)
+        of = (*_velocity_names(tuple(coordinates)), tuple(parameters or ()))
+        return _of_text(_trace.formula_of(L, of), coordinates, parameters, n)
+    if hasattr(L, "free_symbols"):
+        from ._sympy import formula_of_expression
+
+        return _of_text(*formula_of_expression(L, coordinates, parameters), parameters, n)
+    raise TypeError(f"L is a {type(L).__name__}, where a function, a formula, a SymPy expression or a System is needed")
+
+
+_velocity_names = functools.lru_cache(256)(lambda coordinates: tuple(map(tuple, _core.velocity_names(list(coordinates)))))
+
+
+def expression(of, system):
+    """The text of an expression beside a Lagrangian: itself, or that of a function (t, q, v, z, **parameters)."""
+    if isinstance(of, str):
+        return of
+    if callable(of):
+        names = system.coordinates
+        return _trace.formula_of(of, (names, _core.velocity_names(system.given_coordinates)[1], list(system.parameters)))
+    raise ValueError(f"{of!r} is no expression: give a text, or a function of (t, q, v, z)")
+
+
+def names(coordinates, n):
+    """The names of coordinates, with those that they have by default."""
+    if coordinates is not None:
+        return list(coordinates)
+    if n is None:
+        raise ValueError("`coordinates` is not given: their names, as [\"x\", \"y\"], or \"q[3]\" for three")
+    return [f"q[{n}]"]
+
+
+def _of_text(text, coordinates, parameters, n):
+    if coordinates is None and text.isidentifier():
+        for name, _, coordinates, formula, values, _, _ in _core.catalogue():
+            if name == text:
+                return system(formula, coordinates, dict(values) | dict(parameters or {}))
+    coordinates = names(coordinates, n)
+    try:
+        key = (text, tuple(coordinates), tuple(parameters.items()) if parameters else ())
+        found = _SYSTEMS.get(key)
+    except TypeError:
+        # What cannot be hashed is no number, and refused below.
+        key = found = None
+    if found is None:
+        found = _core.System(text, coordinates, parameters)
+        if len(_SYSTEMS) >= _MOST:
+            _SYSTEMS.clear()
+        if key is not None:
+            _SYSTEMS[key] = found
+    return found

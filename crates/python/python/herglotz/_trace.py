@@ -1,0 +1,263 @@
+"""Functions of the user's, called once with symbols in place of numbers.
+
+`Traced` is an array of symbols. It is an array of NumPy's, so that slices, sums, products, stacking and the like are
+NumPy's own; functions of numbers, and the few others that look at values, are replaced here.
+"""
+
+import inspect
+
+import numpy as np
+
+from ._core import Condition, Symbol, symbols, velocity_names
+
+
+class Traced(np.ndarray):
+    """An array of symbols and numbers."""
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **kwargs):
+        return apply(ufunc, method, inputs, kwargs)
+
+    def __array_function__(self, func, types, args, kwargs):
+        return call(func, args, kwargs)
+
+
+def array(values):
+    """An array of traced values and numbers: as `np.array`, for functions of NumPy that `np.array` hides the trace from.
+
+    Parameters
+    ----------
+    values : nested sequences of traced values and numbers
+    """
+    found = np.array(values, dtype=object)
+    return found.view(Traced)
+
+
+def _unary(name):
+    known = getattr(np, name)
+
+    def function(x):
+        return x.apply(name) if isinstance(x, Symbol) else known(float(x))
+
+    return np.frompyfunc(function, 1, 1)
+
+
+def _binary(name):
+    known = getattr(np, name)
+
+    def function(x, y):
+        if isinstance(x, Symbol):
+            return x.apply_two(name, y)
+        if isinstance(y, Symbol):
+            return y.apply_two(name, x, True)
+        return known(float(x), float(y))
+
+    return np.frompyfunc(function, 2, 1)
+
+
+def _choose(condition, x, y):
+    if isinstance(condition, Condition):
+        if not isinstance(x, Symbol) and not isinstance(y, Symbol) and x is y:
+            return x
+        return condition.choose(x, y)
+    return x if condition else y
+
+
+_UNARY = (
+    "negative positive reciprocal sqrt absolute fabs sign sin cos tan arctan arcsin arccos sinh cosh tanh arcsinh arccosh "
+    "arctanh exp expm1 log log1p log2 log10 square"
+)
+_UFUNCS = {getattr(np, name): _unary(name) for name in _UNARY.split()}
+_BINARY = {"minimum": "minimum", "maximum": "maximum", "fmin": "minimum", "fmax": "maximum"}
+_BINARY |= {"arctan2": "arctan2", "hypot": "hypot"}
+_UFUNCS |= {getattr(np, name): _binary(known) for name, known in _BINARY.items()}
+_OPERATORS = {
+    np.less: lambda x, y: x < y,
+    np.less_equal: lambda x, y: x <= y,
+    np.greater: lambda x, y: x > y,
+    np.greater_equal: lambda x, y: x >= y,
+    np.equal: lambda x, y: x == y,
+    np.not_equal: lambda x, y: x != y,
+    np.logical_and: lambda x, y: x & y,
+    np.logical_or: lambda x, y: x | y,
+    np.bitwise_and: lambda x, y: x & y,
+    np.bitwise_or: lambda x, y: x | y,
+    np.power: lambda x, y: x**y,
+    np.float_power: lambda x, y: x**y,
+}
+_UFUNCS |= {ufunc: np.frompyfunc(function, 2, 1) for ufunc, function in _OPERATORS.items()}
+_NOT = np.frompyfunc(lambda x: ~x if isinstance(x, Condition) else not x, 1, 1)
+_UFUNCS |= {np.logical_not: _NOT, np.invert: _NOT}
+# These do with objects what they do with numbers.
+_OWN = {np.add, np.subtract, np.multiply, np.divide, np.matmul}
+_OWN |= {getattr(np, name) for name in ("vecdot", "matvec", "vecmat") if hasattr(np, name)}
+
+
+def _plain(x):
+    """Without the class, as an array of objects."""
+    if isinstance(x, (Symbol, Condition)):
+        found = np.empty((), dtype=object)
+        found[()] = x
+        return found
+    if isinstance(x, np.ndarray):
+        return x.view(np.ndarray).astype(object, copy=False)
+    return x
+
+
+def _wrapped(found):
+    if isinstance(found, np.ndarray):
+        return found.view(Traced) if found.ndim else found[()]
+    return found
+
+
+def apply(ufunc, method, inputs, kwargs):
+    """A function of numbers of NumPy, on arrays with symbols in them."""
+    kwargs = dict(kwargs or {})
+    out = kwargs.pop("out", None)
+    known = _UFUNCS.get(ufunc) or (ufunc if ufunc in _OWN else None)
+    if known is None:
+        if ufunc.__name__ in ("logaddexp", "floor_divide", "remainder", "floor", "ceil", "rint", "trunc", "isnan", "isfinite"):
+            hint = "; it has no use in a smooth Lagrangian" if ufunc.__name__ != "logaddexp" else "; write it out"
+        else:
+            hint = ""
+        raise TypeError(f"np.{ufunc.__name__} is not known of a traced value{hint}")
+    found = getattr(known, method)(*map(_plain, inputs), **kwargs)
+    if out is not None:
+        out[0][...] = found
+        return out[0]
+    return _wrapped(found)
+
+
+def _where(condition, x, y):
+    """As `np.where`: x where a condition on traced values holds, else y."""
+    return _wrapped(_CHOOSE(_plain(condition), _plain(x), _plain(y)))
+
+
+_CHOOSE = np.frompyfunc(_choose, 3, 1)
+
+
+def where(condition, x, y):
+    """x where a condition holds, else y, elementwise: `np.where`, for traced values as for numbers."""
+    return np.where(condition, x, y)
+
+
+def _norm(x, ord=None, axis=None, keepdims=False):
+    x = np.asanyarray(x)
+    if x.ndim > 1 and axis is None and ord is not None:
+        raise TypeError("np.linalg.norm of a traced matrix is known for ord=None alone")
+    if ord in (None, 2):
+        return np.sqrt(np.sum(x * x, axis=axis, keepdims=keepdims))
+    if ord == 1:
+        return np.sum(np.abs(x), axis=axis, keepdims=keepdims)
+    if ord == np.inf:
+        return np.max(np.abs(x), axis=axis, keepdims=keepdims)
+    raise TypeError(f"np.linalg.norm with ord={ord} is not known of a traced value: take None, 1, 2 or inf")
+
+
+def _select(condlist, choicelist, default=0):
+    found = default
+    for condition, choice in reversed(list(zip(condlist, choicelist))):
+        found = _where(condition, choice, found)
+    return found
+
+
+def _clip(a, a_min=None, a_max=None, **kwargs):
+    low, high = kwargs.get("min", a_min), kwargs.get("max", a_max)
+    a = a if low is None else np.maximum(a, low)
+    return a if high is None else np.minimum(a, high)
+
+
+_FUNCTIONS = {np.where: _where, np.linalg.norm: _norm, np.select: _select, np.clip: _clip}
+
+
+def call(func, args, kwargs):
+    """Another function of NumPy's, on arrays with symbols in them."""
+    own = _FUNCTIONS.get(func)
+    if own is not None:
+        return own(*args, **kwargs)
+
+    def traced(x):
+        if isinstance(x, (Symbol, Condition)):
+            return _plain(x).view(Traced)
+        if isinstance(x, (list, tuple)):
+            return type(x)(map(traced, x))
+        return x
+
+    args = [traced(x) for x in args]
+    # NumPy's own, which calls functions of numbers.
+    implementation = getattr(func, "_implementation", func)
+    return _wrapped(implementation(*args, **kwargs))
+
+
+def _vector(values):
+    found = np.empty(len(values), dtype=object)
+    found[:] = values
+    return found.view(Traced)
+
+
+def formula_of(function, names):
+    """The formula of a function (t, q, v, z, **parameters) over the names of coordinates, velocities and parameters."""
+    coordinates, _, parameters = names
+    t, q, v, z, values = symbols(len(coordinates), len(parameters))
+    wanted = _parameters_of(function)
+    if wanted is None:
+        given = dict(zip(parameters, values))
+    else:
+        required, others = wanted
+        for name in required:
+            if name not in parameters:
+                raise ValueError(
+                    f"the parameter {name!r} of {_name(function)} has no value: give parameters={{{name!r}: ...}}"
+                )
+        given = {name: value for name, value in zip(parameters, values) if name in required or name in others}
+    return value_text(function(t, _vector(q), _vector(v), z, **given), function, names)
+
+
+def components_of(function, n):
+    """The formulas of the components of a map (q, p, z) -> (q, p, z), with v for p."""
+    names = velocity_names([f"q[{n}]"])
+    _, q, p, z, _ = symbols(n, 0)
+    found = function(_vector(q), _vector(p), z)
+    if not isinstance(found, (tuple, list)) or len(found) != 3:
+        raise ValueError(f"{_name(function)} gives {found!r}, where a tuple (q, p, z) is needed")
+    found = list(np.ravel(np.array(found[0], dtype=object))), list(np.ravel(np.array(found[1], dtype=object))), found[2]
+    for what, x in (("q", found[0]), ("p", found[1])):
+        if len(x) != n:
+            raise ValueError(f"{_name(function)} gives a {what} of {len(x)} numbers, where there are {n} coordinates")
+    return [value_text(x, function, (*names, [])) for x in (*found[0], *found[1], found[2])]
+
+
+def _name(function):
+    return getattr(function, "__name__", "the function")
+
+
+def _parameters_of(function):
+    """The names of the parameters of a function after t, q, v and z: without a default, and with one."""
+    code = getattr(function, "__code__", None)
+    if code is not None and code.co_argcount == 4 and not code.co_kwonlyargcount and not code.co_flags & 8:
+        return (), ()
+    try:
+        found = list(inspect.signature(function).parameters.values())
+    except (TypeError, ValueError):
+        return None
+    if any(p.kind is p.VAR_KEYWORD for p in found):
+        return None
+    found = [p for p in found[4:] if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)]
+    return [p.name for p in found if p.default is p.empty], [p.name for p in found if p.default is not p.empty]
+
+
+def value_text(value, function, names):
+    """The formula of a traced value."""
+    if isinstance(value, np.ndarray):
+        if value.ndim:
+            raise ValueError(
+                f"{_name(function)} gives an array of shape {value.shape}, where a number is needed: take a component, or a sum"
+            )
+        value = value[()]
+    if isinstance(value, Symbol):
+        return value.text(*map(list, names))
+    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
+        return repr(float(value))
+    raise ValueError(f"{_name(function)} gives {value!r}, where a number is needed: does it return?")
+
+
+__all__ = ["Traced", "array", "formula_of", "velocity_names", "where"]

@@ -1,0 +1,112 @@
+//! Numbers from Python and back, with the name of the argument in what is said of them.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyFloat, PyInt, PyList, PyTuple};
+use std::fmt::Display;
+
+/// The `ValueError` with the text of an error.
+pub fn value_error(error: impl Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// The number of an argument.
+pub fn number(name: &str, from: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let wrong = || value_error(format!("`{name}` is {}, where a finite number is needed", shown(from)));
+    if from.is_instance_of::<PyBool>() {
+        return Err(wrong());
+    }
+    let x: f64 = from.extract().map_err(|_| wrong())?;
+    if x.is_finite() { Ok(x) } else { Err(wrong()) }
+}
+
+/// An object in an error, cut where it is long.
+fn shown(from: &Bound<'_, PyAny>) -> String {
+    const LONGEST: usize = 60;
+    let text = from.repr().map_or_else(|_| "an object".to_owned(), |text| text.to_string());
+    if text.chars().count() <= LONGEST { text } else { text.chars().take(LONGEST).chain("...".chars()).collect() }
+}
+
+/// The finite numbers of an argument of one dimension; a single number is one of length 1.
+pub fn numbers(name: &str, from: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    // What is written out is read at once; NumPy reads the rest.
+    if from.is_instance_of::<PyFloat>() {
+        return Ok(vec![number(name, from)?]);
+    }
+    let plain = |items: &mut dyn Iterator<Item = Bound<'_, PyAny>>| -> Option<Vec<f64>> {
+        items.map(|x| if x.is_exact_instance_of::<PyFloat>() || x.is_exact_instance_of::<PyInt>() { x.extract().ok() } else { None }).collect()
+    };
+    let written = if let Ok(list) = from.cast::<PyList>() {
+        plain(&mut list.iter())
+    } else if let Ok(tuple) = from.cast::<PyTuple>() {
+        plain(&mut tuple.iter())
+    } else {
+        None
+    };
+    let found = match written {
+        Some(found) => found,
+        None => {
+            let (shape, found) = array(name, from)?;
+            if shape.len() > 1 {
+                return Err(value_error(format!("`{name}` has the shape {shape:?}, where one dimension is needed")));
+            }
+            found
+        }
+    };
+    finite(name, &found)?;
+    Ok(found)
+}
+
+/// Checks that all numbers are finite.
+fn finite(name: &str, numbers: &[f64]) -> PyResult<()> {
+    match numbers.iter().enumerate().find(|(_, x)| !x.is_finite()) {
+        Some((i, x)) => Err(value_error(format!("`{name}[{i}]` is {x}, where a finite number is needed"))),
+        None => Ok(()),
+    }
+}
+
+/// The numbers of an array of any shape, in the order of C.
+fn array(name: &str, from: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)> {
+    if let Ok(array) = from.extract::<PyReadonlyArrayDyn<'_, f64>>() {
+        let shape = array.shape().to_vec();
+        return Ok((shape, array.as_array().iter().copied().collect()));
+    }
+    let numpy = from.py().import("numpy")?;
+    let wrong = |what: String| value_error(format!("`{name}` {what}, where an array of real numbers is needed"));
+    let ragged = |_| wrong(format!("is {}", shown(from)));
+    let any = numpy.call_method1("asarray", (from,)).map_err(ragged)?;
+    let dtype = any.getattr("dtype")?;
+    let kind: String = dtype.getattr("kind")?.extract()?;
+    if !matches!(kind.as_str(), "f" | "i" | "u") {
+        return Err(wrong(format!("has the dtype {dtype}: {}", shown(from))));
+    }
+    let any = any.call_method1("astype", ("float64",))?;
+    let array: PyReadonlyArrayDyn<'_, f64> = any.extract().map_err(|_| PyTypeError::new_err(name.to_owned()))?;
+    Ok((array.shape().to_vec(), array.as_array().iter().copied().collect()))
+}
+
+/// The finite numbers of an argument of two dimensions with so many columns, and the number of its rows.
+pub fn table(name: &str, from: &Bound<'_, PyAny>, columns: usize) -> PyResult<(usize, Vec<f64>)> {
+    let (shape, found) = array(name, from)?;
+    match shape.as_slice() {
+        [rows, width] if *width == columns => {
+            finite(name, &found)?;
+            Ok((*rows, found))
+        }
+        _ => Err(value_error(format!(
+            "`{name}` has the shape {shape:?}, where [M, {columns}] is needed: a row for each member"
+        ))),
+    }
+}
+
+/// A vector as an array, without a copy.
+pub fn vector(py: Python<'_>, numbers: Vec<f64>) -> Py<PyArray1<f64>> {
+    PyArray1::from_vec(py, numbers).unbind()
+}
+
+/// Rows one after the other as a matrix, without a copy.
+pub fn matrix(py: Python<'_>, numbers: Vec<f64>, columns: usize) -> PyResult<Py<PyArray2<f64>>> {
+    let rows = numbers.len() / columns.max(1);
+    Ok(PyArray1::from_vec(py, numbers).reshape([rows, columns])?.unbind())
+}

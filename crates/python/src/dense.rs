@@ -1,0 +1,164 @@
+//! States of a motion at any time.
+
+use crate::arrays::{matrix, numbers, value_error, vector};
+use crate::motion::{Motion, columns};
+use crate::signals::Signals;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use runtime_herglotz::{AnyIntegrator, Column, Rate, Start, Steps, Watch, Way, When};
+use std::ops::ControlFlow;
+
+/// The ends of a motion's steps.
+#[derive(Default)]
+struct Nodes {
+    t: Vec<f64>,
+    q: Vec<f64>,
+    p: Vec<f64>,
+    z: Vec<f64>,
+}
+
+struct Keeps {
+    nodes: Nodes,
+    /// The time beyond which no node is needed, and whether one is there.
+    until: f64,
+    done: bool,
+    signals: Signals,
+}
+
+impl Watch for Keeps {
+    fn node(&mut self, t: f64, q: &[f64], p: &[f64], z: f64) {
+        if self.done {
+            return;
+        }
+        let first = self.nodes.t.first().copied().unwrap_or(t);
+        self.done = t != first && (t - first).abs() >= (self.until - first).abs();
+        self.nodes.t.push(t);
+        self.nodes.q.extend_from_slice(q);
+        self.nodes.p.extend_from_slice(p);
+        self.nodes.z.push(z);
+    }
+
+    fn poll(&mut self, _part: f64) -> ControlFlow<()> {
+        if self.done { ControlFlow::Break(()) } else { self.signals.look() }
+    }
+}
+
+/// A motion at any time: by the node before it, and the step from there.
+#[pyclass(frozen, module = "herglotz._core")]
+pub struct Dense {
+    system: runtime_herglotz::System,
+    by: AnyIntegrator,
+    nodes: Nodes,
+}
+
+/// The times, positions, velocities, momenta, actions and energies of states.
+type States =
+    (Py<PyArray2<f64>>, Py<PyArray2<f64>>, Py<PyArray2<f64>>, Py<PyArray1<f64>>, Py<PyArray1<f64>>, Py<PyArray2<f64>>);
+
+/// Runs a motion up to a time again and keeps the ends of its steps.
+#[pyfunction]
+pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
+    let mut keeps = Keeps { nodes: Nodes::default(), until, done: false, signals: Signals::new() };
+    let by = py.detach(|| {
+        let plan = motion.system.plan(&motion.motion)?;
+        let by = match motion.motion.way {
+            Way::Steps { by, .. } | Way::Accuracy { by: Some(by), .. } => Ok(by),
+            Way::Accuracy { by: None, .. } => plan.integrator.name.parse::<AnyIntegrator>(),
+        };
+        let Ok(by) = by else { return Ok(None) };
+        let again = runtime_herglotz::Motion {
+            way: Way::Steps { by, steps: Steps::Count(plan.steps) },
+            rows: None,
+            columns: Vec::new(),
+            events: Vec::new(),
+            conformal_factor: false,
+            nodes: true,
+            ..motion.motion.clone()
+        };
+        motion.system.run(&again, &mut keeps)?;
+        Ok(Some(by))
+    });
+    if let Some(raised) = keeps.signals.raised {
+        return Err(raised);
+    }
+    let by = by.map_err(|error: runtime_herglotz::RuntimeError| value_error(error))?;
+    let by = by.ok_or_else(|| value_error("the integrator of the plan is not known by its name"))?;
+    Ok(Dense { system: motion.system.clone(), by, nodes: keeps.nodes })
+}
+
+impl Dense {
+    /// The rows at some times within one step, in its direction.
+    fn within(&self, k: usize, times: Vec<f64>, all: &[Column]) -> PyResult<Vec<Vec<f64>>> {
+        let (n, Nodes { t, q, p, z }) = (self.system.dimension(), &self.nodes);
+        let part = |x: &[f64]| x.get(k * n..(k + 1) * n).unwrap_or_default().to_vec();
+        let at = |x: &[f64], k: usize| x.get(k).copied().unwrap_or(f64::NAN);
+        let start = Start { t: at(t, k), q: part(q), rate: Rate::Momentum(part(p)), z: at(z, k) };
+        let way = Way::Steps { by: self.by, steps: Steps::Count(1) };
+        let motion = runtime_herglotz::Motion {
+            rows: Some(When::At(times)),
+            columns: all.to_vec(),
+            ..runtime_herglotz::Motion::new(start, at(t, k + 1), way)
+        };
+        Ok(self.system.record(&motion).map_err(value_error)?.1)
+    }
+}
+
+#[pymethods]
+impl Dense {
+    /// The states at some times, in any order, with the values of expressions there.
+    fn at(&self, py: Python<'_>, t: &Bound<'_, PyAny>, expressions: Vec<String>) -> PyResult<States> {
+        let (n, times) = (self.system.dimension(), numbers("t", t)?);
+        let nodes = self.nodes.t.as_slice();
+        let (Some(&first), Some(&last)) = (nodes.first(), nodes.last()) else {
+            return Err(value_error("the motion has no steps"));
+        };
+        let sign = if last < first { -1.0 } else { 1.0 };
+        let inside = |t: f64| sign * first <= sign * t && sign * t <= sign * last;
+        if let Some(t) = times.iter().find(|t| !inside(**t)) {
+            return Err(value_error(format!("`t` has {t}, where the motion is from {first} to {last}")));
+        }
+        let mut all = columns(n, false);
+        let own = all.len();
+        for text in &expressions {
+            all.push(Column::parse(text, self.system.formula()).map_err(value_error)?);
+        }
+        let mut order: Vec<(f64, usize)> = times.iter().copied().zip(0..).collect();
+        order.sort_by(|a, b| (sign * a.0).total_cmp(&(sign * b.0)));
+        let width = all.len();
+        let mut found = vec![f64::NAN; times.len() * width];
+        let mut rest = order.as_slice();
+        while let Some(&(t, _)) = rest.first() {
+            // The step that ends there, or has it inside.
+            let k = nodes.partition_point(|node| sign * node < sign * t).saturating_sub(1);
+            let end = nodes.get(k + 1).copied().unwrap_or(last);
+            let (these, others) = rest.split_at(rest.partition_point(|(t, _)| sign * t <= sign * end).max(1));
+            rest = others;
+            let mut different: Vec<f64> = these.iter().map(|(t, _)| *t).collect();
+            different.dedup();
+            let rows = self.within(k, different.clone(), &all)?;
+            for (t, index) in these {
+                let row = different.iter().position(|x| x == t).and_then(|i| rows.get(i));
+                if let (Some(row), Some(to)) = (row, found.get_mut(index * width..(index + 1) * width)) {
+                    to.copy_from_slice(row);
+                }
+            }
+        }
+        let part = |from: usize, count: usize| -> Vec<f64> {
+            found.chunks_exact(width).flat_map(|row| row.iter().skip(from).take(count).copied()).collect()
+        };
+        Ok((
+            matrix(py, part(1, n), n)?,
+            matrix(py, part(1 + n, n), n)?,
+            matrix(py, part(1 + 2 * n, n), n)?,
+            vector(py, part(1 + 3 * n, 1)),
+            vector(py, part(2 + 3 * n, 1)),
+            matrix(py, part(own, width - own), width - own)?,
+        ))
+    }
+
+    /// The ends of the steps.
+    #[getter]
+    fn times(&self, py: Python<'_>) -> Py<PyArray1<f64>> {
+        vector(py, self.nodes.t.clone())
+    }
+}

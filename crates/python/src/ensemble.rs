@@ -1,0 +1,183 @@
+//! Many motions of one formula.
+
+use crate::arrays::{matrix, number, numbers, table, value_error, vector};
+use crate::motion::{self, GivenWay};
+use crate::signals::Signals;
+use crate::system::System;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use runtime_herglotz::{Column, Ensemble, EnsembleWatch, MemberEnd, Rate, Start, Status, Varied, When};
+use std::ops::ControlFlow;
+
+/// Keeps the members' ends, or their rows.
+struct Kept {
+    n: usize,
+    /// The rows of each member, where they are more than the end.
+    rows: Option<usize>,
+    extra: usize,
+    parts: [Vec<f64>; 5],
+    t: Vec<f64>,
+    steps: Vec<i64>,
+    success: Vec<bool>,
+    troubles: Vec<(usize, String)>,
+    signals: Signals,
+}
+
+impl Kept {
+    fn states(&mut self, row: &[f64]) {
+        let mut rest = row;
+        for (part, count) in self.parts.iter_mut().zip([self.n, self.n, self.n, 1, self.extra]) {
+            let (first, others) = rest.split_at(count.min(rest.len()));
+            part.extend_from_slice(first);
+            part.resize(part.len() + count - first.len(), f64::NAN);
+            rest = others;
+        }
+    }
+}
+
+impl EnsembleWatch for Kept {
+    fn member(&mut self, member: MemberEnd) -> ControlFlow<()> {
+        let MemberEnd { index, ending, rows } = member;
+        let trouble = match &ending {
+            Err(cause) => Some(cause.to_string()),
+            Ok(end) => match (&end.status, &end.suspicion) {
+                (Status::Completed, None) => None,
+                (Status::Completed, Some(suspicion)) => Some(suspicion.to_string()),
+                (status, _) => Some(status.to_string()),
+            },
+        };
+        self.success.push(ending.as_ref().is_ok_and(|end| end.status == Status::Completed));
+        self.troubles.extend(trouble.map(|trouble| (index, trouble)));
+        self.t.push(ending.as_ref().map_or(f64::NAN, |end| end.t));
+        self.steps.push(ending.as_ref().map_or(0, |end| end.steps as i64));
+        match self.rows {
+            None => {
+                let row = ending.map(|end| end.columns).unwrap_or_default();
+                self.states(&row);
+            }
+            Some(count) => {
+                for k in 0..count {
+                    self.states(rows.get(k).map_or(&[], Vec::as_slice));
+                }
+            }
+        }
+        self.signals.look()
+    }
+
+    fn poll(&mut self) -> ControlFlow<()> {
+        self.signals.look()
+    }
+}
+
+/// Many motions at their ends, or by rows one after the other.
+#[pyclass(frozen, get_all, module = "herglotz._core")]
+pub struct EnsembleRecord {
+    t: Py<PyArray1<f64>>,
+    q: Py<PyArray2<f64>>,
+    v: Py<PyArray2<f64>>,
+    p: Py<PyArray2<f64>>,
+    z: Py<PyArray1<f64>>,
+    columns: Option<Py<PyArray2<f64>>>,
+    steps: Py<PyArray1<i64>>,
+    success: Py<PyArray1<bool>>,
+    /// What went wrong, by the index of the member.
+    troubles: Vec<(usize, String)>,
+    /// The times of the rows.
+    times: Option<Py<PyArray1<f64>>>,
+    in_lanes: usize,
+}
+
+/// Runs an ensemble, with the interpreter left to other threads.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "they are those of `ensemble`, which names them")]
+pub fn run_ensemble(
+    py: Python<'_>,
+    system: &System,
+    start: (Bound<'_, PyAny>, Bound<'_, PyAny>, bool, Bound<'_, PyAny>),
+    t: Bound<'_, PyAny>,
+    way: GivenWay<'_>,
+    names: Vec<String>,
+    values: Vec<Bound<'_, PyAny>>,
+    observed: Vec<String>,
+    threads: Option<usize>,
+) -> PyResult<EnsembleRecord> {
+    let n = system.inner.dimension();
+    let (q, rate, is_momentum, z) = start;
+    let (count, q) = table("q0", &q, n)?;
+    let rate_name = if is_momentum { "p0" } else { "v0" };
+    let (rates, rate) = table(rate_name, &rate, n)?;
+    if rates != count {
+        return Err(value_error(format!("`{rate_name}` has {rates} rows, where `q0` has {count}")));
+    }
+    let members = |name: &str, of: &Bound<'_, PyAny>| -> PyResult<Vec<f64>> {
+        let found = numbers(name, of)?;
+        match found.len() {
+            1 if of.len().is_err() => Ok(vec![number(name, of)?; count]),
+            length if length == count => Ok(found),
+            length => Err(value_error(format!("`{name}` has {length} numbers, where there are {count} members"))),
+        }
+    };
+    let z = members("z0", &z)?;
+    let mut varied = Vec::with_capacity(names.len());
+    for (name, value) in names.iter().zip(&values) {
+        varied.push(members(&format!("parameters[{name:?}]"), value)?);
+    }
+    let way = motion::way(&way)?;
+    let times = motion::times(&t)?;
+    let (Some(&t0), Some(&end)) = (times.first(), times.last()) else { return Err(value_error("`t` is empty")) };
+    let rows = (times.len() > 2).then(|| times.clone());
+    let mut columns: Vec<Column> = (0..n).map(Column::Position).collect();
+    columns.extend((0..n).map(Column::Velocity));
+    columns.extend((0..n).map(Column::Momentum));
+    columns.push(Column::Action);
+    for text in &observed {
+        columns.push(Column::parse(text, system.inner.formula()).map_err(value_error)?);
+    }
+    let mut kept = Kept {
+        n,
+        rows: rows.as_ref().map(Vec::len),
+        extra: observed.len(),
+        parts: Default::default(),
+        t: Vec::with_capacity(count),
+        steps: Vec::with_capacity(count),
+        success: Vec::with_capacity(count),
+        troubles: Vec::new(),
+        signals: Signals::new(),
+    };
+    let start = |i: usize| {
+        let part = |x: &[f64]| x.get(i * n..(i + 1) * n).unwrap_or_default().to_vec();
+        let rate = if is_momentum { Rate::Momentum(part(&rate)) } else { Rate::Velocity(part(&rate)) };
+        Start { t: t0, q: part(&q), rate, z: z.get(i).copied().unwrap_or(f64::NAN) }
+    };
+    let of_member = |i: usize| varied.iter().map(|all| all.get(i).copied().unwrap_or(f64::NAN)).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let ensemble = Ensemble {
+        count,
+        start: &start,
+        t0,
+        varied: (!names.is_empty()).then_some(Varied { names: &names, values: &of_member }),
+        end,
+        way,
+        rows: rows.clone().map(When::At),
+        columns: &columns,
+        threads,
+    };
+    let tally = py.detach(|| system.inner.ensemble(&ensemble, &mut kept)).map_err(value_error)?;
+    if let Some(raised) = kept.signals.raised {
+        return Err(raised);
+    }
+    let [q, v, p, z, columns] = kept.parts;
+    Ok(EnsembleRecord {
+        t: vector(py, kept.t),
+        q: matrix(py, q, n)?,
+        v: matrix(py, v, n)?,
+        p: matrix(py, p, n)?,
+        z: vector(py, z),
+        columns: if kept.extra > 0 { Some(matrix(py, columns, kept.extra)?) } else { None },
+        steps: PyArray1::from_vec(py, kept.steps).unbind(),
+        success: PyArray1::from_vec(py, kept.success).unbind(),
+        troubles: kept.troubles,
+        times: rows.map(|rows| vector(py, rows)),
+        in_lanes: tally.in_lanes,
+    })
+}

@@ -1,0 +1,69 @@
+//! The extension module below the Python package `herglotz`: what is named with an underscore there, checked and documented by the
+//! package's own files.
+
+mod arrays;
+mod condition;
+mod contact;
+mod dense;
+mod ensemble;
+mod looks;
+mod motion;
+mod run;
+mod signals;
+mod symbol;
+mod system;
+mod text;
+
+use pyo3::prelude::*;
+use runtime_herglotz::{AnyIntegrator, CATALOGUE};
+
+/// The extension module.
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use crate::contact::conformality;
+    #[pymodule_export]
+    use crate::dense::{Dense, nodes};
+    #[pymodule_export]
+    use crate::ensemble::{EnsembleRecord, run_ensemble};
+    #[pymodule_export]
+    use crate::looks::{check, compare, geometry};
+    #[pymodule_export]
+    use crate::motion::Motion;
+    #[pymodule_export]
+    use crate::run::{Record, run};
+    #[pymodule_export]
+    use crate::condition::Condition;
+    #[pymodule_export]
+    use crate::symbol::{Symbol, symbols};
+    #[pymodule_export]
+    use crate::system::{System, velocity_names};
+    #[pymodule_export]
+    use crate::{catalogue, integrators};
+}
+
+/// An entry of the catalogue: name, about, coordinates, Lagrangian, parameters, position and velocity of the start.
+type Entry = (
+    &'static str,
+    &'static str,
+    Vec<&'static str>,
+    &'static str,
+    Vec<(&'static str, f64)>,
+    Vec<f64>,
+    Vec<f64>,
+);
+
+/// The systems that are known by name.
+#[pyfunction]
+fn catalogue() -> Vec<Entry> {
+    let entry = |e: &runtime_herglotz::CatalogueEntry| {
+        (e.name, e.about, e.coordinates.to_vec(), e.lagrangian, e.parameters.to_vec(), e.q.to_vec(), e.v.to_vec())
+    };
+    CATALOGUE.iter().map(entry).collect()
+}
+
+/// The names of all integrators, with their orders.
+#[pyfunction]
+fn integrators() -> Vec<(String, u32)> {
+    AnyIntegrator::all().into_iter().map(|integrator| (integrator.to_string(), integrator.order())).collect()
+}

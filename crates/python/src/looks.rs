@@ -1,0 +1,75 @@
+//! What is looked at beside a motion: the geometry at a point, whether steps are contact, which integrator is the best.
+
+use crate::arrays::{number, numbers, value_error};
+use crate::motion::Motion;
+use crate::signals::Signals;
+use crate::system::System;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use runtime_herglotz::Start;
+
+/// The contact geometry of a Lagrangian at a time and a point, by name.
+#[pyfunction]
+pub fn geometry<'py>(
+    py: Python<'py>,
+    system: &System,
+    at: (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>),
+) -> PyResult<Bound<'py, PyDict>> {
+    let start = Start::new(number("t", &at.0)?, numbers("q", &at.1)?, numbers("v", &at.2)?, number("z", &at.3)?);
+    let found = system.inner.geometry(&start).map_err(value_error)?;
+    let all = PyDict::new(py);
+    all.set_item("lagrangian", found.lagrangian)?;
+    all.set_item("momentum", found.momentum)?;
+    all.set_item("energy", found.energy)?;
+    all.set_item("rate", found.rate)?;
+    all.set_item("mass", found.mass)?;
+    all.set_item("condition", found.condition)?;
+    all.set_item("eta", found.eta)?;
+    all.set_item("reeb", found.reeb)?;
+    all.set_item("volume", found.volume)?;
+    all.set_item("herglotz_field", found.herglotz_field)?;
+    Ok(all)
+}
+
+/// A place of a check: t, sigma, the logarithm of the factor, the two defects, and the momenta beside their predictions.
+type Place = (f64, f64, f64, f64, f64, Vec<(f64, f64)>);
+
+/// A check: the integrator, the step, the places, the theorems, and whether every step is contact.
+type Checked = (String, f64, Vec<Place>, Vec<(String, String, f64)>, bool);
+
+/// Whether the steps of a motion are contact, and the theorems of the discrete theory on it.
+#[pyfunction]
+pub fn check(py: Python<'_>, motion: &Motion, places: usize) -> PyResult<Checked> {
+    let found = py.detach(|| motion.system.check(&motion.motion, places)).map_err(value_error)?;
+    let is_contact = found.is_contact();
+    let place = |place: runtime_herglotz::Place| {
+        let momenta = place.momenta.iter().map(|m| (m.momentum, m.predicted)).collect();
+        (place.t, place.sigma, place.log_factor, place.contact_defect, place.herglotz_defect, momenta)
+    };
+    let places = found.places.into_iter().map(place).collect();
+    let stated = |s: runtime_herglotz::Stated| (s.statement.to_string(), s.method, s.residual);
+    let statements = found.statements.into_iter().map(stated).collect();
+    Ok((found.integrator, found.step_size, places, statements, is_contact))
+}
+
+/// A run of a comparison: integrator, order, step, steps, evaluations, error and seconds.
+type Work = (String, u32, f64, usize, u64, f64, f64);
+
+/// A comparison: the runs, how the reference was computed, and what is left out and why.
+type Compared = (Vec<Work>, String, Vec<(String, String)>);
+
+/// Run time against error for all integrators that apply.
+#[pyfunction]
+pub fn compare(py: Python<'_>, motion: &Motion) -> PyResult<Compared> {
+    let mut signals = Signals::new();
+    let mut go_on = |_: f64| signals.look().is_continue();
+    let found = py.detach(|| motion.system.compare(&motion.motion, &mut go_on));
+    if let Some(raised) = signals.raised {
+        return Err(raised);
+    }
+    let found = found.map_err(value_error)?;
+    let row = |w: runtime_herglotz::Work| {
+        (w.integrator, w.order, w.step_size, w.steps, w.evaluations, w.error, w.seconds)
+    };
+    Ok((found.rows.into_iter().map(row).collect(), found.reference, found.left_out))
+}

@@ -1,0 +1,144 @@
+//! What is asked of a motion.
+
+use crate::arrays::{number, numbers, value_error};
+use crate::system::System;
+use pyo3::prelude::*;
+use runtime_herglotz::{AnyIntegrator, Column, Direction, Event, Rate, Start, Steps, Way, When};
+
+/// A motion that is asked for, read from the arguments of `solve`.
+#[pyclass(frozen, module = "herglotz._core")]
+pub struct Motion {
+    pub system: runtime_herglotz::System,
+    pub motion: runtime_herglotz::Motion,
+    /// Whether the rows have the conformal factor.
+    pub conformal_factor: bool,
+}
+
+/// The arguments accuracy, integrator, step and steps.
+pub type GivenWay<'py> = (Option<Bound<'py, PyAny>>, Option<String>, Option<Bound<'py, PyAny>>, Option<usize>);
+
+/// The way that arguments say.
+pub fn way((accuracy, integrator, step, steps): &GivenWay<'_>) -> PyResult<Way> {
+    /// What is computed to where nothing is said.
+    const ACCURACY: f64 = 1e-9;
+    let by = integrator.as_deref().map(|name| name.parse::<AnyIntegrator>().map_err(value_error)).transpose()?;
+    let given = match (step, *steps) {
+        (Some(_), Some(_)) => return Err(value_error("`step` and `steps` are both given: give one of them")),
+        (Some(step), None) => Some(Steps::Size(number("step", step)?)),
+        (None, Some(count)) => Some(Steps::Count(count)),
+        (None, None) => None,
+    };
+    match (given, by, accuracy) {
+        (Some(_), _, Some(_)) => {
+            Err(value_error("`accuracy` is given beside a step: give the accuracy, or the step with an integrator"))
+        }
+        (Some(_), None, None) => Err(value_error("a step is given without `integrator`: name one, as \"gauss_8\"")),
+        (Some(steps), Some(by), None) => Ok(Way::Steps { by, steps }),
+        (None, by, None) => Ok(Way::Accuracy { wanted: ACCURACY, by }),
+        (None, by, Some(accuracy)) => Ok(Way::Accuracy { wanted: number("accuracy", accuracy)?, by }),
+    }
+}
+
+/// What every row has: t, q, v, p, z, the energy, and the conformal factor where it is asked for.
+pub fn columns(n: usize, conformal_factor: bool) -> Vec<Column> {
+    let mut columns = vec![Column::Time];
+    columns.extend((0..n).map(Column::Position));
+    columns.extend((0..n).map(Column::Velocity));
+    columns.extend((0..n).map(Column::Momentum));
+    columns.extend([Column::Action, Column::Energy]);
+    columns.extend(conformal_factor.then_some(Column::LogFactor));
+    columns
+}
+
+/// The times of an argument: those of the rows, of which the first is that of the start; a single number is the end, from 0.
+pub fn times(t: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let mut times = numbers("t", t)?;
+    if let [end] = times.as_slice() {
+        if t.len().is_ok() {
+            return Err(no_times());
+        }
+        times = vec![0.0, *end];
+    }
+    Ok(times)
+}
+
+fn no_times() -> PyErr {
+    value_error("`t` must be the time of the end, for a motion that starts at 0, or at least two times of which the first is that of the start")
+}
+
+/// A column or an event by its text, with its name in what is wrong with it.
+fn named<T>(what: &str, text: &str, read: Result<T, runtime_herglotz::RuntimeError>) -> PyResult<T> {
+    read.map_err(|error| value_error(format!("{what} {text:?}: {error}")))
+}
+
+#[pymethods]
+impl Motion {
+    #[new]
+    #[expect(clippy::too_many_arguments, reason = "they are those of `solve`, which names them")]
+    fn new(
+        system: &System,
+        start: (Bound<'_, PyAny>, Bound<'_, PyAny>, bool, Bound<'_, PyAny>),
+        t: Bound<'_, PyAny>,
+        every: Option<usize>,
+        way: GivenWay<'_>,
+        events: Vec<(String, String, bool)>,
+        columns: Vec<String>,
+        conformal_factor: bool,
+    ) -> PyResult<Self> {
+        let formula = system.inner.formula();
+        let (q, rate, is_momentum, z) = start;
+        let q = numbers("q0", &q)?;
+        let rate =
+            if is_momentum { Rate::Momentum(numbers("p0", &rate)?) } else { Rate::Velocity(numbers("v0", &rate)?) };
+        let length = match &rate {
+            Rate::Velocity(v) => ("v0", v.len()),
+            Rate::Momentum(p) => ("p0", p.len()),
+        };
+        let expected = formula.dimension();
+        for (what, found) in [("q0", q.len()), length] {
+            if found != expected {
+                return Err(value_error(format!(
+                    "`{what}` has {found} numbers, where the system has {expected} coordinates"
+                )));
+            }
+        }
+        let times = times(&t)?;
+        let (Some(&first), Some(&end)) = (times.first(), times.last()) else { return Err(no_times()) };
+        let rows = Some(every.map_or(When::At(times), When::Every));
+        let way = self::way(&way)?;
+        let mut all = self::columns(expected, conformal_factor);
+        for text in &columns {
+            all.push(named("the column", text, Column::parse(text, formula))?);
+        }
+        let read = |(text, direction, terminal): &(String, String, bool)| {
+            let function = named("the event", text, formula.expression(text).map_err(Into::into))?;
+            let direction = match direction.as_str() {
+                "rising" => Direction::Rising,
+                "falling" => Direction::Falling,
+                "both" => Direction::Both,
+                other => {
+                    return Err(value_error(format!(
+                        "the direction {other:?} of the event {text:?} is none of \"rising\", \"falling\", \"both\""
+                    )));
+                }
+            };
+            Ok(Event { function, direction, terminal: *terminal })
+        };
+        let events = events.iter().map(read).collect::<PyResult<_>>()?;
+        let start = Start { t: first, q, rate, z: number("z0", &z)? };
+        let motion = runtime_herglotz::Motion {
+            rows,
+            columns: all,
+            events,
+            conformal_factor,
+            ..runtime_herglotz::Motion::new(start, end, way)
+        };
+        Ok(Motion { system: system.inner.clone(), motion, conformal_factor })
+    }
+
+    /// The plan in words, with the name of the integrator, the step, the number of steps and the predicted error.
+    fn plan(&self, py: Python<'_>) -> PyResult<(String, String, f64, usize, Option<f64>)> {
+        let plan = py.detach(|| self.system.plan(&self.motion)).map_err(value_error)?;
+        Ok((plan.text, plan.integrator.name.into_owned(), plan.step_size, plan.steps, plan.error))
+    }
+}

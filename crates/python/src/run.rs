@@ -1,0 +1,132 @@
+//! Runs of motions, and what is kept of them.
+
+use crate::arrays::{matrix, value_error, vector};
+use crate::motion::Motion;
+use crate::signals::Signals;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use runtime_herglotz::{Crossing, Outcome, Status, Watch};
+use std::ops::ControlFlow;
+
+/// Keeps the rows of a motion by their parts.
+struct Kept {
+    n: usize,
+    conformal_factor: bool,
+    t: Vec<f64>,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    p: Vec<f64>,
+    z: Vec<f64>,
+    energy: Vec<f64>,
+    log_factor: Vec<f64>,
+    columns: Vec<f64>,
+    crossings: Vec<Crossing>,
+    signals: Signals,
+}
+
+impl Watch for Kept {
+    fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
+        let n = self.n;
+        let mut rest = numbers;
+        let mut take = |count: usize, to: &mut Vec<f64>| {
+            let (first, others) = rest.split_at(count.min(rest.len()));
+            to.extend_from_slice(first);
+            rest = others;
+        };
+        take(1, &mut self.t);
+        take(n, &mut self.q);
+        take(n, &mut self.v);
+        take(n, &mut self.p);
+        take(1, &mut self.z);
+        take(1, &mut self.energy);
+        if self.conformal_factor {
+            take(1, &mut self.log_factor);
+        }
+        take(usize::MAX, &mut self.columns);
+        ControlFlow::Continue(())
+    }
+
+    fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
+        self.crossings.push(crossing.clone());
+        ControlFlow::Continue(())
+    }
+
+    fn poll(&mut self, _part: f64) -> ControlFlow<()> {
+        self.signals.look()
+    }
+}
+
+/// A crossing: the index of the event, t, q, v, p and z.
+type Crossed = (usize, f64, Vec<f64>, Vec<f64>, Vec<f64>, f64);
+
+/// What a motion has led to, by rows.
+#[pyclass(frozen, get_all, module = "herglotz._core")]
+pub struct Record {
+    t: Py<PyArray1<f64>>,
+    q: Py<PyArray2<f64>>,
+    v: Py<PyArray2<f64>>,
+    p: Py<PyArray2<f64>>,
+    z: Py<PyArray1<f64>>,
+    energy: Py<PyArray1<f64>>,
+    log_factor: Option<Py<PyArray1<f64>>>,
+    /// A column for each that was asked for.
+    columns: Option<Py<PyArray2<f64>>>,
+    crossings: Vec<Crossed>,
+    /// The end, whether it is a row or not: t, q, p, z.
+    end: (f64, Vec<f64>, Vec<f64>, Option<f64>),
+    status: String,
+    success: bool,
+    suspicion: Option<String>,
+    steps: usize,
+    evaluations: u64,
+    interrupted: Option<Py<PyAny>>,
+}
+
+/// Runs a motion, with the interpreter left to other threads.
+#[pyfunction]
+pub fn run(py: Python<'_>, motion: &Motion) -> PyResult<Record> {
+    let n = motion.system.dimension();
+    let mut kept = Kept {
+        n,
+        conformal_factor: motion.conformal_factor,
+        t: Vec::new(),
+        q: Vec::new(),
+        v: Vec::new(),
+        p: Vec::new(),
+        z: Vec::new(),
+        energy: Vec::new(),
+        log_factor: Vec::new(),
+        columns: Vec::new(),
+        crossings: Vec::new(),
+        signals: Signals::new(),
+    };
+    let outcome = py.detach(|| motion.system.run(&motion.motion, &mut kept)).map_err(value_error)?;
+    record(py, motion, kept, outcome)
+}
+
+fn record(py: Python<'_>, motion: &Motion, kept: Kept, outcome: Outcome) -> PyResult<Record> {
+    let n = kept.n;
+    let own = crate::motion::columns(n, motion.conformal_factor).len();
+    let extra = motion.motion.columns.len() - own;
+    let columns = if extra > 0 { Some(matrix(py, kept.columns, extra)?) } else { None };
+    let crossings = kept.crossings.into_iter().map(|c| (c.event, c.t, c.q, c.v, c.p, c.z)).collect();
+    Ok(Record {
+        t: vector(py, kept.t),
+        q: matrix(py, kept.q, n)?,
+        v: matrix(py, kept.v, n)?,
+        p: matrix(py, kept.p, n)?,
+        z: vector(py, kept.z),
+        energy: vector(py, kept.energy),
+        log_factor: motion.conformal_factor.then(|| vector(py, kept.log_factor)),
+        columns,
+        crossings,
+        end: (outcome.t, outcome.q, outcome.p, outcome.z),
+        status: outcome.status.to_string(),
+        // A terminal event is what was asked for.
+        success: matches!(outcome.status, Status::Completed | Status::Stopped { .. }) && kept.signals.raised.is_none(),
+        suspicion: outcome.suspicion.map(|suspicion| suspicion.to_string()),
+        steps: outcome.steps,
+        evaluations: outcome.evaluations,
+        interrupted: kept.signals.raised.map(|raised| raised.into_value(py).into_any()),
+    })
+}

@@ -1,0 +1,135 @@
+//! Systems.
+
+use crate::arrays::value_error;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyType};
+use runtime_herglotz::SeenSymmetry;
+
+/// A Lagrangian with all that integrators need.
+#[pyclass(frozen, module = "herglotz")]
+pub struct System {
+    pub inner: runtime_herglotz::System,
+    /// The text of the formula.
+    #[pyo3(get)]
+    lagrangian: String,
+    /// The coordinates as they were given, arrays with their length.
+    #[pyo3(get)]
+    given_coordinates: Vec<String>,
+}
+
+/// What an object is made anew of: its class, and the arguments.
+type Reduced<'py> = (Bound<'py, PyType>, (String, Vec<String>, Bound<'py, PyDict>));
+
+/// Slices of texts.
+fn texts(of: &[String]) -> Vec<&str> {
+    of.iter().map(String::as_str).collect()
+}
+
+/// The values of parameters, by name.
+pub fn values(of: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(String, f64)>> {
+    let Some(of) = of else { return Ok(Vec::new()) };
+    let pair = |(name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+        let name: String = name.extract().map_err(|_| value_error("a name in `parameters` is no text"))?;
+        let value = crate::arrays::number(&format!("parameters[{name:?}]"), &value)?;
+        Ok((name, value))
+    };
+    of.iter().map(pair).collect()
+}
+
+#[pymethods]
+impl System {
+    #[new]
+    #[pyo3(signature = (lagrangian, coordinates, parameters = None))]
+    fn new(lagrangian: String, coordinates: Vec<String>, parameters: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let parameters = values(parameters)?;
+        let values: Vec<(&str, f64)> = parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+        let inner = runtime_herglotz::System::parse(&lagrangian, &texts(&coordinates), &values).map_err(value_error)?;
+        Ok(System { inner, lagrangian, given_coordinates: coordinates })
+    }
+
+    /// The names of the coordinates.
+    #[getter]
+    fn coordinates(&self) -> Vec<String> {
+        self.inner.formula().coordinates()
+    }
+
+    /// The parameters with their values.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        self.inner.formula().parameters().try_for_each(|(name, value)| all.set_item(name, value))?;
+        Ok(all)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        let (this, py) = (slf.get(), slf.py());
+        Ok((slf.get_type(), (this.lagrangian.clone(), this.given_coordinates.clone(), this.parameters(py)?)))
+    }
+
+    fn __repr__(&self) -> String {
+        let parameters = self.inner.formula().parameters().map(|(name, value)| format!("{name:?}: {value:?}"));
+        let parameters: Vec<String> = parameters.collect();
+        let (l, coordinates) = (&self.lagrangian, &self.given_coordinates);
+        format!("System({l:?}, {coordinates:?}, {{{}}})", parameters.join(", "))
+    }
+
+    /// The same with other values of some parameters.
+    fn with_parameters(&self, parameters: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let parameters = values(Some(parameters))?;
+        let values: Vec<(&str, f64)> = parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+        let inner = self.inner.with_parameters(&values).map_err(value_error)?;
+        Ok(System {
+            inner,
+            lagrangian: self.lagrangian.clone(),
+            given_coordinates: self.given_coordinates.clone(),
+        })
+    }
+
+    /// The number of coordinates.
+    #[getter]
+    fn dimension(&self) -> usize {
+        self.inner.dimension()
+    }
+
+    /// What is proved of the formula, by name.
+    #[getter]
+    fn structure(&self) -> Vec<&'static str> {
+        let s = self.inner.structure();
+        let all = [
+            ("autonomous", s.autonomous),
+            ("z_free", s.z_free),
+            ("z_affine", s.z_affine),
+            ("constant_rate", s.constant_rate),
+            ("separable", s.separable),
+            ("quadratic", s.quadratic),
+            ("constant_mass", s.constant_mass),
+            ("smooth", self.inner.is_smooth()),
+        ];
+        all.into_iter().filter(|(_, holds)| *holds).map(|(name, _)| name).collect()
+    }
+
+    /// The symmetries that are seen: the coordinates that a translation moves, or the pair that a rotation turns.
+    #[getter]
+    fn symmetries(&self) -> Vec<Vec<usize>> {
+        let of = |symmetry: SeenSymmetry| match symmetry {
+            SeenSymmetry::Translation(i) => vec![i],
+            SeenSymmetry::Rotation(i, j) => vec![i, j],
+        };
+        self.inner.symmetries().into_iter().map(of).collect()
+    }
+
+    /// The Lagrangian as a source file in Rust.
+    fn to_rust(&self, name: &str) -> PyResult<String> {
+        self.inner.to_rust(name).map_err(value_error)
+    }
+}
+
+/// The names of all coordinates and of their velocities, of names with arrays.
+#[pyfunction]
+pub fn velocity_names(coordinates: Vec<String>) -> PyResult<(Vec<String>, Vec<String>)> {
+    // A formula knows how names are read.
+    let formula = runtime_herglotz::Formula::parse("0", &texts(&coordinates), &[]).map_err(value_error)?;
+    let names = formula.coordinates();
+    let velocities = names.iter().map(|name| runtime_herglotz::velocity_name(name)).collect();
+    Ok((names, velocities))
+}

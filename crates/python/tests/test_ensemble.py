@@ -1,0 +1,99 @@
+"""Many motions: against single ones, threads, processes, failures."""
+
+from concurrent.futures import ProcessPoolExecutor
+
+import joblib
+import multiprocessing
+import numpy as np
+import pytest
+
+import herglotz as hz
+
+PENDULUM = "theta'^2/2 + cos(theta) + gamma*z"
+NAMES = ["theta"]
+
+
+def starts(count):
+    rng = np.random.default_rng(3)
+    return rng.uniform(-2, 2, (count, 1)), rng.uniform(-1, 1, (count, 1))
+
+
+def test_members_are_single_motions():
+    q, v = starts(50)
+    many = hz.ensemble(PENDULUM, q, v, 10.0, accuracy=1e-10, coordinates=NAMES, parameters={"gamma": -0.1})
+    assert many.q.shape == (50, 1) and many.z.shape == (50,) and many.success.all() and not many.troubles
+    for i in (0, 17, 49):
+        one = hz.solve(PENDULUM, q[i], v[i], 10.0, accuracy=1e-12, coordinates=NAMES, parameters={"gamma": -0.1})
+        assert np.allclose(many.q[i], one.q[-1], atol=1e-9) and np.isclose(many.z[i], one.z[-1], atol=1e-9)
+
+
+def test_parameters_and_rows_differ():
+    q, v = starts(20)
+    gamma = np.linspace(-1, 0, 20)
+    t = np.linspace(0, 5, 6)
+    wanted = dict(accuracy=1e-10, coordinates=NAMES)
+    many = hz.ensemble(
+        PENDULUM, q, v, t, parameters={"gamma": gamma}, z0=np.arange(20.0), observe={"e": "exp(gamma*t)"}, **wanted
+    )
+    assert many.q.shape == (20, 6, 1) and many["e"].shape == (20, 6)
+    for i in (0, 7, 19):
+        one = hz.solve(PENDULUM, q[i], v[i], t, z0=float(i), parameters={"gamma": gamma[i]}, **wanted)
+        assert np.allclose(many.q[i], one.q, atol=1e-9) and np.allclose(many.z[i], one.z, atol=1e-8)
+        assert np.allclose(many["e"][i], np.exp(gamma[i] * t))
+
+
+def test_the_number_of_threads_does_not_matter():
+    q, v = starts(1000)
+    run = lambda threads: hz.ensemble(
+        PENDULUM, q, v, 3.0, integrator="gauss_8", step=0.25, threads=threads, coordinates=NAMES, parameters={"gamma": -0.1}
+    )
+    assert np.array_equal(run(1).q, run(3).q)
+
+
+def test_a_member_that_fails_is_told():
+    fall = "x'^2/2 + 1/x"
+    q = np.array([[1.0], [0.0], [2.0]])
+    many = hz.ensemble(fall, q, np.zeros((3, 1)), 0.5, integrator="gauss_4", step=0.05, coordinates=["x"])
+    assert list(many.success) == [True, False, True] and set(many.troubles) == {1}
+    assert np.isnan(many.q[1]).all() and np.isfinite(many.q[[0, 2]]).all()
+
+
+def test_shapes_are_checked():
+    ask = lambda q, v, **more: hz.ensemble(PENDULUM, q, v, 1.0, coordinates=NAMES, **more)
+    with pytest.raises(ValueError, match="`q0`"):
+        ask([1.0], [0.0], parameters={"gamma": 0.0})
+    with pytest.raises(ValueError, match="`v0`"):
+        ask(np.ones((3, 1)), np.ones((2, 1)), parameters={"gamma": 0.0})
+    with pytest.raises(ValueError, match=r"parameters\[\"gamma\"\]"):
+        ask(np.ones((3, 1)), np.ones((3, 1)), parameters={"gamma": np.zeros(4)})
+    with pytest.raises(ValueError, match="`z0`"):
+        ask(np.ones((3, 1)), np.ones((3, 1)), z0=[0.0], parameters={"gamma": 0.0})
+
+
+def part(work):
+    system, q, v = work
+    many = hz.ensemble(system, q, v, 3.0, integrator="gauss_8", step=0.25, threads=1)
+    return many.q
+
+
+def end(sol):
+    return sol.q[-1], sol(0.5).q
+
+
+def test_processes_give_the_same_numbers():
+    system = hz.system(PENDULUM, NAMES, {"gamma": -0.1})
+    q, v = starts(64)
+    whole = part((system, q, v))
+    parts = [(system, q[i : i + 16], v[i : i + 16]) for i in range(0, 64, 16)]
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        assert np.array_equal(np.concatenate(list(pool.map(part, parts))), whole)
+        sol = hz.solve(system, [1.0], [0.0], 1.0)
+        there, here = pool.submit(end, sol).result(), end(sol)
+        assert np.array_equal(there[0], here[0]) and np.array_equal(there[1], here[1])
+
+
+def test_joblib_gives_the_same_numbers():
+    system = hz.system(PENDULUM, NAMES, {"gamma": -0.1})
+    q, v = starts(32)
+    jobs = (joblib.delayed(part)((system, q[i : i + 16], v[i : i + 16])) for i in (0, 16))
+    assert np.array_equal(np.concatenate(joblib.Parallel(n_jobs=2)(jobs)), part((system, q, v)))
