@@ -272,3 +272,22 @@ fn scenes_run() {
         assert!((log_factor + 2.0 * t.ln()).abs() < 1e-9, "{t}");
     }
 }
+
+/// Where the integrators are compared, each error has its best one, and shorter steps have smaller errors.
+#[test]
+#[ignore = "some seconds of measuring"]
+fn comparisons_name_the_best() {
+    let at = Directory::new("compare");
+    let file = at.write("scene.toml", &OSCILLATOR.replace("time = 400.0", "time = 20.0"));
+    let said = succeed(&["compare", &file, "--out", &at.path("out")]);
+    let best = said.lines().find(|line| line.starts_with("the best for 1e-3: ")).unwrap();
+    assert!(["1e-6: ", "1e-9: ", "1e-12: "].iter().all(|error| best.contains(error)), "{said}");
+    let table = at.read("out/compare.csv");
+    let of = |name: &str| {
+        let rows: Vec<&str> = table.lines().filter(|line| line.starts_with(name)).collect();
+        rows.iter().map(|row| row.split(',').nth(5).unwrap().parse::<f64>().unwrap()).collect::<Vec<_>>()
+    };
+    let errors = of("midpoint,");
+    assert!(errors.len() > 2 && errors[0] > 10.0 * errors[errors.len() - 1], "{errors:?}");
+    assert!(!of("gauss_8,").is_empty() && at.read("out/compare.svg").contains("midpoint"));
+}
