@@ -108,6 +108,10 @@ fn rows_and_events_are_those_of_the_motion() {
     let period = std::f64::consts::TAU / f64::sqrt(0.99);
     assert!(times.len() == 4 && times.windows(2).all(|t| (t[1] - t[0] - period).abs() < 1e-9), "{times:?}");
     assert!(at.read("out/columns.svg").contains("<svg"));
+    // A column that is not always a number.
+    let of_column = at.write("column.toml", &OSCILLATOR.replace("\"exp(-gamma*t/2)*x\"", "\"log(x)\""));
+    let (code, told) = fail(&["run", &of_column, "--out", &at.path("column")]);
+    assert!(code == Some(0) && told.contains("the column `log(x)` is not a finite number in"), "{told}");
     // A sum of what JSON says.
     let said = succeed(&["run", &file, "--out", &at.path("out"), "--set", "run.time=30", "--json"]);
     let told: serde_json::Value = serde_json::from_str(&said).unwrap();
