@@ -89,7 +89,7 @@ fn panel((x_label, y_label): (&str, &str), line: Line, points: Vec<(f64, f64)>) 
 /// A linear axis around numbers, from a tick to a tick; none where there are none.
 fn axis(numbers: impl Iterator<Item = f64>) -> Option<Axis> {
     let (low, high) = numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-    if !(low <= high) {
+    if low > high {
         return None;
     }
     // What does not vary beyond round-off is shown as a line.

@@ -108,6 +108,10 @@ fn rows_and_events_are_those_of_the_motion() {
     let period = std::f64::consts::TAU / f64::sqrt(0.99);
     assert!(times.len() == 4 && times.windows(2).all(|t| (t[1] - t[0] - period).abs() < 1e-9), "{times:?}");
     assert!(at.read("out/columns.svg").contains("<svg"));
+    // A column that is not always a number.
+    let of_column = at.write("column.toml", &OSCILLATOR.replace("\"exp(-gamma*t/2)*x\"", "\"log(x)\""));
+    let (code, told) = fail(&["run", &of_column, "--out", &at.path("column")]);
+    assert!(code == Some(0) && told.contains("the column `log(x)` is not a finite number in"), "{told}");
     // A sum of what JSON says.
     let said = succeed(&["run", &file, "--out", &at.path("out"), "--set", "run.time=30", "--json"]);
     let told: serde_json::Value = serde_json::from_str(&said).unwrap();
@@ -271,4 +275,23 @@ fn scenes_run() {
     for (t, log_factor) in column(&field, "t").iter().zip(column(&field, "log_factor")) {
         assert!((log_factor + 2.0 * t.ln()).abs() < 1e-9, "{t}");
     }
+}
+
+/// Where the integrators are compared, each error has its best one, and shorter steps have smaller errors.
+#[test]
+#[ignore = "some seconds of measuring"]
+fn comparisons_name_the_best() {
+    let at = Directory::new("compare");
+    let file = at.write("scene.toml", &OSCILLATOR.replace("time = 400.0", "time = 20.0"));
+    let said = succeed(&["compare", &file, "--out", &at.path("out")]);
+    let best = said.lines().find(|line| line.starts_with("the best for 1e-3: ")).unwrap();
+    assert!(["1e-6: ", "1e-9: ", "1e-12: "].iter().all(|error| best.contains(error)), "{said}");
+    let table = at.read("out/compare.csv");
+    let of = |name: &str| {
+        let rows: Vec<&str> = table.lines().filter(|line| line.starts_with(name)).collect();
+        rows.iter().map(|row| row.split(',').nth(5).unwrap().parse::<f64>().unwrap()).collect::<Vec<_>>()
+    };
+    let errors = of("midpoint,");
+    assert!(errors.len() > 2 && errors[0] > 10.0 * errors[errors.len() - 1], "{errors:?}");
+    assert!(!of("gauss_8,").is_empty() && at.read("out/compare.svg").contains("midpoint"));
 }

@@ -68,8 +68,9 @@ fn of_json(check: &runtime_herglotz::Check, momenta: &[String]) -> serde_json::V
 fn in_words(check: &runtime_herglotz::Check, momenta: &[String]) -> String {
     let size = |x: f64| format!("{x:.1e}");
     let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
-    let mut places = vec![words(&["t", "sigma_d", "log_factor", "contact", "Herglotz"])];
-    places[0].extend(momenta.iter().flat_map(|name| [name.clone(), "predicted".to_owned()]));
+    let mut header = words(&["t", "sigma_d", "log_factor", "contact", "Herglotz"]);
+    header.extend(momenta.iter().flat_map(|name| [name.clone(), "predicted".to_owned()]));
+    let mut places = vec![header];
     for place in &check.places {
         let mut row = vec![short(place.t), short(place.sigma), short(place.log_factor)];
         row.extend([size(place.contact_defect), size(place.herglotz_defect)]);

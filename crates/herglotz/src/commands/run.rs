@@ -67,6 +67,8 @@ struct Writer {
     names: Vec<String>,
     row_count: usize,
     event_count: usize,
+    /// The rows in which each column is not finite.
+    not_finite: Vec<usize>,
     /// Whether the next row is written already.
     skip: bool,
     bar: ProgressBar,
@@ -94,6 +96,9 @@ impl Watch for Writer {
             return ControlFlow::Continue(());
         }
         self.row_count += 1;
+        for (count, x) in self.not_finite.iter_mut().zip(numbers) {
+            *count += usize::from(!x.is_finite());
+        }
         let written = self.rows.numbers(numbers);
         self.keep(written)
     }
@@ -195,11 +200,14 @@ impl Run {
         };
         writer.bar.finish_and_clear();
         let outcome = outcome.map_err(explain)?;
-        let Writer { rows, events, row_count, event_count, interrupted, failure, .. } = writer;
+        let Writer { rows, events, row_count, event_count, not_finite, interrupted, failure, .. } = writer;
         let rows_bytes = rows.finish()?;
         let events_bytes = events.map(Table::finish).transpose()?.unwrap_or(0);
         if let Some(failure) = failure {
             return Err(failure);
+        }
+        for (count, (name, _)) in not_finite.iter().zip(&scene.columns).filter(|(count, _)| **count > 0) {
+            eprintln!("warning: the column `{name}` is not a finite number in {count} rows");
         }
         if let Some(interrupted) = &interrupted {
             let path = directory.file(CHECKPOINT);
@@ -281,6 +289,7 @@ impl Run {
             names: scene.events.iter().map(|(name, _)| name.clone()).collect(),
             row_count: beside.map_or(0, |beside| beside.rows),
             event_count: beside.map_or(0, |beside| beside.events),
+            not_finite: vec![0; scene.columns.len()],
             skip,
             bar: progress_bar(!self.json),
             stop: stop_flag(),
@@ -325,8 +334,12 @@ impl Run {
         } else {
             let Plan { integrator, step_size, .. } = plan;
             let error = plan.error.map(|error| format!(", estimated error {error:.1e}")).unwrap_or_default();
-            let mut lines =
-                vec![format!("{status}: {steps} steps of {} by {}{error}", short(*step_size), integrator.name)];
+            let mut lines = vec![format!(
+                "{status}: {steps} {} of {} by {}{error}",
+                if *steps == 1 { "step" } else { "steps" },
+                short(*step_size),
+                integrator.name
+            )];
             let crossings = if scene.events.is_empty() { String::new() } else { format!(", {events} events") };
             lines.push(format!("{rows} rows{crossings}; the end:"));
             lines.extend(end.iter().map(|(name, x)| format!("  {name} = {}", short(*x))));

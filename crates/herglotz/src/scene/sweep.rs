@@ -99,7 +99,7 @@ fn values_of(text: &str, values: &At<Values>) -> Result<Vec<f64>, SceneError> {
         count if count > MOST => return refuse("too many values; take fewer"),
         count => count,
     };
-    if *spacing == Spacing::Log && !(a * b > 0.0) {
+    if *spacing == Spacing::Log && (a == 0.0 || b == 0.0 || a.signum() != b.signum()) {
         return refuse("equal quotients need `from` and `to` of one sign, and not 0; take spacing = \"linear\"");
     }
     let last = count.saturating_sub(1).max(1) as f64;
