@@ -6,6 +6,7 @@ mod condition;
 mod contact;
 mod dense;
 mod ensemble;
+mod exact;
 mod looks;
 mod motion;
 mod run;
@@ -26,6 +27,8 @@ mod _core {
     use crate::dense::{Dense, nodes};
     #[pymodule_export]
     use crate::ensemble::{EnsembleRecord, run_ensemble};
+    #[pymodule_export]
+    use crate::exact::{exact_lagrangian, exponential, retract};
     #[pymodule_export]
     use crate::looks::{check, compare, geometry};
     #[pymodule_export]

@@ -128,7 +128,7 @@ impl Symbol {
             "log1p" => Function::Ln1p,
             "log2" => return Some(self.scaled(Function::Ln, LOG2_E)),
             "log10" => return Some(self.scaled(Function::Ln, LOG10_E)),
-            "positive" => return Some(Ok(self.clone())),
+            "positive" | "conjugate" => return Some(Ok(self.clone())),
             "square" => return Some(self.with(|graph| graph.powi(self.id, 2))),
             "arcsin" => return Some(self.inverse(true)),
             "arccos" => return Some(self.inverse(false)),

@@ -78,7 +78,7 @@ def test_the_geometry_at_a_point():
 
 
 def test_a_check_of_contact_steps():
-    found = hz.check(L, [1.0], [0.0], 10.0, integrator="gauss_4", step=0.25, places=4)
+    found = hz.check(L, [1.0], [0.3], 10.0, integrator="gauss_4", step=0.25, places=4)
     assert found and found.integrator == "gauss_4" and found.step == 0.25 and len(found.places) >= 4
     assert all(place.contact_defect < 1e-9 for place in found.places)
     assert found.places[1].sigma == pytest.approx(np.exp(GAMMA * 0.25), rel=1e-9)

@@ -16,6 +16,7 @@ A Lagrangian L(t, q, v, z) that depends on its own action z has friction in it: 
 
 from ._core import System, catalogue as _catalogue, integrators as _integrators
 from ._ensemble import Ensemble, ensemble
+from ._exact import DiscreteLagrangian, Exponential, Retraction, exact_lagrangian, exponential, retract
 from ._looks import Check, Comparison, Contact, Geometry, check, compare, geometry, is_contact
 from ._solution import Crossings, Interrupted, Plan, Solution, States
 from ._solve import Event, solve
@@ -40,11 +41,14 @@ __all__ = [
     "Comparison",
     "Contact",
     "Crossings",
+    "DiscreteLagrangian",
     "Ensemble",
     "Event",
+    "Exponential",
     "Geometry",
     "Interrupted",
     "Plan",
+    "Retraction",
     "Solution",
     "States",
     "System",
@@ -53,9 +57,12 @@ __all__ = [
     "check",
     "compare",
     "ensemble",
+    "exact_lagrangian",
+    "exponential",
     "geometry",
     "integrators",
     "is_contact",
+    "retract",
     "solve",
     "system",
     "where",

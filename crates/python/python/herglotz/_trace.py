@@ -64,7 +64,7 @@ def _choose(condition, x, y):
 
 _UNARY = (
     "negative positive reciprocal sqrt absolute fabs sign sin cos tan arctan arcsin arccos sinh cosh tanh arcsinh arccosh "
-    "arctanh exp expm1 log log1p log2 log10 square"
+    "arctanh exp expm1 log log1p log2 log10 square conjugate"
 )
 _UFUNCS = {getattr(np, name): _unary(name) for name in _UNARY.split()}
 _BINARY = {"minimum": "minimum", "maximum": "maximum", "fmin": "minimum", "fmax": "maximum"}

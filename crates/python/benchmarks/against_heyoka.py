@@ -1,0 +1,180 @@
+"""Motions from Python beside heyoka's, in one run: warm, cold, the overhead of a call, the time to import, the size of the wheel.
+
+    python benchmarks/against_heyoka.py [WHEEL]
+
+Needs heyoka beside herglotz. The motions are (T is the end, z is carried along):
+
+    P2   v^2/2 - 1 + cos q - 0.01 z      q = 1, v = 1   T = 1000
+    P6   v^2/2 - q^2/2 - 0.05 z^2        q = 1, v = 0, z = 1   T = 100
+
+Warm is the cheapest way to an error of (q, v) at the end, relative to its size there: of both a list of settings is run. The reference
+is heyoka's with its smallest tolerance.
+"""
+
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+
+PROBLEMS = {
+    "P2": dict(start=([1.0], [1.0], 0.0), end=1000.0, levels={1e-9: 0.4, 1e-12: 0.4}),
+    "P6": dict(start=([1.0], [0.0], 1.0), end=100.0, levels={1e-9: 0.6}),
+}
+
+
+def lagrangian(name):
+    return {
+        "P2": lambda t, q, v, z: v @ v / 2 - 1 + np.cos(q[0]) - 0.01 * z,
+        "P6": lambda t, q, v, z: v @ v / 2 - q @ q / 2 - 0.05 * z * z,
+    }[name]
+
+
+def equations(name, hy):
+    q, v, z = hy.make_vars("q", "v", "z")
+    if name == "P2":
+        return [(q, v), (v, -hy.sin(q) - 0.01 * v), (z, v * v / 2.0 - 1.0 + hy.cos(q) - 0.01 * z)]
+    return [(q, v), (v, -q - 0.1 * z * v), (z, v * v / 2.0 - q * q / 2.0 - 0.05 * z * z)]
+
+
+def median(run, least=0.3):
+    times, run_until = [], time.perf_counter() + least
+    while time.perf_counter() < run_until or len(times) < 7:
+        begin = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - begin)
+    return float(np.median(times))
+
+
+def of_heyoka(name, tolerance):
+    import heyoka as hy
+
+    q, v, z = PROBLEMS[name]["start"]
+    state, end = np.array([*q, *v, z]), PROBLEMS[name]["end"]
+    integrator = hy.taylor_adaptive(equations(name, hy), state.tolist(), tol=tolerance)
+
+    def run():
+        integrator.time = 0.0
+        integrator.state[:] = state
+        integrator.propagate_until(end)
+        return integrator.state[:2].copy()
+
+    return run
+
+
+def of_herglotz(name, integrator, steps):
+    import herglotz as hz
+
+    q, v, z = PROBLEMS[name]["start"]
+    system = hz.system(lagrangian(name), n=1)
+
+    def run():
+        sol = hz.solve(system, q, v, PROBLEMS[name]["end"], z0=z, integrator=integrator, steps=steps)
+        return np.array([sol.q[-1, 0], sol.v[-1, 0]])
+
+    return run
+
+
+def cheapest(runs, reference, level):
+    """The median time of the fastest of some runs that are within an error, with its settings."""
+    best = None
+    for settings, run in runs:
+        found = run()
+        if np.linalg.norm(found - reference) <= level * np.linalg.norm(reference):
+            seconds = median(run)
+            if best is None or seconds < best[0]:
+                best = seconds, settings
+    return best
+
+
+def warm():
+    for name, problem in PROBLEMS.items():
+        reference = of_heyoka(name, 1e-28 if name == "P2" else 1e-18)()
+        theirs = [(f"tol={tol:.0e}", of_heyoka(name, tol)) for tol in 10.0 ** -np.arange(6, 19)]
+        end = problem["end"]
+        ours = [
+            (f"gauss_{stages}, {steps} steps", of_herglotz(name, f"gauss_{stages}", int(steps)))
+            for stages in (6, 8, 10, 12, 14, 16)
+            for steps in np.unique(np.round(end / np.linspace(0.8, 5.0, 15)))
+        ]
+        for level, bound in problem["levels"].items():
+            their, our = cheapest(theirs, reference, level), cheapest(ours, reference, level)
+            if their is None or our is None:
+                print(f"{name} warm, {level:.0e}: heyoka {their}, herglotz {our}")
+                continue
+            print(
+                f"{name} warm, {level:.0e}: heyoka {their[0] * 1e6:.0f} us ({their[1]}), herglotz {our[0] * 1e6:.0f} us "
+                f"({our[1]}): {our[0] / their[0]:.2f}, of at most {bound}"
+            )
+
+
+COLD_HEYOKA = """
+import sys, time, numpy as np, heyoka as hy
+sys.path.insert(0, {folder!r})
+from against_heyoka import *
+begin = time.perf_counter()
+of_heyoka({name!r}, 1e-13)()
+print(time.perf_counter() - begin)
+"""
+
+COLD_HERGLOTZ = """
+import sys, time, numpy as np, herglotz as hz
+sys.path.insert(0, {folder!r})
+from against_heyoka import *
+q, v, z = PROBLEMS[{name!r}]["start"]
+begin = time.perf_counter()
+hz.solve(lagrangian({name!r}), q, v, PROBLEMS[{name!r}]["end"], z0=z, accuracy=1e-9)
+print(time.perf_counter() - begin)
+"""
+
+IMPORT = """
+import time
+begin = time.perf_counter()
+import numpy
+middle = time.perf_counter()
+import herglotz
+print(time.perf_counter() - middle)
+"""
+
+
+def in_a_process(code, count=5):
+    """The median of the number that a program prints, each time in a process of its own."""
+    found = [float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout) for _ in range(count)]
+    return float(np.median(found))
+
+
+def cold():
+    folder = os.path.dirname(os.path.abspath(__file__))
+    for name in PROBLEMS:
+        their = in_a_process(COLD_HEYOKA.format(folder=folder, name=name))
+        our = in_a_process(COLD_HERGLOTZ.format(folder=folder, name=name))
+        print(f"{name} cold, 1e-9: heyoka {their * 1e3:.1f} ms, herglotz {our * 1e3:.2f} ms: {our / their:.3f}, of at most 0.05")
+
+
+def overhead():
+    """A call of `solve`, less the run itself: of one step, which both have."""
+    import herglotz as hz
+    from herglotz import _core
+
+    system = hz.system(lagrangian("P2"), n=1)
+    request = ([1.0], [1.0], False, 0.0), 0.1, None, (None, "strang", None, 1), [], [], False
+    motion = _core.Motion(system, *request)
+    run = median(lambda: [_core.run(motion) for _ in range(100)]) / 100
+    for what, L in (("a system", system), ("a function", lagrangian("P2"))):
+        call = lambda: hz.solve(L, [1.0], [1.0], 0.1, integrator="strang", steps=1)
+        whole = median(lambda: [call() for _ in range(100)]) / 100
+        print(f"overhead of solve of {what}: {(whole - run) * 1e6:.1f} us, of at most 20; its run of one step {run * 1e6:.1f} us")
+
+
+def main():
+    warm()
+    cold()
+    overhead()
+    print(f"import after numpy: {in_a_process(IMPORT) * 1e3:.1f} ms, of at most 50")
+    if len(sys.argv) > 1:
+        print(f"wheel: {os.path.getsize(sys.argv[1]) / 1e6:.1f} MB, of at most 12")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,302 @@
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Vector: TypeAlias = NDArray[np.float64]
+# A function (t, q, v, z, **parameters), a formula or the name of a system, an expression of SymPy, or a system.
+Lagrangian: TypeAlias = Callable[..., Any] | str | System | Any
+Expression: TypeAlias = str | Callable[..., Any]
+Direction: TypeAlias = Literal["both", "rising", "falling"]
+
+__version__: str
+
+class System:
+    def __new__(cls, lagrangian: str, coordinates: Sequence[str], parameters: Mapping[str, float] | None = None) -> System: ...
+    @property
+    def lagrangian(self) -> str: ...
+    @property
+    def coordinates(self) -> list[str]: ...
+    @property
+    def given_coordinates(self) -> list[str]: ...
+    @property
+    def parameters(self) -> dict[str, float]: ...
+    @property
+    def dimension(self) -> int: ...
+    @property
+    def structure(self) -> list[str]: ...
+    @property
+    def symmetries(self) -> list[list[int]]: ...
+    def with_parameters(self, parameters: Mapping[str, float]) -> System: ...
+    def to_rust(self, name: str) -> str: ...
+
+class Event:
+    when: Expression
+    direction: Direction
+    terminal: bool
+    def __init__(self, when: Expression, direction: Direction = "both", terminal: bool = False) -> None: ...
+
+class Crossings(NamedTuple):
+    t: Vector
+    q: Vector
+    v: Vector
+    p: Vector
+    z: Vector
+
+class States(NamedTuple):
+    t: Vector | float
+    q: Vector
+    v: Vector
+    p: Vector
+    z: Vector | float
+    energy: Vector | float
+
+class Plan:
+    text: str
+    integrator: str
+    step: float
+    steps: int
+    error: float | None
+
+class Solution:
+    system: System
+    t: Vector
+    q: Vector
+    v: Vector
+    p: Vector
+    z: Vector
+    energy: Vector
+    log_factor: Vector | None
+    events: list[Crossings] | dict[str, Crossings]
+    status: str
+    success: bool
+    suspicion: str | None
+    steps: int
+    evaluations: int
+    @property
+    def t_end(self) -> float: ...
+    @property
+    def plan(self) -> Plan: ...
+    @property
+    def momenta(self) -> dict[str, Vector]: ...
+    def __getitem__(self, name: str) -> Vector: ...
+    def __call__(self, t: ArrayLike) -> States: ...
+    def resume(self, t: ArrayLike) -> Solution: ...
+    def to_xarray(self) -> Any: ...
+    def to_pandas(self) -> Any: ...
+    def plot(self, *names: str, ax: Any = None) -> Any: ...
+
+class Interrupted(KeyboardInterrupt):
+    solution: Solution
+    def __init__(self, solution: Solution) -> None: ...
+
+class Ensemble:
+    system: System
+    t: Vector
+    q: Vector
+    v: Vector
+    p: Vector
+    z: Vector
+    times: Vector | None
+    steps: NDArray[np.int64]
+    success: NDArray[np.bool_]
+    troubles: dict[int, str]
+    in_lanes: int
+    def __len__(self) -> int: ...
+    def __getitem__(self, name: str) -> Vector: ...
+
+class Geometry(NamedTuple):
+    lagrangian: float
+    momentum: Vector
+    energy: float
+    rate: float
+    mass: Vector
+    condition: float
+    eta: Vector
+    reeb: Vector
+    volume: float
+    herglotz_field: Vector
+
+class Contact(NamedTuple):
+    is_contact: bool
+    sigma: float
+    defect: float
+    image: Vector
+    jacobian: Vector
+    def __bool__(self) -> bool: ...
+
+class Exponential(NamedTuple):
+    q1: Vector
+    regularity: float
+
+class Retraction(NamedTuple):
+    v0: Vector
+    v1: Vector
+    z1: float
+    action: float
+    sigma: float
+
+class DiscreteLagrangian(NamedTuple):
+    value: float
+    d1: Vector
+    d2: Vector
+    dz: float
+    sigma: float
+
+class Place(NamedTuple):
+    t: float
+    sigma: float
+    log_factor: float
+    contact_defect: float
+    herglotz_defect: float
+    momenta: list[tuple[float, float]]
+
+class Check(NamedTuple):
+    is_contact: bool
+    integrator: str
+    step: float
+    places: list[Place]
+    statements: list[tuple[str, str, float]]
+    def __bool__(self) -> bool: ...
+
+class Work(NamedTuple):
+    integrator: str
+    order: int
+    step: float
+    steps: int
+    evaluations: int
+    error: float
+    seconds: float
+
+class Comparison:
+    rows: list[Work]
+    reference: str
+    left_out: dict[str, str]
+    def best(self, error: float) -> Work | None: ...
+    def to_pandas(self) -> Any: ...
+    def plot(self, ax: Any = None) -> Any: ...
+
+def system(
+    L: Lagrangian,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    *,
+    n: int | None = None,
+) -> System: ...
+def solve(
+    L: Lagrangian,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
+    t: ArrayLike | None = None,
+    *,
+    p0: ArrayLike | None = None,
+    z0: float = 0.0,
+    accuracy: float | None = None,
+    integrator: str | None = None,
+    step: float | None = None,
+    steps: int | None = None,
+    every: int | None = None,
+    events: Expression | Event | Sequence[Expression | Event] | Mapping[str, Expression | Event] = (),
+    observe: Mapping[str, Expression] | None = None,
+    conformal_factor: bool = False,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Solution: ...
+def ensemble(
+    L: Lagrangian,
+    q0: ArrayLike,
+    v0: ArrayLike | None = None,
+    t: ArrayLike | None = None,
+    *,
+    p0: ArrayLike | None = None,
+    z0: ArrayLike = 0.0,
+    accuracy: float | None = None,
+    integrator: str | None = None,
+    step: float | None = None,
+    steps: int | None = None,
+    observe: Mapping[str, Expression] | None = None,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    threads: int | None = None,
+) -> Ensemble: ...
+def geometry(
+    L: Lagrangian,
+    t: float,
+    q: ArrayLike,
+    v: ArrayLike,
+    z: float = 0.0,
+    *,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Geometry: ...
+def is_contact(
+    map: Callable[[Any, Any, Any], tuple[Any, Any, Any]],
+    at: tuple[ArrayLike, ArrayLike, float],
+    *,
+    tolerance: float = 1e-9,
+) -> Contact: ...
+def check(
+    L: Lagrangian,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
+    t: ArrayLike | None = None,
+    *,
+    p0: ArrayLike | None = None,
+    z0: float = 0.0,
+    places: int = 10,
+    accuracy: float | None = None,
+    integrator: str | None = None,
+    step: float | None = None,
+    steps: int | None = None,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Check: ...
+def compare(
+    L: Lagrangian,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
+    t: ArrayLike | None = None,
+    *,
+    p0: ArrayLike | None = None,
+    z0: float = 0.0,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Comparison: ...
+def where(condition: Any, x: Any, y: Any) -> Any: ...
+def array(values: Any) -> Any: ...
+def integrators() -> dict[str, int]: ...
+def catalogue() -> dict[str, str]: ...
+def exponential(
+    L: Lagrangian,
+    h: float,
+    q0: ArrayLike,
+    v0: ArrayLike,
+    z0: float = 0.0,
+    t: float = 0.0,
+    *,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Exponential: ...
+def retract(
+    L: Lagrangian,
+    h: float,
+    q0: ArrayLike,
+    q1: ArrayLike,
+    z0: float = 0.0,
+    t: float = 0.0,
+    *,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Retraction: ...
+def exact_lagrangian(
+    L: Lagrangian,
+    h: float,
+    q0: ArrayLike,
+    q1: ArrayLike,
+    z0: float = 0.0,
+    t: float = 0.0,
+    *,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> DiscreteLagrangian: ...

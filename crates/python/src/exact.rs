@@ -1,0 +1,97 @@
+//! The exact discrete Lagrangian, the contact exponential map and its inverse.
+
+use crate::arrays::{number, numbers, value_error};
+use crate::system::System;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{DiscretePoint, VelocityPoint};
+use discrete_herglotz::DiscreteLagrangian;
+use ::exact_lagrangian::ExactLagrangian;
+use formula_lagrangian::Formula;
+use pyo3::prelude::*;
+
+/// What is computed of points.
+#[derive(Clone, Copy, PartialEq)]
+enum What {
+    Exponential,
+    Retraction,
+    Lagrangian,
+}
+
+/// A time, two vectors and an action, checked.
+struct At {
+    h: f64,
+    t: f64,
+    first: Vec<f64>,
+    second: Vec<f64>,
+    z: f64,
+}
+
+/// The vectors and numbers of a result.
+type Found = (Vec<Vec<f64>>, Vec<f64>);
+
+fn found<const N: usize>(formula: &Formula, what: What, at: &At) -> PyResult<Found> {
+    let vector = |x: &[f64]| SVector::<f64, N>::from_iterator(x.iter().copied());
+    let list = |x: &SVector<f64, N>| x.as_slice().to_vec();
+    let lagrangian = formula.lagrangian::<N>().map_err(value_error)?;
+    let exact = ExactLagrangian::<_, N>::new(&lagrangian, at.h).map_err(value_error)?;
+    let (first, second) = (vector(&at.first), vector(&at.second));
+    if what == What::Exponential {
+        let x = VelocityPoint { q: first, v: second, z: at.z };
+        let differential = exact.exponential().differential(at.t, &x).map_err(value_error)?;
+        let smallest = differential.regularity().smallest;
+        return Ok((vec![list(&differential.image.q1)], vec![smallest]));
+    }
+    let x = DiscretePoint { q0: first, q1: second, z0: at.z };
+    if what == What::Lagrangian {
+        let jet = exact.jet(at.t, &x).map_err(value_error)?;
+        return Ok((vec![list(&jet.d1), list(&jet.d2)], vec![jet.value, jet.dz, jet.sigma()]));
+    }
+    let motion = exact.retract(at.t, &x).map_err(value_error)?;
+    let vectors = vec![list(&motion.start.v), list(&motion.end.v)];
+    Ok((vectors, vec![motion.end.z, motion.action, motion.b.exp()]))
+}
+
+fn of_system(
+    py: Python<'_>,
+    system: &System,
+    what: What,
+    names: [&str; 2],
+    arguments: [Bound<'_, PyAny>; 5],
+) -> PyResult<Found> {
+    let [h, first, second, z, t] = arguments;
+    let (first, second) = (numbers(names[0], &first)?, numbers(names[1], &second)?);
+    let at = At { h: number("h", &h)?, t: number("t", &t)?, first, second, z: number("z0", &z)? };
+    let n = system.inner.dimension();
+    for (name, x) in names.iter().zip([&at.first, &at.second]) {
+        if x.len() != n {
+            return Err(value_error(format!("`{name}` has {} numbers, where the system has {n} coordinates", x.len())));
+        }
+    }
+    let formula = system.inner.formula();
+    py.detach(|| match n {
+        1 => found::<1>(formula, what, &at),
+        2 => found::<2>(formula, what, &at),
+        3 => found::<3>(formula, what, &at),
+        _ => Err(value_error(format!(
+            "the system has {n} coordinates, where the exact Lagrangian is compiled for 1 to 3: write the system in Rust"
+        ))),
+    })
+}
+
+/// The position after a time h, and the smallest singular value of its derivative by the velocity.
+#[pyfunction]
+pub fn exponential(py: Python<'_>, system: &System, arguments: [Bound<'_, PyAny>; 5]) -> PyResult<Found> {
+    of_system(py, system, What::Exponential, ["q0", "v0"], arguments)
+}
+
+/// The velocities of the motion between two points, its end's action, its own action and conformal factor.
+#[pyfunction]
+pub fn retract(py: Python<'_>, system: &System, arguments: [Bound<'_, PyAny>; 5]) -> PyResult<Found> {
+    of_system(py, system, What::Retraction, ["q0", "q1"], arguments)
+}
+
+/// The value and the first derivatives of the exact discrete Lagrangian.
+#[pyfunction]
+pub fn exact_lagrangian(py: Python<'_>, system: &System, arguments: [Bound<'_, PyAny>; 5]) -> PyResult<Found> {
+    of_system(py, system, What::Lagrangian, ["q0", "q1"], arguments)
+}

@@ -1,0 +1,46 @@
+"""The exact discrete Lagrangian: its theorems, and motions of `solve`."""
+
+import numpy as np
+import pytest
+
+import herglotz as hz
+
+
+def L(t, q, v, z):
+    return v @ v / 2 + np.cos(q[0]) * np.cos(q[1]) - 0.1 * z - 0.05 * z * z
+
+
+Q0, V0, Z0, H = [1.0, 0.2], [0.3, -0.4], 0.1, 0.5
+
+
+def test_the_retraction_is_the_inverse_of_the_exponential():
+    there = hz.exponential(L, H, Q0, V0, Z0)
+    assert there.regularity == pytest.approx(H, rel=0.2)
+    back = hz.retract(L, H, Q0, there.q1, Z0)
+    assert np.allclose(back.v0, V0, rtol=1e-13)
+    sol = hz.solve(L, Q0, V0, H, z0=Z0, accuracy=1e-13)
+    assert np.allclose(there.q1, sol.q[-1], rtol=1e-12) and np.allclose(back.v1, sol.v[-1], rtol=1e-12)
+    assert back.z1 == pytest.approx(sol.z[-1], rel=1e-12) and back.action == pytest.approx(sol.z[-1] - Z0, rel=1e-12)
+
+
+def test_the_derivatives_are_momenta():
+    q1 = hz.exponential(L, H, Q0, V0, Z0).q1
+    exact, motion = hz.exact_lagrangian(L, H, Q0, q1, Z0), hz.retract(L, H, Q0, q1, Z0)
+    assert exact.value == pytest.approx(motion.action, rel=1e-13)
+    # W is 1: momenta are velocities.
+    assert np.allclose(exact.d2, motion.v1, rtol=1e-12) and np.allclose(-exact.d1 / exact.sigma, V0, rtol=1e-12)
+    assert exact.sigma == pytest.approx(1 + exact.dz, rel=1e-14) and exact.sigma == pytest.approx(motion.sigma, rel=1e-13)
+    e = 1e-5
+    slope = (hz.exact_lagrangian(L, H, Q0, q1 + [e, 0], Z0).value - hz.exact_lagrangian(L, H, Q0, q1 - [e, 0], Z0).value) / (2 * e)
+    assert slope == pytest.approx(exact.d2[0], rel=1e-8)
+
+
+def test_bad_input_is_named():
+    with pytest.raises(ValueError, match="`q1` has 1"):
+        hz.retract(L, H, Q0, [1.0])
+    with pytest.raises(ValueError, match="`h` is nan"):
+        hz.retract(L, np.nan, Q0, Q0)
+    with pytest.raises(ValueError):
+        hz.retract(L, -1.0, Q0, Q0)
+    with pytest.raises(ValueError, match="compiled for 1 to 3"):
+        hz.exponential("v[0]^2 + v[1]^2 + v[2]^2 + v[3]^2", H, np.ones(4), np.ones(4))

@@ -1,0 +1,40 @@
+"""The stubs say what the package has."""
+
+import ast
+import inspect
+from pathlib import Path
+
+import herglotz as hz
+
+STUBS = ast.parse(Path(hz.__file__).with_name("__init__.pyi").read_text())
+
+
+def test_every_public_name_has_a_stub_and_a_docstring():
+    named = {node.name for node in STUBS.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+    assert set(hz.__all__) <= named
+    # Named tuples that others hold are known by their holders.
+    assert named - set(hz.__all__) <= {"Place", "Work"}
+    for name in hz.__all__:
+        assert inspect.getdoc(getattr(hz, name)), name
+
+
+def test_functions_have_the_arguments_of_their_stubs():
+    for node in STUBS.body:
+        if not isinstance(node, ast.FunctionDef):
+            continue
+        known = [argument.arg for argument in (*node.args.args, *node.args.kwonlyargs)]
+        assert known == list(inspect.signature(getattr(hz, node.name)).parameters), node.name
+
+
+def test_classes_have_what_their_stubs_have():
+    sol = hz.solve("pendulum", t=1.0)
+    made = {"Solution": sol, "Plan": sol.plan, "System": sol.system, "States": sol(0.5), "Event": hz.Event("theta")}
+    made["Ensemble"] = hz.ensemble("pendulum", [[1.0]], [[0.0]], 1.0)
+    made["Geometry"] = hz.geometry("pendulum", 0.0, [1.0], [0.0])
+    made["Contact"] = hz.is_contact(lambda q, p, z: (q, p, z), ([1.0], [0.0], 0.0))
+    for node in STUBS.body:
+        if isinstance(node, ast.ClassDef) and node.name in made:
+            for member in node.body:
+                name = member.target.id if isinstance(member, ast.AnnAssign) else getattr(member, "name", None)
+                if name is not None:
+                    assert hasattr(made[node.name], name), (node.name, name)
