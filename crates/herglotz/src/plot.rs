@@ -111,10 +111,10 @@ fn axis(numbers: impl Iterator<Item = f64>) -> Option<Axis> {
     Some(Axis::Linear((low / step + rounding).floor() * step, (high / step - rounding).ceil() * step, step))
 }
 
-/// The integrators that are near the best for most errors, from 10 to one power to 10 to another; the best ones first.
-fn near_the_best(comparison: &Comparison, worst: i32, best: i32) -> Vec<&str> {
+/// The integrators that are near the best for most errors from 0.1 to 1e-15; the best ones first.
+fn near_the_best(comparison: &Comparison) -> Vec<&str> {
     let mut near: Vec<(&str, usize)> = Vec::new();
-    for error in (best..=worst).map(|power| 10f64.powi(power)) {
+    for error in (1..=15).map(|digits| 10f64.powi(-digits)) {
         let Some(fastest) = comparison.best(error) else { continue };
         let good = |row: &&Work| row.error <= error && row.seconds <= NEAR * fastest.seconds;
         let names: BTreeSet<&str> = comparison.rows.iter().filter(good).map(|row| row.integrator.as_str()).collect();
@@ -131,7 +131,9 @@ fn near_the_best(comparison: &Comparison, worst: i32, best: i32) -> Vec<&str> {
 
 /// Run time against error, both in powers of ten, of the integrators that are near the best.
 pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
-    let shown = || comparison.rows.iter().filter(|row| row.error > 0.0 && row.error.is_finite() && row.seconds > 0.0);
+    let names = near_the_best(comparison);
+    let drawn = |row: &&Work| row.error > 0.0 && row.error.is_finite() && row.seconds > 0.0;
+    let shown = || comparison.rows.iter().filter(drawn).filter(|row| names.contains(&row.integrator.as_str()));
     let range = |of: &dyn Fn(&Work) -> f64| {
         let powers = shown().map(of).map(f64::log10);
         let (low, high) = powers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
@@ -139,7 +141,6 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
     };
     let (fast, slow) = range(&|row| row.seconds)?;
     let (best, worst) = range(&|row| row.error)?;
-    let names = near_the_best(comparison, worst, best);
     let curve = |(number, name): (usize, &&str)| {
         let points = shown().filter(|row| row.integrator == **name).map(|row| (row.seconds, row.error));
         Curve::new(name, Line::Coloured(number), points)
