@@ -2,13 +2,20 @@
 
 use contact_figure::{Axis, Curve, Line, Panel, draw, draw_grid};
 use herglotz::Scene;
-use runtime_herglotz::{Column, Comparison, velocity_name};
+use runtime_herglotz::{Column, Comparison, Work, velocity_name};
+use std::collections::BTreeSet;
 
 /// The most points of a curve: more are not seen.
 const POINTS: usize = 2000;
 
 /// The panels beside each other.
 const IN_A_ROW: usize = 3;
+
+/// The most integrators of a comparison that are drawn.
+const CURVES: usize = 12;
+
+/// How much slower than the best one an integrator may be for an error to be drawn.
+const NEAR: f64 = 3.0;
 
 /// The longest label of an axis, in characters.
 const LABEL: usize = 30;
@@ -104,22 +111,36 @@ fn axis(numbers: impl Iterator<Item = f64>) -> Option<Axis> {
     Some(Axis::Linear((low / step + rounding).floor() * step, (high / step - rounding).ceil() * step, step))
 }
 
-/// Run time against error, both in powers of ten.
+/// The integrators that are near the best for most errors from 0.1 to 1e-15; the best ones first.
+fn near_the_best(comparison: &Comparison) -> Vec<&str> {
+    let mut near: Vec<(&str, usize)> = Vec::new();
+    for error in (1..=15).map(|digits| 10f64.powi(-digits)) {
+        let Some(fastest) = comparison.best(error) else { continue };
+        let good = |row: &&Work| row.error <= error && row.seconds <= NEAR * fastest.seconds;
+        let names: BTreeSet<&str> = comparison.rows.iter().filter(good).map(|row| row.integrator.as_str()).collect();
+        for name in names {
+            match near.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, count)) => *count += 1,
+                None => near.push((name, 1)),
+            }
+        }
+    }
+    near.sort_by_key(|(name, count)| (std::cmp::Reverse(*count), *name));
+    near.into_iter().take(CURVES).map(|(name, _)| name).collect()
+}
+
+/// Run time against error, both in powers of ten, of the integrators that are near the best.
 pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
-    let shown = || comparison.rows.iter().filter(|row| row.error > 0.0 && row.error.is_finite() && row.seconds > 0.0);
-    let range = |of: &dyn Fn(&runtime_herglotz::Work) -> f64| {
+    let names = near_the_best(comparison);
+    let drawn = |row: &&Work| row.error > 0.0 && row.error.is_finite() && row.seconds > 0.0;
+    let shown = || comparison.rows.iter().filter(drawn).filter(|row| names.contains(&row.integrator.as_str()));
+    let range = |of: &dyn Fn(&Work) -> f64| {
         let powers = shown().map(of).map(f64::log10);
         let (low, high) = powers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         (low <= high).then(|| (low.floor() as i32, (high.ceil() as i32).max(low.floor() as i32 + 1)))
     };
     let (fast, slow) = range(&|row| row.seconds)?;
     let (best, worst) = range(&|row| row.error)?;
-    let mut names: Vec<&str> = Vec::new();
-    for row in shown() {
-        if !names.contains(&row.integrator.as_str()) {
-            names.push(&row.integrator);
-        }
-    }
     let curve = |(number, name): (usize, &&str)| {
         let points = shown().filter(|row| row.integrator == **name).map(|row| (row.seconds, row.error));
         Curve::new(name, Line::Coloured(number), points)

@@ -50,7 +50,7 @@ start.x = [1, 2]
 "#;
 
 /// What is changed in a good scene, from and to.
-const BAD: [(&str, &str); 57] = [
+const BAD: [(&str, &str); 58] = [
     // Names.
     ("cos(theta)", "cos(teta)"),
     ("gamma*z", "delta*z"),
@@ -109,6 +109,7 @@ const BAD: [(&str, &str); 57] = [
     ("every = 0.1", "at = [0, 2, 1]"),
     ("every = 0.1", "at = [0, 200]"),
     ("count = 101", "count = 0"),
+    ("count = 101", "count = 10000000000"),
     ("count = 101", "count = 101, spacing = \"log\""),
     ("[system]", "version = 2\nnew = \"thing\"\n[system]"),
     // What the system does not let be done.

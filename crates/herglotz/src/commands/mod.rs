@@ -25,7 +25,7 @@ pub(crate) enum Command {
     Plan(plan::Plan),
     /// Say whether the motion is contact: sigma_d, momenta, Herglotz' equation, and the discrete theory's theorems; ends with 1 if not.
     Check(check::Check),
-    /// Measure run time against error for all integrators that apply: compare.csv and compare.svg.
+    /// Measure run time against error for all integrators that apply: compare.csv, and the best dozen in compare.svg.
     Compare(compare::Compare),
     /// Run all members of a sweep over threads: sweep.csv.
     Sweep(sweep::Sweep),

@@ -9,6 +9,9 @@ use runtime_herglotz::{Formula, Rate, Start};
 /// The largest number of members.
 const MOST: usize = 100_000_000;
 
+/// The largest number of values of one knob, which are kept.
+const MOST_VALUES: usize = 10_000_000;
+
 /// What is swept.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Slot {
@@ -94,9 +97,13 @@ fn values_of(text: &str, values: &At<Values>) -> Result<Vec<f64>, SceneError> {
         Values::Range(range) => range,
     };
     let (a, b) = (super::finite(text, from, "from")?, super::finite(text, to, "to")?);
+    let count_at = count.span();
     let count = match **count {
         0 => return Err(SceneError::at(text, count.span(), "no values; give a `count` of at least 1")),
-        count if count > MOST => return refuse("too many values; take fewer"),
+        count if count > MOST_VALUES => {
+            let message = format!("these are more than {MOST_VALUES} values; take fewer");
+            return Err(SceneError::at(text, count_at, message));
+        }
         count => count,
     };
     if *spacing == Spacing::Log && (a == 0.0 || b == 0.0 || a.signum() != b.signum()) {
