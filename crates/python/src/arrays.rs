@@ -35,7 +35,15 @@ pub fn numbers(name: &str, from: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
         return Ok(vec![number(name, from)?]);
     }
     let plain = |items: &mut dyn Iterator<Item = Bound<'_, PyAny>>| -> Option<Vec<f64>> {
-        items.map(|x| if x.is_exact_instance_of::<PyFloat>() || x.is_exact_instance_of::<PyInt>() { x.extract().ok() } else { None }).collect()
+        items
+            .map(|x| {
+                if x.is_exact_instance_of::<PyFloat>() || x.is_exact_instance_of::<PyInt>() {
+                    x.extract().ok()
+                } else {
+                    None
+                }
+            })
+            .collect()
     };
     let written = if let Ok(list) = from.cast::<PyList>() {
         plain(&mut list.iter())

@@ -2,10 +2,10 @@
 
 use crate::arrays::{number, numbers, value_error};
 use crate::system::System;
+use ::exact_lagrangian::ExactLagrangian;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, VelocityPoint};
 use discrete_herglotz::DiscreteLagrangian;
-use ::exact_lagrangian::ExactLagrangian;
 use formula_lagrangian::Formula;
 use pyo3::prelude::*;
 

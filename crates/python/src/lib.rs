@@ -22,6 +22,8 @@ use runtime_herglotz::{AnyIntegrator, CATALOGUE};
 #[pymodule]
 mod _core {
     #[pymodule_export]
+    use crate::condition::Condition;
+    #[pymodule_export]
     use crate::contact::conformality;
     #[pymodule_export]
     use crate::dense::{Dense, nodes};
@@ -36,8 +38,6 @@ mod _core {
     #[pymodule_export]
     use crate::run::{Record, run};
     #[pymodule_export]
-    use crate::condition::Condition;
-    #[pymodule_export]
     use crate::symbol::{Symbol, symbols};
     #[pymodule_export]
     use crate::system::{System, velocity_names};
@@ -46,15 +46,8 @@ mod _core {
 }
 
 /// An entry of the catalogue: name, about, coordinates, Lagrangian, parameters, position and velocity of the start.
-type Entry = (
-    &'static str,
-    &'static str,
-    Vec<&'static str>,
-    &'static str,
-    Vec<(&'static str, f64)>,
-    Vec<f64>,
-    Vec<f64>,
-);
+type Entry =
+    (&'static str, &'static str, Vec<&'static str>, &'static str, Vec<(&'static str, f64)>, Vec<f64>, Vec<f64>);
 
 /// The systems that are known by name.
 #[pyfunction]

@@ -68,8 +68,7 @@ pub fn compare(py: Python<'_>, motion: &Motion) -> PyResult<Compared> {
         return Err(raised);
     }
     let found = found.map_err(value_error)?;
-    let row = |w: runtime_herglotz::Work| {
-        (w.integrator, w.order, w.step_size, w.steps, w.evaluations, w.error, w.seconds)
-    };
+    let row =
+        |w: runtime_herglotz::Work| (w.integrator, w.order, w.step_size, w.steps, w.evaluations, w.error, w.seconds);
     Ok((found.rows.into_iter().map(row).collect(), found.reference, found.left_out))
 }

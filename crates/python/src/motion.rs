@@ -63,7 +63,9 @@ pub fn times(t: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
 }
 
 fn no_times() -> PyErr {
-    value_error("`t` must be the time of the end, for a motion that starts at 0, or at least two times of which the first is that of the start")
+    value_error(
+        "`t` must be the time of the end, for a motion that starts at 0, or at least two times of which the first is that of the start",
+    )
 }
 
 /// A column or an event by its text, with its name in what is wrong with it.

@@ -292,9 +292,8 @@ impl Symbol {
     /// A function of one number by the name that NumPy has for it.
     #[pyo3(name = "apply")]
     fn apply_named(&self, name: &str) -> PyResult<Symbol> {
-        self.named(name).unwrap_or_else(|| {
-            Err(PyTypeError::new_err(format!("np.{name} is not known of a traced value")))
-        })
+        self.named(name)
+            .unwrap_or_else(|| Err(PyTypeError::new_err(format!("np.{name} is not known of a traced value"))))
     }
 
     /// A function of two numbers by the name that NumPy has for it.

@@ -78,11 +78,7 @@ impl System {
         let parameters = values(Some(parameters))?;
         let values: Vec<(&str, f64)> = parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
         let inner = self.inner.with_parameters(&values).map_err(value_error)?;
-        Ok(System {
-            inner,
-            lagrangian: self.lagrangian.clone(),
-            given_coordinates: self.given_coordinates.clone(),
-        })
+        Ok(System { inner, lagrangian: self.lagrangian.clone(), given_coordinates: self.given_coordinates.clone() })
     }
 
     /// The number of coordinates.

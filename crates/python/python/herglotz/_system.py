@@ -1,6 +1,7 @@
 """Systems of what a user may call a Lagrangian."""
 
 import functools
+from types import FunctionType
 
 from . import _core, _trace
 
@@ -34,7 +35,7 @@ def system(L, coordinates=None, parameters=None, *, n=None):
         coordinates = [coordinates]
     if isinstance(L, str):
         return _of_text(L, coordinates, parameters, n)
-    if callable(L) and not hasattr(L, "free_symbols"):
+    if type(L) is FunctionType or (callable(L) and not hasattr(L, "free_symbols")):
         coordinates = names(coordinates, n)
         of = (*_velocity_names(tuple(coordinates)), tuple(parameters or ()))
         return _of_text(_trace.formula_of(L, of), coordinates, parameters, n)

@@ -15,6 +15,10 @@ class Traced(np.ndarray):
     """An array of symbols and numbers."""
 
     def __array_ufunc__(self, ufunc, method, *inputs, **kwargs):
+        if ufunc is np.matmul and not kwargs and type(inputs[0]) is type(inputs[1]) is Traced:
+            # The most frequent one, at once.
+            found = ufunc(inputs[0].view(np.ndarray), inputs[1].view(np.ndarray))
+            return found.view(Traced) if isinstance(found, np.ndarray) else found
         return apply(ufunc, method, inputs, kwargs)
 
     def __array_function__(self, func, types, args, kwargs):
@@ -189,9 +193,10 @@ def call(func, args, kwargs):
 
 
 def _vector(values):
-    found = np.empty(len(values), dtype=object)
-    found[:] = values
-    return found.view(Traced)
+    found = Traced(len(values), object)
+    for i, value in enumerate(values):
+        found[i] = value
+    return found
 
 
 def formula_of(function, names):
@@ -254,7 +259,7 @@ def value_text(value, function, names):
             )
         value = value[()]
     if isinstance(value, Symbol):
-        return value.text(*map(list, names))
+        return value.text(*names)
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
         return repr(float(value))
     raise ValueError(f"{_name(function)} gives {value!r}, where a number is needed: does it return?")
