@@ -3,8 +3,8 @@
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
-use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Dual, Lagrangian, VelocityPoint};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint};
+use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
 use formula_lagrangian::{Formula, FormulaLagrangian};
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
@@ -45,13 +45,19 @@ fn nothing_is_allocated() {
         "sum(i, 0, n-1, v[i]^2*(2 + sin(q[i])))/2 - sum(i, 1, n-1, cos(q[i] - q[i-1])*v[i]*v[i-1]) - exp(-a*t)*z";
     let l: FormulaLagrangian<8> = Formula::parse(text, &["q[8]"], &[("a", 0.1)]).unwrap().lagrangian().unwrap();
     let x = VelocityPoint::new([0.3; 8], [0.7; 8], 0.1);
-    let moving = |x: f64| Dual { re: x, d: SVector::<f64, 2>::new(1.0, 2.0) };
-    let y = VelocityPoint { q: x.q.map(moving), v: x.v.map(moving), z: moving(x.z) };
     let mut sum = 0.0;
     let count = allocations(|| {
-        sum += l.value(0.5, &x.q, &x.v, x.z) + l.with_gradient(0.5, &x).1.z + l.gradient(moving(0.5), &y).x[0].d[1];
+        sum += l.value(0.5, &x.q, &x.v, x.z) + l.with_gradient(0.5, &x).1.z + l.gradient(0.5, &x).x[0];
         sum += l.force(0.5, &x)[7] + l.mass_matrix(0.5, &x)[(6, 7)] + l.hessian(0.5, &x).vv[(1, 1)];
     });
     assert!(sum.is_finite());
     assert_eq!(count, 0);
+    // Nor by the steps of integrators: duals, whose registers are on the heap, are in none.
+    let problem = Problem::new(&l, 0.0, x).unwrap();
+    for stages in [1, 2, 8, 16] {
+        let plan = problem.by(GaussCollocation { stages }).steps(Steps::Size(1e-3)).plan(Until::Time(1.0)).unwrap();
+        let mut stepper = plan.stepper().unwrap();
+        stepper.advance(1).unwrap();
+        assert_eq!(allocations(|| stepper.advance(10).unwrap()), 0, "{stages} stages");
+    }
 }

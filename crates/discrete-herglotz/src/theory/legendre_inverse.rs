@@ -5,6 +5,9 @@ use crate::{ITERATION_LIMIT, StepError, last_correction};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, largest, linear};
 
+/// The corrections that have not become smaller after which they are rounding.
+const STALLED: u32 = 8;
+
 /// `FL^-1 (q, p, z) = (q, v, z)` with `L_v(t, q, v, z) = p`, by Newton's method from a guess of the velocity: the state of a run with its
 /// velocity, and back to [`legendre`](contact_geom::legendre). A guess of 0 finds it where there is one alone.
 ///
@@ -26,7 +29,7 @@ pub fn legendre_inverse<const N: usize>(
     guess: &SVector<f64, N>,
 ) -> Result<VelocityPoint<N>, StepError> {
     let mut x = VelocityPoint { q: state.q, v: *guess, z: state.z };
-    let mut before = f64::INFINITY;
+    let (mut before, mut stalled) = (f64::INFINITY, 0);
     let mut momenta = lagrangian.gradient(t, &x).y;
     for _ in 0..ITERATION_LIMIT {
         let mut change = momenta - state.p;
@@ -46,7 +49,11 @@ pub fn legendre_inverse<const N: usize>(
             return Err(StepError::NonFinite);
         }
         let round_off = f64::EPSILON * scale;
-        if last_correction(size, before, round_off) || (size >= 0.5 * before && (held || size <= 64.0 * round_off)) {
+        let stalls = size >= 0.5 * before;
+        stalled += u32::from(stalls);
+        // The rounding of a gradient whose terms cancel does not show in its size: with half of the digits, it is what is left.
+        let left = stalled >= STALLED && size <= f64::EPSILON.sqrt() * scale;
+        if last_correction(size, before, round_off) || (stalls && (held || size <= 64.0 * round_off || left)) {
             return Ok(x);
         }
         before = size;
@@ -80,6 +87,17 @@ mod tests {
             let off = (legendre(&system, 0.0, &x).p[0] - p).abs();
             let w = system.hessian(0.0, &x).vv[(0, 0)];
             assert!(off <= 2.0 * f64::EPSILON * (1.0 + p.abs() + w * x.v[0].abs()), "p = {p}: {off:e}, W = {w:e}");
+        }
+    }
+
+    /// Where the terms of the gradient cancel, its rounding is what is left of the momentum.
+    #[test]
+    fn a_gradient_whose_terms_cancel() {
+        let system = contact_geom::ValueOnly(Relativistic::default());
+        for p in [-0.9, 1e-3, -1e-5, 1e-7] {
+            let x = legendre_inverse(&system, 0.0, &PhasePoint::new([0.0], [p], 0.1), &[0.0].into()).unwrap();
+            let expected = p / (1.0 + p * p).sqrt();
+            assert!((x.v[0] - expected).abs() <= 4.0 * f64::EPSILON, "p = {p}: {:e}", x.v[0] - expected);
         }
     }
 
