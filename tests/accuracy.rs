@@ -89,7 +89,6 @@ impl Lagrangian<1> for Bench {
             separable: true,
             quadratic: affine && self.quartic == 0.0,
             constant_mass: true,
-            ..Structure::default()
         }
     }
 }

@@ -265,7 +265,6 @@ impl<const N: usize> RandomSystem<N> {
             separable,
             quadratic,
             constant_mass,
-            ..Structure::default()
         }
     }
 

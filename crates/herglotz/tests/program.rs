@@ -279,7 +279,6 @@ fn scenes_run() {
 
 /// Where the integrators are compared, each error has its best one, and shorter steps have smaller errors.
 #[test]
-#[ignore = "some seconds of measuring"]
 fn comparisons_name_the_best() {
     let at = Directory::new("compare");
     let file = at.write("scene.toml", &OSCILLATOR.replace("time = 400.0", "time = 20.0"));

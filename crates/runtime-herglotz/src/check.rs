@@ -71,14 +71,12 @@ impl Check {
         self.contact_defect() <= CONTACT
     }
 
-    /// The largest relative departure of a momentum from its prediction, of the momentum's largest size along the motion.
+    /// The largest departure of a momentum from its prediction, in units of the largest momentum of any symmetry: one that vanishes has no
+    /// size of its own.
     pub fn momentum_defect(&self) -> f64 {
-        let count = self.places.first().map_or(0, |place| place.momenta.len());
-        contact_geom::largest((0..count).map(|i| {
-            let of = |f: fn(&MomentumThere) -> f64| self.places.iter().filter_map(move |p| p.momenta.get(i).map(f));
-            let size = contact_geom::largest(of(|m| m.predicted));
-            let apart = contact_geom::largest(of(|m| m.momentum - m.predicted));
-            if apart == 0.0 { 0.0 } else { apart / size }
-        }))
+        let all = || self.places.iter().flat_map(|place| &place.momenta);
+        let size = contact_geom::largest(all().map(|m| m.predicted));
+        let apart = contact_geom::largest(all().map(|m| m.momentum - m.predicted));
+        if size > 0.0 { apart / size } else { apart }
     }
 }

@@ -1,5 +1,7 @@
 //! Systems that are known when the program runs, against the types of the libraries.
 
+#![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
+
 use contact_geom::systems as typed;
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, herglotz_field};
 use discrete_herglotz::{AnyIntegrator, InputError, Interrupted, Problem, Status, Steps, Until};

@@ -117,7 +117,6 @@ fn structures(report: &mut Report) {
         separable: true,
         quadratic: true,
         constant_mass: true,
-        ..Structure::default()
     };
     for (t, x) in places() {
         // Where L is not defined nothing is said; elsewhere every claim gets a number.

@@ -66,7 +66,6 @@ impl Lagrangian<1> for Duffing {
             separable: true,
             quadratic: self.beta == 0.0,
             constant_mass: true,
-            ..Structure::default()
         }
     }
 }

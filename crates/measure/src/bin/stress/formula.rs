@@ -204,7 +204,6 @@ impl<const N: usize> Formula<N> {
             separable: mass && !matches!(self.rate, Rate::Region { .. }),
             quadratic: mass && linear && affine,
             constant_mass: mass,
-            ..Structure::default()
         }
     }
 
