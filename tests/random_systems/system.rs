@@ -257,15 +257,7 @@ impl<const N: usize> RandomSystem<N> {
             && bumps.iter().all(|b| b.along == Along::Time && b.on != On::Mass);
         let steady_z = monomials.iter().all(|m| m.z == 0 || m.frequency == 0.0);
         let constant_rate = z_affine && !timed_drag && steady_z;
-        Structure {
-            autonomous,
-            z_free,
-            z_affine,
-            constant_rate,
-            separable,
-            quadratic,
-            constant_mass,
-        }
+        Structure { autonomous, z_free, z_affine, constant_rate, separable, quadratic, constant_mass }
     }
 
     /// The shortest time in which the motion at a point can meet something new, by the bumps alone.

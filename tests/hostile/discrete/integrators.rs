@@ -8,9 +8,10 @@ use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::MidpointRule;
 use discrete_herglotz::{
     AnyIntegrator, ByRule, Checkpoint, CheckpointError, Composed, Discrete, DiscreteLagrangian, Discretisation, Facts,
-    InputError, Integrator, Interrupted, Item, Method, Midpoint, Problem, SplittingScheme, Status, Stepper, Steps,
-    Until, Wants,
+    InputError, Integrator, Interrupted, Item, Method, Midpoint, Moment, Problem, SplittingScheme, Status, Stepper,
+    Steps, Until, Wants,
 };
+use std::ops::ControlFlow;
 
 pub const ATTACKS: &[Attack] = &[
     Attack {
@@ -32,7 +33,10 @@ pub const ATTACKS: &[Attack] = &[
     },
     Attack { on: &["Discrete::new", "Facts::of_discrete", "Run::accuracy"], run: orders },
     Attack { on: &["Stepper::save", "Stepper::restore"], run: saved },
-    Attack { on: &["Checkpoint::every", "Interrupted::read", "Run::resume"], run: resumed },
+    Attack {
+        on: &["Checkpoint::every", "Moment::interrupted", "Interrupted::read", "Interrupted::write", "Run::resume"],
+        run: resumed,
+    },
 ];
 
 /// A discrete Lagrangian is made of each step that is one.
@@ -162,6 +166,21 @@ fn resumed(report: &mut Report) {
             for other in others {
                 report.check(other == Err(InputError::AnotherRun), || format!("another run: {other:?}"));
             }
+        }
+        // By hand, in the middle, and to a place that is none.
+        let mut kept = None;
+        let mut keep = |at: &Moment<'_, 1>| {
+            if at.k == 3 {
+                kept = at.interrupted();
+            }
+            ControlFlow::Continue(())
+        };
+        seven(&problem, by).observe(&mut keep).run(until).unwrap();
+        if let Some(kept) = kept {
+            report.check(kept.write(path.join("below a file")).is_err(), || "a file below a file".into());
+            kept.write(&path).unwrap();
+            let read = Interrupted::read(&path).unwrap();
+            report.check(read == kept && seven(&problem, by).resume(read).run(until) == Ok(whole), || "by hand".into());
         }
         for value in HOSTILE.into_iter().filter(|value| value.abs() < 10.0) {
             let other = Problem::new(&Claiming, 0.0, VelocityPoint::new([value], [0.7], 0.2)).unwrap();

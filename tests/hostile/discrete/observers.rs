@@ -32,6 +32,7 @@ pub const ATTACKS: &[Attack] = &[
     Attack {
         on: &[
             "Moment::velocity",
+            "Moment::velocity_at",
             "Moment::energy",
             "Moment::last_step",
             "LastStep::span",
@@ -248,6 +249,9 @@ fn moments(report: &mut Report) {
             let mut look = |at: &Moment<'_, 1>| {
                 report.door(&at.t, at.velocity());
                 report.door(&at.t, at.energy());
+                for value in HOSTILE {
+                    report.door(&value, at.velocity_at(at.t, &PhasePoint::new([value], [value], value)));
+                }
                 let Some(step) = at.last_step() else { return ControlFlow::Break(Stop::here("no step")) };
                 let ((from, start), (to, end)) = step.ends();
                 let met = at_start.replace((to, end)).is_none_or(|before| before == (from, start));
