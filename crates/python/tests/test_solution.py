@@ -52,6 +52,17 @@ def test_a_motion_goes_on():
     assert by_steps.steps == 20 and np.allclose(by_steps.q[-1], pendulum(20.0, integrator="gauss_4", steps=40).q[-1], rtol=1e-12)
 
 
+def test_what_was_not_reached_is_gone_on_with():
+    times = np.array([0.0, 1.0, 5.0, 10.0])
+    part = pendulum(times, events=[hz.Event("theta", terminal=True)])
+    assert 1.0 < part.t_end < 5.0
+    rest = part.resume()
+    # The event that has ended the first part is at the start of the rest, and ends it at the next crossing.
+    assert rest.t[0] == part.t_end and rest.t_end > part.t_end + 1
+    with pytest.raises(ValueError, match="reached its end"):
+        pendulum(times).resume()
+
+
 def test_what_is_pickled_is_the_same():
     sol = pendulum(np.linspace(0, 10, 11), events={"zero": "theta"}, observe={"twice": "2*theta"})
     sol(3.0), sol.plan
