@@ -13,7 +13,9 @@ Direction: TypeAlias = Literal["both", "rising", "falling"]
 __version__: str
 
 class System:
-    def __new__(cls, lagrangian: str, coordinates: Sequence[str], parameters: Mapping[str, float] | None = None) -> System: ...
+    def __new__(
+        cls, lagrangian: str, coordinates: Sequence[str], parameters: Mapping[str, float] | None = None
+    ) -> System: ...
     @property
     def lagrangian(self) -> str: ...
     @property
