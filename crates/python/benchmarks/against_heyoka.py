@@ -21,7 +21,10 @@ import numpy as np
 
 PROBLEMS = {
     "P2": dict(
-        start=([1.0], [1.0], 0.0), end=1000.0, levels={1e-9: 0.4, 1e-12: 0.4}, steps=dict(integrator="gauss_16", steps=300)
+        start=([1.0], [1.0], 0.0),
+        end=1000.0,
+        levels={1e-9: 0.4, 1e-12: 0.4},
+        steps=dict(integrator="gauss_16", steps=300),
     ),
     "P6": dict(start=([1.0], [0.0], 1.0), end=100.0, levels={1e-9: 0.6}, steps=dict(integrator="gauss_8", steps=60)),
 }
@@ -143,7 +146,10 @@ print(time.perf_counter() - middle)
 
 def in_a_process(code, count=5):
     """The median of the number that a program prints, each time in a process of its own."""
-    found = [float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout) for _ in range(count)]
+    found = [
+        float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
+        for _ in range(count)
+    ]
     return float(np.median(found))
 
 
@@ -172,7 +178,9 @@ def overhead():
     for what, L in (("a system", system), ("a function", lagrangian("P2"))):
         call = lambda: hz.solve(L, [1.0], [1.0], 0.1, integrator="strang", steps=1)
         whole = median(lambda: [call() for _ in range(100)]) / 100
-        print(f"overhead of solve of {what}: {(whole - run) * 1e6:.1f} us, of at most 20; its run of one step {run * 1e6:.1f} us")
+        print(
+            f"overhead of solve of {what}: {(whole - run) * 1e6:.1f} us, of at most 20; its run of one step {run * 1e6:.1f} us"
+        )
 
 
 def main():

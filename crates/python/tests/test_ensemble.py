@@ -1,13 +1,12 @@
 """Many motions: against single ones, threads, processes, failures."""
 
+import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
 
+import herglotz as hz
 import joblib
-import multiprocessing
 import numpy as np
 import pytest
-
-import herglotz as hz
 
 PENDULUM = "theta'^2/2 + cos(theta) + gamma*z"
 NAMES = ["theta"]
@@ -45,7 +44,15 @@ def test_parameters_and_rows_differ():
 def test_the_number_of_threads_does_not_matter():
     q, v = starts(1000)
     run = lambda threads: hz.ensemble(
-        PENDULUM, q, v, 3.0, integrator="gauss_8", step=0.25, threads=threads, coordinates=NAMES, parameters={"gamma": -0.1}
+        PENDULUM,
+        q,
+        v,
+        3.0,
+        integrator="gauss_8",
+        step=0.25,
+        threads=threads,
+        coordinates=NAMES,
+        parameters={"gamma": -0.1},
     )
     assert np.array_equal(run(1).q, run(3).q)
 

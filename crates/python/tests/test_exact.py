@@ -1,9 +1,8 @@
 """The exact discrete Lagrangian: its theorems, and motions of `solve`."""
 
+import herglotz as hz
 import numpy as np
 import pytest
-
-import herglotz as hz
 
 
 def L(t, q, v, z):
@@ -29,9 +28,13 @@ def test_the_derivatives_are_momenta():
     assert exact.value == pytest.approx(motion.action, rel=1e-13)
     # W is 1: momenta are velocities.
     assert np.allclose(exact.d2, motion.v1, rtol=1e-12) and np.allclose(-exact.d1 / exact.sigma, V0, rtol=1e-12)
-    assert exact.sigma == pytest.approx(1 + exact.dz, rel=1e-14) and exact.sigma == pytest.approx(motion.sigma, rel=1e-13)
+    assert exact.sigma == pytest.approx(1 + exact.dz, rel=1e-14) and exact.sigma == pytest.approx(
+        motion.sigma, rel=1e-13
+    )
     e = 1e-5
-    slope = (hz.exact_lagrangian(L, H, Q0, q1 + [e, 0], Z0).value - hz.exact_lagrangian(L, H, Q0, q1 - [e, 0], Z0).value) / (2 * e)
+    slope = (
+        hz.exact_lagrangian(L, H, Q0, q1 + [e, 0], Z0).value - hz.exact_lagrangian(L, H, Q0, q1 - [e, 0], Z0).value
+    ) / (2 * e)
     assert slope == pytest.approx(exact.d2[0], rel=1e-8)
 
 

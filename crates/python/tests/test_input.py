@@ -1,9 +1,8 @@
 """What is wrong with an argument is a ValueError that names it."""
 
+import herglotz as hz
 import numpy as np
 import pytest
-
-import herglotz as hz
 
 FORMULA = "x'^2/2 - x^2/2 + gamma*z"
 GOOD = dict(L=FORMULA, q0=[1.0], v0=[0.0], t=1.0, coordinates=["x"], parameters={"gamma": -0.1})
@@ -30,7 +29,7 @@ BAD = [
     (dict(t=np.nan), "`t"),
     (dict(accuracy=0.0), "accuracy|error"),
     (dict(accuracy="high"), "`accuracy` is 'high'"),
-    (dict(integrator="gaus_4"), "no integrator \"gaus_4\""),
+    (dict(integrator="gaus_4"), 'no integrator "gaus_4"'),
     (dict(step=0.1), "`integrator`"),
     (dict(integrator="gauss_4", step=0.1, steps=3), "`step` and `steps`"),
     (dict(integrator="gauss_4", step=0.1, accuracy=1e-3), "`accuracy` is given beside"),
@@ -38,15 +37,15 @@ BAD = [
     (dict(parameters={}), "unknown name `gamma`"),
     (dict(parameters={"gamma": np.nan}), r"parameters\[\"gamma\"\]"),
     (dict(parameters={"gamma": "low"}), r"parameters\[\"gamma\"\]"),
-    (dict(coordinates=["t"]), "\"t\" has a meaning"),
+    (dict(coordinates=["t"]), '"t" has a meaning'),
     (dict(L="x'^2/2 + cos(y)"), r"line 1, column 14.*\n.*\n +\^"),
     (dict(L="x'"), "linear in x'"),
     (dict(L="pendulun"), "pendulum|unknown name"),
     (dict(L="x'^2/2 + 1/x", q0=[0.0]), "not finite at the start"),
-    (dict(events="y"), "event \"y\": line 1, column 1"),
-    (dict(events=[hz.Event("x", direction="up")]), "\"up\""),
+    (dict(events="y"), 'event "y": line 1, column 1'),
+    (dict(events=[hz.Event("x", direction="up")]), '"up"'),
     (dict(events=[3]), "3 is no expression"),
-    (dict(observe={"a": "sin(x"}), "the column \"sin\\(x\""),
+    (dict(observe={"a": "sin(x"}), 'the column "sin\\(x"'),
 ]
 
 

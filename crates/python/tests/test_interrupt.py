@@ -6,9 +6,8 @@ import signal
 import threading
 import time
 
-import pytest
-
 import herglotz as hz
+import pytest
 
 PENDULUM = "theta'^2/2 + cos(theta) + gamma*z"
 # Some minutes.
@@ -39,8 +38,16 @@ def test_ctrl_c_ends_an_ensemble():
     begin = time.monotonic()
     many = np.ones((200_000, 1))
     with pytest.raises(KeyboardInterrupt):
-        hz.ensemble(PENDULUM, many, many, 1e3, integrator="gauss_2", step=0.1, coordinates=["theta"],
-                    parameters={"gamma": -1e-3 * np.ones(200_000)})
+        hz.ensemble(
+            PENDULUM,
+            many,
+            many,
+            1e3,
+            integrator="gauss_2",
+            step=0.1,
+            coordinates=["theta"],
+            parameters={"gamma": -1e-3 * np.ones(200_000)},
+        )
     assert time.monotonic() - begin < 20
 
 

@@ -1,9 +1,8 @@
 """Geometry, contact maps, checks."""
 
+import herglotz as hz
 import numpy as np
 import pytest
-
-import herglotz as hz
 
 GAMMA = -0.1
 
@@ -64,8 +63,15 @@ def test_maps_and_points_are_checked():
 
 
 def test_the_geometry_at_a_point():
-    at = hz.geometry("m*x'^2/2 + x*y' + y'^2/2 + c*x'*z - x^2", 0.0, [0.5, 0.2], [0.3, 0.7], 0.4, coordinates=["x", "y"],
-                     parameters={"m": 2.0, "c": 0.1})
+    at = hz.geometry(
+        "m*x'^2/2 + x*y' + y'^2/2 + c*x'*z - x^2",
+        0.0,
+        [0.5, 0.2],
+        [0.3, 0.7],
+        0.4,
+        coordinates=["x", "y"],
+        parameters={"m": 2.0, "c": 0.1},
+    )
     p = [2 * 0.3 + 0.1 * 0.4, 0.5 + 0.7]
     assert np.allclose(at.momentum, p) and np.allclose(at.mass, [[2, 0], [0, 1]]) and at.rate == pytest.approx(0.03)
     assert np.allclose(at.eta, [-p[0], -p[1], 0, 0, 1])

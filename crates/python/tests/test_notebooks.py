@@ -18,5 +18,7 @@ def test_a_notebook_runs(path):
     notebook = nbformat.read(path, as_version=4)
     # An error of a cell, a failed assertion among them, is raised.
     NotebookClient(notebook, timeout=300, kernel_name="python3").execute()
-    drawn = [output for cell in notebook.cells for output in cell.get("outputs", []) if "image/png" in output.get("data", {})]
+    drawn = [
+        output for cell in notebook.cells for output in cell.get("outputs", []) if "image/png" in output.get("data", {})
+    ]
     assert len(drawn) >= 2

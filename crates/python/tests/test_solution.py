@@ -2,10 +2,9 @@
 
 import pickle
 
+import herglotz as hz
 import numpy as np
 import pytest
-
-import herglotz as hz
 
 PENDULUM = "theta'^2/2 + cos(theta) + gamma*z"
 NAMES = dict(coordinates=["theta"], parameters={"gamma": -0.1})
@@ -15,7 +14,9 @@ def pendulum(t, **more):
     return hz.solve(PENDULUM, [1.0], [0.0], t, **NAMES, **more)
 
 
-@pytest.mark.parametrize("way", [dict(accuracy=1e-10), dict(integrator="gauss_8", step=0.7), dict(integrator="strang", steps=300)])
+@pytest.mark.parametrize(
+    "way", [dict(accuracy=1e-10), dict(integrator="gauss_8", step=0.7), dict(integrator="strang", steps=300)]
+)
 def test_states_at_any_time_are_those_of_rows(way):
     times = np.sort(np.random.default_rng(1).uniform(0, 20, 40))
     times = np.concatenate([[0.0], times, [20.0]])
@@ -49,7 +50,20 @@ def test_a_motion_goes_on():
     assert np.allclose(rest.q[-1], whole.q[-1], rtol=1e-9) and np.allclose(rest.z[-1], whole.z[-1], rtol=1e-9)
     assert rest.t[0] == 12.0 and len(rest.t) == 3 and len(rest.events[0].t) > 0
     by_steps = pendulum(10.0, integrator="gauss_4", steps=20).resume(20.0)
-    assert by_steps.steps == 20 and np.allclose(by_steps.q[-1], pendulum(20.0, integrator="gauss_4", steps=40).q[-1], rtol=1e-12)
+    assert by_steps.steps == 20 and np.allclose(
+        by_steps.q[-1], pendulum(20.0, integrator="gauss_4", steps=40).q[-1], rtol=1e-12
+    )
+
+
+def test_what_was_not_reached_is_gone_on_with():
+    times = np.array([0.0, 1.0, 5.0, 10.0])
+    part = pendulum(times, events=[hz.Event("theta", terminal=True)])
+    assert 1.0 < part.t_end < 5.0
+    rest = part.resume()
+    # The event that has ended the first part is at the start of the rest, and ends it at the next crossing.
+    assert rest.t[0] == part.t_end and rest.t_end > part.t_end + 1
+    with pytest.raises(ValueError, match="reached its end"):
+        pendulum(times).resume()
 
 
 def test_what_is_pickled_is_the_same():

@@ -1,9 +1,8 @@
 """Motions against closed forms and against themselves."""
 
+import herglotz as hz
 import numpy as np
 import pytest
-
-import herglotz as hz
 
 OSCILLATOR = dict(coordinates=["x"], parameters={"gamma": -0.1})
 FORMULA = "x'^2/2 - x^2/2 + gamma*z"

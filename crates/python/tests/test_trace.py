@@ -2,11 +2,10 @@
 
 import math
 
+import herglotz as hz
 import numpy as np
 import pytest
 import sympy
-
-import herglotz as hz
 
 STATE = dict(t=0.3, q=[0.7, -0.4], v=[0.2, 0.5], z=0.1)
 
@@ -34,12 +33,18 @@ FUNCTIONS = [
     lambda t, q, v, z: np.max(q) - np.min(q) + np.clip(q[0], 0, 0.5) + np.prod(q) + np.mean(q),
     lambda t, q, v, z: np.dot(q, v) + np.inner(q, v) + np.sum(q[::-1] * v) + np.einsum("i,i", q, v) + np.vdot(q, v),
     lambda t, q, v, z: q @ np.array([[2.0, 1.0], [1.0, 3.0]]) @ q + np.trace(np.outer(q, v)),
-    lambda t, q, v, z: np.sum(np.diff(np.concatenate([q, v, [0.0]])) ** 2) + np.sum(np.roll(q, 1) * v) + np.cumsum(q)[-1],
-    lambda t, q, v, z: np.stack([q, v]).sum() + np.sum(np.array([q[0], 2.0 * v[1]])) + np.float64(2) * q[0] + q[0] / np.int64(3),
+    lambda t, q, v, z: (
+        np.sum(np.diff(np.concatenate([q, v, [0.0]])) ** 2) + np.sum(np.roll(q, 1) * v) + np.cumsum(q)[-1]
+    ),
+    lambda t, q, v, z: (
+        np.stack([q, v]).sum() + np.sum(np.array([q[0], 2.0 * v[1]])) + np.float64(2) * q[0] + q[0] / np.int64(3)
+    ),
     lambda t, q, v, z: np.sum(np.sin(np.array([q[0], v[1]]))) + np.linalg.norm(hz.array([q[0], 1.0])),
     lambda t, q, v, z: (lambda w: w[0] * z + np.square(w[1]) + np.reciprocal(w[0]))(np.exp(q) - t),
     lambda t, q, v, z: sum(float(i) * x for i, x in enumerate(q)) - (-q[0]) + abs(q[1]) + +z,
-    lambda t, q, v, z: np.select([q[0] < 0, q[0] < 1], [z, 2 * z], 3 * z) + np.linalg.norm(np.cross([*q, 1.0], [*v, z])[:2]),
+    lambda t, q, v, z: (
+        np.select([q[0] < 0, q[0] < 1], [z, 2 * z], 3 * z) + np.linalg.norm(np.cross([*q, 1.0], [*v, z])[:2])
+    ),
 ]
 
 

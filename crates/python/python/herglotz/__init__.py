@@ -14,7 +14,9 @@ A Lagrangian L(t, q, v, z) that depends on its own action z has friction in it: 
 ((1001, 1), 'completed')
 """
 
-from ._core import System, catalogue as _catalogue, integrators as _integrators
+from ._core import System
+from ._core import catalogue as _catalogue
+from ._core import integrators as _integrators
 from ._ensemble import Ensemble, ensemble
 from ._exact import DiscreteLagrangian, Exponential, Retraction, exact_lagrangian, exponential, retract
 from ._looks import Check, Comparison, Contact, Geometry, check, compare, geometry, is_contact

@@ -52,7 +52,10 @@ def ensemble(
     parameters = dict(parameters or {})
     varied = {name: value for name, value in parameters.items() if np.ndim(value)}
     # Any value of these will do for the formula.
-    fixed = {name: float(np.ravel(value)[0]) if name in varied and np.size(value) else value for name, value in parameters.items()}
+    fixed = {
+        name: float(np.ravel(value)[0]) if name in varied and np.size(value) else value
+        for name, value in parameters.items()
+    }
     if np.ndim(q0) != 2:
         raise ValueError(f"`q0` has {np.ndim(q0)} dimensions, where the shape (M, n) is needed: a row for each member")
     system, _, _ = system_and_start(L, np.zeros(np.shape(q0)[1]), v0, p0, coordinates, fixed)

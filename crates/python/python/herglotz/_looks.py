@@ -132,8 +132,20 @@ def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters):
 
 
 def check(
-    L, q0=None, v0=None, t=None, *, p0=None, z0=0.0, places=10, accuracy=None, integrator=None, step=None, steps=None,
-    coordinates=None, parameters=None,
+    L,
+    q0=None,
+    v0=None,
+    t=None,
+    *,
+    p0=None,
+    z0=0.0,
+    places=10,
+    accuracy=None,
+    integrator=None,
+    step=None,
+    steps=None,
+    coordinates=None,
+    parameters=None,
 ):
     """Whether the steps of a motion are contact: sigma, defects and momenta at some places, and the discrete theorems.
 

@@ -141,13 +141,14 @@ class Solution:
             return States(float(t), q[0], v[0], p[0], float(z[0]), float(energy[0]))
         return States(times.astype(float), q, v, p, z, energy)
 
-    def resume(self, t):
+    def resume(self, t=None):
         """Goes on from the end of the motion, as it was asked for, with its own events and columns.
 
         Parameters
         ----------
-        t : float or array
-            The new end; or the times of the rows, beyond the end of this motion, of which the first may be that end.
+        t : float or array, optional
+            The new end; or the times of the rows, beyond the end of this motion, of which the first may be that end. What
+            was asked for and not reached, if nothing is said.
 
         Returns
         -------
@@ -159,6 +160,12 @@ class Solution:
         at, q, p, z = self._end
         if z is None:
             raise ValueError("the motion has no action to go on from")
+        if t is None:
+            asked = np.atleast_1d(np.asarray(self._request[1], dtype=float))
+            start = asked[0] if len(asked) > 1 else 0.0
+            t = asked[asked > at] if asked[-1] > start else asked[asked < at]
+            if len(t) == 0:
+                raise ValueError("the motion has reached its end: give `t`, a later one")
         times = np.atleast_1d(np.asarray(t, dtype=float))
         if len(times) == 0 or times[0] != at:
             times = np.concatenate([[at], times])

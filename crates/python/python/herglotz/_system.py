@@ -46,7 +46,9 @@ def system(L, coordinates=None, parameters=None, *, n=None):
     raise TypeError(f"L is a {type(L).__name__}, where a function, a formula, a SymPy expression or a System is needed")
 
 
-_velocity_names = functools.lru_cache(256)(lambda coordinates: tuple(map(tuple, _core.velocity_names(list(coordinates)))))
+_velocity_names = functools.lru_cache(256)(
+    lambda coordinates: tuple(map(tuple, _core.velocity_names(list(coordinates))))
+)
 
 
 def expression(of, system):
@@ -55,7 +57,9 @@ def expression(of, system):
         return of
     if callable(of):
         names = system.coordinates
-        return _trace.formula_of(of, (names, _core.velocity_names(system.given_coordinates)[1], list(system.parameters)))
+        return _trace.formula_of(
+            of, (names, _core.velocity_names(system.given_coordinates)[1], list(system.parameters))
+        )
     raise ValueError(f"{of!r} is no expression: give a text, or a function of (t, q, v, z)")
 
 
@@ -64,7 +68,7 @@ def names(coordinates, n):
     if coordinates is not None:
         return list(coordinates)
     if n is None:
-        raise ValueError("`coordinates` is not given: their names, as [\"x\", \"y\"], or \"q[3]\" for three")
+        raise ValueError('`coordinates` is not given: their names, as ["x", "y"], or "q[3]" for three')
     return [f"q[{n}]"]
 
 

@@ -119,7 +119,17 @@ def apply(ufunc, method, inputs, kwargs):
     out = kwargs.pop("out", None)
     known = _UFUNCS.get(ufunc) or (ufunc if ufunc in _OWN else None)
     if known is None:
-        if ufunc.__name__ in ("logaddexp", "floor_divide", "remainder", "floor", "ceil", "rint", "trunc", "isnan", "isfinite"):
+        if ufunc.__name__ in (
+            "logaddexp",
+            "floor_divide",
+            "remainder",
+            "floor",
+            "ceil",
+            "rint",
+            "trunc",
+            "isnan",
+            "isfinite",
+        ):
             hint = "; it has no use in a smooth Lagrangian" if ufunc.__name__ != "logaddexp" else "; write it out"
         else:
             hint = ""
