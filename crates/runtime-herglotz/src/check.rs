@@ -20,7 +20,7 @@ pub struct Place {
     pub sigma: f64,
     /// The logarithm of the conformal factor of the motion up to there.
     pub log_factor: f64,
-    /// How far the pullback of `dz - p dq` by the step is from `sigma_d` times it, relative to its size; by differences of fourth order,
+    /// How far the pullback of `dz - p dq` by the step is from `sigma_d` times it, relative to its size; by differences of sixth order,
     /// which see some 1e-11.
     pub contact_defect: f64,
     /// How fast the steps depart from Herglotz' equations: the distance of (q, p, z) from two steps of half the length by contact Gauss
@@ -56,7 +56,7 @@ pub struct Check {
     pub statements: Vec<Stated>,
 }
 
-/// The largest defect of a step that counts as contact: what differences of fourth order see of steps of the catalogue's systems is
+/// The largest defect of a step that counts as contact: what differences of sixth order see of steps of the catalogue's systems is
 /// 1e-11; a step of the classical method of Runge and Kutta that moves a pendulum by a tenth of its period has 1e-4.
 pub const CONTACT: f64 = 1e-9;
 

@@ -52,8 +52,8 @@ fn contact_defect<const N: usize>(
             let there = Triple::<N>::from_fn(|i| from.component(i) + if i == k { by * distance } else { 0.0 });
             Ok(step(lagrangian, way, t, &there.into())?.0.into())
         };
-        let (near, far) = (moved(1.0)?.minus(moved(-1.0)?), moved(2.0)?.minus(moved(-2.0)?));
-        let derivative = near.scale(8.0).minus(far).scale(1.0 / (12.0 * distance));
+        let [near, middle, far] = [1.0, 2.0, 3.0].map(|by| Ok::<_, RuntimeError>(moved(by)?.minus(moved(-by)?)));
+        let derivative = near?.scale(45.0).minus(middle?.scale(9.0)).plus(far?).scale(1.0 / (60.0 * distance));
         let pulled_back = derivative.z - end.p.dot(&derivative.x);
         let eta = match k {
             k if k < N => -at.p[k],
