@@ -42,7 +42,7 @@ def test_ctrl_c_ends_an_ensemble():
             PENDULUM,
             many,
             many,
-            1e3,
+            1e2,
             integrator="gauss_2",
             step=0.1,
             coordinates=["theta"],
