@@ -76,7 +76,12 @@ fn in_words(comparison: &Comparison) -> String {
         None => format!("{error:.0e}: none"),
     };
     let mut lines = vec![format!("the reference: {}", comparison.reference)];
-    lines.extend(comparison.left_out.iter().map(|(name, why)| format!("left out: {name}: {why}")));
+    // Those with one reason in one line.
+    for same in comparison.left_out.chunk_by(|a, b| a.1 == b.1) {
+        let names: Vec<&str> = same.iter().map(|(name, _)| name.as_str()).collect();
+        let why = same.first().map_or("", |(_, why)| why);
+        lines.push(format!("left out: {}: {why}", names.join(", ")));
+    }
     lines.push(format!("the best for {}", ERRORS.map(best).join("; ")));
     lines.join("\n")
 }
