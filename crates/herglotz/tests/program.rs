@@ -292,5 +292,6 @@ fn comparisons_name_the_best() {
     };
     let errors = of("midpoint,");
     assert!(errors.len() > 2 && errors[0] > 10.0 * errors[errors.len() - 1], "{errors:?}");
-    assert!(!of("gauss_8,").is_empty() && at.read("out/compare.svg").contains("midpoint"));
+    // The figure has those near the best.
+    assert!(!of("gauss_8,").is_empty() && at.read("out/compare.svg").contains("gauss_"));
 }
