@@ -14,6 +14,14 @@ PENDULUM = "theta'^2/2 + cos(theta) + gamma*z"
 LONG = dict(integrator="gauss_2", steps=400_000_000, coordinates=["theta"], parameters={"gamma": -1e-9})
 
 
+@pytest.fixture(autouse=True)
+def signals_are_heard():
+    """A process that a script has started in the background ignores Ctrl-C, and its Python with it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def press(after):
     threading.Timer(after, os.kill, (os.getpid(), signal.SIGINT)).start()
 
