@@ -131,6 +131,7 @@ def test_arrays_are_not_copies():
 
 
 def test_every_name_of_the_catalogue_runs():
+    # From t = 1: one of them is singular at t = 0.
     for name in hz.catalogue():
-        system = hz.solve(name, t=0.5).system
-        assert hz.solve(name, t=0.5).success, system
+        system = hz.solve(name, t=[1.0, 1.5]).system
+        assert hz.solve(name, t=[1.0, 1.5]).success, system
