@@ -130,7 +130,10 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
     /// The kick of the unknowns of a piece: each is gone to once, and has its forces from all elements of the run there. An element is
     /// evaluated once for each of its unknowns, which costs less than to write its forces and to read them again.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "of slices by themselves the compiler knows that they do not overlap"
+    )]
     fn kick_piece<'a, const FULL: bool, const MASSES: bool>(
         &'a self,
         block: usize,

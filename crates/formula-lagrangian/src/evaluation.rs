@@ -1,7 +1,7 @@
 //! A tape at work on numbers of any kind.
 
 use crate::functions::{atan2, hypot};
-use crate::graph::Inputs;
+use crate::node::Inputs;
 use crate::tape::{Code, Instruction, PREVIOUS, Tape};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;

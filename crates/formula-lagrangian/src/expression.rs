@@ -2,8 +2,8 @@
 
 use crate::evaluation::At;
 use crate::formula::index;
-use crate::graph::Inputs;
 use crate::names::Names;
+use crate::node::Inputs;
 use crate::parser::{MOST_NODES, Parser};
 use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph};

@@ -97,7 +97,7 @@ impl<const N: usize> FormulaLagrangian<N> {
             let position = graph.position(i as u32);
             !needed.get(position.index()).copied().unwrap_or(false)
         });
-        let smooth = kinks(&graph, root) == crate::graph::Inputs::NONE;
+        let smooth = kinks(&graph, root) == crate::node::Inputs::NONE;
         let formula = Formula { graph, ..formula.clone() };
         let mut lagrangian = FormulaLagrangian {
             formula,

@@ -1,6 +1,6 @@
 //! The same Lagrangian as Rust source.
 
-use crate::graph::Inputs;
+use crate::node::Inputs;
 use crate::{FormulaError, FormulaLagrangian, Function, Graph, Id, Node, Operation};
 use contact_geom::{Lagrangian, Structure};
 use std::fmt::{Display, Formatter, Write};

@@ -1,6 +1,6 @@
 //! What a graph proves of a Lagrangian.
 
-use crate::graph::Inputs;
+use crate::node::Inputs;
 use crate::{Graph, Id, Node, Operation};
 use contact_geom::Structure;
 

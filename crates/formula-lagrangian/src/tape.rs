@@ -1,6 +1,6 @@
 //! Straight code in registers, made of a graph.
 
-use crate::graph::Inputs;
+use crate::node::Inputs;
 use crate::{Function, Graph, Id, Node, Operation};
 
 /// One instruction: what is written to the register `to`, of the registers `a` and `b` and of what is in `extra`: a constant by its

@@ -2,19 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
+mod random;
+
 use contact_geom::VelocityPoint;
 use formula_lagrangian::{Formula, FormulaLagrangian};
-
-/// Numbers without pattern (G. Marsaglia, "Xorshift RNGs", 2003).
-struct Random(u64);
+use random::Random;
 
 impl Random {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as usize % n
-    }
     fn number(&mut self) -> f64 {
         0.2 + self.below(1 << 20) as f64 / (1 << 20) as f64
     }

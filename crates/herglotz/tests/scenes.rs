@@ -2,7 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
+#[path = "../../formula-lagrangian/tests/random/mod.rs"]
+mod random;
+
 use herglotz::{Scene, SceneError};
+use random::Random;
 use runtime_herglotz::{Rate, When};
 
 const GOOD: &str = r#"[system]
@@ -206,18 +210,6 @@ fn places_in_formulas_of_several_lines_are_those_of_the_file() {
     let line = bad.lines().position(|line| line.contains("rr^2")).unwrap() + 1;
     assert_eq!((error.line, error.column, error.length), (line, 38, 2));
     assert_eq!((error.text.trim(), error.nearest.as_deref()), ("L = (u'[0]^2 + u'[1]^2 + x'^2)/2 - rr^2", Some("r")));
-}
-
-/// Numbers without pattern (G. Marsaglia, "Xorshift RNGs", 2003).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as usize % n
-    }
 }
 
 const WORDS: [&str; 40] = [

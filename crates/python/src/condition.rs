@@ -1,6 +1,6 @@
 //! Comparisons of traced values.
 
-use crate::symbol::{Operand, Symbol, no_number};
+use crate::symbol::{Operand, Symbol, no_number, tracer};
 use formula_lagrangian::Id;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -99,7 +99,7 @@ impl Condition {
         inputs: &Bound<'py, pyo3::types::PyTuple>,
         kwargs: Option<&Bound<'py, pyo3::types::PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        slf.py().import("herglotz._trace")?.getattr("apply")?.call1((ufunc, method, inputs, kwargs))
+        tracer(slf.py(), "apply")?.call1((ufunc, method, inputs, kwargs))
     }
 
     fn __array_function__<'py>(
@@ -110,7 +110,7 @@ impl Condition {
         kwargs: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let _ = types;
-        slf.py().import("herglotz._trace")?.getattr("call")?.call1((function, arguments, kwargs))
+        tracer(slf.py(), "call")?.call1((function, arguments, kwargs))
     }
 
     fn __repr__(&self) -> &'static str {

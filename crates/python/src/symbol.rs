@@ -160,7 +160,7 @@ fn is_scalar(other: &Bound<'_, PyAny>) -> bool {
 }
 
 /// A function of the package's own tracer.
-fn tracer<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn tracer<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     static TRACE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let module = TRACE.get_or_try_init(py, || py.import("herglotz._trace").map(|module| module.into_any().unbind()))?;
     module.bind(py).getattr(name)

@@ -119,7 +119,7 @@ impl Assembly {
     /// Adds what the stage j, with its first derivatives, contributes to the Jacobian, and to its border where there is one:
     ///
     /// `dR_i/dV_k = delta_ik rho_i L_vv + h a_ik (rho_i L_vq - rho_k L_qv) - h^2 sum_j a_ij a_jk rho_j L_qq`.
-    #[allow(clippy::too_many_arguments)]
+    #[expect(clippy::too_many_arguments, reason = "what the formula has, and where its sum goes")]
     pub fn add_stage(
         &mut self,
         system: &AssembledSystem,

@@ -270,7 +270,7 @@ pub(crate) fn collocate<const N: usize, T: Scalar>(
 /// There are so many probes that a motion is looked at in all at [`PROBES`] places and more if it is long, which is to say, if it
 /// changes its position or its velocity by as much as they are; and at [`PROBES_STILL`](crate::numerics::gauss::PROBES_STILL) if there is no
 /// force at all.
-#[expect(clippy::too_many_arguments)]
+#[expect(clippy::too_many_arguments, reason = "the panel, its rates, and what is counted")]
 fn between_nodes<const N: usize, T: Scalar>(
     rates: &dyn Rates<N, T>,
     problem: &Problem<N, T>,

@@ -56,6 +56,7 @@ fn template(entry: &CatalogueEntry) -> Result<String, Failure> {
             format!("{name} = {{ from = {from}, to = {to}, count = 11 }}  # or a list; spacing = \"log\"; \"start.{first}\" for the start")
         },
     );
+    let t = if entry.t == 0.0 { String::new() } else { format!("t = {}\n", number(entry.t)) };
     Ok(format!(
         r#"# {about}. Run it by `herglotz run FILE`; `herglotz plan FILE` says what will be computed.
 version = 1
@@ -69,10 +70,10 @@ parameters = {{ {parameters} }}
 [start]
 {q}
 {v}
-# p_{first} instead of a velocity starts from momenta; z and t are 0 if they are not given.
+{t}# p_{first} instead of a velocity starts from momenta; z and t are 0 if they are not given.
 
 [run]
-time = 100.0
+time = {time}
 accuracy = 1e-9  # or integrator = "gauss_8", step = 0.5; `herglotz list integrators` lists them
 
 [want]
@@ -87,5 +88,6 @@ events = [{{ when = "{first}", direction = "rising" }}]
 "#,
         about = entry.about,
         first_velocity = velocity_name(first),
+        time = number(entry.t + 100.0),
     ))
 }

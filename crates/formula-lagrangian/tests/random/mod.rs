@@ -1,0 +1,14 @@
+//! Random numbers of the tests: the same in every run.
+
+/// Numbers without pattern (G. Marsaglia, "Xorshift RNGs", 2003).
+pub struct Random(pub u64);
+
+impl Random {
+    /// A whole number below `n`.
+    pub fn below(&mut self, n: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as usize % n
+    }
+}
