@@ -412,3 +412,6 @@ fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
         None => refuse(best, cause),
     }
 }
+
+#[cfg(test)]
+mod tests;

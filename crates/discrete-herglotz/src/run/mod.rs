@@ -21,8 +21,6 @@ mod quotient;
 pub(crate) mod rows;
 pub(crate) mod saved;
 mod stepper;
-#[cfg(test)]
-mod tests;
 pub(crate) mod verified;
 pub(crate) mod watch;
 
@@ -303,29 +301,6 @@ pub(crate) trait Motion<const N: usize> {
 
     /// The state at a time of the step that starts at a time and a state, and `sigma_d` from there to it.
     fn inside(&self, from: &(f64, PhasePoint<N>), t: f64) -> Result<(PhasePoint<N>, f64), StepError>;
-}
-
-/// A whole run from t = 0 by given steps, for tests.
-#[cfg(test)]
-pub(crate) fn run_of<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
-    start: contact_geom::VelocityPoint<N>,
-    span: f64,
-    integrator: AnyIntegrator,
-    steps: Steps,
-) -> Result<Outcome<N>, InputError> {
-    Problem::new(lagrangian, 0.0, start)?.by(integrator).steps(steps).run(Until::Time(span))
-}
-
-/// The same by an integrator and steps for an accuracy.
-#[cfg(test)]
-pub(crate) fn run_to<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
-    start: contact_geom::VelocityPoint<N>,
-    span: f64,
-    wanted: f64,
-) -> Result<Outcome<N>, InputError> {
-    Problem::new(lagrangian, 0.0, start)?.accuracy(wanted).run(Until::Time(span))
 }
 
 /// Runs have steps.

@@ -1,12 +1,13 @@
 //! What a run gives, by every integrator: rows at times, events, the way back, a stop and a start from there.
 
-use crate::run::{
-    AnyIntegrator, Checkpoint, CheckpointError, Event, Events, Interrupted, Moment, Problem, Progress, Quotient, Rows,
-    Run, Steps, Stop, Until, run_of,
-};
-use crate::{Gauss, InputError, Method, Outcome, Status};
+use crate::run_of;
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
+use discrete_herglotz::{
+    AnyIntegrator, Checkpoint, CheckpointError, Event, Events, Interrupted, Moment, Problem, Progress, Quotient, Rows,
+    Run, Steps, Stop, Until,
+};
+use discrete_herglotz::{Gauss, InputError, Method, Outcome, Status};
 use std::ops::ControlFlow;
 
 /// Every integrator that takes a system.
@@ -89,7 +90,7 @@ fn rows_at_times() {
         let observed = run_in(&problem, integrator, 40, span).observe(&mut rows).run(Until::Time(span)).unwrap();
         assert_eq!(observed, run_in(&problem, integrator, 40, span).run(Until::Time(span)).unwrap(), "{integrator}");
         assert_eq!(rows.rows.iter().map(|row| row.t).collect::<Vec<_>>(), times, "{integrator}");
-        let error = |row: &crate::Row<2>, truth: &Option<PhasePoint<2>>| {
+        let error = |row: &discrete_herglotz::Row<2>, truth: &Option<PhasePoint<2>>| {
             let state = PhasePoint { q: row.q, p: row.p, z: row.z.unwrap() };
             assert_eq!(row.v, Some(row.p));
             truth.map_or(0.0, |truth| distance(&state, &truth))
@@ -247,7 +248,7 @@ fn events_that_are_not_defined() {
     let mut events = Events::new([Event::new(|t, _| if t < 2.1 { 1.0 } else { f64::NAN })]);
     let outcome = run(&mut events);
     assert!(
-        matches!(outcome.status, Status::Failed { cause: crate::StepError::Event { t }, .. } if t > 2.1),
+        matches!(outcome.status, Status::Failed { cause: discrete_herglotz::StepError::Event { t }, .. } if t > 2.1),
         "{outcome:?}"
     );
     // What another function does before, in the same step of 2.0 to 2.2, is not lost.
@@ -262,7 +263,7 @@ fn events_that_are_not_defined() {
     let mut at_start = Events::new([Event::new(|t, _| if t > 0.0 { 1.0 } else { f64::NAN })]);
     let outcome = run(&mut at_start);
     assert_eq!((outcome.steps, outcome.t), (0, 0.0));
-    assert!(matches!(outcome.status, Status::Failed { cause: crate::StepError::Event { .. }, .. }));
+    assert!(matches!(outcome.status, Status::Failed { cause: discrete_herglotz::StepError::Event { .. }, .. }));
 }
 
 /// An observer that stops, at the start or after some steps; what it asks for decides what is computed, and no bit of the motion.

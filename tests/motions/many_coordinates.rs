@@ -1,12 +1,12 @@
 //! Systems of many coordinates, in the two mebibytes of stack that a thread of the standard library has.
 
-use crate::{
-    DiscreteLagrangian, Gauss, Midpoint, Solver, Splitting, SplittingScheme, Stepper, derived_jet, derived_second_jet,
-    verified,
-};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Chain, Ends, System};
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, ValueOnly, legendre};
+use discrete_herglotz::{
+    DiscreteLagrangian, Gauss, Midpoint, Solver, Splitting, SplittingScheme, Stepper, derived_jet, derived_second_jet,
+    verified,
+};
 
 const MEBIBYTE: usize = 1 << 20;
 

@@ -1,12 +1,12 @@
 //! Brouwer's law: the rounding of steps adds up as a random walk, with no drift in any direction.
 
-use crate::{
-    ActionSplitting, Composition, Flow, InputError, LeftMidpoint, Midpoint, Rectangle, Splitting, SplittingScheme,
-    Stepper, Strang, Trapezoidal,
-};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, OneCoordinate};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
+use discrete_herglotz::{
+    ActionSplitting, Composition, Flow, InputError, LeftMidpoint, Midpoint, Rectangle, Splitting, SplittingScheme,
+    Stepper, Strang, Trapezoidal,
+};
 
 type MakeStepper<'a> = dyn Fn(f64, PhasePoint<1>) -> Result<Box<dyn Stepper<1> + 'a>, InputError> + 'a;
 

@@ -1,8 +1,8 @@
 //! Tests of the choice of steps.
 
-use crate::run::accuracy::choose_with;
+use super::choose_with;
 use crate::run::pilot::{BUDGET, Pilots};
-use crate::run::{Needs, Problem, Request, Shared, Until, run_to};
+use crate::run::{Needs, Outcome, Problem, Request, Shared, Until};
 use crate::{AnyIntegrator, InputError, Obstacle, Status};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
@@ -10,6 +10,16 @@ use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint};
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// A whole run from t = 0 by an integrator and steps for an accuracy.
+fn run_to<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    start: VelocityPoint<N>,
+    span: f64,
+    wanted: f64,
+) -> Result<Outcome<N>, InputError> {
+    Problem::new(lagrangian, 0.0, start)?.accuracy(wanted).run(Until::Time(span))
+}
 
 /// `v^2/2 - V(q) + gamma (1 + swing cos t) z`.
 struct Line {

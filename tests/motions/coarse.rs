@@ -1,10 +1,12 @@
 //! Steps that are far too long are marked or refused, by every integrator; and what must not decide about them.
 
-use crate::run::run_of;
-use crate::{AnyIntegrator, Gauss, InputError, Method, SplittingScheme, Status, StepError, Stepper, Steps, Suspicion};
+use crate::run_of;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Kepler, OneCoordinate, Pendulum};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use discrete_herglotz::{
+    AnyIntegrator, Gauss, InputError, Method, SplittingScheme, Status, StepError, Stepper, Steps, Suspicion,
+};
 
 /// How a run of three given steps ends, and its mark; where it begins.
 fn run<L: Lagrangian<1>>(

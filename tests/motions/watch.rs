@@ -1,14 +1,14 @@
 //! Steps that do not resolve their motion are seen; those that do raise no suspicion.
 
-use crate::{
-    ActionSplitting, Composition, DiscreteLagrangian, Flow, InputError, Midpoint, Splitting, SplittingScheme, Stepper,
-    Strang, Trapezoidal,
-};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
     DoublePendulum, Duffing, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System, TwoCoordinates,
 };
 use contact_geom::{GeometryError, Lagrangian, PhasePoint, Scalar, Structure, legendre};
+use discrete_herglotz::{
+    ActionSplitting, Composition, DiscreteLagrangian, Flow, InputError, Midpoint, Splitting, SplittingScheme, Stepper,
+    Strang, Trapezoidal,
+};
 
 type Outcome = Result<(), InputError>;
 
@@ -294,7 +294,7 @@ fn what_is_not_finite_is_refused() -> Outcome {
             assert!(named(Strang::new(&pendulum, 0.1, t0, &start), name), "{name}");
             assert!(named(ActionSplitting::new(&square, scheme, 0.1, t0, start), name), "{name}");
             assert!(named(Composition::new(|h| Midpoint::new(&pendulum, h), scheme, 0.1, t0, start), name), "{name}");
-            for method in crate::Method::ALL {
+            for method in discrete_herglotz::Method::ALL {
                 assert!(named(method.discretise(&pendulum, 0.1, t0, &start), name), "{method} {name}");
             }
         }

@@ -1,0 +1,29 @@
+//! Motions as their user sees them: rows, events and progress, steps that are too long, many coordinates, round-off.
+
+#![allow(missing_docs)]
+// In a check `f64::max` and `amax` would lose a NaN.
+#![deny(clippy::disallowed_methods)]
+// What a test cannot go on without is a failure of it.
+#![allow(clippy::panic, clippy::unwrap_used)]
+
+mod motions {
+    mod coarse;
+    mod many_coordinates;
+    mod observed;
+    mod round_off;
+    mod watch;
+}
+
+use contact_geom::{Lagrangian, VelocityPoint};
+use discrete_herglotz::{AnyIntegrator, InputError, Outcome, Problem, Steps, Until};
+
+/// A whole run from t = 0 by given steps.
+fn run_of<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    start: VelocityPoint<N>,
+    span: f64,
+    integrator: AnyIntegrator,
+    steps: Steps,
+) -> Result<Outcome<N>, InputError> {
+    Problem::new(lagrangian, 0.0, start)?.by(integrator).steps(steps).run(Until::Time(span))
+}
