@@ -6,8 +6,9 @@ use crate::tape::{Code, Instruction, PREVIOUS, Tape};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 
-/// The numbers of registers that lie on the stack; a tape that needs more has them on the heap. Each is a power of two, so that an index
-/// into them is made one by a mask, and no bound is checked.
+/// The numbers of registers that lie on the stack; a tape that needs more has them on the heap. They are cleared before each evaluation, so
+/// that a short tape has few.
+const TINY: usize = 4;
 const SMALL: usize = 8;
 const MIDDLE: usize = 32;
 const LARGE: usize = 256;
@@ -28,91 +29,91 @@ impl<'a, T: Scalar> At<'a, T> {
     }
 }
 
-/// Registers by their number.
-trait Registers<T> {
-    fn get(&self, register: u16) -> T;
-    fn set(&mut self, register: u16, value: T);
-}
-
-impl<T: Copy, const R: usize> Registers<T> for [T; R] {
-    #[inline(always)]
-    fn get(&self, register: u16) -> T {
-        const { assert!(R.is_power_of_two(), "a mask makes an index") };
-        self[usize::from(register) & (R - 1)]
-    }
-    #[inline(always)]
-    fn set(&mut self, register: u16, value: T) {
-        self[usize::from(register) & (R - 1)] = value;
-    }
-}
-
-/// Of any length; indices are right by construction, and what is not there would be not a number.
-struct OnHeap<T>(Vec<T>);
-
-impl<T: Scalar> Registers<T> for OnHeap<T> {
-    #[inline(always)]
-    fn get(&self, register: u16) -> T {
-        self.0.get(usize::from(register)).copied().unwrap_or_else(|| T::from(f64::NAN))
-    }
-    #[inline(always)]
-    fn set(&mut self, register: u16, value: T) {
-        if let Some(place) = self.0.get_mut(usize::from(register)) {
-            *place = value;
-        }
-    }
-}
+/// Registers on the stack, each of a vector's in cache lines of its own: one that lies across two is slow to read after it was written.
+#[repr(align(64))]
+struct OnStack<T, const R: usize>([T; R]);
 
 impl Tape {
     /// Evaluates it and writes the results to slices, one after the other.
     #[inline(always)]
     pub fn evaluate<T: Scalar>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
-        // One copy of the code for each kind of dual numbers is enough: nothing that takes many steps evaluates them.
+        // Nothing that takes many steps evaluates nested duals.
         if T::NESTED || self.registers > LARGE {
-            T::apart(|| self.run(at, OnHeap(vec![T::zero(); self.registers]), results));
+            self.interpret(at, &mut vec![T::zero(); self.registers], results);
+        } else if self.registers <= TINY {
+            self.interpret(at, &mut OnStack([T::zero(); TINY]).0, results);
         } else if self.registers <= SMALL {
-            T::apart(|| self.run(at, [T::zero(); SMALL], results));
+            self.interpret(at, &mut OnStack([T::zero(); SMALL]).0, results);
         } else if self.registers <= MIDDLE {
-            T::apart(|| self.run(at, [T::zero(); MIDDLE], results));
+            self.interpret(at, &mut OnStack([T::zero(); MIDDLE]).0, results);
         } else {
-            T::apart(|| self.run(at, [T::zero(); LARGE], results));
+            self.evaluate_large(at, results);
         }
     }
 
+    /// A frame of the stack by itself.
+    #[inline(never)]
+    fn evaluate_large<T: Scalar>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
+        self.interpret(at, &mut OnStack([T::zero(); LARGE]).0, results);
+    }
+
+    /// One copy of the code for each kind of numbers, whatever the number of registers: it is long, and compiled for each dimension.
     #[inline(always)]
-    fn run<T: Scalar>(&self, at: At<'_, T>, mut registers: impl Registers<T>, results: &mut [&mut [T]]) {
+    fn interpret<T: Scalar>(&self, at: At<'_, T>, registers: &mut [T], results: &mut [&mut [T]]) {
+        T::apart(
+            #[inline(always)]
+            || self.run(at, registers, results),
+        );
+    }
+
+    #[inline(always)]
+    fn run<T: Scalar>(&self, at: At<'_, T>, registers: &mut [T], results: &mut [&mut [T]]) {
         // Plain loops: chained iterators, and copies of slices, cost more than all the work of a short tape.
         let n = at.q.len() as u16;
         for (x, i) in at.q.iter().zip(0..) {
-            registers.set(i, *x);
+            set(registers, i, *x);
         }
         if self.reads.meets(Inputs::VELOCITY) {
             for (x, i) in at.v.iter().zip(n..) {
-                registers.set(i, *x);
+                set(registers, i, *x);
             }
         }
         if self.reads.meets(Inputs::ACTION.and(Inputs::TIME)) {
-            registers.set(2 * n, at.z);
-            registers.set(2 * n + 1, at.t);
+            set(registers, 2 * n, at.z);
+            set(registers, 2 * n + 1, at.t);
         }
         let mut previous = T::zero();
         for instruction in &self.code {
-            previous = perform(instruction, &registers, previous);
-            registers.set(instruction.to, previous);
+            previous = perform(instruction, registers, previous);
+            set(registers, instruction.to, previous);
         }
         let mut places = self.results.iter();
         for part in results.iter_mut() {
             for (result, place) in part.iter_mut().zip(&mut places) {
-                *result = if *place == PREVIOUS { previous } else { registers.get(*place) };
+                *result = if *place == PREVIOUS { previous } else { get(registers, *place) };
             }
         }
     }
 }
 
+/// A register by its number, which is right by construction; what is not there would be not a number.
+#[inline(always)]
+fn get<T: Scalar>(registers: &[T], register: u16) -> T {
+    registers.get(usize::from(register)).copied().unwrap_or_else(|| T::from(f64::NAN))
+}
+
+#[inline(always)]
+fn set<T: Scalar>(registers: &mut [T], register: u16, value: T) {
+    if let Some(place) = registers.get_mut(usize::from(register)) {
+        *place = value;
+    }
+}
+
 /// The result of one instruction.
 #[inline(always)]
-fn perform<T: Scalar>(instruction: &Instruction, registers: &impl Registers<T>, previous: T) -> T {
+fn perform<T: Scalar>(instruction: &Instruction, registers: &[T], previous: T) -> T {
     let k = instruction.constant();
-    let r = |i: u16| if i == PREVIOUS { previous } else { registers.get(i) };
+    let r = |i: u16| if i == PREVIOUS { previous } else { get(registers, i) };
     let a = || r(instruction.a);
     let b = || r(instruction.b);
     let [c, d] = instruction.third_and_fourth();

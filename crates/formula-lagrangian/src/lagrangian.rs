@@ -193,6 +193,7 @@ fn second_derivatives(graph: &mut Graph, partials: &[Id], variables: &[Id]) -> O
 
 impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     const PROVED: bool = true;
+    const INTERPRETED: bool = true;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {

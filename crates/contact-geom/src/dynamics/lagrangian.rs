@@ -35,6 +35,9 @@ pub trait Lagrangian<const N: usize> {
     /// `formula-lagrangian` do: they are not probed, and no other derivatives are compiled.
     const PROVED: bool = false;
 
+    /// Whether an evaluation is dear to begin, whatever the numbers: L is then asked for many at once where that is possible.
+    const INTERPRETED: bool = false;
+
     /// The value `L(t, q, v, z)`.
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T;
 
@@ -109,6 +112,7 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<L> {
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
     const HAS_CLOCK: bool = L::HAS_CLOCK;
     const PROVED: bool = L::PROVED;
+    const INTERPRETED: bool = L::INTERPRETED;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {

@@ -10,7 +10,6 @@ mod observed;
 mod pack;
 mod sharded;
 mod shards;
-mod sine;
 mod single;
 mod splitting;
 #[cfg(test)]

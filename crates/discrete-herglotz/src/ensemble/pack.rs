@@ -1,6 +1,7 @@
 //! Several registers of lanes as one number, each lane a trajectory of its own.
 
 use crate::gauss::lanes::{Lanes, note_branch, token};
+use crate::gauss::sine::{REDUCIBLE, Register, cosine, sine};
 use contact_geom::Scalar;
 use pulp::{Simd, bytemuck};
 use std::fmt::{Debug, Formatter};
@@ -88,10 +89,25 @@ impl<S: Simd, const K: usize> Pack<S, K> {
     #[inline(always)]
     fn within_range(self, argument: Self) -> Self {
         let set = token::<S>();
-        let (range, none) = (set.splat_f64s(super::sine::REDUCIBLE), set.splat_f64s(f64::NAN));
+        let (range, none) = (set.splat_f64s(REDUCIBLE), set.splat_f64s(f64::NAN));
         Pack(std::array::from_fn(|k| {
             set.select_f64s(set.less_than_f64s(set.abs_f64s(argument.0[k]), range), self.0[k], none)
         }))
+    }
+}
+
+impl<S: Simd, const K: usize> Register for Pack<S, K> {
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Pack::splat(x)
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Pack::mul_add(self, b, c)
+    }
+    #[inline(always)]
+    fn turned(self, of: Self) -> Self {
+        Pack(std::array::from_fn(|k| Lanes::<S>(self.0[k]).turned(Lanes(of.0[k])).0))
     }
 }
 
@@ -242,11 +258,11 @@ impl<S: Simd, const K: usize> Scalar for Pack<S, K> {
     }
     #[inline(always)]
     fn sin(self) -> Self {
-        super::sine::sine(self).within_range(self)
+        sine(self).within_range(self)
     }
     #[inline(always)]
     fn cos(self) -> Self {
-        super::sine::cosine(self).within_range(self)
+        cosine(self).within_range(self)
     }
     #[inline(always)]
     fn sin_versine(self) -> (Self, Self) {

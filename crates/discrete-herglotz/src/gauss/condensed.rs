@@ -13,6 +13,8 @@ use num_traits::{One, Zero};
 use pulp::{Simd, WithSimd};
 use qd::Quad;
 use std::array::from_fn;
+use std::cell::RefCell;
+use std::sync::Arc;
 
 /// The step of `L = v.Mv/2 - V(t, q) + gamma z` in the accelerations `a_i = M^-1 L_q(t_i, Q_i)` alone: with the stages
 /// `rho_i` of the integrating factor, which depend on `gamma h` only,
@@ -54,7 +56,29 @@ pub(crate) struct ExactEnd {
     pub end_v: Exact,
 }
 
+thread_local! {
+    /// The table that was made last: a plan and its run, and a run after a run, have the same.
+    static LAST: RefCell<Option<Arc<Condensed>>> = const { RefCell::new(None) };
+}
+
 impl Condensed {
+    /// The table for a number of stages, a step and a rate.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn of(s: usize, h: f64, gamma: f64) -> Result<Arc<Self>, InputError> {
+        let last = LAST.with_borrow(Clone::clone);
+        let same = |table: &Arc<Self>| {
+            table.s == s && table.h.to_bits() == h.to_bits() && table.gamma.to_bits() == gamma.to_bits()
+        };
+        if let Some(last) = last.filter(same) {
+            return Ok(last);
+        }
+        let table = Arc::new(Self::new(s, h, gamma)?);
+        LAST.set(Some(table.clone()));
+        Ok(table)
+    }
+
     /// # Errors
     /// [`StepError::StageFactor`] and [`InputError::Sigma`] where a stage of the integrating factor, or its end, is not
     /// positive: the step is too long for this rate.

@@ -15,7 +15,7 @@ use super::table::StageTable;
 use super::time_transformation::{Extension, TimeTransformation, Values};
 use crate::gauss::lanes::{Lanes, branched};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Hessian, KernelDual, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
+use contact_geom::{Derivatives, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
 use pulp::Simd;
 use std::array::from_fn;
 
@@ -189,54 +189,6 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
     /// The clock's rate at the state.
     pub fn rate(&self) -> f64 {
         self.extension.transformation.rate(&SVector::from(self.q.map(|q| q.value)))
-    }
-
-    /// The point of TQ x R at a block of stages.
-    #[inline(always)]
-    fn point<S: Simd>(&self, r: usize) -> VelocityPoint<N, Lanes<S>> {
-        VelocityPoint {
-            q: SVector::from_fn(|d, _| self.x[d].block(r)),
-            v: SVector::from_fn(|d, _| self.v[d].block(r)),
-            z: self.z_stages.block(r),
-        }
-    }
-
-    /// Evaluates L and its gradient at the stages; returns the largest change of a clock's rates, relative to the largest.
-    #[inline(always)]
-    fn evaluate<S: Simd>(&mut self, t: f64) -> f64 {
-        let (mut dg, mut sg) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
-        for r in 0..blocks::<S>(self.table.s) {
-            let at = self.table.times.block::<S>(r) + t;
-            let (re, d) = self.lagrangian.with_gradient(at, &self.point::<S>(r));
-            let (mut weight, falling) = (self.table.weights.block::<S>(r), -self.falling.block::<S>(r));
-            let mut of_clock = [Lanes::<S>::splat(0.0); N];
-            if !P::PHYSICAL {
-                let point = self.point::<S>(r);
-                let q = SVector::<_, N>::from_fn(|i, _| {
-                    let mut q = KernelDual::<Lanes<S>, SVector<Lanes<S>, N>>::constant(point.q[i]);
-                    q.d[i] = Lanes::splat(1.0);
-                    q
-                });
-                let KernelDual { re: g, d: slope } = self.extension.transformation.rate(&q);
-                let energy = point.v.dot(&d.y) - re;
-                let extended = energy.mul_add(falling, energy + self.extension.p_t.value);
-                of_clock = from_fn(|i| slope[i] * extended * -weight);
-                weight *= g;
-                dg = dg.max((g - self.extension.g.block(r)).abs());
-                sg = sg.max(g.abs());
-                self.extension.g.set(r, g);
-            }
-            self.l.set(r, weight * re);
-            self.rate.set(r, weight * d.z.mul_add(falling, d.z));
-            for i in 0..N {
-                let push = d.x[i].mul_add(falling, d.x[i]);
-                let force = if P::PHYSICAL { weight * push } else { push.mul_add(weight, of_clock[i]) };
-                self.force[i].set(r, force);
-                self.l_v[i].set(r, d.y[i]);
-            }
-        }
-        self.evaluations += self.table.s as u64;
-        if P::PHYSICAL { 0.0 } else { dg.largest() / sg.largest() }
     }
 
     /// What the velocities of the stages move the positions by.

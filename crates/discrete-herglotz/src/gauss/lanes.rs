@@ -1,5 +1,6 @@
 //! Lanes of a vector register as numbers that a Lagrangian can be written over.
 
+use super::sine::{REDUCIBLE, Register, cosine, sine};
 use contact_geom::Scalar;
 use pulp::{Simd, WithSimd, bytemuck};
 use std::cell::Cell;
@@ -98,32 +99,6 @@ impl<S: Simd> Lanes<S> {
         self
     }
 
-    /// `sin(x + k pi)` where `x - turns pi` is small: the odd polynomial of the rest, with the sign of the turns.
-    ///
-    /// pi in three parts, of which the first two have so few digits that their products with the turns are exact.
-    #[inline(always)]
-    fn reduced_sine(self, turns: Self, sign_of: Self) -> Self {
-        let r = turns.mul_add(Self::splat(-PI[0]), self);
-        let r = turns.mul_add(Self::splat(-PI[1]), r);
-        let r = turns.mul_add(Self::splat(-PI[2]), r);
-        let square = r * r;
-        let mut sum = Self::splat(SINE[0]);
-        for c in &SINE[1..] {
-            sum = sum.mul_add(square, Self::splat(*c));
-        }
-        let sine = (square * r).mul_add(sum, r);
-        // 1 for an even number of half turns, -1 for an odd one.
-        let half = sign_of * 0.5;
-        let odd = (half - half.rounded()) * 2.0;
-        sine * (Self::splat(1.0) - odd.abs() * 2.0)
-    }
-
-    /// The nearest integer, for sizes below 2^51: adding and taking away 1.5 * 2^52 leaves no binary places.
-    #[inline(always)]
-    fn rounded(self) -> Self {
-        (self + ROUNDING) - ROUNDING
-    }
-
     /// Whether all lanes are within the range of the argument reduction.
     #[inline(always)]
     fn reducible(self) -> bool {
@@ -131,34 +106,22 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// See [`Lanes::rounded`].
-const ROUNDING: f64 = 6_755_399_441_055_744.0;
-
-/// The arguments up to which sine and cosine are reduced by three parts of pi: the half turns then have at most 19 binary
-/// digits.
-const REDUCIBLE: f64 = 5e5;
-
-/// pi to 140 binary digits: 33, 33 and the rest.
-const PI: [f64; 3] = [
-    f64::from_bits(0x4009_21fb_5440_0000),
-    f64::from_bits(0x3de0_b461_1a60_0000),
-    f64::from_bits(0x3bb3_198a_2e03_7073),
-];
-
-/// The coefficients `(-1)^k / (2k+1)!`, from k = 11 down to 1: the first one left out is below 1e-20 on a quarter turn.
-const SINE: [f64; 11] = [
-    -1.0 / 25_852_016_738_884_976_640_000.0,
-    1.0 / 51_090_942_171_709_440_000.0,
-    -1.0 / 121_645_100_408_832_000.0,
-    1.0 / 355_687_428_096_000.0,
-    -1.0 / 1_307_674_368_000.0,
-    1.0 / 6_227_020_800.0,
-    -1.0 / 39_916_800.0,
-    1.0 / 362_880.0,
-    -1.0 / 5_040.0,
-    1.0 / 120.0,
-    -1.0 / 6.0,
-];
+impl<S: Simd> Register for Lanes<S> {
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Lanes::splat(x)
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Lanes::mul_add(self, b, c)
+    }
+    #[inline(always)]
+    fn turned(self, of: Self) -> Self {
+        let set = token::<S>();
+        let last = set.and_u64s(set.transmute_u64s_f64s(of.0), set.splat_u64s(1));
+        Lanes(set.select_f64s(set.equal_u64s(last, set.splat_u64s(0)), self.0, set.neg_f64s(self.0)))
+    }
+}
 
 impl<S: Simd> Debug for Lanes<S> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
@@ -315,17 +278,14 @@ impl<S: Simd> Scalar for Lanes<S> {
         if !self.reducible() {
             return self.each(f64::sin);
         }
-        let turns = (self * std::f64::consts::FRAC_1_PI).rounded();
-        self.reduced_sine(turns, turns)
+        sine(self)
     }
-    /// `cos x = sin(x + pi/2)`, the quarter turn put among the turns.
     #[inline(always)]
     fn cos(self) -> Self {
         if !self.reducible() {
             return self.each(f64::cos);
         }
-        let turns = (self * std::f64::consts::FRAC_1_PI + 0.5).rounded();
-        self.reduced_sine(turns - 0.5, turns)
+        cosine(self)
     }
     #[inline(always)]
     fn sin_versine(self) -> (Self, Self) {

@@ -6,6 +6,7 @@
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
 use super::instructions::Instructions;
+use super::pair::Pair;
 use super::position_newton::{At, PositionNewton, curvature};
 use super::resolution::{FORETOLD, Tail};
 use super::simplified::SlopeNewton;
@@ -15,8 +16,9 @@ use crate::StepError;
 use crate::gauss::lanes::{Lanes, branched};
 use crate::run::saved::{Saved, load_option, save_option, saved};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Lagrangian, VelocityPoint, largest};
+use contact_geom::{Derivatives, Lagrangian, Scalar, VelocityPoint, largest};
 use pulp::Simd;
+use std::sync::Arc;
 
 /// The steps after which a matrix is expected to last.
 const LASTING: usize = 64;
@@ -35,7 +37,7 @@ const TAILS: usize = 7;
 #[repr(C)]
 pub(super) struct SeparableStages<'a, L, const N: usize> {
     pub lagrangian: &'a L,
-    pub table: Condensed,
+    pub table: Arc<Condensed>,
     pub left: Preconditioned,
     /// What the force adds to the linear one, `a_i + kappa Q_i`: the unknown of the iteration.
     rest: [Stages; N],
@@ -76,7 +78,7 @@ pub(super) struct SeparableStages<'a, L, const N: usize> {
 impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
     pub fn new(
         lagrangian: &'a L,
-        table: Condensed,
+        table: Arc<Condensed>,
         left: Preconditioned,
         inverse_mass: Option<Box<SMatrix<f64, N, N>>>,
         start: &VelocityPoint<N>,
@@ -186,13 +188,29 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         }
     }
 
-    /// The accelerations at positions, one block of stages.
+    /// The forces at positions, one block of stages.
     #[inline(always)]
-    fn accelerations<S: Simd>(&self, t: f64, r: usize) -> SVector<Lanes<S>, N> {
+    fn force<S: Simd>(&self, t: f64, r: usize) -> SVector<Lanes<S>, N> {
+        self.force_of(self.table.times.block::<S>(r) + t, |d| self.x[d].block(r))
+    }
+
+    /// The same of this one and the next.
+    #[inline(always)]
+    fn forces<S: Simd>(&self, t: f64, r: usize) -> [SVector<Lanes<S>, N>; 2] {
+        let force = self.force_of(Pair::<S>::of(&self.table.times, r) + t, |d| Pair::of(&self.x[d], r));
+        [SVector::from_fn(|d, _| force[d].0), SVector::from_fn(|d, _| force[d].1)]
+    }
+
+    #[inline(always)]
+    fn force_of<T: Scalar>(&self, t: T, q: impl Fn(usize) -> T) -> SVector<T, N> {
+        let x = VelocityPoint { q: SVector::from_fn(|d, _| q(d)), v: SVector::from_element(T::zero()), z: T::zero() };
+        self.lagrangian.force(t, &x)
+    }
+
+    /// The accelerations of forces.
+    #[inline(always)]
+    fn accelerations<S: Simd>(&self, force: SVector<Lanes<S>, N>) -> SVector<Lanes<S>, N> {
         let zero = Lanes::<S>::splat(0.0);
-        let x =
-            VelocityPoint { q: SVector::from_fn(|d, _| self.x[d].block(r)), v: SVector::from_element(zero), z: zero };
-        let force = self.lagrangian.force(self.table.times.block::<S>(r) + t, &x);
         match &self.inverse_mass {
             None => force,
             Some(inverse) => {
@@ -216,7 +234,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         }
         let s = self.table.s;
         let m = blocks::<S>(s);
-        let kappa = Lanes::<S>::splat(self.left.kappa);
         let solved = std::mem::take(&mut self.solved);
         if self.warm && !solved {
             for d in 0..N {
@@ -255,18 +272,21 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
                 aside = false;
                 self.begin::<S>(small);
             }
-            let (mut change, mut size) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
-            for r in 0..m {
-                let a = self.accelerations::<S>(t, r);
-                for d in 0..N {
-                    let linear = kappa * self.x[d].block(r);
-                    let rest = a[d] + linear;
-                    change = change.max((rest - self.rest[d].block(r)).abs());
-                    size = size.max(a[d].abs()).max(linear.abs());
-                    self.rest[d].set(r, rest);
-                    self.a[d].set(r, a[d]);
+            let mut most = [Lanes::<S>::splat(0.0); 2];
+            let mut first = 0;
+            if const { L::INTERPRETED } {
+                while first < 2 * Pair::<S>::among(m) {
+                    let [one, other] = self.forces::<S>(t, first);
+                    self.take(first, one, &mut most);
+                    self.take(first + 1, other, &mut most);
+                    first += 2;
                 }
             }
+            for r in first..m {
+                let force = self.force::<S>(t, r);
+                self.take(r, force, &mut most);
+            }
+            let [change, size] = most;
             self.evaluations += s as u64;
             let (mut change, size) = (change.largest(), size.largest());
             if solved {
@@ -304,6 +324,20 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         }
         self.taken += 1;
         AfterSweep::Done
+    }
+
+    /// Takes the forces of one block of stages; what they have changed by most, and the largest of what they consist of, are kept.
+    #[inline(always)]
+    fn take<S: Simd>(&mut self, r: usize, force: SVector<Lanes<S>, N>, [change, size]: &mut [Lanes<S>; 2]) {
+        let (a, kappa) = (self.accelerations(force), Lanes::<S>::splat(self.left.kappa));
+        for d in 0..N {
+            let linear = kappa * self.x[d].block(r);
+            let rest = a[d] + linear;
+            *change = change.max((rest - self.rest[d].block(r)).abs());
+            *size = size.max(a[d].abs()).max(linear.abs());
+            self.rest[d].set(r, rest);
+            self.a[d].set(r, a[d]);
+        }
     }
 
     /// Looks at the slope of the force, and refines matrices that last.
@@ -388,8 +422,19 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             let v = Lanes::<S>::splat(self.v[d].value);
             table.d.apply(&self.a[d], s, &mut velocities[d], |r| table.inverse_rho.block(r) * v);
         }
-        let mut action = Stages::ZERO;
-        for r in 0..blocks::<S>(s) {
+        let (mut action, m) = (Stages::ZERO, blocks::<S>(s));
+        let mut first = 0;
+        if const { L::INTERPRETED } {
+            while first < 2 * Pair::<S>::among(m) {
+                let q = SVector::from_fn(|d, _| Pair::<S>::of(&self.x[d], first));
+                let v = SVector::from_fn(|d, _| Pair::of(&velocities[d], first));
+                let l = self.lagrangian.value(Pair::of(&table.times, first) + t, &q, &v, 0.0.into());
+                action.set(first, l.0);
+                action.set(first + 1, l.1);
+                first += 2;
+            }
+        }
+        for r in first..m {
             let q = SVector::from_fn(|d, _| self.x[d].block::<S>(r));
             let v = SVector::from_fn(|d, _| velocities[d].block::<S>(r));
             action.set(r, self.lagrangian.value(table.times.block::<S>(r) + t, &q, &v, Lanes::splat(0.0)));

@@ -26,6 +26,7 @@ use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint
 pub(crate) use marks::FEW;
 use marks::Sequence;
 use pulp::{Simd, WithSimd};
+use std::sync::Arc;
 
 /// How the steps of contact Gauss collocation are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +48,7 @@ const MOST_LINEAR: usize = 32;
 #[allow(clippy::large_enum_variant)] // One is made for a run, in a box.
 enum Route<'a, L, const N: usize> {
     /// In a box of its own: its matrices are larger than all that others hold.
-    Linear(Box<Linear<N>>, Condensed),
+    Linear(Box<Linear<N>>, Arc<Condensed>),
     Condensed(SeparableStages<'a, L, N>),
     General(General<'a, L, Physical, N>),
 }
@@ -109,7 +110,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let condensed = structure.separable && structure.has_constant_rate();
         let (mut mass, mut of_sigma) = (None, 0.0);
         let route = if condensed {
-            let table = Condensed::new(s, h, lagrangian.gradient(t0, &start).z)?;
+            let table = Condensed::of(s, h, lagrangian.gradient(t0, &start).z)?;
             let unit = is_identity(&w);
             mass = Some(w);
             of_sigma = resolution::of_sigma(1.0 + table.grow.head, table.gamma * h);

@@ -1,11 +1,9 @@
-//! Sine and cosine of packs.
+//! Sine and cosine of numbers that lie in vector registers.
 
-use super::pack::Pack;
-use crate::gauss::lanes::token;
-use pulp::Simd;
+use std::ops::{Add, Mul, Sub};
 
 /// The arguments below which sine and cosine are reduced by three parts of pi: the half turns then have at most 19 binary digits.
-pub(super) const REDUCIBLE: f64 = 5e5;
+pub(crate) const REDUCIBLE: f64 = 5e5;
 
 /// 1.5 * 2^52: a number of a smaller size added to it is rounded to an integer, whose last digit is the last of the sum's.
 const ROUNDING: f64 = 6_755_399_441_055_744.0;
@@ -30,38 +28,42 @@ const SINE: [f64; 8] = [
     -0.166_666_666_666_666_66,
 ];
 
+/// What the functions of this module ask of registers.
+pub(crate) trait Register: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// A constant in all lanes.
+    fn splat(x: f64) -> Self;
+    /// `self b + c`.
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// With the other sign in the lanes in which the last binary digit of `of` is 1.
+    fn turned(self, of: Self) -> Self;
+}
+
 /// `sin x` for `|x|` below [`REDUCIBLE`], within 2 units in the last place.
 #[inline(always)]
-pub(super) fn sine<S: Simd, const K: usize>(x: Pack<S, K>) -> Pack<S, K> {
-    let rounded = x.mul_add(Pack::splat(std::f64::consts::FRAC_1_PI), Pack::splat(ROUNDING));
-    reduced(x, rounded - ROUNDING, rounded)
+pub(crate) fn sine<R: Register>(x: R) -> R {
+    let rounded = x.mul_add(R::splat(std::f64::consts::FRAC_1_PI), R::splat(ROUNDING));
+    reduced(x, rounded - R::splat(ROUNDING), rounded)
 }
 
 /// `cos x = sin(x + pi/2)`, the quarter turn put among the turns.
 #[inline(always)]
-pub(super) fn cosine<S: Simd, const K: usize>(x: Pack<S, K>) -> Pack<S, K> {
+pub(crate) fn cosine<R: Register>(x: R) -> R {
     // The half is added before it is rounded to an integer.
-    let half = x.mul_add(Pack::splat(std::f64::consts::FRAC_1_PI), Pack::splat(0.5));
-    let rounded = half + ROUNDING;
-    reduced(x, (rounded - ROUNDING) - 0.5, rounded)
+    let half = x.mul_add(R::splat(std::f64::consts::FRAC_1_PI), R::splat(0.5));
+    let rounded = half + R::splat(ROUNDING);
+    reduced(x, (rounded - R::splat(ROUNDING)) - R::splat(0.5), rounded)
 }
 
 /// `(-1)^k sin(x - turns pi)` where the last binary digit of `rounded` is that of k.
 #[inline(always)]
-fn reduced<S: Simd, const K: usize>(x: Pack<S, K>, turns: Pack<S, K>, rounded: Pack<S, K>) -> Pack<S, K> {
-    let r = turns.mul_add(Pack::splat(-PI[0]), x);
-    let r = turns.mul_add(Pack::splat(-PI[1]), r);
-    let r = turns.mul_add(Pack::splat(-PI[2]), r);
+fn reduced<R: Register>(x: R, turns: R, rounded: R) -> R {
+    let r = turns.mul_add(R::splat(-PI[0]), x);
+    let r = turns.mul_add(R::splat(-PI[1]), r);
+    let r = turns.mul_add(R::splat(-PI[2]), r);
     let y = r * r;
-    let mut sum = Pack::splat(SINE[0]);
+    let mut sum = R::splat(SINE[0]);
     for c in &SINE[1..] {
-        sum = sum.mul_add(y, Pack::splat(*c));
+        sum = sum.mul_add(y, R::splat(*c));
     }
-    let sine = (y * r).mul_add(sum, r);
-    let set = token::<S>();
-    let (one, zero) = (set.splat_u64s(1), set.splat_u64s(0));
-    Pack(std::array::from_fn(|k| {
-        let last = set.and_u64s(set.transmute_u64s_f64s(rounded.0[k]), one);
-        set.select_f64s(set.equal_u64s(last, zero), sine.0[k], set.neg_f64s(sine.0[k]))
-    }))
+    (y * r).mul_add(sum, r).turned(rounded)
 }

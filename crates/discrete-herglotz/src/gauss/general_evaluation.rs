@@ -1,0 +1,90 @@
+//! L and its gradient at the stages of a general step.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+use super::general::General;
+use super::pair::Pair;
+use super::stages::blocks;
+use super::time_transformation::TimeTransformation;
+use crate::gauss::lanes::Lanes;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Derivatives, KernelDual, Lagrangian, Triple, VelocityPoint};
+use pulp::Simd;
+use std::array::from_fn;
+
+impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, P, N> {
+    /// The point of TQ x R at a block of stages.
+    #[inline(always)]
+    pub(super) fn point<S: Simd>(&self, r: usize) -> VelocityPoint<N, Lanes<S>> {
+        VelocityPoint {
+            q: SVector::from_fn(|d, _| self.x[d].block(r)),
+            v: SVector::from_fn(|d, _| self.v[d].block(r)),
+            z: self.z_stages.block(r),
+        }
+    }
+
+    /// Evaluates L and its gradient at the stages; returns the largest change of a clock's rates, relative to the largest.
+    #[inline(always)]
+    pub(super) fn evaluate<S: Simd>(&mut self, t: f64) -> f64 {
+        let (mut dg, mut sg) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
+        let (m, mut first) = (blocks::<S>(self.table.s), 0);
+        if const { L::INTERPRETED && P::PHYSICAL } {
+            while first < 2 * Pair::<S>::among(m) {
+                let point = VelocityPoint {
+                    q: SVector::from_fn(|d, _| Pair::<S>::of(&self.x[d], first)),
+                    v: SVector::from_fn(|d, _| Pair::of(&self.v[d], first)),
+                    z: Pair::of(&self.z_stages, first),
+                };
+                let (l, d) = self.lagrangian.with_gradient(Pair::of(&self.table.times, first) + t, &point);
+                self.weigh(first, l.0, &Triple { x: d.x.map(|e| e.0), y: d.y.map(|e| e.0), z: d.z.0 });
+                self.weigh(first + 1, l.1, &Triple { x: d.x.map(|e| e.1), y: d.y.map(|e| e.1), z: d.z.1 });
+                first += 2;
+            }
+        }
+        for r in first..m {
+            let at = self.table.times.block::<S>(r) + t;
+            let (re, d) = self.lagrangian.with_gradient(at, &self.point::<S>(r));
+            if const { P::PHYSICAL } {
+                self.weigh(r, re, &d);
+                continue;
+            }
+            let (mut weight, falling) = (self.table.weights.block::<S>(r), -self.falling.block::<S>(r));
+            let point = self.point::<S>(r);
+            let q = SVector::<_, N>::from_fn(|i, _| {
+                let mut q = KernelDual::<Lanes<S>, SVector<Lanes<S>, N>>::constant(point.q[i]);
+                q.d[i] = Lanes::splat(1.0);
+                q
+            });
+            let KernelDual { re: g, d: slope } = self.extension.transformation.rate(&q);
+            let energy = point.v.dot(&d.y) - re;
+            let extended = energy.mul_add(falling, energy + self.extension.p_t.value);
+            let of_clock: [_; N] = from_fn(|i| slope[i] * extended * -weight);
+            weight *= g;
+            dg = dg.max((g - self.extension.g.block(r)).abs());
+            sg = sg.max(g.abs());
+            self.extension.g.set(r, g);
+            self.l.set(r, weight * re);
+            self.rate.set(r, weight * d.z.mul_add(falling, d.z));
+            for i in 0..N {
+                let push = d.x[i].mul_add(falling, d.x[i]);
+                self.force[i].set(r, push.mul_add(weight, of_clock[i]));
+                self.l_v[i].set(r, d.y[i]);
+            }
+        }
+        self.evaluations += self.table.s as u64;
+        if P::PHYSICAL { 0.0 } else { dg.largest() / sg.largest() }
+    }
+
+    /// Takes L and its gradient at one block of stages, with the weights of physical time.
+    #[inline(always)]
+    fn weigh<S: Simd>(&mut self, r: usize, l: Lanes<S>, d: &Triple<N, Lanes<S>>) {
+        let (weight, falling) = (self.table.weights.block::<S>(r), -self.falling.block::<S>(r));
+        self.l.set(r, weight * l);
+        self.rate.set(r, weight * d.z.mul_add(falling, d.z));
+        for i in 0..N {
+            self.force[i].set(r, weight * d.x[i].mul_add(falling, d.x[i]));
+            self.l_v[i].set(r, d.y[i]);
+        }
+    }
+}
