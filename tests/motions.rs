@@ -7,6 +7,7 @@
 #![allow(clippy::panic, clippy::unwrap_used)]
 
 mod motions {
+    mod accuracy;
     mod coarse;
     mod many_coordinates;
     mod observed;

@@ -1,111 +1,13 @@
-//! Tests of the choice of steps.
+//! What the choice of steps costs.
 
 use super::choose_with;
+use crate::AnyIntegrator;
 use crate::run::pilot::{BUDGET, Pilots};
-use crate::run::{Needs, Outcome, Problem, Request, Shared, Until};
-use crate::{AnyIntegrator, InputError, Obstacle, Status};
-use contact_geom::nalgebra::SVector;
+use crate::run::{Needs, Problem, Request, Shared, Until};
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
-use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint};
+use contact_geom::{Lagrangian, VelocityPoint};
 use std::borrow::Cow;
 use std::sync::Arc;
-use std::time::Instant;
-
-/// A whole run from t = 0 by an integrator and steps for an accuracy.
-fn run_to<L: Lagrangian<N>, const N: usize>(
-    lagrangian: &L,
-    start: VelocityPoint<N>,
-    span: f64,
-    wanted: f64,
-) -> Result<Outcome<N>, InputError> {
-    Problem::new(lagrangian, 0.0, start)?.accuracy(wanted).run(Until::Time(span))
-}
-
-/// `v^2/2 - V(q) + gamma (1 + swing cos t) z`.
-struct Line {
-    gamma: f64,
-    swing: f64,
-    potential: Potential,
-}
-
-enum Potential {
-    /// A jump, so narrow that no gradient sees it.
-    Jump { at: f64, height: f64 },
-    /// A well beside the origin, where damped motions come to rest.
-    Well,
-    /// `-q^4`: motions leave all numbers in a finite time.
-    Pole,
-}
-
-impl Lagrangian<1> for Line {
-    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        let square = q[0] * q[0];
-        let potential = match self.potential {
-            Potential::Jump { at, height } => ((q[0] - at) * 1e10).tanh() * (0.5 * height),
-            Potential::Well => q[0] * -0.386 + square * -0.379 + square * square * 0.158 + (q[0].cos() - 1.0) * -0.963,
-            Potential::Pole => square * square * -1.0,
-        };
-        v[0] * v[0] * 0.5 - potential + z * (t.cos() * self.swing + 1.0) * self.gamma
-    }
-
-    fn structure(&self) -> Structure {
-        Structure {
-            autonomous: self.swing == 0.0,
-            constant_rate: self.swing == 0.0,
-            z_affine: true,
-            separable: true,
-            constant_mass: true,
-            ..Structure::default()
-        }
-    }
-}
-
-fn at(q: f64, v: f64) -> VelocityPoint<1> {
-    VelocityPoint::new([q], [v], 0.0)
-}
-
-/// Runs on both sides of a jump agree to the last digit; the values of L tell, in a step and between two.
-#[test]
-fn jumps_of_the_potential_are_refused() {
-    for i in 0..64 {
-        // Some of them where steps end.
-        let place = if i % 4 == 0 { 10.0 * (i + 1) as f64 / 64.0 } else { 0.5 + 0.137 * i as f64 };
-        let height = [-0.8, -0.02, 0.003, 0.3][i / 4 % 4];
-        let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Jump { at: place, height } };
-        let problem = Problem::new(&line, 0.0, at(0.0, 1.0)).unwrap();
-        let cause = match problem.accuracy(1e-6).plan(Until::Time(10.0)) {
-            Err(InputError::Accuracy { cause, .. }) => cause,
-            other => panic!("{place}, {height}: {:?}", other.map(|plan| plan.count())),
-        };
-        assert!(matches!(cause, Obstacle::Order { .. } | Obstacle::Unresolved { .. }), "{place}, {height}: {cause:?}");
-    }
-}
-
-/// A motion that has come to rest, up to its round-off, is followed on.
-#[test]
-fn motions_that_come_to_rest_are_followed() {
-    let line = Line { gamma: -0.89, swing: 0.0, potential: Potential::Well };
-    for span in [40.0, 90.0, 400.0] {
-        let outcome = run_to(&line, at(0.3, -0.5), span, 1e-8).unwrap();
-        assert_eq!(outcome.status, Status::Completed, "{span}");
-        // At the bottom of the well: its force there is round-off.
-        let x = VelocityPoint::new([outcome.q[0]], [outcome.p[0]], 0.0);
-        let force = line.gradient(0.0, &x).x[0];
-        assert!(span < 90.0 || (force.abs() <= 1e-14 && outcome.p[0].abs() <= 1e-14), "{span}: {force:e}, {outcome:?}");
-    }
-}
-
-/// What is at rest stays there, while z goes on.
-#[test]
-fn rest_is_followed() {
-    let line = Line { gamma: -0.25, swing: 1.0, potential: Potential::Pole };
-    let start = VelocityPoint::new([0.0], [0.0], -0.98);
-    let outcome = run_to(&line, start, 20.0, 1e-8).unwrap();
-    assert_eq!((outcome.status, outcome.q[0], outcome.p[0]), (Status::Completed, 0.0, 0.0));
-    // z' = gamma (1 + cos t) z. The accuracy is not that of z, but steps that do not resolve it to a twentieth are refused.
-    let z = -0.98 * (-0.25 * (20.0 + 20.0f64.sin())).exp();
-    assert!(outcome.z.is_some_and(|found| (found - z).abs() <= 0.05 * z.abs()), "{:?}, not {z}", outcome.z);
-}
 
 /// The integrator and the steps that are chosen for a run, with what the search for them has cost.
 fn search<L: Lagrangian<N>, const N: usize>(
@@ -127,7 +29,7 @@ fn search<L: Lagrangian<N>, const N: usize>(
 fn pilot_runs_cost_little() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
     for (span, wanted) in [(30.0, 1e-4), (30.0, 1e-7), (100.0, 1e-9), (300.0, 1e-6), (1000.0, 1e-8)] {
-        let problem = Problem::new(&pendulum, 0.0, at(1.0, 1.0)).unwrap();
+        let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.0], 0.0)).unwrap();
         let (_, count, spent) = search(&problem, span, None, wanted);
         let run = problem.accuracy(wanted).run(Until::Time(span)).unwrap();
         assert_eq!(count, run.steps);
@@ -160,34 +62,4 @@ fn pilot_runs_by_a_clock_cost_little() {
             assert!(spent as f64 <= most, "{e}: {spent} evaluations for {}", run.evaluations);
         }
     }
-}
-
-/// A singularity is found to be one in bounded work, by whatever method.
-#[test]
-fn singularities_end_the_search_soon() {
-    let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Pole };
-    for integrator in ["gauss_8", "midpoint", "strang", "midpoint_by_kahan_li_8"] {
-        let integrator: AnyIntegrator = integrator.parse().unwrap();
-        let clock = Instant::now();
-        let problem = Problem::new(&line, 0.0, at(0.5, 0.5)).unwrap();
-        let refused = problem.by(integrator).accuracy(1e-4).run(Until::Time(20.0)).err();
-        assert!(
-            matches!(
-                refused,
-                Some(InputError::Accuracy { cause: Obstacle::Halted { .. } | Obstacle::Unresolved { .. }, .. })
-            ),
-            "{refused:?}"
-        );
-        // Of ten that are allowed on a busy core.
-        assert!(clock.elapsed().as_secs_f64() < 5.0, "{integrator}: {:?}", clock.elapsed());
-    }
-}
-
-/// Where a motion decays below the normal numbers, to a few units of the smallest, runs differ by roundings and are not chaotic.
-#[test]
-fn what_decays_below_the_numbers_is_rounded() {
-    let system = contact_geom::systems::HarmonicOscillator { gamma: -0.1 };
-    let start = VelocityPoint::new([1e-300], [5e-301], 0.0);
-    let refused = run_to(&system, start, 1e3, 1e-9).err();
-    assert!(matches!(refused, Some(InputError::Accuracy { cause: Obstacle::RoundOff, .. })), "{refused:?}");
 }
