@@ -37,35 +37,3 @@ pub const DIAGRAMS: [&str; 10] = [
     "gauss_12",
     "gauss_16",
 ];
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::candidate::{Control, RunError};
-    use crate::problems::PROBLEMS;
-
-    #[test]
-    fn the_midpoint_rule_is_of_second_order() -> Result<(), RunError> {
-        let problem = &PROBLEMS[3];
-        for z in [false, true] {
-            let mut all = candidates(problem, z);
-            all.retain(|candidate| candidate.name() == "midpoint");
-            assert_eq!(all.len(), 1);
-            let (coarse, fine) = (all[0].run(problem.duration / 3200.0)?, all[0].run(problem.duration / 6400.0)?);
-            let ratio = problem.error(&coarse.state) / problem.error(&fine.state);
-            assert!((ratio - 4.0).abs() < 0.1, "{ratio}");
-            assert_eq!((coarse.steps, fine.steps, fine.state.len()), (3200, 6400, if z { 3 } else { 2 }));
-            // At least one iteration a step, and the jet after it.
-            assert!(fine.evaluations >= 2 * fine.steps);
-        }
-        Ok(())
-    }
-
-    #[test]
-    fn steps_are_refused_or_fail_with_a_reason() {
-        let all = candidates(&PROBLEMS[1], true);
-        for candidate in all.iter().filter(|candidate| candidate.control() == Control::Step) {
-            assert!(candidate.run(-1.0).is_err() && candidate.run(f64::NAN).is_err(), "{}", candidate.name());
-        }
-    }
-}

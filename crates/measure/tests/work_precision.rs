@@ -1,0 +1,35 @@
+//! The program `work_precision` as it is run: its tests of parts compile no integrator.
+
+#![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
+
+use std::process::Command;
+
+/// The midpoint rule on P6, with the action or without (P6 needs it): of second order, and as many steps as the step says.
+#[test]
+fn the_midpoint_rule_is_of_second_order() {
+    let out = std::env::temp_dir().join(format!("work_precision_{}", std::process::id()));
+    let program = Command::new(env!("CARGO_BIN_EXE_work_precision"))
+        .args(["--quick", "--problem", "P6", "--method", "midpoint", "--out"])
+        .arg(&out)
+        .output()
+        .unwrap();
+    assert!(program.status.success(), "{}", String::from_utf8_lossy(&program.stderr));
+    let table = std::fs::read_to_string(out.join("work_precision.csv")).unwrap();
+    std::fs::remove_dir_all(&out).unwrap();
+    let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    let column = |name: &str| header.iter().position(|column| *column == name).unwrap();
+    let [h, steps, evaluations, error] = ["h", "steps", "evaluations", "error"].map(column);
+    let rows: Vec<[f64; 4]> =
+        lines.map(|line| [h, steps, evaluations, error].map(|i| line[i].parse().unwrap())).collect();
+    for [h, steps, evaluations, _] in &rows {
+        // At least one iteration a step, and the jet after it; P6 ends at t = 100.
+        assert!(h * steps == 100.0 && *evaluations >= 2.0 * steps, "{h} {steps} {evaluations}");
+    }
+    let resolved: Vec<_> = rows.iter().filter(|row| (1e-8..1e-3).contains(&row[3])).collect();
+    assert!(resolved.len() >= 3, "{table}");
+    for pair in resolved.windows(2) {
+        let slope = (pair[0][3] / pair[1][3]).ln() / (pair[0][0] / pair[1][0]).ln();
+        assert!((slope - 2.0).abs() < 0.15, "{slope} between {:?} and {:?}", pair[0], pair[1]);
+    }
+}
