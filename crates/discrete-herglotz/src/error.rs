@@ -27,7 +27,7 @@ pub enum InputError {
         wanted: f64,
     },
     /// A wanted accuracy is not reached.
-    #[error("the wanted relative error {wanted:e} is not reached (the best estimate was {reached:e}): {cause}")]
+    #[error("the wanted relative error {wanted:e} is not reached (the best estimate was {reached:.1e}): {cause}")]
     Accuracy {
         /// The error that was asked for.
         wanted: f64,

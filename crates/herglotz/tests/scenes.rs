@@ -163,6 +163,12 @@ fn bad_input_is_told_with_its_place_and_a_remedy() {
         let error = Scene::read_with(GOOD, &[change.to_owned()]).err().unwrap();
         told += &format!("--set {change}\n{error}\n\n");
     }
+    // Round-off depends on the instructions of the processor.
+    if let Some((before, (_, after))) =
+        told.split_once("best estimate was ").and_then(|(a, b)| Some((a, b.split_once(')')?)))
+    {
+        told = format!("{before}best estimate was round-off){after}");
+    }
     let expected = include_str!("snapshots/errors.txt");
     if told != expected {
         let first = told.lines().zip(expected.lines()).position(|(a, b)| a != b);

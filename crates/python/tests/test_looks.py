@@ -89,3 +89,16 @@ def test_a_check_of_contact_steps():
     assert all(place.contact_defect < 1e-9 for place in found.places)
     assert found.places[1].sigma == pytest.approx(np.exp(GAMMA * 0.25), rel=1e-9)
     assert found.statements and all(residual < 1e-8 for _, _, residual in found.statements)
+
+
+def test_a_comparison_ranks_integrators():
+    found = hz.compare("x'^2/2 - x^2/2 - 0.05*z^2", [1.0], [0.0], 2.0, z0=1.0, coordinates=["x"])
+    order = {row.integrator: row.order for row in found.rows}
+    assert order["midpoint"] == 2 and order["gauss_4"] == 8
+    midpoint = [row for row in found.rows if row.integrator == "midpoint" and 1e-10 < row.error < 1e-3]
+    slopes = [np.log(a.error / b.error) / np.log(a.step / b.step) for a, b in zip(midpoint, midpoint[1:])]
+    assert len(slopes) >= 3 and all(abs(slope - 2) < 0.15 for slope in slopes)
+    best = found.best(1e-9)
+    assert best.error <= 1e-9 and all(row.seconds >= best.seconds for row in found.rows if row.error <= 1e-9)
+    assert found.best(0.0) is None or found.best(0.0).error == 0.0
+    assert list(found.to_pandas().columns)[:2] == ["integrator", "order"]

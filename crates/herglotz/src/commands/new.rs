@@ -74,7 +74,7 @@ parameters = {{ {parameters} }}
 
 [run]
 time = {time}
-accuracy = 1e-9  # or integrator = "gauss_8", step = 0.5; `herglotz list integrators` lists them
+accuracy = 1e-8  # or integrator = "gauss_8", step = 0.5; `herglotz list integrators` lists them
 
 [want]
 # Rows by every = TIME, at = [TIMES] or every_step = STEPS. Columns are names and any formulas; without them, the whole state.
@@ -88,6 +88,6 @@ events = [{{ when = "{first}", direction = "rising" }}]
 "#,
         about = entry.about,
         first_velocity = velocity_name(first),
-        time = number(entry.t + 100.0),
+        time = number(entry.t + 50.0),
     ))
 }
