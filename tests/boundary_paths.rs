@@ -1,5 +1,5 @@
-//! Critical paths between given ends: against the discrete Herglotz equations, the differential of the action, the flow, closed forms,
-//! and a Newton's method of its own on faer's sparse LU.
+//! Critical paths between given ends: against the discrete Herglotz equations, the differential of the action, the flow and closed forms. (Against Newton's
+//! method on a sparse factorisation: `scale --case path`.)
 
 // What a test cannot go on without is a failure of it.
 #![allow(clippy::unwrap_used)]
