@@ -3,7 +3,7 @@
 use crate::run_of;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Kepler, OneCoordinate, Pendulum};
-use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
+use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, larger};
 use discrete_herglotz::{
     AnyIntegrator, Gauss, InputError, Method, SplittingScheme, Status, StepError, Stepper, Steps, Suspicion,
 };
@@ -25,7 +25,7 @@ fn every_integrator<L: Lagrangian<1>>(system: &L) {
     let (mut marked, mut of_all) = (0, 0);
     for integrator in AnyIntegrator::all().into_iter().filter(|integrator| integrator.check(system).is_ok()) {
         let (parts, coarse) = match integrator {
-            AnyIntegrator::Gauss { stages } => (f64::max(0.5 * stages as f64, 1.0), 2.5 * stages as f64 + 2.5),
+            AnyIntegrator::Gauss { stages } => (larger(0.5 * stages as f64, 1.0), 2.5 * stages as f64 + 2.5),
             _ => (1.0, 40.0),
         };
         let fine = if integrator.order() == 1 { 0.1 } else { 0.4 * parts };
@@ -175,7 +175,7 @@ fn a_doubt_is_no_mark() {
     let system = OneCoordinate::from(Pendulum { gamma: -0.01 });
     for integrator in AnyIntegrator::all().into_iter().filter(|i| i.order() > 1 && i.check::<1, _>(&system).is_ok()) {
         let parts =
-            if let AnyIntegrator::Gauss { stages } = integrator { f64::max(0.5 * stages as f64, 1.0) } else { 1.0 };
+            if let AnyIntegrator::Gauss { stages } = integrator { larger(0.5 * stages as f64, 1.0) } else { 1.0 };
         for radians in [0.1, 0.2, 0.3, 0.4] {
             for count in [10, 100] {
                 let (span, steps) = (radians * parts * f64::from(count), Steps::Count(count as usize));
@@ -259,7 +259,7 @@ fn tiny_steps_lose_nothing() {
         let (t, a) = (h * f64::from(count), -f64::sin(q) - 0.1 * v);
         let (right_q, right_p) = (q + t * (v + 0.5 * t * a), v + t * (a + 0.5 * t * (-f64::cos(q) * v - 0.1 * a)));
         // A rounding of the start, the end and the series.
-        let off = f64::max((end.q[0] - right_q).abs(), (end.p[0] - right_p).abs());
+        let off = larger((end.q[0] - right_q).abs(), (end.p[0] - right_p).abs());
         assert!(off <= 4.0 * f64::EPSILON, "{}, h = {h:e}: {off:e}", scheme.name());
     }
 }
