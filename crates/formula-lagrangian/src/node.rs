@@ -1,6 +1,6 @@
 //! What expressions are made of.
 
-/// A node of a [`Graph`]. The nodes that it is made of have smaller numbers.
+/// A node of a [`Graph`](crate::Graph). The nodes that it is made of have smaller numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Id(pub(crate) u32);
 
