@@ -8,7 +8,6 @@ use contact_geom::nalgebra::SVector;
 
 /// The numbers of registers that lie on the stack; a tape that needs more has them on the heap. They are cleared before each evaluation, so
 /// that a short tape has few.
-const TINY: usize = 4;
 const SMALL: usize = 8;
 const MIDDLE: usize = 32;
 const LARGE: usize = 256;
@@ -40,8 +39,6 @@ impl Tape {
         // Nothing that takes many steps evaluates nested duals.
         if T::NESTED || self.registers > LARGE {
             self.interpret(at, &mut vec![T::zero(); self.registers], results);
-        } else if self.registers <= TINY {
-            self.interpret(at, &mut OnStack([T::zero(); TINY]).0, results);
         } else if self.registers <= SMALL {
             self.interpret(at, &mut OnStack([T::zero(); SMALL]).0, results);
         } else if self.registers <= MIDDLE {

@@ -1,8 +1,8 @@
 //! Formulas run by integrators, against the Rust types of the same Lagrangians.
 
-use contact_geom::systems::Pendulum;
+use contact_geom::systems::{Pendulum, QuadraticInZ};
 use contact_geom::{Dual, Lagrangian, VelocityPoint, nalgebra::SVector};
-use discrete_herglotz::{GaussCollocation, Problem, Steps, Until};
+use discrete_herglotz::{GaussCollocation, Problem, Status, Steps, Until};
 use formula_lagrangian::Formula;
 
 #[test]
@@ -23,4 +23,28 @@ fn a_pendulum_by_gauss() {
     let one = |x| SVector::from([Dual::constant(x)]);
     let l = lagrangian.value(Dual::constant(0.0), &SVector::from([moving]), &one(0.3), Dual::constant(0.0));
     assert_eq!(l.d[0], -1f64.sin());
+}
+
+/// As many stages as there are, so that one, two or more vector registers hold them: formulas are evaluated for two of them at once, types for
+/// one, to the same bits. By accelerations (the pendulum) and by the general route (drag of the second degree in z).
+#[test]
+fn gauss_steps_of_any_number_of_stages_are_those_of_the_type() {
+    fn ends(lagrangian: &impl Lagrangian<1>, stages: usize) -> [f64; 3] {
+        let start = VelocityPoint::new([1.0], [0.3], 0.5);
+        let problem = Problem::new(lagrangian, 0.0, start).unwrap();
+        let run = problem.by(GaussCollocation { stages }).steps(Steps::Size(0.25));
+        let outcome = run.run(Until::Time(20.0)).unwrap();
+        assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
+        [outcome.q[0], outcome.p[0], outcome.z.unwrap()]
+    }
+    let pendulum = Formula::parse("theta'^2/2 - versine(theta) + gamma*z", &["theta"], &[("gamma", -0.1)]).unwrap();
+    let curved = Formula::parse("(x'^2 - x^2 - c*z^2)/2", &["x"], &[("c", 0.1)]).unwrap();
+    for stages in 3..=16 {
+        let (formula, typed) =
+            (ends(&pendulum.lagrangian::<1>().unwrap(), stages), ends(&Pendulum { gamma: -0.1 }, stages));
+        assert_eq!(formula, typed, "{stages} stages");
+        let (formula, typed) =
+            (ends(&curved.lagrangian::<1>().unwrap(), stages), ends(&QuadraticInZ { c: 0.1 }, stages));
+        assert_eq!(formula, typed, "{stages} stages");
+    }
 }

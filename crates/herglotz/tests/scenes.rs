@@ -328,7 +328,7 @@ fn changes_of_good_scenes_do_no_harm() {
 
 /// The same a million times: `cargo test --release -p herglotz --test scenes -- --ignored`.
 #[test]
-#[ignore = "some minutes"]
+#[ignore = "takes a minute"]
 fn a_million_changes_of_good_scenes_do_no_harm() {
     assert!(attack(0xd1b5_4a32_d192_ed03, 1_000_000) > 50_000);
 }

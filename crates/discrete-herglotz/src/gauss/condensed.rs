@@ -331,6 +331,18 @@ mod tests {
     use super::*;
     use contact_geom::larger;
 
+    /// A table that is kept serves the same stages, step and rate alone.
+    #[test]
+    fn kept_tables_are_not_those_of_others() {
+        let table = Condensed::of(4, 0.5, -0.1).unwrap();
+        assert!(Arc::ptr_eq(&table, &Condensed::of(4, 0.5, -0.1).unwrap()));
+        for (s, h, gamma) in [(5, 0.5, -0.1), (4, 0.25, -0.1), (4, 0.5, 0.1), (4, -0.5, -0.1)] {
+            let _ = Condensed::of(4, 0.5, -0.1).unwrap();
+            let other = Condensed::of(s, h, gamma).unwrap();
+            assert_eq!((other.s, other.h, other.gamma), (s, h, gamma));
+        }
+    }
+
     /// The products are those of sums term by term, to double-double round-off: 1e-30 for up to sixteen terms below one.
     #[test]
     fn products_are_exact_in_two_parts() {
