@@ -1,7 +1,7 @@
 //! Eight numbers in vector registers, over which local terms are evaluated.
 
-use contact_geom::Scalar;
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+use contact_geom::{Scalar, scalar_operators};
+use std::ops::Neg;
 use wide::f64x8;
 
 /// The number of lanes.
@@ -78,23 +78,6 @@ impl From<f64> for Lanes {
     }
 }
 
-impl num_traits::Zero for Lanes {
-    #[inline(always)]
-    fn zero() -> Self {
-        Self::splat(0.0)
-    }
-    fn is_zero(&self) -> bool {
-        *self == Self::zero()
-    }
-}
-
-impl num_traits::One for Lanes {
-    #[inline(always)]
-    fn one() -> Self {
-        Self::splat(1.0)
-    }
-}
-
 impl Neg for Lanes {
     type Output = Self;
     #[inline(always)]
@@ -103,35 +86,11 @@ impl Neg for Lanes {
     }
 }
 
-macro_rules! arithmetic {
-    ($($op:ident, $method:ident, $assign:ident, $assign_method:ident;)*) => {$(
-        impl $op for Lanes {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, b: Self) -> Self {
-                Lanes($op::$method(self.0, b.0))
-            }
-        }
-        impl $op<f64> for Lanes {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, b: f64) -> Self {
-                Lanes($op::$method(self.0, f64x8::splat(b)))
-            }
-        }
-        impl $assign for Lanes {
-            #[inline(always)]
-            fn $assign_method(&mut self, b: Self) {
-                *self = $op::$method(*self, b);
-            }
-        }
-    )*};
-}
-arithmetic! {
-    Add, add, AddAssign, add_assign;
-    Sub, sub, SubAssign, sub_assign;
-    Mul, mul, MulAssign, mul_assign;
-    Div, div, DivAssign, div_assign;
+scalar_operators! { [] Lanes;
+    a + b = Lanes(a.0 + b.0);
+    c - d = Lanes(c.0 - d.0);
+    e * f = Lanes(e.0 * f.0);
+    g / h = Lanes(g.0 / h.0);
 }
 
 impl Scalar for Lanes {

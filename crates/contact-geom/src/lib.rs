@@ -51,3 +51,5 @@ pub use number::{
 pub use statement::Statement;
 
 pub use nalgebra;
+#[doc(hidden)] // For `scalar_operators`.
+pub use num_traits;

@@ -176,6 +176,31 @@ fn sweeps_do_not_depend_on_threads() {
         assert!((scaled[i] - x[i] * f64::exp(-gamma[i] * 10.0)).abs() < 1e-12 * scaled[i].abs(), "member {i}");
     }
     assert!(at.read("one/sweep_0.svg").contains("<svg"));
+
+    // x rises through 0 at 3/4 of a period, and then once in each.
+    let events = at.read("one/events.csv");
+    assert_eq!(events, at.read("three/events.csv"));
+    assert!(events.starts_with("index,gamma,start.x,event,t,x,x',p_x,z\n"), "{events}");
+    let (gamma, t) = (column(&events, "gamma"), column(&events, "t"));
+    assert_eq!(t.len(), 2 * 3 * 3);
+    for (gamma, t) in gamma.iter().zip(t) {
+        assert!(oscillation(*gamma, t).abs() < 1e-9, "{gamma}, {t}");
+    }
+    assert!(at.read("one/sweep_events_0.svg").contains("<svg"));
+
+    // A terminal one ends its member.
+    let terminal = OSCILLATOR.replace("\"rising\" }", "\"falling\", terminal = true }");
+    let file = at.write("terminal.toml", &terminal);
+    let said = succeed(&["sweep", &file, "--out", &at.path("terminal")]);
+    assert!(said.starts_with("6 members: 0 completed (0 suspicious), 0 failed, 6 stopped by an event"), "{said}");
+    let table = at.read("terminal/sweep.csv");
+    for (gamma, t) in column(&table, "gamma").iter().zip(column(&table, "t")) {
+        assert!(t < 2.0 && oscillation(*gamma, t).abs() < 1e-9, "{gamma}, {t}: {table}");
+    }
+    let with_factor = terminal.replace("\"x\", \"exp", "\"log_factor\", \"exp");
+    let file = at.write("factor.toml", &with_factor);
+    let (code, told) = fail(&["sweep", &file, "--out", &at.path("factor")]);
+    assert!(code == Some(2) && told.contains("the column `log_factor`"), "{told}");
 }
 
 /// A member that fails is a row with its status, and the others are there.

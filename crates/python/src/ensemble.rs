@@ -1,12 +1,12 @@
 //! Many motions of one formula.
 
 use crate::arrays::{matrix, number, numbers, table, value_error, vector};
-use crate::motion::{self, GivenWay};
+use crate::motion::{self, GivenEvent, GivenWay};
 use crate::signals::Signals;
 use crate::system::System;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use runtime_herglotz::{Column, Ensemble, EnsembleWatch, MemberEnd, Rate, Start, Status, Varied, When};
+use runtime_herglotz::{Column, Crossing, Ensemble, EnsembleWatch, MemberEnd, Rate, Start, Status, Varied, When};
 use std::ops::ControlFlow;
 
 /// Keeps the members' ends, or their rows.
@@ -20,6 +20,7 @@ struct Kept {
     steps: Vec<i64>,
     success: Vec<bool>,
     troubles: Vec<(usize, String)>,
+    crossings: Vec<(usize, Crossing)>,
     signals: Signals,
 }
 
@@ -37,16 +38,20 @@ impl Kept {
 
 impl EnsembleWatch for Kept {
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()> {
-        let MemberEnd { index, ending, rows } = member;
+        let MemberEnd { index, ending, rows, crossings } = member;
+        self.crossings.extend(crossings.into_iter().map(|crossing| (index, crossing)));
         let trouble = match &ending {
             Err(cause) => Some(cause.to_string()),
             Ok(end) => match (&end.status, &end.suspicion) {
-                (Status::Completed, None) => None,
-                (Status::Completed, Some(suspicion)) => Some(suspicion.to_string()),
+                // A terminal event is what was asked for.
+                (Status::Completed | Status::Stopped { .. }, suspicion) => {
+                    suspicion.map(|suspicion| suspicion.to_string())
+                }
                 (status, _) => Some(status.to_string()),
             },
         };
-        self.success.push(ending.as_ref().is_ok_and(|end| end.status == Status::Completed));
+        let reached = |status| matches!(status, Status::Completed | Status::Stopped { .. });
+        self.success.push(ending.as_ref().is_ok_and(|end| reached(end.status)));
         self.troubles.extend(trouble.map(|trouble| (index, trouble)));
         self.t.push(ending.as_ref().map_or(f64::NAN, |end| end.t));
         self.steps.push(ending.as_ref().map_or(0, |end| end.steps as i64));
@@ -69,6 +74,9 @@ impl EnsembleWatch for Kept {
     }
 }
 
+/// The member, the index of the event, t, q, v, p and z.
+type Found = (usize, usize, f64, Vec<f64>, Vec<f64>, Vec<f64>, f64);
+
 /// Many motions at their ends, or by rows one after the other.
 #[pyclass(frozen, get_all, module = "herglotz._core")]
 pub struct EnsembleRecord {
@@ -82,6 +90,8 @@ pub struct EnsembleRecord {
     success: Py<PyArray1<bool>>,
     /// What went wrong, by the index of the member.
     troubles: Vec<(usize, String)>,
+    /// What the events have found: the member, the index of the event, t, q, v, p and z.
+    crossings: Vec<Found>,
     /// The times of the rows.
     times: Option<Py<PyArray1<f64>>>,
     in_lanes: usize,
@@ -98,6 +108,7 @@ pub fn run_ensemble(
     way: GivenWay<'_>,
     names: Vec<String>,
     values: Vec<Bound<'_, PyAny>>,
+    events: Vec<GivenEvent>,
     observed: Vec<String>,
     threads: Option<usize>,
 ) -> PyResult<EnsembleRecord> {
@@ -133,6 +144,7 @@ pub fn run_ensemble(
     for text in &observed {
         columns.push(Column::parse(text, system.inner.formula()).map_err(value_error)?);
     }
+    let events = motion::events(events, system.inner.formula())?;
     let mut kept = Kept {
         n,
         rows: rows.as_ref().map(Vec::len),
@@ -142,6 +154,7 @@ pub fn run_ensemble(
         steps: Vec::with_capacity(count),
         success: Vec::with_capacity(count),
         troubles: Vec::new(),
+        crossings: Vec::new(),
         signals: Signals::new(),
     };
     let start = |i: usize| {
@@ -160,6 +173,7 @@ pub fn run_ensemble(
         way,
         rows: rows.clone().map(When::At),
         columns: &columns,
+        events: &events,
         threads,
     };
     let tally = py.detach(|| system.inner.ensemble(&ensemble, &mut kept)).map_err(value_error)?;
@@ -177,6 +191,7 @@ pub fn run_ensemble(
         steps: PyArray1::from_vec(py, kept.steps).unbind(),
         success: PyArray1::from_vec(py, kept.success).unbind(),
         troubles: kept.troubles,
+        crossings: kept.crossings.into_iter().map(|(i, c)| (i, c.event, c.t, c.q, c.v, c.p, c.z)).collect(),
         times: rows.map(|rows| vector(py, rows)),
         in_lanes: tally.in_lanes,
     })

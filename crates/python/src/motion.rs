@@ -3,7 +3,7 @@
 use crate::arrays::{number, numbers, value_error};
 use crate::system::System;
 use pyo3::prelude::*;
-use runtime_herglotz::{AnyIntegrator, Column, Direction, Event, Rate, Start, Steps, Way, When};
+use runtime_herglotz::{AnyIntegrator, Column, Direction, Event, Formula, Rate, Start, Steps, Way, When};
 
 /// A motion that is asked for, read from the arguments of `solve`.
 #[pyclass(frozen, module = "herglotz._core")]
@@ -73,6 +73,28 @@ fn named<T>(what: &str, text: &str, read: Result<T, runtime_herglotz::RuntimeErr
     read.map_err(|error| value_error(format!("{what} {text:?}: {error}")))
 }
 
+/// The text of an event, its direction, and whether it ends the motion.
+pub type GivenEvent = (String, String, bool);
+
+/// The events that were asked for.
+pub fn events(given: Vec<GivenEvent>, formula: &Formula) -> PyResult<Vec<Event>> {
+    let read = |(text, direction, terminal): GivenEvent| {
+        let function = named("the event", &text, formula.expression(&text).map_err(Into::into))?;
+        let direction = match direction.as_str() {
+            "rising" => Direction::Rising,
+            "falling" => Direction::Falling,
+            "both" => Direction::Both,
+            other => {
+                return Err(value_error(format!(
+                    "the direction {other:?} of the event {text:?} is none of \"rising\", \"falling\", \"both\""
+                )));
+            }
+        };
+        Ok(Event { function, direction, terminal })
+    };
+    given.into_iter().map(read).collect()
+}
+
 #[pymethods]
 impl Motion {
     #[new]
@@ -83,7 +105,7 @@ impl Motion {
         t: Bound<'_, PyAny>,
         every: Option<usize>,
         way: GivenWay<'_>,
-        events: Vec<(String, String, bool)>,
+        events: Vec<GivenEvent>,
         columns: Vec<String>,
         conformal_factor: bool,
     ) -> PyResult<Self> {
@@ -112,21 +134,7 @@ impl Motion {
         for text in &columns {
             all.push(named("the column", text, Column::parse(text, formula))?);
         }
-        let read = |(text, direction, terminal): &(String, String, bool)| {
-            let function = named("the event", text, formula.expression(text).map_err(Into::into))?;
-            let direction = match direction.as_str() {
-                "rising" => Direction::Rising,
-                "falling" => Direction::Falling,
-                "both" => Direction::Both,
-                other => {
-                    return Err(value_error(format!(
-                        "the direction {other:?} of the event {text:?} is none of \"rising\", \"falling\", \"both\""
-                    )));
-                }
-            };
-            Ok(Event { function, direction, terminal: *terminal })
-        };
-        let events = events.iter().map(read).collect::<PyResult<_>>()?;
+        let events = self::events(events, formula)?;
         let start = Start { t: first, q, rate, z: number("z0", &z)? };
         let motion = runtime_herglotz::Motion {
             rows,

@@ -65,6 +65,28 @@ def test_a_member_that_fails_is_told():
     assert np.isnan(many.q[1]).all() and np.isfinite(many.q[[0, 2]]).all()
 
 
+def test_events_of_members_are_those_of_single_motions():
+    gamma = np.array([-0.2, 0.0, -0.05])
+    q, v = np.array([[1.0], [-0.5], [2.0]]), np.zeros((3, 1))
+    wanted = dict(accuracy=1e-10, coordinates=NAMES)
+    for events in (
+        {"up": hz.Event("theta", "rising"), "slow": "theta' - gamma*theta"},
+        hz.Event("theta", "falling", terminal=True),
+    ):
+        many = hz.ensemble(PENDULUM, q, v, 20.0, parameters={"gamma": gamma}, events=events, **wanted)
+        assert many.success.all() and not many.troubles
+        for i in range(3):
+            one = hz.solve(PENDULUM, q[i], v[i], 20.0, parameters={"gamma": gamma[i]}, events=events, **wanted)
+            assert many.t[i] == one.t_end and np.array_equal(many.q[i], one.q[-1])
+            for name in events if isinstance(events, dict) else (0,):
+                ours, alone = many.events[name], one.events[name]
+                mine = ours.member == i
+                assert mine.sum() == len(alone.t) > 0
+                assert np.array_equal(ours.t[mine], alone.t) and np.array_equal(ours.v[mine], alone.v)
+    none = hz.ensemble(PENDULUM, q, v, 1.0, parameters={"gamma": gamma}, events=["theta - 50"], **wanted)
+    assert none.events[0].q.shape == (0, 1) and none.events[0].member.dtype == int
+
+
 def test_shapes_are_checked():
     ask = lambda q, v, **more: hz.ensemble(PENDULUM, q, v, 1.0, coordinates=NAMES, **more)
     with pytest.raises(ValueError, match="`q0`"):

@@ -1,6 +1,6 @@
 //! Many motions of one formula.
 
-use crate::{Column, RuntimeError, Start, System, Way, When};
+use crate::{Column, Crossing, Event, RuntimeError, Start, System, Way, When};
 use discrete_herglotz::{InputError, Status, Suspicion, Tally};
 use std::ops::ControlFlow;
 
@@ -12,8 +12,8 @@ pub struct Varied<'a> {
     pub values: &'a (dyn Fn(usize) -> Vec<f64> + Sync),
 }
 
-/// Many motions of one formula, over threads: their starts, and parameters, are functions of the index. Members without rows whose
-/// parameters are the same are advanced together in the lanes of vector registers.
+/// Many motions of one formula, over threads: their starts, and parameters, are functions of the index. Members without rows and
+/// events whose parameters are the same are advanced together in the lanes of vector registers.
 pub struct Ensemble<'a> {
     /// How many.
     pub count: usize,
@@ -31,6 +31,8 @@ pub struct Ensemble<'a> {
     pub rows: Option<When>,
     /// What a row has, and what is told of the end.
     pub columns: &'a [Column],
+    /// The changes of sign that are to be found in each; a terminal one ends its member alone.
+    pub events: &'a [Event],
     /// As many as there are processors where it is `None`.
     pub threads: Option<usize>,
 }
@@ -44,6 +46,8 @@ pub struct MemberEnd {
     pub ending: Result<Ending, InputError>,
     /// The recorded rows.
     pub rows: Vec<Vec<f64>>,
+    /// The events that were found, in their order.
+    pub crossings: Vec<Crossing>,
 }
 
 /// Where the motion of a member has led to.
@@ -74,7 +78,7 @@ pub trait EnsembleWatch {
     /// A member at its end; `Break` ends the ensemble after the members under way.
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()>;
 
-    /// Is called every few thousand members, or fewer where each has rows or parameters of its own.
+    /// Is called every few thousand members, or fewer where each has rows, events or parameters of its own, or where they take long.
     fn poll(&mut self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }

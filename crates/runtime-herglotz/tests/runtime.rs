@@ -253,6 +253,7 @@ fn members_are_single_runs_whatever_the_threads() {
         way: by_steps(40),
         rows: None,
         columns: &columns,
+        events: &[],
         threads: Some(threads),
     };
     let (one, three) = (members(&system, &of(1)), members(&system, &of(3)));
@@ -278,11 +279,64 @@ fn members_are_single_runs_whatever_the_threads() {
     let motion =
         Motion { rows: recorded.rows.clone(), columns: columns.to_vec(), ..Motion::new(start(4), 10.0, by_steps(40)) };
     assert_eq!(all[4].rows, system.record(&motion).unwrap().1);
+    // Rows that end before the motion does: the end is its own.
+    let early = Ensemble { rows: Some(When::At(vec![0.0, 5.0])), varied: None, ..of(2) };
+    let ending = members(&system, &early).swap_remove(4).ending.unwrap();
+    let end_of_all = all[4].ending.clone().unwrap();
+    assert_eq!((ending.v, ending.columns), (end_of_all.v, end_of_all.columns));
     // To an accuracy.
     let accurate = Ensemble { way: accurate(1e-8), ..of(2) };
     for (a, b) in members(&system, &accurate).iter().zip(&one) {
         if let (Ok(a), Ok(b)) = (&a.ending, &b.ending) {
             assert!((a.q[0] - b.q[0]).abs() < 1e-8, "{a:?} {b:?}");
+        }
+    }
+}
+
+/// Of each by itself, with its own parameters; a terminal event ends its member alone, and what lies beyond it is not told.
+#[test]
+fn events_of_members_are_those_of_single_runs() {
+    let system = pendulum();
+    let start = |i: usize| Start::new(0.0, [0.3 + 0.1 * i as f64], [0.0], 0.0);
+    let values = |i: usize| vec![-0.02 * i as f64];
+    let columns = [Column::Time, Column::Velocity(0)];
+    let of = |text: &str| system.formula().expression(text).unwrap();
+    for terminal in [false, true] {
+        // One has a parameter of the member in it.
+        let slow = Event { function: of("theta' - gamma*theta"), direction: Direction::Both, terminal: false };
+        let down = Event { function: of("theta"), direction: Direction::Falling, terminal };
+        let events = [slow, down];
+        let rows = Some(When::At((0..=8).map(f64::from).collect()));
+        let many = Ensemble {
+            count: 40,
+            start: &start,
+            t0: 0.0,
+            varied: Some(Varied { names: &["gamma"], values: &values }),
+            end: 8.0,
+            way: by_steps(32),
+            rows: rows.clone(),
+            columns: &columns,
+            events: &events,
+            threads: Some(2),
+        };
+        for member in members(&system, &many) {
+            let i = member.index;
+            let own = system.with_parameters(&[("gamma", values(i)[0])]).unwrap();
+            // Events that are written anew have the values of their own.
+            let of = |text: &str| own.formula().expression(text).unwrap();
+            let slow = Event { function: of("theta' - gamma*theta"), ..events[0].clone() };
+            let motion = Motion {
+                rows: rows.clone(),
+                columns: columns.to_vec(),
+                events: vec![slow, events[1].clone()],
+                ..Motion::new(start(i), 8.0, by_steps(32))
+            };
+            let mut alone = Seen::default();
+            let outcome = own.run(&motion, &mut alone).unwrap();
+            let ending = member.ending.unwrap();
+            assert_eq!((ending.t, &ending.q, &ending.p), (outcome.t, &outcome.q, &outcome.p), "{i}");
+            assert_eq!(ending.t < 8.0, terminal, "{i}");
+            assert_eq!((member.rows, member.crossings), (alone.rows, alone.crossings), "{i}");
         }
     }
 }

@@ -7,6 +7,7 @@ pub mod linear;
 mod module;
 #[cfg(feature = "num-dual")]
 mod num_dual;
+mod operators;
 pub(crate) mod rounded;
 mod scalar;
 

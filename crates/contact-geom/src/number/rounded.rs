@@ -1,18 +1,14 @@
 //! Numbers that know the size of the terms they came from.
 
-// The rules of error propagation mix operations: clippy takes that for a slip.
-#![allow(clippy::suspicious_arithmetic_impl)]
-
-use crate::Scalar;
-use num_traits::{One, Zero};
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+use crate::{Scalar, scalar_operators};
+use std::ops::Neg;
 
 /// A number with the size of its terms: a running bound of its rounding error, in units of the machine's epsilon.
 ///
 /// Of a sum that vanishes but for rounding, `value / size` is at most about epsilon; of one that does not cancel it is of the
 /// order of one. The quotient does not depend on any unit, so that it tells a zero from a small number whatever the scale.
 /// Constants are exact. (N. J. Higham, "Accuracy and Stability of Numerical Algorithms", section 3.3.)
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounded {
     pub value: f64,
     pub size: f64,
@@ -52,20 +48,10 @@ impl From<f64> for Rounded {
     }
 }
 
-impl Zero for Rounded {
-    #[inline]
-    fn zero() -> Self {
-        0.0.into()
-    }
-    fn is_zero(&self) -> bool {
-        self.value == 0.0
-    }
-}
-
-impl One for Rounded {
-    #[inline]
-    fn one() -> Self {
-        1.0.into()
+/// Of equal value, however it came about.
+impl PartialEq for Rounded {
+    fn eq(&self, b: &Self) -> bool {
+        self.value == b.value
     }
 }
 
@@ -77,61 +63,11 @@ impl Neg for Rounded {
     }
 }
 
-impl Add for Rounded {
-    type Output = Self;
-    #[inline]
-    fn add(self, b: Self) -> Self {
-        Rounded::new(self.value + b.value, self.size + b.size)
-    }
-}
-
-impl Sub for Rounded {
-    type Output = Self;
-    #[inline]
-    fn sub(self, b: Self) -> Self {
-        Rounded::new(self.value - b.value, self.size + b.size)
-    }
-}
-
-impl Mul for Rounded {
-    type Output = Self;
-    #[inline]
-    fn mul(self, b: Self) -> Self {
-        Rounded::new(self.value * b.value, self.value.abs() * b.size + b.value.abs() * self.size)
-    }
-}
-
-impl Div for Rounded {
-    type Output = Self;
-    #[inline]
-    fn div(self, b: Self) -> Self {
-        let value = self.value / b.value;
-        Rounded::new(value, (self.size + value.abs() * b.size) / b.value.abs())
-    }
-}
-
-macro_rules! mixed {
-    ($($op:ident, $method:ident, $assign:ident, $assign_method:ident;)*) => {$(
-        impl $op<f64> for Rounded {
-            type Output = Self;
-            #[inline]
-            fn $method(self, b: f64) -> Self {
-                self.$method(Rounded::from(b))
-            }
-        }
-        impl $assign for Rounded {
-            #[inline]
-            fn $assign_method(&mut self, b: Self) {
-                *self = self.$method(b);
-            }
-        }
-    )*};
-}
-mixed! {
-    Add, add, AddAssign, add_assign;
-    Sub, sub, SubAssign, sub_assign;
-    Mul, mul, MulAssign, mul_assign;
-    Div, div, DivAssign, div_assign;
+scalar_operators! { [] Rounded;
+    a + b = Rounded::new(a.value + b.value, a.size + b.size);
+    c - d = Rounded::new(c.value - d.value, c.size + d.size);
+    e * f = Rounded::new(e.value * f.value, e.value.abs() * f.size + f.value.abs() * e.size);
+    g / h = Rounded::new(g.value / h.value, (g.size + (g.value / h.value).abs() * h.size) / h.value.abs());
 }
 
 impl Scalar for Rounded {

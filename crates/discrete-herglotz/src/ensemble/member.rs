@@ -43,7 +43,9 @@ pub struct Tally {
     pub members: usize,
     /// Those that took all of their steps.
     pub completed: usize,
-    /// Those that did not, or could not begin.
+    /// Those that an observer has ended.
+    pub stopped: usize,
+    /// Those whose run failed, or that could not begin.
     pub failed: usize,
     /// Those with a suspicion.
     pub suspicious: usize,
@@ -56,12 +58,14 @@ pub struct Tally {
 impl Tally {
     pub(super) fn add<const N: usize>(&mut self, member: &Member<N>) {
         self.members += 1;
-        let completed = member.ending.is_ok_and(|ending| ending.status == Status::Completed);
-        self.completed += usize::from(completed);
-        self.failed += usize::from(!completed);
         self.suspicious += usize::from(member.ending.is_ok_and(|ending| ending.suspicion.is_some()));
-        if !completed {
-            self.first_failed = self.first_failed.or(Some(member.index));
+        match member.ending.map(|ending| ending.status) {
+            Ok(Status::Completed) => self.completed += 1,
+            Ok(Status::Stopped { .. }) => self.stopped += 1,
+            _ => {
+                self.failed += 1;
+                self.first_failed = self.first_failed.or(Some(member.index));
+            }
         }
     }
 }

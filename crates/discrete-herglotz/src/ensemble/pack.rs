@@ -2,10 +2,10 @@
 
 use crate::gauss::lanes::{Lanes, note_branch, token};
 use crate::gauss::sine::{REDUCIBLE, Register, cosine, sine};
-use contact_geom::Scalar;
+use contact_geom::{Scalar, scalar_operators};
 use pulp::{Simd, bytemuck};
 use std::fmt::{Debug, Formatter};
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+use std::ops::Neg;
 
 /// `K` registers of the instruction set `S`: while one of them waits for its last operation, the others keep the processor busy.
 ///
@@ -91,7 +91,7 @@ impl<S: Simd, const K: usize> Pack<S, K> {
         let set = token::<S>();
         let (range, none) = (set.splat_f64s(REDUCIBLE), set.splat_f64s(f64::NAN));
         Pack(std::array::from_fn(|k| {
-            set.select_f64s(set.less_than_f64s(set.abs_f64s(argument.0[k]), range), self.0[k], none)
+            set.select_f64s(set.less_than_f64s(Lanes::<S>(argument.0[k]).abs().0, range), self.0[k], none)
         }))
     }
 }
@@ -131,23 +131,6 @@ impl<S: Simd, const K: usize> From<f64> for Pack<S, K> {
     }
 }
 
-impl<S: Simd, const K: usize> num_traits::Zero for Pack<S, K> {
-    #[inline(always)]
-    fn zero() -> Self {
-        Self::splat(0.0)
-    }
-    fn is_zero(&self) -> bool {
-        *self == Self::zero()
-    }
-}
-
-impl<S: Simd, const K: usize> num_traits::One for Pack<S, K> {
-    #[inline(always)]
-    fn one() -> Self {
-        Self::splat(1.0)
-    }
-}
-
 impl<S: Simd, const K: usize> Neg for Pack<S, K> {
     type Output = Self;
     #[inline(always)]
@@ -156,36 +139,11 @@ impl<S: Simd, const K: usize> Neg for Pack<S, K> {
     }
 }
 
-macro_rules! arithmetic {
-    ($($op:ident, $method:ident, $assign:ident, $assign_method:ident, $of:ident;)*) => {$(
-        impl<S: Simd, const K: usize> $op for Pack<S, K> {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, b: Self) -> Self {
-                let set = token::<S>();
-                Pack(std::array::from_fn(|k| set.$of(self.0[k], b.0[k])))
-            }
-        }
-        impl<S: Simd, const K: usize> $op<f64> for Pack<S, K> {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, b: f64) -> Self {
-                self.$method(Self::splat(b))
-            }
-        }
-        impl<S: Simd, const K: usize> $assign for Pack<S, K> {
-            #[inline(always)]
-            fn $assign_method(&mut self, b: Self) {
-                *self = self.$method(b);
-            }
-        }
-    )*};
-}
-arithmetic! {
-    Add, add, AddAssign, add_assign, add_f64s;
-    Sub, sub, SubAssign, sub_assign, sub_f64s;
-    Mul, mul, MulAssign, mul_assign, mul_f64s;
-    Div, div, DivAssign, div_assign, div_f64s;
+scalar_operators! { [S: Simd, const K: usize] Pack<S, K>;
+    a + b = Pack(std::array::from_fn(|k| token::<S>().add_f64s(a.0[k], b.0[k])));
+    c - d = Pack(std::array::from_fn(|k| token::<S>().sub_f64s(c.0[k], d.0[k])));
+    e * f = Pack(std::array::from_fn(|k| token::<S>().mul_f64s(e.0[k], f.0[k])));
+    g / h = Pack(std::array::from_fn(|k| token::<S>().div_f64s(g.0[k], h.0[k])));
 }
 
 impl<S: Simd, const K: usize> Scalar for Pack<S, K> {
@@ -211,7 +169,7 @@ impl<S: Simd, const K: usize> Scalar for Pack<S, K> {
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        self.map(|x| token::<S>().abs_f64s(x))
+        self.map(|x| Lanes::<S>(x).abs().0)
     }
     #[inline(always)]
     fn recip(self) -> Self {

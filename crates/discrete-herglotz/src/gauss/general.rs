@@ -214,11 +214,14 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
         if const { N > MOST_IN_LANES } {
             return self.invert_one_by_one(t);
         }
-        (0..blocks::<S>(self.table.s)).all(|r| {
+        for r in 0..blocks::<S>(self.table.s) {
             let at = self.table.times.block::<S>(r) + t;
             let w = self.lagrangian.mass_matrix(at, &self.point::<S>(r));
-            self.mass.invert(r, &w)
-        })
+            if !self.mass.invert(r, &w) {
+                return false;
+            }
+        }
+        true
     }
 
     /// The positions and the actions of the stages from their velocities and Lagrangians.

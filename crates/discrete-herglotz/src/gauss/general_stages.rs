@@ -30,8 +30,10 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
         }
         if first > FORETOLD || self.one_minus_rho.abs() > STRONG {
             let one = Lanes::<S>::splat(1.0);
-            let integral = (0..blocks::<S>(self.table.s))
-                .fold(Lanes::<S>::splat(0.0), |sum, r| sum + self.rate.block::<S>(r) / (one - self.falling.block(r)));
+            let mut integral = Lanes::<S>::splat(0.0);
+            for r in 0..blocks::<S>(self.table.s) {
+                integral += self.rate.block::<S>(r) / (one - self.falling.block(r));
+            }
             self.misfit = larger(self.misfit, of_sigma(1.0 / (1.0 - self.one_minus_rho), integral.sum()));
         }
     }

@@ -1,11 +1,11 @@
 //! Lanes of a vector register as numbers that a Lagrangian can be written over.
 
 use super::sine::{REDUCIBLE, Register, cosine, sine};
-use contact_geom::Scalar;
+use contact_geom::{Scalar, scalar_operators};
 use pulp::{Simd, WithSimd, bytemuck};
 use std::cell::Cell;
 use std::fmt::{Debug, Formatter};
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+use std::ops::Neg;
 
 /// As many numbers as a register of the instruction set `S` has lanes, worked on at once.
 ///
@@ -65,7 +65,9 @@ impl<S: Simd> Lanes<S> {
 
     #[inline(always)]
     pub fn abs(self) -> Self {
-        Lanes(token::<S>().abs_f64s(self.0))
+        // Not by the set's own, which is a call in some of them.
+        let set = token::<S>();
+        Lanes(set.and_f64s(self.0, set.splat_f64s(f64::from_bits(u64::MAX >> 1))))
     }
 
     /// Lane by lane the larger; where one is not a number, the result may be either, other than that of [`Scalar::max`].
@@ -147,23 +149,6 @@ impl<S: Simd> From<f64> for Lanes<S> {
     }
 }
 
-impl<S: Simd> num_traits::Zero for Lanes<S> {
-    #[inline(always)]
-    fn zero() -> Self {
-        Self::splat(0.0)
-    }
-    fn is_zero(&self) -> bool {
-        *self == Self::zero()
-    }
-}
-
-impl<S: Simd> num_traits::One for Lanes<S> {
-    #[inline(always)]
-    fn one() -> Self {
-        Self::splat(1.0)
-    }
-}
-
 impl<S: Simd> Neg for Lanes<S> {
     type Output = Self;
     #[inline(always)]
@@ -172,35 +157,11 @@ impl<S: Simd> Neg for Lanes<S> {
     }
 }
 
-macro_rules! arithmetic {
-    ($($op:ident, $method:ident, $assign:ident, $assign_method:ident, $of:ident;)*) => {$(
-        impl<S: Simd> $op for Lanes<S> {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, b: Self) -> Self {
-                Lanes(token::<S>().$of(self.0, b.0))
-            }
-        }
-        impl<S: Simd> $op<f64> for Lanes<S> {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, b: f64) -> Self {
-                self.$method(Self::splat(b))
-            }
-        }
-        impl<S: Simd> $assign for Lanes<S> {
-            #[inline(always)]
-            fn $assign_method(&mut self, b: Self) {
-                *self = self.$method(b);
-            }
-        }
-    )*};
-}
-arithmetic! {
-    Add, add, AddAssign, add_assign, add_f64s;
-    Sub, sub, SubAssign, sub_assign, sub_f64s;
-    Mul, mul, MulAssign, mul_assign, mul_f64s;
-    Div, div, DivAssign, div_assign, div_f64s;
+scalar_operators! { [S: Simd] Lanes<S>;
+    a + b = Lanes(token::<S>().add_f64s(a.0, b.0));
+    c - d = Lanes(token::<S>().sub_f64s(c.0, d.0));
+    e * f = Lanes(token::<S>().mul_f64s(e.0, f.0));
+    g / h = Lanes(token::<S>().div_f64s(g.0, h.0));
 }
 
 impl<S: Simd> Scalar for Lanes<S> {

@@ -160,6 +160,21 @@ impl Between {
         TABLES[s - 1][set].get_or_init(|| Box::new(Self::new(s, set)))
     }
 
+    /// A polynomial at the points.
+    #[inline(always)]
+    fn value<S: Simd>(&self, s: usize, y: &Stages, out: &mut Stages) {
+        self.value.apply(y, s, out, |_| Lanes::<S>::splat(0.0));
+    }
+
+    /// From a number at the start of the step, what grows at the rate of a polynomial.
+    #[inline(always)]
+    fn grown<S: Simd>(&self, s: usize, h: f64, y: &Stages, from: f64, out: &mut Stages) {
+        self.integral.apply(y, s, out, |_| Lanes::<S>::splat(0.0));
+        for r in 0..blocks::<S>(s) {
+            out.set(r, out.block::<S>(r) * h + from);
+        }
+    }
+
     fn new(s: usize, set: usize) -> Self {
         let g = Coefficients::of(s);
         let golden = 0.618_033_988_749_894_9;
@@ -199,27 +214,20 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
         let Curve { s, t, h, .. } = *curve;
         let between = Between::of(s, set);
         let zero = Lanes::<S>::splat(0.0);
-        let value = |y: &Stages, out: &mut Stages| between.value.apply(y, s, out, |_| zero);
-        let grown = |y: &Stages, from: f64, out: &mut Stages| {
-            between.integral.apply(y, s, out, |_| zero);
-            for r in 0..blocks::<S>(s) {
-                out.set(r, out.block::<S>(r) * h + from);
-            }
-        };
         let (mut v, mut q, mut f, mut y) = ([Stages::ZERO; N], [Stages::ZERO; N], [Stages::ZERO; N], [Stages::ZERO; N]);
         let (mut rate, mut one_minus_rho, mut l, mut z) =
             (Stages::ZERO, Stages::ZERO, Stages::ZERO, Stages([curve.z; MOST]));
         for d in 0..N {
-            value(&curve.v[d], &mut v[d]);
-            grown(&curve.v[d], curve.q[d], &mut q[d]);
-            value(&curve.force[d], &mut f[d]);
-            grown(&curve.force[d], curve.p[d], &mut y[d]);
+            between.value::<S>(s, &curve.v[d], &mut v[d]);
+            between.grown::<S>(s, h, &curve.v[d], curve.q[d], &mut q[d]);
+            between.value::<S>(s, &curve.force[d], &mut f[d]);
+            between.grown::<S>(s, h, &curve.force[d], curve.p[d], &mut y[d]);
         }
-        value(&curve.rate, &mut rate);
-        grown(&curve.rate, 0.0, &mut one_minus_rho);
-        value(&curve.l, &mut l);
+        between.value::<S>(s, &curve.rate, &mut rate);
+        between.grown::<S>(s, h, &curve.rate, 0.0, &mut one_minus_rho);
+        between.value::<S>(s, &curve.l, &mut l);
         if curve.acts {
-            grown(&curve.l, curve.z, &mut z);
+            between.grown::<S>(s, h, &curve.l, curve.z, &mut z);
         }
         let (mut of_value, mut kinetic, mut largest_l) = (zero, zero, zero);
         let (mut misfit, mut size, mut of_z, mut size_z, mut all) = (zero, zero, zero, zero, zero);

@@ -41,7 +41,7 @@ pub(crate) use stepper::FEW;
 pub use stepper::{GaussRoute, GaussStepper};
 
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
-use coefficients::MOST;
+pub(crate) use coefficients::MOST;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
     Clock, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Triple,

@@ -2,9 +2,9 @@
 
 use super::lanes::{Lanes, note_branch};
 use super::stages::Stages;
-use contact_geom::Scalar;
+use contact_geom::{Scalar, scalar_operators};
 use pulp::Simd;
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+use std::ops::Neg;
 
 /// The lanes of two registers: a formula that is read instruction by instruction is read once for both, and while one of them waits for its last
 /// operation, the other keeps the processor busy. Lane by lane the same bits as [`Lanes`].
@@ -23,11 +23,6 @@ impl<S: Simd> Pair<S> {
     #[inline(always)]
     pub fn of(x: &Stages, r: usize) -> Self {
         Pair(x.block(r), x.block(r + 1))
-    }
-
-    #[inline(always)]
-    fn both(self, f: impl Fn(Lanes<S>) -> Lanes<S>) -> Self {
-        Pair(f(self.0), f(self.1))
     }
 
     /// What both say, where it is the same.
@@ -58,23 +53,6 @@ impl<S: Simd> From<f64> for Pair<S> {
     }
 }
 
-impl<S: Simd> num_traits::Zero for Pair<S> {
-    #[inline(always)]
-    fn zero() -> Self {
-        0.0.into()
-    }
-    fn is_zero(&self) -> bool {
-        *self == Self::zero()
-    }
-}
-
-impl<S: Simd> num_traits::One for Pair<S> {
-    #[inline(always)]
-    fn one() -> Self {
-        1.0.into()
-    }
-}
-
 impl<S: Simd> Neg for Pair<S> {
     type Output = Self;
     #[inline(always)]
@@ -83,42 +61,18 @@ impl<S: Simd> Neg for Pair<S> {
     }
 }
 
-macro_rules! arithmetic {
-    ($($op:ident, $method:ident, $assign:ident, $assign_method:ident;)*) => {$(
-        impl<S: Simd> $op for Pair<S> {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, b: Self) -> Self {
-                Pair(self.0.$method(b.0), self.1.$method(b.1))
-            }
-        }
-        impl<S: Simd> $op<f64> for Pair<S> {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, b: f64) -> Self {
-                self.$method(Self::from(b))
-            }
-        }
-        impl<S: Simd> $assign for Pair<S> {
-            #[inline(always)]
-            fn $assign_method(&mut self, b: Self) {
-                *self = self.$method(b);
-            }
-        }
-    )*};
-}
-arithmetic! {
-    Add, add, AddAssign, add_assign;
-    Sub, sub, SubAssign, sub_assign;
-    Mul, mul, MulAssign, mul_assign;
-    Div, div, DivAssign, div_assign;
+scalar_operators! { [S: Simd] Pair<S>;
+    a + b = Pair(a.0 + b.0, a.1 + b.1);
+    c - d = Pair(c.0 - d.0, c.1 - d.1);
+    e * f = Pair(e.0 * f.0, e.1 * f.1);
+    g / h = Pair(g.0 / h.0, g.1 / h.1);
 }
 
 macro_rules! functions {
     ($($name:ident)*) => {$(
         #[inline(always)]
         fn $name(self) -> Self {
-            self.both(Scalar::$name)
+            Pair(Scalar::$name(self.0), Scalar::$name(self.1))
         }
     )*};
 }
@@ -141,10 +95,10 @@ impl<S: Simd> Scalar for Pair<S> {
     }
     #[inline(always)]
     fn powi(self, n: i32) -> Self {
-        self.both(|x| x.powi(n))
+        Pair(self.0.powi(n), self.1.powi(n))
     }
     fn powf(self, a: f64) -> Self {
-        self.both(|x| x.powf(a))
+        Pair(self.0.powf(a), self.1.powf(a))
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {

@@ -366,9 +366,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         for d in 0..N {
             let (q, v) = (Lanes::<S>::splat(self.q[d].value), Lanes::<S>::splat(self.v[d].value));
             let base = &mut self.base[d];
-            let of_q = |r| head.q.block::<S>(r) * q;
             let Some(weight) = small else {
-                (0..blocks::<S>(s)).for_each(|r| base.set(r, head.u.block::<S>(r).mul_add(v, of_q(r))));
+                for r in 0..blocks::<S>(s) {
+                    base.set(r, head.u.block::<S>(r).mul_add(v, head.q.block::<S>(r) * q));
+                }
                 continue;
             };
             let (q_rest, v_rest) = (Lanes::<S>::splat(self.q[d].rest), Lanes::<S>::splat(self.v[d].rest));
@@ -380,9 +381,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
                     let of_state = |r| tail.u.block(r).mul_add(v, tail.q.block(r) * q);
                     tail.b.apply::<S>(&self.rest[d], s, base, of_state);
                     let weight = Lanes::<S>::splat(weight);
-                    (0..blocks::<S>(s)).for_each(|r| base.set(r, sum(r, weight.mul_add(base.block(r), rests(r)))));
+                    for r in 0..blocks::<S>(s) {
+                        base.set(r, sum(r, weight.mul_add(base.block(r), rests(r))));
+                    }
                 }
-                _ => (0..blocks::<S>(s)).for_each(|r| base.set(r, sum(r, rests(r)))),
+                _ => {
+                    for r in 0..blocks::<S>(s) {
+                        base.set(r, sum(r, rests(r)));
+                    }
+                }
             }
         }
     }

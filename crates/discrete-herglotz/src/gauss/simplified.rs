@@ -188,7 +188,9 @@ impl<const N: usize> StageNewton<N> {
     /// From the residuals of the stages to their corrections.
     #[inline(always)]
     fn solve<S: Simd>(&self, v: &mut [Stages; N], z: &mut Stages, rho: &mut Stages) {
-        v.iter_mut().chain([&mut *z, &mut *rho]).for_each(|x| self.modes.enter::<S>(x));
+        for x in v.iter_mut().chain([&mut *z, &mut *rho]) {
+            self.modes.enter::<S>(x);
+        }
         for (mode, block) in self.modes.iter().zip(&self.blocks) {
             let r_v = Vector::<N>::from_fn(|d, _| mode.of(&v[d]));
             let (dv, dz, drho) = block.solve(r_v, mode.of(z), mode.of(rho));
@@ -198,7 +200,9 @@ impl<const N: usize> StageNewton<N> {
             mode.set(z, dz);
             mode.set(rho, drho);
         }
-        v.iter_mut().chain([z, rho]).for_each(|x| self.modes.leave::<S>(x));
+        for x in v.iter_mut().chain([z, rho]) {
+            self.modes.leave::<S>(x);
+        }
     }
 }
 
@@ -253,21 +257,17 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
         }
         // Factors are compared with 1.
         let mut largest = [[zero, zero], [zero, zero], [zero, one]];
-        let mut add = |to: &mut Stages, change: &Stages, kind: usize| {
+        let velocities = v.iter_mut().zip(&dv).map(|(v, dv)| (v, dv, 0));
+        for (to, change, kind) in velocities.chain([(z, &dz, 1), (falling, &drho, 2)]) {
+            let [of_change, size] = &mut largest[kind];
             for r in 0..m {
                 let change = change.block::<S>(r);
                 let sum = to.block::<S>(r) + change;
-                let [of_change, size] = &mut largest[kind];
                 *of_change = of_change.max(change.abs());
                 *size = size.max(sum.abs());
                 to.set(r, sum);
             }
-        };
-        for d in 0..N {
-            add(&mut v[d], &dv[d], 0);
         }
-        add(z, &dz, 1);
-        add(falling, &drho, 2);
         let (mut far, mut position) = (zero, zero);
         for d in 0..N {
             let before = x[d];
@@ -281,10 +281,11 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
                 position = position.max(now.abs());
             }
         }
-        let change = largest.iter().fold(0.0, |m, [change, size]| {
-            let (change, size) = (change.largest(), size.largest());
-            larger(m, if change > 0.0 { change / size } else { change })
-        });
+        let mut change = 0.0;
+        for [of_change, size] in &largest {
+            let (of_change, size) = (of_change.largest(), size.largest());
+            change = larger(change, if of_change > 0.0 { of_change / size } else { of_change });
+        }
         (change, far.largest() / position.largest())
     }
 }

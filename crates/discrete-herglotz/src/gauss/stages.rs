@@ -34,7 +34,11 @@ impl Stages {
     /// The sum of what is 0 beyond the last stage.
     #[inline(always)]
     pub fn sum<S: Simd>(&self, s: usize) -> f64 {
-        (0..blocks::<S>(s)).fold(Lanes::<S>::splat(0.0), |sum, r| sum + self.block(r)).sum()
+        let mut sum = Lanes::<S>::splat(0.0);
+        for r in 0..blocks::<S>(s) {
+            sum += self.block(r);
+        }
+        sum.sum()
     }
 }
 

@@ -1,9 +1,11 @@
 //! The integrator and the number of steps for a wanted error.
 
-use super::pilot::{BUDGET, Marks, PilotEnd, Pilots, Track};
+use super::pilot::{BUDGET, Elsewhere, Marks, PilotEnd, Pilots, Track};
 use super::{MOST_STEPS, Problem, Request, Shared};
+use crate::gauss::MOST;
 use crate::{ClockedGauss, GaussCollocation, InputError, Obstacle};
 use contact_geom::{Derivatives, Lagrangian, larger};
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// The searches that may follow each other: each makes the steps shorter, or ends.
@@ -20,6 +22,13 @@ const REFERENCE: usize = 12;
 
 /// The stages from which a Gauss method is its own reference.
 const OWN: usize = 6;
+
+/// The stages where there are few steps, or dear ones.
+const STAGES: usize = 8;
+
+/// The steps of so many stages, as the motion at its start lets expect, from which on the most stages are the cheapest where
+/// the accelerations alone are iterated: half as many evaluations for an error, in the pilot runs too, against tables of four times the size.
+const MANY: usize = 32;
 
 /// The stages by a clock, for every error: what its clock makes smooth could be followed by longer steps of more stages, were it not for
 /// the iteration.
@@ -46,18 +55,24 @@ struct Converged<const N: usize> {
     k: usize,
     /// The error of the run with k steps, and what is predicted of that with 2k.
     errors: [f64; 2],
-    /// The largest misfit between the nodes of the run with k steps.
+    /// The largest misfit between the nodes of the run with k steps, and the order with which it falls: half of that of the error.
     misfit: f64,
+    order: f64,
+    /// Whether the run with 2k steps costs less: its iterations converge where longer steps need Newton's method.
+    finer_is_cheaper: bool,
     truth: Track<N>,
     marks: Marks,
     /// Whether something narrow was met on the way.
     narrow: bool,
 }
 
-/// The stages of Gauss collocation for an error, where no integrator is named: few steps of many stages cost their tables, many steps of
-/// few stages their number.
-pub(crate) fn stages_for(wanted: f64) -> usize {
-    if wanted < 1e-10 { 12 } else { 8 }
+/// The stages of Gauss collocation where no integrator is named: few steps of many stages cost their tables, many steps of few stages their
+/// number.
+fn stages_along<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, wanted: f64) -> usize {
+    let structure = &request.problem.structure;
+    let condensed = structure.separable && structure.has_constant_rate();
+    // General steps as long as those of so many stages are not solved by sweeps.
+    if condensed && first_guess(request, STAGES, wanted) >= MANY { MOST } else { STAGES }
 }
 
 /// Chooses the steps, and the integrator where the run names none, so that the error of (q, p), relative to their size, is at most
@@ -77,7 +92,7 @@ pub(super) fn choose<'p, L: Lagrangian<N>, const N: usize>(
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
-    choose_with(&mut Pilots { request, left: BUDGET, wanted, watches_clock: false })
+    choose_with(&mut Pilots { request, left: BUDGET, wanted, watches_clock: false, watches_newton: false })
 }
 
 /// The same with a budget.
@@ -85,28 +100,58 @@ pub(super) fn choose_with<'p, L: Lagrangian<N>, const N: usize>(
     pilots: &mut Pilots<'_, 'p, L, N>,
 ) -> Result<Choice<'p, L, N>, InputError> {
     let wanted = pilots.wanted;
-    let Some(integrator) = pilots.request.integrator.clone() else {
-        let stages = stages_for(wanted);
-        let equal: Shared<'p, L, N> = Arc::new(GaussCollocation { stages });
-        pilots.watches_clock = const { L::HAS_CLOCK } && pilots.request.problem.structure.autonomous;
-        if let Some(choice) = by_equal_steps(pilots, &equal, stages)? {
-            return Ok(choice);
-        }
-        pilots.watches_clock = false;
-        // Where the clock leads nowhere equal steps may.
-        let clocked: Shared<'p, L, N> = Arc::new(ClockedGauss { stages: BY_CLOCK });
-        return by_clock(pilots, &clocked, BY_CLOCK)
-            .or_else(|refused| by_equal_steps(pilots, &equal, stages)?.ok_or(refused));
-    };
+    let Some(integrator) = pilots.request.integrator.clone() else { return choose_all(pilots) };
     let facts = integrator.facts();
     match facts.collocation {
-        Some(stages) if stages >= OWN && facts.by_clock => by_clock(pilots, &integrator, stages),
-        Some(stages) if stages >= OWN => by_equal_steps(pilots, &integrator, stages)?.ok_or(InputError::NoSteps),
+        Some(stages) if stages >= OWN && facts.by_clock => Ok(by_clock(pilots, &integrator, stages)?),
+        Some(stages) if stages >= OWN => Ok(by_equal_steps(pilots, &integrator, stages)?),
         _ => {
             let at = if facts.by_clock { Compared::Times } else { Compared::Tenths };
-            let found = reference(pilots, REFERENCE, wanted / 8.0, at)?;
+            let found = converge(pilots, REFERENCE, wanted / 8.0, at)?;
             by_reference(pilots, &integrator, &found)
         }
+    }
+}
+
+/// The same where no integrator is named.
+fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, 'p, L, N>,
+) -> Result<Choice<'p, L, N>, InputError> {
+    let gauss = |stages: usize| -> Shared<'p, L, N> { Arc::new(GaussCollocation { stages }) };
+    let mut stages = stages_along(pilots.request, pilots.wanted);
+    pilots.watches_clock = const { L::HAS_CLOCK } && pilots.request.problem.structure.autonomous;
+    pilots.watches_newton = stages > STAGES;
+    let mut found = by_equal_steps(pilots, &gauss(stages), stages);
+    pilots.watches_newton = false;
+    if let Err(Ended::Elsewhere(Elsewhere::FewerStages)) = found {
+        stages = STAGES;
+        found = by_equal_steps(pilots, &gauss(stages), stages);
+    }
+    pilots.watches_clock = false;
+    let Err(Ended::Elsewhere(Elsewhere::Clock)) = found else { return Ok(found?) };
+    // Where the clock leads nowhere equal steps may.
+    let clocked: Shared<'p, L, N> = Arc::new(ClockedGauss { stages: BY_CLOCK });
+    let by_clock = by_clock(pilots, &clocked, BY_CLOCK);
+    Ok(by_clock.or_else(|_| by_equal_steps(pilots, &gauss(stages), stages))?)
+}
+
+/// How a search ends that finds no runs that agree.
+enum Ended {
+    Refused(InputError),
+    /// Another integrator is cheaper; pilot runs that watch for that end there.
+    Elsewhere(Elsewhere),
+}
+
+impl From<InputError> for Ended {
+    fn from(refused: InputError) -> Self {
+        Ended::Refused(refused)
+    }
+}
+
+impl From<Ended> for InputError {
+    fn from(ended: Ended) -> Self {
+        // Nothing else ends a search that does not watch for it.
+        if let Ended::Refused(refused) = ended { refused } else { InputError::NoIntegrator }
     }
 }
 
@@ -121,19 +166,19 @@ enum Compared {
     Times,
 }
 
-/// Gauss collocation that is its own reference, with equal steps; `None` where a clock takes much fewer, and these were watched.
+/// Gauss collocation that is its own reference, with equal steps.
 fn by_equal_steps<'p, L: Lagrangian<N>, const N: usize>(
     pilots: &mut Pilots<'_, 'p, L, N>,
     integrator: &Shared<'p, L, N>,
     stages: usize,
-) -> Result<Option<Choice<'p, L, N>>, InputError> {
+) -> Result<Choice<'p, L, N>, Ended> {
     let wanted = pilots.wanted;
-    let Some(found) = converge(pilots, stages, wanted, Compared::Steps)? else { return Ok(None) };
+    let found = converge(pilots, stages, wanted, Compared::Steps)?;
     // Where W or the drag changes along the motion a longer step may leave their domain, as no misfit foretells.
     let structure = &pilots.request.problem.structure;
     let longer = structure.separable && structure.has_constant_rate();
     let (count, error) = fewest(stages, wanted, &found, longer);
-    Ok(Some(chosen(pilots, integrator, count, error, &found)))
+    Ok(chosen(pilots, integrator, count, error, &found))
 }
 
 /// The same with steps that are equal in the time of the motion's clock.
@@ -141,22 +186,11 @@ fn by_clock<'p, L: Lagrangian<N>, const N: usize>(
     pilots: &mut Pilots<'_, 'p, L, N>,
     integrator: &Shared<'p, L, N>,
     stages: usize,
-) -> Result<Choice<'p, L, N>, InputError> {
+) -> Result<Choice<'p, L, N>, Ended> {
     let wanted = pilots.wanted;
-    let found = reference(pilots, stages, wanted, Compared::Times)?;
+    let found = converge(pilots, stages, wanted, Compared::Times)?;
     let (count, error) = fewest(stages, wanted, &found, false);
     Ok(chosen(pilots, integrator, count, error, &found))
-}
-
-/// The runs that agree where no clock is watched.
-fn reference<L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, '_, L, N>,
-    stages: usize,
-    goal: f64,
-    compared: Compared,
-) -> Result<Converged<N>, InputError> {
-    let refused = InputError::Accuracy { wanted: pilots.wanted, reached: f64::INFINITY, cause: Obstacle::Budget };
-    converge(pilots, stages, goal, compared)?.ok_or(refused)
 }
 
 /// The choice of steps of which so many fill the span; by a clock they are counted anew, in its time.
@@ -186,19 +220,20 @@ fn first_guess<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, st
     let logarithm = |n: usize| (1..=n).map(|i| (i as f64).ln()).sum::<f64>();
     let constant = 4.0 * logarithm(stages) - 3.0 * logarithm(2 * stages);
     let radians = ((goal.ln() - constant) / (2.0 * s + 1.0)).exp();
-    let count = span.abs() * frequency / (0.5 * radians).min(s / 3.0);
+    // Beyond half a period sweeps do not contract.
+    let count = span.abs() * frequency / (0.5 * radians).min(s / 3.0).min(PI);
     // What is stiff at its start need not be resolved, and what is free there may be anything later.
     if count.is_finite() { (count.ceil() as usize).clamp(1, 1 << 20) } else { 1 }
 }
 
-/// Finds the runs that agree; `None` where one has ended since a clock would take much fewer steps.
+/// Finds the runs that agree.
 fn converge<L: Lagrangian<N>, const N: usize>(
     pilots: &mut Pilots<'_, '_, L, N>,
     stages: usize,
     goal: f64,
     compared: Compared,
-) -> Result<Option<Converged<N>>, InputError> {
-    let refuse = |wanted, reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
+) -> Result<Converged<N>, Ended> {
+    let refuse = |wanted, reached, cause| Err(InputError::Accuracy { wanted, reached, cause }.into());
     let (wanted, t0, span) = (pilots.wanted, pilots.request.problem.t0, pilots.request.span);
     let s = stages as f64;
     let marks_of = |k: usize| match compared {
@@ -241,7 +276,7 @@ fn converge<L: Lagrangian<N>, const N: usize>(
                     tracks.push(track);
                     continue;
                 }
-                PilotEnd::Uneven => return Ok(None),
+                PilotEnd::Elsewhere(elsewhere) => return Err(Ended::Elsewhere(elsewhere)),
                 PilotEnd::Exhausted => {
                     return refuse(wanted, best, if best.is_finite() { Obstacle::Budget } else { cause });
                 }
@@ -277,14 +312,16 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         let rounded = 2e-15 * larger(growth, 1.0) * (k as f64).sqrt();
         let agreed = error <= 0.25 * goal || (error <= 1e-2 && beyond <= 0.1 * goal && rounded <= 0.1 * goal);
         if falls && agreed {
-            return Ok(Some(Converged {
+            return Ok(Converged {
                 k,
                 errors: [error, beyond],
                 misfit: coarse.misfit,
+                order,
+                finer_is_cheaper: fine.cost < coarse.cost,
                 truth: fine.clone(),
                 marks,
                 narrow: narrows > 0,
-            }));
+            });
         }
         strikes = if error < 0.5 * best { 0 } else { strikes + 1 };
         cause = if !falls {
@@ -323,22 +360,27 @@ fn obstacle(distances: &[f64], order: f64, wanted: f64, t0: f64, span: f64) -> O
 
 /// The fewest steps of a Gauss method that the converged runs allow, with the error that they predict.
 fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, longer: bool) -> (usize, f64) {
-    let Converged { k, errors: [error, beyond], misfit, narrow, .. } = *found;
-    let order = 2.0 * stages as f64;
+    let Converged { k, errors: [error, beyond], misfit, order, finer_is_cheaper, narrow, .. } = *found;
     // Ten times as exactly as wanted between the runs and beyond them, as errors of neighbouring steps may differ so much.
     let (target, predicted) = (0.2 * wanted, 0.02 * wanted);
-    let change = (larger(error, 1e-14) / predicted).powf(1.0 / order);
-    let steps = (k as f64 * change).ceil();
-    if narrow {
+    let steps = |order: f64| (k as f64 * (larger(error, 1e-14) / predicted).powf(1.0 / order)).ceil();
+    // Of what is not smooth, as at a kink, other steps tell nothing.
+    if narrow || order < stages as f64 / 3.0 {
         return if error <= target { (k, error) } else { (2 * k, beyond) };
     }
+    if finer_is_cheaper {
+        return (2 * k, beyond);
+    }
     if error <= target {
-        // Coarser than what was followed only where the misfit says that steps still resolve the motion.
-        let fewer = steps.max((0.6 * k as f64).ceil());
+        // The error of longer steps grows faster than their order. They are taken only where the misfit says that they still resolve the
+        // motion.
+        let fewer = steps(2.5 * stages as f64).max((0.6 * k as f64).ceil());
         let coarser = misfit * (k as f64 / fewer).powf(stages as f64);
         return if longer && fewer < k as f64 && coarser <= 1e-2 { (fewer as usize, predicted) } else { (k, error) };
     }
-    if steps < 2.0 * k as f64 { (steps as usize, larger(predicted, beyond)) } else { (2 * k, beyond) }
+    // That of shorter steps falls like the square of the misfit.
+    let more = steps(2.0 * larger(order, 0.5));
+    if more < 2.0 * k as f64 { (more as usize, larger(predicted, beyond)) } else { (2 * k, beyond) }
 }
 
 /// The steps of any integrator, whose runs are compared with the reference.

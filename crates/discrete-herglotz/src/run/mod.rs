@@ -48,7 +48,6 @@ pub use watch::Doubt;
 
 use crate::{InputError, StepError};
 use accuracy::Choice;
-pub(crate) use accuracy::stages_for;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
 use std::sync::Arc;
@@ -152,8 +151,8 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// a small multiple of the run; what is narrower than the distance of their nodes, about the step divided by four times the stages, may
     /// go unseen.
     ///
-    /// Where no integrator is named, it is contact Gauss collocation: with stages for the wanted accuracy, and by the clock that the
-    /// Lagrangian states where that takes much fewer steps.
+    /// Where no integrator is named, it is contact Gauss collocation: with 8 stages, with 16 where it is to take many steps whose
+    /// accelerations alone are iterated, and by the clock that the Lagrangian states where that takes much fewer steps.
     pub fn accuracy(self, wanted: f64) -> Self {
         Run { length: Some(Length::For(wanted, accuracy::choose)), ..self }
     }

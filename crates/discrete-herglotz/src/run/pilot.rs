@@ -23,6 +23,9 @@ const RESOLVED_VALUE: f64 = 0.2;
 /// Products of two numbers that are smaller have lost digits.
 const UNDERFLOWN: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
+/// The smallest number.
+const SMALLEST: f64 = f64::from_bits(1);
+
 /// How many times the expected misfit is more than a smooth motion has: something narrow lies between the nodes.
 const NARROW: f64 = 30.0;
 
@@ -38,6 +41,11 @@ const PARTS: usize = 10;
 /// How many times fewer steps a clock must take at the least, for its steps to be tried: each costs about so many of equal steps of the
 /// same error. Of Kepler's orbits those do of which the eccentricity is above one half.
 const PROFIT: f64 = 3.5;
+
+/// The steps that Newton's method may solve before other stages are tried, and the part of all. Where it solves fewer of a coarse run, one with
+/// twice as many steps needs it hardly at all.
+const FEW_NEWTON: f64 = 2.0;
+const PART_NEWTON: f64 = 0.25;
 
 /// The times of a span at which runs are compared.
 #[derive(Clone, Debug)]
@@ -81,6 +89,8 @@ pub(super) struct Track<const N: usize> {
     states: Vec<[SVector<f64, N>; 2]>,
     /// The largest misfit that was seen between the nodes of its steps.
     pub misfit: f64,
+    /// What it has cost without the looks, in evaluations of L at one stage.
+    pub cost: u64,
     /// The span in the time of its clock.
     pub tau: f64,
 }
@@ -101,7 +111,8 @@ impl<const N: usize> Track<N> {
         let last = of.states.last().map_or(0.0, norm);
         let relative = |(a, b): (&[SVector<f64, N>; 2], &[SVector<f64, N>; 2])| {
             let (apart, size) = (norm(&[a[0] - b[0], a[1] - b[1]]), larger(norm(b), last));
-            if apart == 0.0 { 0.0 } else { apart / size }
+            // Numbers are known to no less than half of the smallest one.
+            if apart == 0.0 && size == 0.0 { 0.0 } else { larger(apart, SMALLEST) / size }
         };
         self.states.iter().zip(&of.states).map(relative).collect()
     }
@@ -126,12 +137,21 @@ pub(super) enum PilotEnd<const N: usize> {
     Unresolved { part: f64 },
     /// The same, where the misfit is that of something narrow.
     Narrow { part: f64 },
-    /// Where steps by the motion's own clock are seen to be much fewer.
-    Uneven,
+    /// Where another integrator is seen to be cheaper.
+    Elsewhere(Elsewhere),
     /// At a step that could not be taken.
     Halted { part: f64, cause: StepError },
     /// No evaluations are left.
     Exhausted,
+}
+
+/// What is cheaper than the steps of a run.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Elsewhere {
+    /// Steps by the motion's own clock, since they are much fewer.
+    Clock,
+    /// Steps of fewer stages, since these need Newton's method.
+    FewerStages,
 }
 
 /// What the looks at a run have seen.
@@ -189,6 +209,8 @@ pub(super) struct Pilots<'t, 'p, L, const N: usize> {
     pub wanted: f64,
     /// Whether runs with equal steps end where a clock would take much fewer.
     pub watches_clock: bool,
+    /// Whether they end where Newton's method is needed for many of the steps.
+    pub watches_newton: bool,
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
@@ -242,14 +264,18 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
         let PilotCourse { count, marks, points, narrow, price } = course;
         let Problem { lagrangian, start, .. } = *self.request.problem;
         let floor = larger(0.1 * self.wanted, 1e-11);
-        let watches_clock = self.watches_clock;
-        let (mut looks, mut seen, mut uneven) = (0, PilotLooks::default(), Uneven::default());
+        let Self { watches_clock, watches_newton, .. } = *self;
+        let (mut looks, mut cost, mut seen, mut uneven) = (0, 0, PilotLooks::default(), Uneven::default());
         let ending = self.follow(run, *count, marks, stride, |run, part| {
             let (look, newton_steps) = look(run, *points);
-            let spent = |looks: u64| run.evaluations() + newton_steps * price.newton + looks * price.look;
+            cost = run.evaluations() + newton_steps * price.newton;
+            let spent = |looks: u64| cost + looks * price.look;
             if const { L::HAS_CLOCK } && watches_clock && uneven.profit(lagrangian.clock_rate(&run.state().q)) > PROFIT
             {
-                return (Some(PilotEnd::Uneven), spent(looks));
+                return (Some(PilotEnd::Elsewhere(Elsewhere::Clock)), spent(looks));
+            }
+            if watches_newton && newton_steps as f64 > FEW_NEWTON + PART_NEWTON * part * *count as f64 {
+                return (Some(PilotEnd::Elsewhere(Elsewhere::FewerStages)), spent(looks));
             }
             let ending = look.and_then(|look| {
                 looks += *points as u64 + 1;
@@ -267,7 +293,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
             return Err(InputError::FalseClaim { claim, size });
         }
         Ok(match ending {
-            PilotEnd::Followed(track) => PilotEnd::Followed(Track { misfit: seen.misfit, ..track }),
+            PilotEnd::Followed(track) => PilotEnd::Followed(Track { misfit: seen.misfit, cost, ..track }),
             other => other,
         })
     }
@@ -324,7 +350,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
             }
         }
         self.left = self.left.saturating_sub(spent);
-        ending.unwrap_or(PilotEnd::Followed(Track { states, misfit: 0.0, tau: span }))
+        ending.unwrap_or(PilotEnd::Followed(Track { states, misfit: 0.0, cost: spent, tau: span }))
     }
 }
 

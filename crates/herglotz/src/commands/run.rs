@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 const ROWS: &str = "rows.csv";
-const EVENTS: &str = "events.csv";
+pub(crate) const EVENTS: &str = "events.csv";
 const CHECKPOINT: &str = "checkpoint";
 const BESIDE: &str = "checkpoint.json";
 
@@ -108,9 +108,7 @@ impl Watch for Writer {
             return ControlFlow::Continue(());
         };
         self.event_count += 1;
-        let Crossing { t, q, v, p, z, .. } = crossing;
-        let numbers = [*t].into_iter().chain(q.iter().chain(v).chain(p).copied()).chain([*z]).map(exact);
-        let written = table.record([name.clone()].into_iter().chain(numbers));
+        let written = table.record([name.clone()].into_iter().chain(numbers_of_event(crossing)));
         self.keep(written)
     }
 
@@ -124,6 +122,12 @@ impl Watch for Writer {
     fn interrupted(&mut self, at: Interrupted) {
         self.interrupted = Some(at);
     }
+}
+
+/// What follows the name of the event in a row of events.csv.
+pub(crate) fn numbers_of_event(crossing: &Crossing) -> impl Iterator<Item = String> {
+    let Crossing { t, q, v, p, z, .. } = crossing;
+    [*t].into_iter().chain(q.iter().chain(v).chain(p).copied()).chain([*z]).map(exact)
 }
 
 /// A flag that Ctrl-C sets; a second one ends the program.
@@ -153,7 +157,7 @@ pub(crate) fn progress_bar(shown: bool) -> ProgressBar {
 }
 
 /// The columns of events.csv.
-fn header_of_events(scene: &Scene) -> Vec<String> {
+pub(crate) fn header_of_events(scene: &Scene) -> Vec<String> {
     let names = scene.system.formula().coordinates();
     let velocities = names.iter().map(|name| velocity_name(name));
     let momenta = names.iter().map(|name| format!("p_{name}"));

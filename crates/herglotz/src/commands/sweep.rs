@@ -1,14 +1,14 @@
 //! `herglotz sweep`.
 
 use super::SceneArguments;
-use super::run::{progress_bar, stop_flag};
+use super::run::{EVENTS, header_of_events, numbers_of_event, progress_bar, stop_flag};
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, print, print_json};
 use crate::plot;
 use clap::Args;
 use herglotz::Scene;
 use indicatif::ProgressBar;
-use runtime_herglotz::{Column, Ending, Ensemble, EnsembleWatch, MemberEnd, Status, Varied};
+use runtime_herglotz::{Column, Ending, Ensemble, EnsembleWatch, Event, MemberEnd, Status, Varied};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,13 +18,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) struct Sweep {
     #[command(flatten)]
     scene: SceneArguments,
-    /// The directory of sweep.csv; that with the name of the scene otherwise.
+    /// The directory of sweep.csv, and of events.csv where the scene has events; that with the name of the scene otherwise.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// The number of threads; the results do not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Draw the columns at the end against the first swept value.
+    /// Draw the columns at the end, and the coordinates at the first event, against the first swept value.
     #[arg(long)]
     plot: bool,
     /// Tell how it ended as JSON.
@@ -36,10 +36,12 @@ pub(crate) struct Sweep {
 struct Writer<'s> {
     scene: &'s Scene,
     csv: Table,
+    /// Where the scene has events.
+    events: Option<Table>,
     /// The number of columns at the end.
     columns: usize,
-    /// The swept values of those that began with their columns, where they are drawn.
-    drawn: Option<Vec<(f64, Vec<f64>)>>,
+    /// The swept values of those that began with their columns, and those with the coordinates at the first event, where they are drawn.
+    drawn: Option<[Vec<(f64, Vec<f64>)>; 2]>,
     bar: ProgressBar,
     stop: Arc<AtomicBool>,
     members: usize,
@@ -58,6 +60,18 @@ fn words(ending: &Ending) -> (&'static str, String) {
     }
 }
 
+impl Writer<'_> {
+    fn events_of(&mut self, member: &MemberEnd, values: &[f64]) -> Result<(), Failure> {
+        let Some(table) = &mut self.events else { return Ok(()) };
+        for crossing in &member.crossings {
+            let name = self.scene.events.get(crossing.event).map(|(name, _)| name.clone()).unwrap_or_default();
+            let which = [member.index.to_string()].into_iter().chain(values.iter().map(|x| exact(*x)));
+            table.record(which.chain([name]).chain(numbers_of_event(crossing)))?;
+        }
+        Ok(())
+    }
+}
+
 impl EnsembleWatch for Writer<'_> {
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()> {
         let values = self.scene.members().values(member.index);
@@ -68,8 +82,10 @@ impl EnsembleWatch for Writer<'_> {
                 let (status, why) = words(ending);
                 row.extend([status.to_owned(), why, ending.steps.to_string(), exact(ending.t)]);
                 row.extend(ending.columns.iter().map(|x| exact(*x)));
-                if let (Some(drawn), Some(value)) = (&mut self.drawn, values.first()) {
-                    drawn.push((*value, ending.columns.clone()));
+                if let (Some([ends, events]), Some(value)) = (&mut self.drawn, values.first()) {
+                    ends.push((*value, ending.columns.clone()));
+                    let of_first = member.crossings.iter().filter(|crossing| crossing.event == 0);
+                    events.extend(of_first.map(|crossing| (*value, crossing.q.clone())));
                 }
             }
             Err(cause) => {
@@ -79,7 +95,7 @@ impl EnsembleWatch for Writer<'_> {
         }
         self.members += 1;
         self.bar.set_position((1000 * self.members / self.scene.members().count().max(1)) as u64);
-        match self.csv.record(&row) {
+        match self.csv.record(&row).and_then(|()| self.events_of(&member, &values)) {
             _ if self.stop.load(Ordering::Relaxed) => ControlFlow::Break(()),
             Ok(()) => ControlFlow::Continue(()),
             Err(failure) => {
@@ -100,9 +116,11 @@ impl Sweep {
                 "there is nothing to sweep; add [sweep] with a parameter, as in gamma = { from = -1.0, to = 0.0, count = 11 }",
             ));
         }
-        if let Some((name, _)) = scene.events.iter().find(|(_, event)| event.terminal) {
+        let factor = scene.columns.iter().find(|(_, column)| matches!(column, Column::LogFactor));
+        let terminal = scene.events.iter().find(|(_, event)| event.terminal);
+        if let (Some((column, _)), Some((event, _))) = (factor, terminal) {
             return Err(refuse(&format!(
-                "all members of a sweep end at one time, and the event `{name}` is terminal; leave `terminal` out"
+                "the column `{column}` of a sweep is known at the ends of steps, where the terminal event `{event}` is not; leave one of them out"
             )));
         }
         // The time has a column of its own.
@@ -110,21 +128,29 @@ impl Sweep {
         let (names, columns): (Vec<&str>, Vec<Column>) =
             shown.map(|(name, column)| (name.as_str(), column.clone())).unzip();
         let knobs = scene.knobs.iter().map(|knob| knob.name.as_str());
-        let header =
-            ["index"].into_iter().chain(knobs).chain(["status", "why", "steps", "t"]).chain(names.iter().copied());
+        let swept: Vec<&str> = ["index"].into_iter().chain(knobs).collect();
+        let header = swept.iter().copied().chain(["status", "why", "steps", "t"]).chain(names.iter().copied());
+        let of_events = header_of_events(&scene);
+        let header_of_events = swept.iter().copied().chain(of_events.iter().map(String::as_str));
         let directory = Directory::new(self.out.clone(), &self.scene.file);
         directory.create()?;
         let mut writer = Writer {
             scene: &scene,
             csv: Table::new(directory.file("sweep.csv"), header)?,
+            events: if scene.events.is_empty() {
+                None
+            } else {
+                Some(Table::new(directory.file(EVENTS), header_of_events)?)
+            },
             columns: columns.len(),
-            drawn: self.plot.then(Vec::new),
+            drawn: self.plot.then(Default::default),
             bar: progress_bar(!self.json),
             stop: stop_flag(),
             members: 0,
             failure: None,
         };
         let motion = scene.bare_motion();
+        let events: Vec<Event> = scene.events.iter().map(|(_, event)| event.clone()).collect();
         let parameters = members.parameters();
         let (start, values) = (|i: usize| members.start(i), |i: usize| members.parameter_values(i));
         let varied = Varied { names: &parameters, values: &values };
@@ -137,32 +163,42 @@ impl Sweep {
             way: motion.way,
             rows: None,
             columns: &columns,
+            events: &events,
             threads: self.threads.map(usize::from),
         };
         let tally = scene.system.ensemble(&ensemble, &mut writer);
         writer.bar.finish_and_clear();
         let tally = tally.map_err(|error| self.scene.explain(scene.explain(&error)))?;
-        let Writer { csv, drawn, stop, failure, members: written, .. } = writer;
+        let Writer { csv, events, drawn, stop, failure, members: written, .. } = writer;
         csv.finish()?;
+        events.map(Table::finish).transpose()?;
         if let Some(failure) = failure {
             return Err(failure);
         }
         let knob = scene.knobs.first().map(|knob| knob.name.as_str()).unwrap_or_default();
-        for (i, name) in names.iter().enumerate().filter(|_| drawn.is_some()) {
-            let of = |(value, columns): &(f64, Vec<f64>)| Some((*value, *columns.get(i)?)).filter(|p| p.1.is_finite());
-            let points = drawn.iter().flatten().filter_map(of).collect();
-            if let Some(figure) = plot::of_sweep(knob, name, points) {
-                directory.write(&format!("sweep_{i}.svg"), &figure)?;
+        let coordinates = scene.system.formula().coordinates();
+        let coordinates: Vec<&str> = coordinates.iter().map(String::as_str).collect();
+        let [ends, at_events] = drawn.unwrap_or_default();
+        for (file, names, points) in [("sweep", &names, ends), ("sweep_events", &coordinates, at_events)] {
+            for (i, name) in names.iter().enumerate() {
+                let of =
+                    |(value, numbers): &(f64, Vec<f64>)| Some((*value, *numbers.get(i)?)).filter(|p| p.1.is_finite());
+                if let Some(figure) = plot::of_sweep(knob, name, points.iter().filter_map(of).collect()) {
+                    directory.write(&format!("{file}_{i}.svg"), &figure)?;
+                }
             }
         }
-        let runtime_herglotz::Tally { completed, failed, suspicious, .. } = tally;
+        let runtime_herglotz::Tally { completed, stopped, failed, suspicious, .. } = tally;
         if self.json {
             let told = serde_json::json!({
-                "members": written, "completed": completed, "failed": failed, "suspicious": suspicious,
+                "members": written, "completed": completed, "stopped": stopped, "failed": failed, "suspicious": suspicious,
             });
             print_json(&told)?;
         } else {
-            print(&format!("{written} members: {completed} completed ({suspicious} suspicious), {failed} failed"))?;
+            let stopped = if stopped > 0 { format!(", {stopped} stopped by an event") } else { String::new() };
+            print(&format!(
+                "{written} members: {completed} completed ({suspicious} suspicious), {failed} failed{stopped}"
+            ))?;
         }
         if stop.load(Ordering::Relaxed) && written < members.count() {
             return Err(Failure::Run(format!("interrupted after {written} of {} members", members.count())));

@@ -17,7 +17,7 @@ A Lagrangian L(t, q, v, z) that depends on its own action z has friction in it: 
 from ._core import System
 from ._core import catalogue as _catalogue
 from ._core import integrators as _integrators
-from ._ensemble import Ensemble, ensemble
+from ._ensemble import Ensemble, MemberCrossings, ensemble
 from ._exact import DiscreteLagrangian, Exponential, Retraction, exact_lagrangian, exponential, retract
 from ._looks import Check, Comparison, Contact, Geometry, check, compare, geometry, is_contact
 from ._solution import Crossings, Interrupted, Plan, Solution, States
@@ -49,6 +49,7 @@ __all__ = [
     "Exponential",
     "Geometry",
     "Interrupted",
+    "MemberCrossings",
     "Plan",
     "Retraction",
     "Solution",

@@ -46,6 +46,14 @@ class Crossings(NamedTuple):
     p: Vector
     z: Vector
 
+class MemberCrossings(NamedTuple):
+    member: NDArray[np.int64]
+    t: Vector
+    q: Vector
+    v: Vector
+    p: Vector
+    z: Vector
+
 class States(NamedTuple):
     t: Vector | float
     q: Vector
@@ -101,6 +109,7 @@ class Ensemble:
     p: Vector
     z: Vector
     times: Vector | None
+    events: list[MemberCrossings] | dict[str, MemberCrossings]
     steps: NDArray[np.int64]
     success: NDArray[np.bool_]
     troubles: dict[int, str]
@@ -217,6 +226,7 @@ def ensemble(
     integrator: str | None = None,
     step: float | None = None,
     steps: int | None = None,
+    events: Expression | Event | Sequence[Expression | Event] | Mapping[str, Expression | Event] = (),
     observe: Mapping[str, Expression] | None = None,
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,

@@ -1,9 +1,12 @@
 """Many motions of one Lagrangian."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from . import _core
-from ._solve import system_and_start
+from ._solution import crossings
+from ._solve import events_of, system_and_start
 from ._system import expression
 
 
@@ -19,6 +22,7 @@ def ensemble(
     integrator=None,
     step=None,
     steps=None,
+    events=(),
     observe=None,
     coordinates=None,
     parameters=None,
@@ -40,6 +44,8 @@ def ensemble(
     z0 : float or array of shape (M,)
     parameters : dict of float or arrays of shape (M,), optional
         Those that are arrays differ among members.
+    events : str, Event, or a list or dict of them
+        As of `solve`; what they find has the member too. A terminal one ends its member alone.
     threads : int, optional
         As many as there are processors, if nothing is said.
     accuracy, integrator, step, steps, observe, coordinates
@@ -70,10 +76,23 @@ def ensemble(
         (accuracy, integrator, step, steps),
         list(varied),
         list(varied.values()),
+        events_of(events, system) if events else [],
         [expression(column, system) for column in observe.values()] if observe else [],
         threads,
     )
-    return Ensemble(system, record, tuple(observe or ()))
+    event_names = tuple(events) if isinstance(events, dict) else len(events_of(events, system)) if events else 0
+    return Ensemble(system, record, event_names, tuple(observe or ()))
+
+
+class MemberCrossings(NamedTuple):
+    """The changes of sign of an event in an ensemble: m of them."""
+
+    member: np.ndarray  # (m,)
+    t: np.ndarray  # (m,)
+    q: np.ndarray  # (m, n)
+    v: np.ndarray  # (m, n)
+    p: np.ndarray  # (m, n)
+    z: np.ndarray  # (m,)
 
 
 class Ensemble:
@@ -86,6 +105,8 @@ class Ensemble:
     t : array of shape (M,)
         The times that were reached.
     times : array of shape (k,) or None
+    events : list or dict of MemberCrossings
+        The changes of sign of the events, in their order or by their names: of all members, one after the other.
     steps : array of int of shape (M,)
     success : array of bool of shape (M,)
     troubles : dict of str
@@ -94,7 +115,7 @@ class Ensemble:
         How many members were advanced together in vector registers.
     """
 
-    def __init__(self, system, record, observed):
+    def __init__(self, system, record, event_names, observed):
         self.system = system
         self.t, self.steps, self.success, self.times = record.t, record.steps, record.success, record.times
         self.troubles, self.in_lanes = dict(record.troubles), record.in_lanes
@@ -102,6 +123,7 @@ class Ensemble:
         many = () if self.times is None else (len(self.times),)
         self.q, self.v, self.p = (x.reshape(count, *many, n) for x in (record.q, record.v, record.p))
         self.z = record.z.reshape(count, *many)
+        self.events = crossings(MemberCrossings, record.crossings, event_names, n) if event_names else []
         self._observed = {name: record.columns[:, i].reshape(count, *many) for i, name in enumerate(observed)}
 
     def __len__(self):

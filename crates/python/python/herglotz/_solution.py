@@ -88,7 +88,7 @@ class Solution:
         self._end = record.end
         self._observed = observed
         self._columns = record.columns
-        self.events = _crossings(record.crossings, event_names, system.dimension) if event_names else []
+        self.events = crossings(Crossings, record.crossings, event_names, system.dimension) if event_names else []
         self._event_names = event_names
         self._plan = self._dense = None
 
@@ -239,13 +239,15 @@ class Solution:
         return f"<Solution: {len(self.t)} rows, t = {self.t_end}, {self.steps} steps, {self.status}>"
 
 
-def _crossings(found, names, n):
-    """The crossings of each event: by names, or as many as a number says."""
+def crossings(kind, found, names, n):
+    """The crossings of each event: by names, or as many as a number says. The index of the event stands before t in what was found."""
+    before = kind._fields.index("t")
 
     def of(index):
-        mine = [crossing for crossing in found if crossing[0] == index]
-        numbers = [np.array([crossing[k] for crossing in mine]) for k in range(1, 6)]
-        return Crossings(*(x.reshape(-1, n) if k in (1, 2, 3) else x for k, x in enumerate(numbers)))
+        mine = [crossing for crossing in found if crossing[before] == index]
+        fields = [field for k, field in enumerate(zip(*mine)) if k != before] or [()] * len(kind._fields)
+        arrays = (np.array(field, dtype=int if name == "member" else float) for name, field in zip(kind._fields, fields))
+        return kind(*(x.reshape(-1, n) if name in ("q", "v", "p") else x for name, x in zip(kind._fields, arrays)))
 
     if isinstance(names, int):
         return [of(index) for index in range(names)]

@@ -1,22 +1,26 @@
 //! Many motions at once.
 
 use super::Sized;
-use super::recorder::{number, rows};
-use crate::{Column, Ending, EnsembleWatch, MemberEnd, RuntimeError, Varied, Way, When};
+use super::observed::{Observed, Seen};
+use super::recorder::{Crossings, number};
+use crate::{Column, Ending, EnsembleWatch, Event, MemberEnd, RuntimeError, Varied, Way};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint};
-use discrete_herglotz::{
-    Ensemble, EnsembleError, InputError, Member, Row, Rows, Start, Tally, Until, legendre_inverse,
-};
-use formula_lagrangian::FormulaLagrangian;
+use discrete_herglotz::{Ensemble, EnsembleError, InputError, Member, Row, Start, Tally, Until, legendre_inverse};
+use formula_lagrangian::{Expression, FormulaLagrangian};
 use std::borrow::Cow;
 use std::ops::Range;
+use std::time::{Duration, Instant};
 
-/// The members between two polls: whole shards of the lanes.
-const BLOCK: usize = 24 * 384;
+/// The members that are computed together in lanes, and those of which each is observed in a run of its own.
+const SHARD: usize = 384;
+const OBSERVED: usize = 16;
 
-/// Those where each has a Lagrangian or rows of its own.
-const OWN_BLOCK: usize = 384;
+/// The most of these between two polls.
+const SHARDS: usize = 24;
+
+/// A time between two polls that is long for the one who waits.
+const LONG: Duration = Duration::from_millis(100);
 
 /// Runs it block by block, so that it can be ended and its memory does not grow.
 pub(super) fn run<const N: usize>(
@@ -31,16 +35,27 @@ pub(super) fn run<const N: usize>(
         let mut lagrangian = system.0.clone();
         varied.names.iter().try_for_each(|name| lagrangian.set(name, 0.0))?;
     }
-    let observed = ensemble.rows.is_some() || ensemble.columns.iter().any(|c| matches!(c, Column::LogFactor));
-    let size = if ensemble.varied.is_some() || observed { OWN_BLOCK } else { BLOCK };
+    let has_factor = ensemble.columns.iter().any(|c| matches!(c, Column::LogFactor));
+    let observed = ensemble.rows.is_some() || !ensemble.events.is_empty() || has_factor;
+    // In lanes the steps for an accuracy are those of a block, which then is not to depend on the time it takes.
+    let (shard, mut shards, fixed) = match (&ensemble.way, &ensemble.varied) {
+        _ if observed => (OBSERVED, 2, false),
+        (_, Some(_)) => (SHARD, 1, true),
+        (Way::Accuracy { .. }, None) => (SHARD, SHARDS, true),
+        (Way::Steps { .. }, None) => (SHARD, 2, false),
+    };
     let (mut tally, mut first) = (Tally::default(), 0);
     while first < ensemble.count {
+        let (clock, size) = (Instant::now(), shards * shard);
         let members = first..ensemble.count.min(first + size);
         first = members.end;
         let mut block = Block { system, ensemble, members, tally: &mut tally, watch, ended: false };
         block.run(observed)?;
         if block.ended || watch.poll().is_break() {
             break;
+        }
+        if !fixed {
+            shards = if clock.elapsed() > LONG { (shards / 2).max(2) } else { (2 * shards).min(SHARDS) };
         }
     }
     Ok(tally)
@@ -73,7 +88,7 @@ impl<const N: usize> Block<'_, N> {
                     self.tally.members += 1;
                     self.tally.failed += 1;
                     self.tally.first_failed = self.tally.first_failed.or(Some(index));
-                    let member = MemberEnd { index, ending: Err(cause), rows: Vec::new() };
+                    let member = MemberEnd { index, ending: Err(cause), rows: Vec::new(), crossings: Vec::new() };
                     self.ended = self.watch.member(member).is_break();
                 }
                 Err(error) => return Err(error.into()),
@@ -85,19 +100,20 @@ impl<const N: usize> Block<'_, N> {
 
     fn run_as_one(&mut self, members: Range<usize>, observed: bool) -> Result<(), EnsembleError> {
         let Block { system, ensemble, .. } = *self;
-        let crate::Ensemble { t0, end, way, columns, .. } = *ensemble;
+        let crate::Ensemble { t0, end, way, columns, events, .. } = *ensemble;
         let first = members.start;
         let start = |i: usize| system.start_of_member(&(ensemble.start)(first + i));
-        let own: Option<Vec<Option<FormulaLagrangian<N>>>> = ensemble.varied.as_ref().map(|varied| {
+        let own: Option<Vec<Option<Own<N>>>> = ensemble.varied.as_ref().map(|varied| {
             let with = |i: usize| {
                 let mut lagrangian = system.0.clone();
                 let values = (varied.values)(i);
                 let set = varied.names.iter().zip(values).try_for_each(|(name, value)| lagrangian.set(name, value));
-                set.is_ok().then_some(lagrangian)
+                set.ok().map(|()| Own { lagrangian, events: events_with_parameters(events, varied, i) })
             };
             members.clone().map(with).collect()
         });
-        let lagrangian = |i: usize| own.as_ref().map_or(Some(&system.0), |own| own.get(i).and_then(Option::as_ref));
+        let own_of = |i: usize| own.as_ref().map(|own| own.get(i).and_then(Option::as_ref));
+        let lagrangian = |i: usize| own_of(i).map_or(Some(&system.0), |own| own.map(|own| &own.lagrangian));
         let many = match &own {
             None => Ensemble::new(&system.0, t0, members.len(), start),
             // One whose parameters are no numbers has no start either.
@@ -122,15 +138,14 @@ impl<const N: usize> Block<'_, N> {
             _ => Cow::Borrowed(columns),
         };
         let (watch, ended) = (&mut *self.watch, &mut self.ended);
-        let mut hand_on = |member: &Member<N>, recorded: Vec<Row<N>>| {
+        let mut hand_on = |member: &Member<N>, Seen { rows, last, crossings }: Seen<N>| {
             if *ended {
                 return;
             }
-            let last = recorded.last();
             let ending = member.ending.as_ref().map_err(|cause| *cause);
             let ending = ending.map(|ending| {
                 let l = lagrangian(member.index).unwrap_or(&system.0);
-                let row = end_of(l, ending, last);
+                let row = end_of(l, ending, last.as_ref());
                 Ending {
                     status: ending.status,
                     suspicion: ending.suspicion,
@@ -143,23 +158,26 @@ impl<const N: usize> Block<'_, N> {
                     columns: own_columns(member.index).iter().map(|column| number(column, &row)).collect(),
                 }
             });
-            let rows = if ensemble.rows.is_some() { recorded } else { Vec::new() };
             let columns = own_columns(member.index);
             let rows = rows.iter().map(|row| columns.iter().map(|column| number(column, row)).collect());
-            let member = MemberEnd { index: first + member.index, ending, rows: rows.collect() };
+            let member = MemberEnd { index: first + member.index, ending, rows: rows.collect(), crossings };
             *ended = watch.member(member).is_break();
         };
         let until = Until::Time(end);
         let of_block = if observed {
-            let when = ensemble.rows.clone().unwrap_or(When::Every(usize::MAX));
-            let seen = |rows: Rows<'_, N>| rows.rows;
-            let many = many.observe(|_| rows::<N>(&when, columns), seen);
-            many.run(until, |member, rows| hand_on(member, rows.unwrap_or_default()))?
+            let observer = |i: usize| {
+                let events = own_of(i).map_or(Some(events), |own| own.map(|own| own.events.as_slice()));
+                let crossings = lagrangian(i).zip(events).and_then(|(l, events)| Crossings::of(l, events));
+                Observed::<N>::new(ensemble.rows.as_ref(), columns, crossings)
+            };
+            let many = many.observe(observer, Observed::seen);
+            many.run(until, |member, seen| hand_on(member, seen.unwrap_or_default()))?
         } else {
-            many.run(until, |member| hand_on(member, Vec::new()))?
+            many.run(until, |member| hand_on(member, Seen::default()))?
         };
         self.tally.members += of_block.members;
         self.tally.completed += of_block.completed;
+        self.tally.stopped += of_block.stopped;
         self.tally.failed += of_block.failed;
         self.tally.suspicious += of_block.suspicious;
         self.tally.in_lanes += of_block.in_lanes;
@@ -167,6 +185,12 @@ impl<const N: usize> Block<'_, N> {
         self.tally.first_failed = self.tally.first_failed.or(first_failed);
         Ok(())
     }
+}
+
+/// A member with parameters of its own.
+struct Own<const N: usize> {
+    lagrangian: FormulaLagrangian<N>,
+    events: Vec<Event>,
 }
 
 /// Whether what is wrong holds for all members, whatever their starts and parameters.
@@ -188,16 +212,30 @@ fn is_common(cause: &InputError) -> bool {
     )
 }
 
+/// Gives an expression the parameters of a member.
+fn set(expression: &mut Expression, varied: &Varied<'_>, index: usize) {
+    for (name, value) in varied.names.iter().zip((varied.values)(index)) {
+        // One that cannot be set has refused the member.
+        let _ = expression.set(name, value);
+    }
+}
+
 /// The columns with the parameters of a member.
 fn with_parameters(columns: &[Column], varied: &Varied<'_>, index: usize) -> Vec<Column> {
-    let values = (varied.values)(index);
     let mut own = columns.to_vec();
     for column in &mut own {
-        let Column::Expression(expression) = column else { continue };
-        for (name, value) in varied.names.iter().zip(&values) {
-            // One that cannot be set has refused the member.
-            let _ = expression.set(name, *value);
+        if let Column::Expression(expression) = column {
+            set(expression, varied, index);
         }
+    }
+    own
+}
+
+/// The events with the parameters of a member.
+fn events_with_parameters(events: &[Event], varied: &Varied<'_>, index: usize) -> Vec<Event> {
+    let mut own = events.to_vec();
+    for event in &mut own {
+        set(&mut event.function, varied, index);
     }
     own
 }
@@ -221,10 +259,21 @@ fn end_of<const N: usize>(
     last: Option<&Row<N>>,
 ) -> Row<N> {
     let (t, x) = (ending.t, &ending.state);
-    let v = last.and_then(|row| row.v).or_else(|| {
+    // One of another time is the end of the step in which the member ended.
+    let of_the_end = last.filter(|row| row.t == t);
+    let v = of_the_end.and_then(|row| row.v).or_else(|| {
         let guess = last.map_or_else(SVector::zeros, |row| row.p);
         legendre_inverse(lagrangian, t, x, &guess).ok().map(|x| x.v)
     });
     let energy = v.map(|v| v.dot(&x.p) - lagrangian.value(t, &x.q, &v, x.z));
-    Row { t, q: x.q, v, p: x.p, z: Some(x.z), energy, log_factor: last.and_then(|r| r.log_factor), columns: Vec::new() }
+    Row {
+        t,
+        q: x.q,
+        v,
+        p: x.p,
+        z: Some(x.z),
+        energy,
+        log_factor: of_the_end.and_then(|r| r.log_factor),
+        columns: Vec::new(),
+    }
 }

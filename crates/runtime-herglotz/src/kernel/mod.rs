@@ -3,6 +3,7 @@
 mod check;
 mod ensemble;
 mod geometry;
+mod observed;
 mod recorder;
 mod run;
 

@@ -19,7 +19,7 @@ pub(super) struct Recorder<'r, const N: usize> {
     columns: &'r [Column],
     /// The numbers of a row.
     numbers: Vec<f64>,
-    events: Option<Events<'r, N>>,
+    crossings: Option<Crossings<'r, N>>,
     nodes: bool,
     needs: Needs,
     course: Option<Course>,
@@ -34,17 +34,15 @@ impl<'r, const N: usize> Recorder<'r, N> {
     ) -> Result<Self, RuntimeError> {
         let columns = motion.columns.as_slice();
         let rows = motion.rows.as_ref().map(|when| rows(when, columns)).transpose()?;
-        let events = motion.events.iter().map(|event| of(lagrangian, event));
-        let events = (!motion.events.is_empty()).then(|| Events::new(events));
-        // Expressions and events may have the action in them.
-        let of_rows = rows.as_ref().map(|rows| rows.needs()).unwrap_or_default();
-        let action = motion.nodes || motion.events.iter().any(|event| event.function.has_action());
-        let of_all = Needs { action, conformal_factor: false, saved: motion.resumable };
+        let crossings = Crossings::of(lagrangian, &motion.events);
+        let needs = |of: Option<Needs>| of.unwrap_or_default();
+        let of_rows = needs(rows.as_ref().map(Observer::needs)).and(needs(crossings.as_ref().map(Crossings::needs)));
+        let of_all = Needs { action: motion.nodes, conformal_factor: false, saved: motion.resumable };
         Ok(Recorder {
             rows,
             columns,
             numbers: Vec::with_capacity(columns.len()),
-            events,
+            crossings,
             nodes: motion.nodes,
             needs: of_rows.and(of_all),
             course: None,
@@ -145,6 +143,53 @@ fn at_states<'r, const N: usize>(
     }
 }
 
+/// The events of a motion, with what belongs to their states.
+pub(super) struct Crossings<'r, const N: usize> {
+    events: Events<'r, N>,
+    /// Whether one of them has the action in it.
+    action: bool,
+}
+
+impl<'r, const N: usize> Crossings<'r, N> {
+    /// `None` where there are no events.
+    pub fn of(lagrangian: &'r FormulaLagrangian<N>, events: &'r [crate::Event]) -> Option<Self> {
+        let action = events.iter().any(|event| event.function.has_action());
+        let all = || Events::new(events.iter().map(|event| of(lagrangian, event)));
+        (!events.is_empty()).then(|| Crossings { events: all(), action })
+    }
+
+    pub fn needs(&self) -> Needs {
+        Needs { action: self.action, ..Needs::default() }
+    }
+
+    pub fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+        self.events.prepare(course)
+    }
+
+    pub fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        self.events.start(at)
+    }
+
+    /// Hands on what is found in a step; `Break` at a terminal event.
+    pub fn step(
+        &mut self,
+        at: &Moment<'_, N>,
+        mut hand_on: impl FnMut(Crossing) -> ControlFlow<()>,
+    ) -> ControlFlow<Stop<N>> {
+        let ended = self.events.step(at);
+        for crossing in self.events.crossings.drain(..) {
+            let PhasePoint { q, p, z } = crossing.state;
+            // The velocity of the step's end is near enough to find it from.
+            let v = at.velocity_at(crossing.t, &crossing.state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
+            let [q, v, p] = [q, v, p].map(|x| x.as_slice().to_vec());
+            if hand_on(Crossing { t: crossing.t, event: crossing.event, q, v, p, z }).is_break() {
+                return ControlFlow::Break(Stop::here("its watch"));
+            }
+        }
+        ended
+    }
+}
+
 fn of<'r, const N: usize>(lagrangian: &'r FormulaLagrangian<N>, event: &'r crate::Event) -> Event<'r, N> {
     let found = Event::new(at_states(lagrangian, &event.function));
     let found = match event.direction {
@@ -165,11 +210,11 @@ impl<const N: usize> Observer<N> for Recorder<'_, N> {
         if let Some(rows) = &mut self.rows {
             rows.prepare(course)?;
         }
-        self.events.as_mut().map_or(Ok(()), |events| events.prepare(course))
+        self.crossings.as_mut().map_or(Ok(()), |crossings| crossings.prepare(course))
     }
 
     fn next(&self, taken: usize) -> usize {
-        if self.nodes || self.events.is_some() {
+        if self.nodes || self.crossings.is_some() {
             return taken + 1;
         }
         let poll = (taken / POLL + 1) * POLL;
@@ -180,8 +225,8 @@ impl<const N: usize> Observer<N> for Recorder<'_, N> {
         if let Some(rows) = &mut self.rows {
             rows.start(at)?;
         }
-        if let Some(events) = &mut self.events {
-            events.start(at)?;
+        if let Some(crossings) = &mut self.crossings {
+            crossings.start(at)?;
         }
         self.hand_on(None)?;
         self.see(at)
@@ -191,18 +236,8 @@ impl<const N: usize> Observer<N> for Recorder<'_, N> {
         if let Some(rows) = &mut self.rows {
             rows.step(at)?;
         }
-        if let Some(events) = &mut self.events {
-            let ended = events.step(at);
-            for crossing in events.crossings.drain(..) {
-                let PhasePoint { q, p, z } = crossing.state;
-                // The velocity of the step's end is near enough to find it from.
-                let v = at.velocity_at(crossing.t, &crossing.state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
-                let [q, v, p] = [q, v, p].map(|x| x.as_slice().to_vec());
-                let crossing = Crossing { t: crossing.t, event: crossing.event, q, v, p, z };
-                if self.watch.crossing(&crossing).is_break() {
-                    return ControlFlow::Break(Stop::here("its watch"));
-                }
-            }
+        if let Some(crossings) = &mut self.crossings {
+            let ended = crossings.step(at, |crossing| self.watch.crossing(&crossing));
             if let ControlFlow::Break(stop) = ended {
                 self.hand_on(stop.at.map(|(t, _)| t))?;
                 return ControlFlow::Break(stop);

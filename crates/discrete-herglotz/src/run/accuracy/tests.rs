@@ -1,10 +1,10 @@
 //! What the choice of steps costs.
 
 use super::choose_with;
-use crate::AnyIntegrator;
 use crate::run::pilot::{BUDGET, Pilots};
 use crate::run::{Needs, Problem, Request, Shared, Until};
-use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
+use crate::{AnyIntegrator, GaussCollocation, Stepper, Wants};
+use contact_geom::systems::{Duffing, Kepler, OneCoordinate, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, VelocityPoint};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ fn search<L: Lagrangian<N>, const N: usize>(
 ) -> (Cow<'static, str>, usize, u64) {
     let integrator = integrator.map(|by| Arc::new(by) as Shared<'_, L, N>);
     let request = Request { problem, t_end: span, span, integrator, needs: Needs::default() };
-    let mut pilots = Pilots { request: &request, left: BUDGET, wanted, watches_clock: false };
+    let mut pilots = Pilots { request: &request, left: BUDGET, wanted, watches_clock: false, watches_newton: false };
     let choice = choose_with(&mut pilots).unwrap();
     (choice.integrator.facts().name, choice.count, BUDGET - pilots.left)
 }
@@ -38,6 +38,42 @@ fn pilot_runs_cost_little() {
         let most = 7.0 * run.evaluations as f64 + looks;
         assert!(spent <= most, "{span}, {wanted:e}: {spent} evaluations for {}", run.evaluations);
     }
+}
+
+/// Many steps whose accelerations alone are iterated have sixteen stages, which cost less; not where these need Newton's method, nor where
+/// there are few.
+#[test]
+fn long_motions_take_more_stages() {
+    let evaluations = |system: &OneCoordinate, integrator: Option<AnyIntegrator>, span| {
+        let problem = Problem::new(system, 0.0, VelocityPoint::new([1.0], [0.5], 0.0)).unwrap();
+        let run = problem.accuracy(1e-7);
+        let run = if let Some(by) = integrator { run.by(by) } else { run };
+        let plan = run.plan(Until::Time(span)).unwrap();
+        (plan.integrator().name.to_string(), plan.run().unwrap().evaluations as f64)
+    };
+    let pendulum = OneCoordinate::from(Pendulum { gamma: -0.01 });
+    let (name, ours) = evaluations(&pendulum, None, 1000.0);
+    let (_, of_eight) = evaluations(&pendulum, Some(AnyIntegrator::Gauss { stages: 8 }), 1000.0);
+    assert_eq!(name, "gauss_16");
+    assert!(ours < 0.9 * of_eight, "{ours} evaluations, {of_eight} with eight stages");
+    assert_eq!(evaluations(&pendulum, None, 10.0).0, "gauss_8");
+    // The hardest springs of the forced double well leave no sweep that contracts.
+    assert_eq!(evaluations(&Duffing::forced().into(), None, 100.0).0, "gauss_8");
+}
+
+/// Where steps that are short enough for the error need Newton's method, and those of half the length hardly do, these are taken.
+#[test]
+fn steps_that_cost_less_are_taken() {
+    let system = QuadraticInZ { c: -0.05 };
+    let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 1.0)).unwrap();
+    let (_, count, _) = search(&problem, 100.0, None, 1e-3);
+    let newton_steps = |count: usize| {
+        let mut run = GaussCollocation { stages: 8 }.run(&problem, 100.0 / count as f64, Wants::default()).unwrap();
+        run.advance(count).unwrap();
+        run.newton_steps()
+    };
+    let (ours, longer) = (newton_steps(count), newton_steps(count / 2));
+    assert!(3 * ours < longer, "{ours} of {count} steps, {longer} of {}", count / 2);
 }
 
 /// So they do by a clock; and where it would gain nothing it costs nothing: the search is that for the integrator by name.

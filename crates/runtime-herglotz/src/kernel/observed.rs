@@ -1,0 +1,101 @@
+//! What is recorded of the members of an ensemble.
+
+use super::recorder::{Crossings, rows};
+use crate::{Column, Crossing, When};
+use discrete_herglotz::{Course, InputError, Moment, Needs, Observer, Row, Rows, Stop};
+use std::ops::ControlFlow;
+
+/// What was recorded of a member.
+pub(super) struct Seen<const N: usize> {
+    pub rows: Vec<Row<N>>,
+    /// The end as a row, if it is that of a step.
+    pub last: Option<Row<N>>,
+    pub crossings: Vec<Crossing>,
+}
+
+impl<const N: usize> Default for Seen<N> {
+    fn default() -> Self {
+        Seen { rows: Vec::new(), last: None, crossings: Vec::new() }
+    }
+}
+
+/// Records a member.
+pub(super) struct Observed<'r, const N: usize> {
+    rows: Option<Rows<'r, N>>,
+    last: Rows<'r, N>,
+    crossings: Option<Crossings<'r, N>>,
+    found: Vec<Crossing>,
+    forward: bool,
+}
+
+impl<'r, const N: usize> Observed<'r, N> {
+    pub fn new(
+        when: Option<&When>,
+        columns: &[Column],
+        crossings: Option<Crossings<'r, N>>,
+    ) -> Result<Self, InputError> {
+        let of_rows = when.map(|when| rows(when, columns)).transpose()?;
+        let last = rows(&When::Every(usize::MAX), columns)?;
+        Ok(Observed { rows: of_rows, last, crossings, found: Vec::new(), forward: true })
+    }
+
+    pub fn seen(mut self) -> Seen<N> {
+        let rows = self.rows.map(|rows| rows.rows).unwrap_or_default();
+        Seen { rows, last: self.last.rows.pop(), crossings: self.found }
+    }
+}
+
+impl<const N: usize> Observer<N> for Observed<'_, N> {
+    fn needs(&self) -> Needs {
+        let of_rows = self.rows.as_ref().map(Observer::needs).unwrap_or_default();
+        let of_events = self.crossings.as_ref().map(Crossings::needs).unwrap_or_default();
+        of_rows.and(of_events).and(self.last.needs())
+    }
+
+    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+        self.forward = course.t_end >= course.t0;
+        if let Some(rows) = &mut self.rows {
+            rows.prepare(course)?;
+        }
+        if let Some(crossings) = &mut self.crossings {
+            crossings.prepare(course)?;
+        }
+        self.last.prepare(course)
+    }
+
+    fn next(&self, taken: usize) -> usize {
+        if self.crossings.is_some() {
+            return taken + 1;
+        }
+        self.rows.as_ref().map_or(usize::MAX, |rows| rows.next(taken))
+    }
+
+    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        if let Some(rows) = &mut self.rows {
+            rows.start(at)?;
+        }
+        if let Some(crossings) = &mut self.crossings {
+            crossings.start(at)?;
+        }
+        self.last.start(at)
+    }
+
+    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        if let Some(rows) = &mut self.rows {
+            rows.step(at)?;
+        }
+        self.last.step(at)?;
+        let Some(crossings) = &mut self.crossings else { return ControlFlow::Continue(()) };
+        let found = &mut self.found;
+        let ended = crossings.step(at, |crossing| {
+            found.push(crossing);
+            ControlFlow::Continue(())
+        });
+        if let (ControlFlow::Break(Stop { at: Some((end, _)), .. }), Some(rows)) = (&ended, &mut self.rows) {
+            // The motion ends before the step does.
+            let forward = self.forward;
+            rows.rows.retain(|row| if forward { row.t <= *end } else { row.t >= *end });
+        }
+        ended
+    }
+}
