@@ -62,8 +62,8 @@ struct Converged<const N: usize> {
     finer_is_cheaper: bool,
     truth: Track<N>,
     marks: Marks,
-    /// Whether something narrow was met on the way.
-    narrow: bool,
+    /// Whether something narrow was met on the way, or misfits that did not fall: other steps than these tell nothing.
+    rough: bool,
 }
 
 /// The stages of Gauss collocation where no integrator is named: few steps of many stages cost their tables, many steps of few stages their
@@ -247,7 +247,7 @@ fn converge<L: Lagrangian<N>, const N: usize>(
     let mut cause = Obstacle::Unresolved { t: t0 };
     // The finer of the last two runs, and their distance.
     let (mut known, mut before): (Option<Track<N>>, f64) = (None, f64::NAN);
-    let mut guessed = false;
+    let (mut guessed, mut rough) = (false, false);
     'search: for _ in 0..ATTEMPTS {
         if 2.0 * k as f64 > MOST_STEPS {
             break;
@@ -320,9 +320,10 @@ fn converge<L: Lagrangian<N>, const N: usize>(
                 finer_is_cheaper: fine.cost < coarse.cost,
                 truth: fine.clone(),
                 marks,
-                narrow: narrows > 0,
+                rough: rough || narrows > 0,
             });
         }
+        rough |= !falls;
         strikes = if error < 0.5 * best { 0 } else { strikes + 1 };
         cause = if !falls {
             Obstacle::Order { order }
@@ -360,12 +361,12 @@ fn obstacle(distances: &[f64], order: f64, wanted: f64, t0: f64, span: f64) -> O
 
 /// The fewest steps of a Gauss method that the converged runs allow, with the error that they predict.
 fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, longer: bool) -> (usize, f64) {
-    let Converged { k, errors: [error, beyond], misfit, order, finer_is_cheaper, narrow, .. } = *found;
+    let Converged { k, errors: [error, beyond], misfit, order, finer_is_cheaper, rough, .. } = *found;
     // Ten times as exactly as wanted between the runs and beyond them, as errors of neighbouring steps may differ so much.
     let (target, predicted) = (0.2 * wanted, 0.02 * wanted);
     let steps = |order: f64| (k as f64 * (larger(error, 1e-14) / predicted).powf(1.0 / order)).ceil();
-    // Of what is not smooth, as at a kink, other steps tell nothing.
-    if narrow || order < stages as f64 / 3.0 {
+    // Steps that end at a kink by chance agree, and others do not.
+    if rough || order < stages as f64 / 3.0 {
         return if error <= target { (k, error) } else { (2 * k, beyond) };
     }
     if finer_is_cheaper {

@@ -32,6 +32,9 @@ pub(crate) struct Sweep {
     json: bool,
 }
 
+/// A swept value with what is drawn against it.
+type Drawn = (f64, Vec<f64>);
+
 /// Writes the members as they come.
 struct Writer<'s> {
     scene: &'s Scene,
@@ -41,7 +44,7 @@ struct Writer<'s> {
     /// The number of columns at the end.
     columns: usize,
     /// The swept values of those that began with their columns, and those with the coordinates at the first event, where they are drawn.
-    drawn: Option<[Vec<(f64, Vec<f64>)>; 2]>,
+    drawn: Option<[Vec<Drawn>; 2]>,
     bar: ProgressBar,
     stop: Arc<AtomicBool>,
     members: usize,
