@@ -21,6 +21,8 @@ pub enum Line {
     DashDot,
     /// Blue discs without a line: single points on a curve.
     Discs,
+    /// Small blue discs without a line: thousands of points.
+    Dots,
     /// Grey diagonal crosses without a line.
     Crosses,
     /// Green upright crosses without a line.
@@ -52,9 +54,10 @@ impl Line {
             Line::Dashed => drawn(points, "#c1272d", 2.2, LineStyle::Custom("8 5".into()), name),
             Line::Dotted => drawn(points, GREY, 2.2, LineStyle::Custom("2 3".into()), name),
             Line::DashDot => drawn(points, GREEN, 2.2, LineStyle::Custom("9 3 2 3".into()), name),
-            Line::Discs => marked(points, SOLID, MarkerShape::Circle, name),
-            Line::Crosses => marked(points, GREY, MarkerShape::Cross, name),
-            Line::Pluses => marked(points, GREEN, MarkerShape::Plus, name),
+            Line::Discs => marked(points, SOLID, MarkerShape::Circle, MARKER, name),
+            Line::Dots => marked(points, SOLID, MarkerShape::Circle, DOT, name),
+            Line::Crosses => marked(points, GREY, MarkerShape::Cross, MARKER, name),
+            Line::Pluses => marked(points, GREEN, MarkerShape::Plus, MARKER, name),
             Line::Coloured(number) => {
                 // The colours go round once while the patterns do one and a half times; shifted, all pairs are met.
                 let colour = COLOURS[number % COLOURS.len()];
@@ -75,8 +78,8 @@ fn drawn(points: Vec<(f64, f64)>, colour: &str, width: f64, pattern: LineStyle, 
 }
 
 /// Points on their own.
-fn marked(points: Vec<(f64, f64)>, colour: &str, shape: MarkerShape, name: Option<&str>) -> Plot {
-    let plot = ScatterPlot::new().with_data(points).with_color(colour).with_size(MARKER).with_marker(shape);
+fn marked(points: Vec<(f64, f64)>, colour: &str, shape: MarkerShape, size: f64, name: Option<&str>) -> Plot {
+    let plot = ScatterPlot::new().with_data(points).with_color(colour).with_size(size).with_marker(shape);
     match name {
         Some(name) => plot.with_legend(name).into(),
         None => plot.into(),
@@ -173,6 +176,9 @@ const GREEN: &str = "#2a7f4f";
 
 /// The size of markers without a line, in pixels.
 const MARKER: f64 = 3.6;
+
+/// The size of a dot.
+const DOT: f64 = 1.0;
 
 /// The width and the height of a panel, in pixels.
 const SIZE: (f64, f64) = (560.0, 400.0);

@@ -8,6 +8,9 @@ use std::collections::BTreeSet;
 /// The most points of a curve: more are not seen.
 const POINTS: usize = 2000;
 
+/// The points from which on they are drawn as dots.
+const MANY: usize = 500;
+
 /// The panels beside each other.
 const IN_A_ROW: usize = 3;
 
@@ -62,7 +65,7 @@ pub(crate) fn of_section(scene: &Scene, crossings: &[(usize, Vec<f64>)]) -> Opti
         let size = |of: fn(&(f64, f64)) -> f64| points.iter().map(|p| of(p).abs()).fold(0.0, f64::max);
         // That the section is at one place needs no figure.
         let shown = size(|p| p.0) > 1e-9 && size(|p| p.1) > 1e-9;
-        panel((name, &velocity_name(name)), Line::Discs, points).filter(|_| shown)
+        panel((name, &velocity_name(name)), single(points.len()), points).filter(|_| shown)
     });
     let panels: Vec<Panel> = panels.collect();
     (!panels.is_empty()).then(|| grid(&panels))
@@ -70,7 +73,12 @@ pub(crate) fn of_section(scene: &Scene, crossings: &[(usize, Vec<f64>)]) -> Opti
 
 /// The figure of one column of the members of a sweep against the swept value.
 pub(crate) fn of_sweep(knob: &str, column: &str, points: Vec<(f64, f64)>) -> Option<String> {
-    panel((knob, column), Line::Discs, points).map(|panel| draw(&panel))
+    panel((knob, column), single(points.len()), points).map(|panel| draw(&panel))
+}
+
+/// How so many single points are drawn.
+fn single(count: usize) -> Line {
+    if count < MANY { Line::Discs } else { Line::Dots }
 }
 
 /// Panels in rows; one alone needs no letter.
