@@ -25,6 +25,8 @@ struct Line {
 enum Potential {
     /// A jump, so narrow that no gradient sees it.
     Jump { at: f64, height: f64 },
+    /// `|q|`, a kink, where no rule of quadrature has its order.
+    Kink,
     /// A well beside the origin, where damped motions come to rest.
     Well,
     /// `-q^4`: motions leave all numbers in a finite time.
@@ -36,6 +38,7 @@ impl Lagrangian<1> for Line {
         let square = q[0] * q[0];
         let potential = match self.potential {
             Potential::Jump { at, height } => ((q[0] - at) * 1e10).tanh() * (0.5 * height),
+            Potential::Kink => q[0].abs(),
             Potential::Well => q[0] * -0.386 + square * -0.379 + square * square * 0.158 + (q[0].cos() - 1.0) * -0.963,
             Potential::Pole => square * square * -1.0,
         };
@@ -73,6 +76,29 @@ fn jumps_of_the_potential_are_refused() {
         };
         assert!(matches!(cause, Obstacle::Order { .. } | Obstacle::Unresolved { .. }), "{place}, {height}: {cause:?}");
     }
+}
+
+/// Steps that end where the motion passes a kink by chance are exact, and those beside them are not: runs that agree there tell nothing of
+/// other steps.
+#[test]
+fn kinks_are_met_or_refused() {
+    let line = Line { gamma: 0.0, swing: 0.0, potential: Potential::Kink };
+    let mut met = 0;
+    for wanted in [1e-3, 1e-6, 1e-9] {
+        for j in 1..=10 {
+            // The motion is of parabolas of duration 2 between the passages at `first` + 2n.
+            let first = 0.5f64.powi(j);
+            let start = at(0.5 * first * first - first, 1.0 - first);
+            for span in [8.0, 32.0] {
+                let Ok(outcome) = run_to(&line, start, span, wanted) else { continue };
+                met += 1;
+                let s = 2.0 - first;
+                let off = (outcome.q[0] + s - 0.5 * s * s).abs().max((outcome.p[0] + 1.0 - s).abs());
+                assert!(off <= wanted, "{wanted:e}, {first}, {span}: off by {off:e}");
+            }
+        }
+    }
+    assert!(met > 0);
 }
 
 /// A motion that has come to rest, up to its round-off, is followed on.

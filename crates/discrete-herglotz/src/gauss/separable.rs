@@ -376,20 +376,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             let rests = |r| head.u.block::<S>(r).mul_add(v_rest, head.q.block::<S>(r) * q_rest);
             // The small terms first: a sum that has been rounded would not know them.
             let sum = |r, small| head.q.block::<S>(r).mul_add(q, head.u.block::<S>(r).mul_add(v, small));
-            match &self.left.tail {
-                Some(tail) if weight > 0.0 => {
-                    let of_state = |r| tail.u.block(r).mul_add(v, tail.q.block(r) * q);
-                    tail.b.apply::<S>(&self.rest[d], s, base, of_state);
-                    let weight = Lanes::<S>::splat(weight);
-                    for r in 0..blocks::<S>(s) {
-                        base.set(r, sum(r, weight.mul_add(base.block(r), rests(r))));
-                    }
-                }
-                _ => {
-                    for r in 0..blocks::<S>(s) {
-                        base.set(r, sum(r, rests(r)));
-                    }
-                }
+            let tail = self.left.tail.as_ref().filter(|_| weight > 0.0);
+            if let Some(tail) = tail {
+                let of_state = |r| tail.u.block(r).mul_add(v, tail.q.block(r) * q);
+                tail.b.apply::<S>(&self.rest[d], s, base, of_state);
+            }
+            let weight = Lanes::<S>::splat(weight);
+            for r in 0..blocks::<S>(s) {
+                let small = if tail.is_some() { weight.mul_add(base.block(r), rests(r)) } else { rests(r) };
+                base.set(r, sum(r, small));
             }
         }
     }

@@ -62,7 +62,8 @@ struct Converged<const N: usize> {
     finer_is_cheaper: bool,
     truth: Track<N>,
     marks: Marks,
-    /// Whether something narrow was met on the way, or misfits that did not fall: other steps than these tell nothing.
+    /// Whether something narrow was met on the way, or misfits that did not fall like those of a smooth motion: these steps tell nothing of
+    /// others.
     rough: bool,
 }
 
@@ -302,8 +303,8 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         let error = larger(coarse.distance(fine), 0.5 * f64::EPSILON);
         // A misfit of a smooth motion falls with the order s. What jumps has one that does not; what is rounded has none to speak of.
         let falls = fine.misfit <= larger(coarse.misfit / 8.0, larger(0.01 * wanted, 1e-11));
-        let order = (coarse.misfit / fine.misfit).log2().clamp(0.0, s);
-        let order = if order.is_nan() { s } else { order };
+        let fall = (coarse.misfit / fine.misfit).log2();
+        let order = if fall.is_nan() { s } else { fall.clamp(0.0, s) };
         // What is left of the error in the finer run: it is of the order 2s, where the misfit is of the order s.
         let beyond = error / 2.0f64.powf(1.5 * order);
         let distances = coarse.distances(fine);
@@ -320,7 +321,8 @@ fn converge<L: Lagrangian<N>, const N: usize>(
                 finer_is_cheaper: fine.cost < coarse.cost,
                 truth: fine.clone(),
                 marks,
-                rough: rough || narrows > 0,
+                // More than twice the order is none: the finer steps end at a kink.
+                rough: rough || narrows > 0 || fall > 2.0 * s,
             });
         }
         rough |= !falls;
@@ -380,7 +382,7 @@ fn fewest<const N: usize>(stages: usize, wanted: f64, found: &Converged<N>, long
         return if longer && fewer < k as f64 && coarser <= 1e-2 { (fewer as usize, predicted) } else { (k, error) };
     }
     // That of shorter steps falls like the square of the misfit.
-    let more = steps(2.0 * larger(order, 0.5));
+    let more = steps(2.0 * order);
     if more < 2.0 * k as f64 { (more as usize, larger(predicted, beyond)) } else { (2 * k, beyond) }
 }
 

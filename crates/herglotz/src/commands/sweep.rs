@@ -184,8 +184,7 @@ impl Sweep {
         let [ends, at_events] = drawn.unwrap_or_default();
         for (file, names, points) in [("sweep", &names, ends), ("sweep_events", &coordinates, at_events)] {
             for (i, name) in names.iter().enumerate() {
-                let of =
-                    |(value, numbers): &(f64, Vec<f64>)| Some((*value, *numbers.get(i)?)).filter(|p| p.1.is_finite());
+                let of = |(value, numbers): &Drawn| Some((*value, *numbers.get(i)?)).filter(|p| p.1.is_finite());
                 if let Some(figure) = plot::of_sweep(knob, name, points.iter().filter_map(of).collect()) {
                     directory.write(&format!("{file}_{i}.svg"), &figure)?;
                 }

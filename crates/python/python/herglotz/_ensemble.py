@@ -69,6 +69,7 @@ def ensemble(
         raise ValueError("`t` is not given: the end, or times")
     if (v0 is None) == (p0 is None):
         raise ValueError("give `v0` or `p0`, one of them")
+    given = events_of(events, system) if events else []
     record = _core.run_ensemble(
         system,
         (q0, v0, False, z0) if p0 is None else (q0, p0, True, z0),
@@ -76,11 +77,11 @@ def ensemble(
         (accuracy, integrator, step, steps),
         list(varied),
         list(varied.values()),
-        events_of(events, system) if events else [],
+        given,
         [expression(column, system) for column in observe.values()] if observe else [],
         threads,
     )
-    event_names = tuple(events) if isinstance(events, dict) else len(events_of(events, system)) if events else 0
+    event_names = tuple(events) if isinstance(events, dict) else len(given)
     return Ensemble(system, record, event_names, tuple(observe or ()))
 
 

@@ -107,8 +107,11 @@ impl<const N: usize> Block<'_, N> {
             let with = |i: usize| {
                 let mut lagrangian = system.0.clone();
                 let values = (varied.values)(i);
-                let set = varied.names.iter().zip(values).try_for_each(|(name, value)| lagrangian.set(name, value));
-                set.ok().map(|()| Own { lagrangian, events: events_with_parameters(events, varied, i) })
+                let all = varied.names.iter().zip(&values);
+                all.clone().try_for_each(|(name, value)| lagrangian.set(name, *value)).ok()?;
+                let mut events = events.to_vec();
+                events.iter_mut().for_each(|event| set(&mut event.function, varied.names, &values));
+                Some(Own { lagrangian, events })
             };
             members.clone().map(with).collect()
         });
@@ -213,29 +216,20 @@ fn is_common(cause: &InputError) -> bool {
 }
 
 /// Gives an expression the parameters of a member.
-fn set(expression: &mut Expression, varied: &Varied<'_>, index: usize) {
-    for (name, value) in varied.names.iter().zip((varied.values)(index)) {
+fn set(expression: &mut Expression, names: &[&str], values: &[f64]) {
+    for (name, value) in names.iter().zip(values) {
         // One that cannot be set has refused the member.
-        let _ = expression.set(name, value);
+        let _ = expression.set(name, *value);
     }
 }
 
 /// The columns with the parameters of a member.
 fn with_parameters(columns: &[Column], varied: &Varied<'_>, index: usize) -> Vec<Column> {
-    let mut own = columns.to_vec();
+    let (mut own, values) = (columns.to_vec(), (varied.values)(index));
     for column in &mut own {
         if let Column::Expression(expression) = column {
-            set(expression, varied, index);
+            set(expression, varied.names, &values);
         }
-    }
-    own
-}
-
-/// The events with the parameters of a member.
-fn events_with_parameters(events: &[Event], varied: &Varied<'_>, index: usize) -> Vec<Event> {
-    let mut own = events.to_vec();
-    for event in &mut own {
-        set(&mut event.function, varied, index);
     }
     own
 }

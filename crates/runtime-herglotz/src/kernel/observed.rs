@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 /// What was recorded of a member.
 pub(super) struct Seen<const N: usize> {
     pub rows: Vec<Row<N>>,
-    /// The end as a row, if it is that of a step.
+    /// The end as a row, if it is that of a step, and the conformal factor is asked for, which is known there alone.
     pub last: Option<Row<N>>,
     pub crossings: Vec<Crossing>,
 }
@@ -22,7 +22,7 @@ impl<const N: usize> Default for Seen<N> {
 /// Records a member.
 pub(super) struct Observed<'r, const N: usize> {
     rows: Option<Rows<'r, N>>,
-    last: Rows<'r, N>,
+    last: Option<Rows<'r, N>>,
     crossings: Option<Crossings<'r, N>>,
     found: Vec<Crossing>,
     forward: bool,
@@ -35,32 +35,30 @@ impl<'r, const N: usize> Observed<'r, N> {
         crossings: Option<Crossings<'r, N>>,
     ) -> Result<Self, InputError> {
         let of_rows = when.map(|when| rows(when, columns)).transpose()?;
-        let last = rows(&When::Every(usize::MAX), columns)?;
+        let has_factor = columns.iter().any(|column| matches!(column, Column::LogFactor));
+        let last = has_factor.then(|| rows(&When::Every(usize::MAX), columns)).transpose()?;
         Ok(Observed { rows: of_rows, last, crossings, found: Vec::new(), forward: true })
     }
 
-    pub fn seen(mut self) -> Seen<N> {
+    pub fn seen(self) -> Seen<N> {
         let rows = self.rows.map(|rows| rows.rows).unwrap_or_default();
-        Seen { rows, last: self.last.rows.pop(), crossings: self.found }
+        Seen { rows, last: self.last.and_then(|mut last| last.rows.pop()), crossings: self.found }
     }
 }
 
 impl<const N: usize> Observer<N> for Observed<'_, N> {
     fn needs(&self) -> Needs {
-        let of_rows = self.rows.as_ref().map(Observer::needs).unwrap_or_default();
+        let of = |rows: &Option<Rows<'_, N>>| rows.as_ref().map(Observer::needs).unwrap_or_default();
         let of_events = self.crossings.as_ref().map(Crossings::needs).unwrap_or_default();
-        of_rows.and(of_events).and(self.last.needs())
+        of(&self.rows).and(of(&self.last)).and(of_events)
     }
 
     fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
         self.forward = course.t_end >= course.t0;
-        if let Some(rows) = &mut self.rows {
+        for rows in self.rows.iter_mut().chain(&mut self.last) {
             rows.prepare(course)?;
         }
-        if let Some(crossings) = &mut self.crossings {
-            crossings.prepare(course)?;
-        }
-        self.last.prepare(course)
+        self.crossings.as_mut().map_or(Ok(()), |crossings| crossings.prepare(course))
     }
 
     fn next(&self, taken: usize) -> usize {
@@ -71,20 +69,16 @@ impl<const N: usize> Observer<N> for Observed<'_, N> {
     }
 
     fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
-        if let Some(rows) = &mut self.rows {
+        for rows in self.rows.iter_mut().chain(&mut self.last) {
             rows.start(at)?;
         }
-        if let Some(crossings) = &mut self.crossings {
-            crossings.start(at)?;
-        }
-        self.last.start(at)
+        self.crossings.as_mut().map_or(ControlFlow::Continue(()), |crossings| crossings.start(at))
     }
 
     fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
-        if let Some(rows) = &mut self.rows {
+        for rows in self.rows.iter_mut().chain(&mut self.last) {
             rows.step(at)?;
         }
-        self.last.step(at)?;
         let Some(crossings) = &mut self.crossings else { return ControlFlow::Continue(()) };
         let found = &mut self.found;
         let ended = crossings.step(at, |crossing| {
