@@ -1,7 +1,7 @@
 //! The choice of steps for a wanted accuracy: what is refused, and what comes to rest.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint};
+use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint, larger};
 use discrete_herglotz::{AnyIntegrator, InputError, Obstacle, Outcome, Problem, Status, Until};
 use std::time::Instant;
 
@@ -93,7 +93,7 @@ fn kinks_are_met_or_refused() {
                 let Ok(outcome) = run_to(&line, start, span, wanted) else { continue };
                 met += 1;
                 let s = 2.0 - first;
-                let off = (outcome.q[0] + s - 0.5 * s * s).abs().max((outcome.p[0] + 1.0 - s).abs());
+                let off = larger((outcome.q[0] + s - 0.5 * s * s).abs(), (outcome.p[0] + 1.0 - s).abs());
                 assert!(off <= wanted, "{wanted:e}, {first}, {span}: off by {off:e}");
             }
         }
