@@ -4,7 +4,7 @@ use std::fmt::{Display, Formatter};
 use thiserror::Error;
 
 /// The largest number of coordinates of a [`FormulaLagrangian`](crate::FormulaLagrangian).
-pub const MOST_COORDINATES: usize = 8;
+pub const MOST_COORDINATES: usize = 16;
 
 /// Bad input to a formula.
 #[derive(Clone, Debug, Error, PartialEq)]

@@ -31,7 +31,7 @@ impl Expression {
     pub(crate) fn parse(formula: &Formula, text: &str) -> Result<Self, FormulaError> {
         let (names, values) = (formula.names.clone(), formula.values.clone());
         let mut graph = Graph::new();
-        let root = Parser::parse(text, &names, &mut graph)?;
+        let root = Parser::parse(text, &names, &mut graph, true)?;
         let tape = Tape::new(&graph, &[root], names.dimension).ok_or(FormulaError::TooLarge { limit: MOST_NODES })?;
         let inputs = graph.inputs(root);
         let mut expression = Expression { names, graph, tape, values, inputs };
@@ -39,11 +39,10 @@ impl Expression {
         Ok(expression)
     }
 
-    /// The value at a time and a state, over any number. Not a number where the slices have not as many entries as there are
-    /// coordinates.
+    /// The value at a time and a state, over any number. Not a number where a slice has fewer entries than there are coordinates.
     pub fn at<T: Scalar>(&self, t: T, q: &[T], v: &[T], z: T) -> T {
         let mut value = T::from(f64::NAN);
-        if q.len() == self.names.dimension && v.len() == self.names.dimension {
+        if let (Some(q), Some(v)) = (q.get(..self.names.dimension), v.get(..self.names.dimension)) {
             self.tape.evaluate(At { q, v, z, t }, &mut [std::slice::from_mut(&mut value)]);
         }
         value

@@ -34,7 +34,7 @@ impl Formula {
     pub fn parse(text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, FormulaError> {
         let names = Names::new(coordinates, parameters)?;
         let mut graph = Graph::new();
-        let root = Parser::parse(text, &names, &mut graph)?;
+        let root = Parser::parse(text, &names, &mut graph, false)?;
         let values = parameters.iter().map(|(_, value)| *value).collect();
         Ok(Formula { names, graph, root, values })
     }
@@ -79,6 +79,22 @@ impl Formula {
     /// [`FormulaError::OtherDimension`] unless the formula has `N` coordinates, [`FormulaError::TooLarge`].
     pub fn lagrangian<const N: usize>(&self) -> Result<FormulaLagrangian<N>, FormulaError> {
         FormulaLagrangian::new(self)
+    }
+
+    /// The same with at least as many coordinates: each beyond those of the formula is that of a free particle of mass 1, by itself, so that
+    /// it stays at rest where it starts so. For programs that are not compiled for each dimension.
+    ///
+    /// ```
+    /// use formula_lagrangian::Formula;
+    /// let three = Formula::parse("sum(i, 0, n-1, v[i]^2 - q[i]^2)/2", &["x[3]"], &[])?;
+    /// assert!(three.lagrangian::<4>().is_err() && three.lagrangian_within::<4>().is_ok());
+    /// # Ok::<(), formula_lagrangian::FormulaError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`FormulaError::OtherDimension`] where the formula has more than `N` coordinates, [`FormulaError::TooLarge`].
+    pub fn lagrangian_within<const N: usize>(&self) -> Result<FormulaLagrangian<N>, FormulaError> {
+        FormulaLagrangian::within(self)
     }
 
     /// Another expression over the same names: a column, or a function whose zeros are events.

@@ -62,7 +62,22 @@ impl<const N: usize> FormulaLagrangian<N> {
         if formula.dimension() != N {
             return Err(FormulaError::OtherDimension { found: formula.dimension(), asked: N });
         }
-        let (mut graph, root) = (formula.graph.clone(), formula.root);
+        Self::within(formula)
+    }
+
+    /// See [`Formula::lagrangian_within`].
+    pub(crate) fn within(formula: &Formula) -> Result<Self, FormulaError> {
+        if formula.dimension() > N {
+            return Err(FormulaError::OtherDimension { found: formula.dimension(), asked: N });
+        }
+        let (mut graph, mut root) = (formula.graph.clone(), formula.root);
+        let half = graph.number(0.5);
+        for i in formula.dimension()..N {
+            let v = graph.velocity(i as u32);
+            let square = graph.mul(v, v);
+            let kinetic = graph.mul(square, half);
+            root = graph.add(root, kinetic);
+        }
         let too_large = FormulaError::TooLarge { limit: WITH_GRADIENT };
         let variables = variables::<N>(&mut graph);
         let partials = graph.gradient(root, &variables, WITH_GRADIENT).ok_or(too_large.clone())?;
@@ -161,10 +176,11 @@ impl<const N: usize> FormulaLagrangian<N> {
     /// and turning two coordinates where L has them in squares of lengths, products and areas alone, as `x^2 + y^2`.
     pub fn symmetries(&self) -> Vec<Symmetry<N>> {
         let along = |i: usize| Symmetry::Translation(SVector::from_fn(|j, _| if i == j { 1.0 } else { 0.0 }));
-        let moving = (0..N).filter(|i| self.cyclic.get(*i) == Some(&true)).map(along);
+        let n = self.formula.dimension();
+        let moving = (0..n).filter(|i| self.cyclic.get(*i) == Some(&true)).map(along);
         let Formula { graph, root, .. } = &self.formula;
         let turns = |(i, j): &(usize, usize)| graph.turns_into_itself(*root, *i as u32, *j as u32);
-        let pairs = (0..N).flat_map(|j| (0..j).map(move |i| (i, j)));
+        let pairs = (0..n).flat_map(|j| (0..j).map(move |i| (i, j)));
         moving.chain(pairs.filter(turns).map(|(i, j)| Symmetry::Rotation(i, j))).collect()
     }
 }

@@ -33,20 +33,23 @@ pub(crate) struct Parser<'a> {
     read: usize,
     /// Inside of brackets lines do not end.
     brackets: usize,
+    /// Whether the value may have any name that is free, in place of `L`.
+    named: bool,
 }
 
 type Parsed<T> = Result<T, ParseError>;
 
 impl<'a> Parser<'a> {
-    /// The node of a text over a graph: definitions, one a line, and at the end the value, with `L =` before it or without.
-    pub fn parse(text: &'a str, names: &'a Names, graph: &'a mut Graph) -> Parsed<Id> {
+    /// The node of a text over a graph: definitions, one a line, and at the end the value, with `L =` before it or without; with any name
+    /// where it is `named`.
+    pub fn parse(text: &'a str, names: &'a Names, graph: &'a mut Graph, named: bool) -> Parsed<Id> {
         if text.len() > LONGEST_TEXT {
             let message = format!("the text has {} bytes, where {LONGEST_TEXT} are possible", text.len());
             return Err(ParseError::at(text, (0, 0), message));
         }
         let words = words(text)?;
         let mut parser =
-            Parser { text, words, at: 0, names, graph, locals: Vec::new(), depth: 0, read: 0, brackets: 0 };
+            Parser { text, words, at: 0, names, graph, locals: Vec::new(), depth: 0, read: 0, brackets: 0, named };
         parser.program()
     }
 
@@ -60,7 +63,7 @@ impl<'a> Parser<'a> {
                 let value = self.expression(0)?;
                 let more = self.ends_line()?;
                 if !more {
-                    return if name == "L" {
+                    return if name == "L" || self.named {
                         Ok(value)
                     } else {
                         Err(self.error(self.word(0), format!("after the definition of `{name}` a value is expected")))

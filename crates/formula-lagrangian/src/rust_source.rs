@@ -46,7 +46,7 @@ impl<const N: usize> FormulaLagrangian<N> {
     }
 
     fn write_rust(&self, out: &mut String, name: &str) -> std::fmt::Result {
-        let (graph, root) = (&self.formula().graph, self.formula().root);
+        let (graph, root, n) = (&self.formula().graph, self.formula().root, self.formula().dimension());
         let fields: Vec<String> = self.formula().parameters().map(|(name, _)| field(name)).collect();
         let coordinates = self.formula().coordinates().join(", ");
         writeln!(
@@ -65,8 +65,8 @@ impl<const N: usize> FormulaLagrangian<N> {
             }
             writeln!(out, "}}\n")?;
         }
-        writeln!(out, "impl Lagrangian<{N}> for {name} {{\n    #[inline(always)]")?;
-        let vector = format!("&SVector<T, {N}>");
+        writeln!(out, "impl Lagrangian<{n}> for {name} {{\n    #[inline(always)]")?;
+        let vector = format!("&SVector<T, {n}>");
         let value = Body { graph, results: &[root], fields: &fields, point: "" };
         let [t, q, v, z] = value.names(&["t", "q", "v", "z"]);
         writeln!(out, "    fn value<T: Scalar>(&self, {t}: T, {q}: {vector}, {v}: {vector}, {z}: T) -> T {{")?;
@@ -76,11 +76,11 @@ impl<const N: usize> FormulaLagrangian<N> {
         let body = Body { graph, results: &self.partials, fields: &fields, point: "x." };
         let [t, x, ..] = body.names(&["t", "x", "x", "x"]);
         writeln!(out, "    #[inline(always)]")?;
-        let triple = format!("Option<Triple<{N}, T>>");
-        writeln!(out, "    fn closed_gradient<T: Scalar>(&self, {t}: T, {x}: &VelocityPoint<{N}, T>) -> {triple} {{")?;
+        let triple = format!("Option<Triple<{n}, T>>");
+        writeln!(out, "    fn closed_gradient<T: Scalar>(&self, {t}: T, {x}: &VelocityPoint<{n}, T>) -> {triple} {{")?;
         write!(out, "{body}")?;
         let part = |from: usize| {
-            let ids = self.partials.iter().skip(from).take(N);
+            let ids = self.partials.iter().skip(from).take(n);
             ids.map(|id| body.number(*id)).collect::<Vec<_>>().join(", ")
         };
         let z = self.partials.last().map(|id| body.number(*id)).unwrap_or_default();

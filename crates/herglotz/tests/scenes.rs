@@ -96,7 +96,7 @@ const BAD: [(&str, &str); 58] = [
     ("coordinates = ", "catalogue = \"pendulum\"\ncoordinates = "),
     ("coordinates = [\"theta\"]", "coordinates = [\"theta\", \"theta\"]"),
     ("coordinates = [\"theta\"]", "coordinates = [\"z\"]"),
-    ("coordinates = [\"theta\"]", "coordinates = [\"q[9]\"]"),
+    ("coordinates = [\"theta\"]", "coordinates = [\"q[17]\"]"),
     ("theta = 1.0", "theta = [1.0]"),
     ("theta = 1.0", "theta = 1,0"),
     ("time = 100.0", "time = 100.0 s"),
@@ -184,6 +184,8 @@ fn a_scene_is_what_it_says() {
     let Some(When::At(times)) = &motion.rows else { panic!("{:?}", motion.rows) };
     assert_eq!((times.len(), times[0], times[1000]), (1001, 0.0, 100.0));
     assert_eq!(scene.columns[5].0, "exp(-0.1*t)*theta");
+    let named = GOOD.replace("exp(-0.1*t)*theta", "growth = exp(-0.1*t); scaled = growth*theta");
+    assert_eq!(read(&named).unwrap().columns[5].0, "scaled");
 
     let scene = read(SEVERAL).unwrap();
     let motion = scene.motion();

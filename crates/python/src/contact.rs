@@ -51,11 +51,11 @@ pub fn conformality(
                         .map(|found| (found.sigma, found.defect))
                         .map_err(value_error)?
                 })*
-                _ => return Err(value_error(format!("{n} coordinates, where 1 to 8 are possible"))),
+                _ => return Err(value_error(format!("{n} coordinates, where 1 to 16 are possible"))),
             }
         };
     }
-    let (sigma, defect) = of!(1 2 3 4 5 6 7 8);
+    let (sigma, defect) = of!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
     let rows: Vec<f64> = jacobian.transpose().as_slice().to_vec();
     Ok((sigma, defect, vector(py, image), matrix(py, rows, size)?))
 }

@@ -3,8 +3,8 @@
 use crate::arrays::{number, numbers, value_error};
 use crate::system::System;
 use ::exact_lagrangian::ExactLagrangian;
-use contact_geom::nalgebra::SVector;
-use contact_geom::{DiscretePoint, VelocityPoint};
+use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::{DiscretePoint, Regularity, VelocityPoint};
 use discrete_herglotz::DiscreteLagrangian;
 use formula_lagrangian::Formula;
 use pyo3::prelude::*;
@@ -30,15 +30,17 @@ struct At {
 type Found = (Vec<Vec<f64>>, Vec<f64>);
 
 fn found<const N: usize>(formula: &Formula, what: What, at: &At) -> PyResult<Found> {
-    let vector = |x: &[f64]| SVector::<f64, N>::from_iterator(x.iter().copied());
-    let list = |x: &SVector<f64, N>| x.as_slice().to_vec();
-    let lagrangian = formula.lagrangian::<N>().map_err(value_error)?;
+    // What is beyond the coordinates of the formula stays at rest, and is not seen.
+    let n = formula.dimension();
+    let vector = |x: &[f64]| SVector::<f64, N>::from_fn(|i, _| x.get(i).copied().unwrap_or(0.0));
+    let list = |x: &SVector<f64, N>| x.iter().take(n).copied().collect::<Vec<f64>>();
+    let lagrangian = formula.lagrangian_within::<N>().map_err(value_error)?;
     let exact = ExactLagrangian::<_, N>::new(&lagrangian, at.h).map_err(value_error)?;
     let (first, second) = (vector(&at.first), vector(&at.second));
     if what == What::Exponential {
         let x = VelocityPoint { q: first, v: second, z: at.z };
         let differential = exact.exponential().differential(at.t, &x).map_err(value_error)?;
-        let smallest = differential.regularity().smallest;
+        let smallest = Regularity::of(DMatrix::from_fn(n, n, |i, j| differential.v[(i, j)])).smallest;
         return Ok((vec![list(&differential.image.q1)], vec![smallest]));
     }
     let x = DiscretePoint { q0: first, q1: second, z0: at.z };
@@ -72,8 +74,9 @@ fn of_system(
         1 => found::<1>(formula, what, &at),
         2 => found::<2>(formula, what, &at),
         3 => found::<3>(formula, what, &at),
+        4..=8 => found::<8>(formula, what, &at),
         _ => Err(value_error(format!(
-            "the system has {n} coordinates, where the exact Lagrangian is compiled for 1 to 3: write the system in Rust"
+            "the system has {n} coordinates, where the exact Lagrangian is compiled for 1 to 8: write the system in Rust"
         ))),
     })
 }

@@ -36,7 +36,7 @@ mod _core {
     #[pymodule_export]
     use crate::motion::Motion;
     #[pymodule_export]
-    use crate::run::{Record, run};
+    use crate::run::{Record, resume, run};
     #[pymodule_export]
     use crate::symbol::{Symbol, symbols};
     #[pymodule_export]

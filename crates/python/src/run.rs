@@ -5,7 +5,7 @@ use crate::motion::Motion;
 use crate::signals::Signals;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use runtime_herglotz::{Crossing, Outcome, Status, Watch};
+use runtime_herglotz::{Crossing, Interrupted, Outcome, Status, Watch, When};
 use std::ops::ControlFlow;
 
 /// Keeps the rows of a motion by their parts.
@@ -22,6 +22,8 @@ struct Kept {
     columns: Vec<f64>,
     crossings: Vec<Crossing>,
     signals: Signals,
+    /// Where a signal has ended it.
+    halted: Option<Interrupted>,
 }
 
 impl Watch for Kept {
@@ -54,6 +56,10 @@ impl Watch for Kept {
     fn poll(&mut self, _part: f64) -> ControlFlow<()> {
         self.signals.look()
     }
+
+    fn interrupted(&mut self, at: Interrupted) {
+        self.halted = Some(at);
+    }
 }
 
 /// A crossing: the index of the event, t, q, v, p and z.
@@ -80,28 +86,50 @@ pub struct Record {
     steps: usize,
     evaluations: u64,
     interrupted: Option<Py<PyAny>>,
+    /// From where it goes on to the last bit.
+    halted: Option<Vec<u8>>,
 }
 
 /// Runs a motion, with the interpreter left to other threads.
 #[pyfunction]
 pub fn run(py: Python<'_>, motion: &Motion) -> PyResult<Record> {
-    let n = motion.system.dimension();
-    let mut kept = Kept {
-        n,
-        conformal_factor: motion.conformal_factor,
-        t: Vec::new(),
-        q: Vec::new(),
-        v: Vec::new(),
-        p: Vec::new(),
-        z: Vec::new(),
-        energy: Vec::new(),
-        log_factor: Vec::new(),
-        columns: Vec::new(),
-        crossings: Vec::new(),
-        signals: Signals::new(),
-    };
-    let outcome = py.detach(|| motion.system.run(&motion.motion, &mut kept)).map_err(value_error)?;
+    let (mut kept, request) = (Kept::new(motion), &motion.motion);
+    let outcome = py.detach(|| motion.system.run(request, &mut kept)).map_err(value_error)?;
     record(py, motion, kept, outcome)
+}
+
+/// Goes on with a motion that was interrupted at a time; the rows that are left are kept.
+#[pyfunction]
+pub fn resume(py: Python<'_>, motion: &Motion, halted: &[u8], at: f64) -> PyResult<Record> {
+    let (mut kept, mut request) = (Kept::new(motion), motion.motion.clone());
+    let from = Interrupted::from_bytes(halted).map_err(value_error)?;
+    if let Some(When::At(times)) = &mut request.rows {
+        let onward = request.end >= request.start.t;
+        times.retain(|t| if onward { *t > at } else { *t < at });
+    }
+    let outcome = py.detach(|| motion.system.resume(&request, from, &mut kept)).map_err(value_error)?;
+    record(py, motion, kept, outcome)
+}
+
+impl Kept {
+    fn new(motion: &Motion) -> Self {
+        let n = motion.system.dimension();
+        Kept {
+            n,
+            conformal_factor: motion.conformal_factor,
+            t: Vec::new(),
+            q: Vec::new(),
+            v: Vec::new(),
+            p: Vec::new(),
+            z: Vec::new(),
+            energy: Vec::new(),
+            log_factor: Vec::new(),
+            columns: Vec::new(),
+            crossings: Vec::new(),
+            signals: Signals::new(),
+            halted: None,
+        }
+    }
 }
 
 fn record(py: Python<'_>, motion: &Motion, kept: Kept, outcome: Outcome) -> PyResult<Record> {
@@ -127,6 +155,7 @@ fn record(py: Python<'_>, motion: &Motion, kept: Kept, outcome: Outcome) -> PyRe
         suspicion: outcome.suspicion.map(|suspicion| suspicion.to_string()),
         steps: outcome.steps,
         evaluations: outcome.evaluations,
+        halted: kept.halted.map(|halted| halted.to_bytes()),
         interrupted: kept.signals.raised.map(|raised| raised.into_value(py).into_any()),
     })
 }

@@ -38,6 +38,24 @@ def test_the_derivatives_are_momenta():
     assert slope == pytest.approx(exact.d2[0], rel=1e-8)
 
 
+def test_five_coordinates():
+    """They are computed among eight; nothing is seen of the others."""
+
+    def chain(t, q, v, z):
+        bonds = sum((q[i + 1] - q[i]) ** 4 for i in range(4))
+        return 2 * (v @ v) - bonds - np.cos(q[0]) - 0.1 * z - 0.05 * z * z
+
+    q0, v0 = np.linspace(0.1, 0.5, 5), np.linspace(0.4, -0.2, 5)
+    there = hz.exponential(chain, H, q0, v0, Z0)
+    assert there.q1.shape == (5,) and there.regularity == pytest.approx(H, rel=0.2)
+    back = hz.retract(chain, H, q0, there.q1, Z0)
+    assert np.allclose(back.v0, v0, rtol=1e-12) and back.v1.shape == (5,)
+    exact = hz.exact_lagrangian(chain, H, q0, there.q1, Z0)
+    assert exact.value == pytest.approx(back.action, rel=1e-13)
+    # W is 4.
+    assert np.allclose(exact.d2, 4 * back.v1, rtol=1e-11) and np.allclose(-exact.d1 / exact.sigma, 4 * v0, rtol=1e-11)
+
+
 def test_bad_input_is_named():
     with pytest.raises(ValueError, match="`q1` has 1"):
         hz.retract(L, H, Q0, [1.0])
@@ -45,5 +63,5 @@ def test_bad_input_is_named():
         hz.retract(L, np.nan, Q0, Q0)
     with pytest.raises(ValueError):
         hz.retract(L, -1.0, Q0, Q0)
-    with pytest.raises(ValueError, match="compiled for 1 to 3"):
-        hz.exponential("v[0]^2 + v[1]^2 + v[2]^2 + v[3]^2", H, np.ones(4), np.ones(4))
+    with pytest.raises(ValueError, match="compiled for 1 to 8"):
+        hz.exponential("sum(i, 0, n-1, v[i]^2)", H, np.ones(9), np.ones(9))

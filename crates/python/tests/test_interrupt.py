@@ -7,6 +7,7 @@ import threading
 import time
 
 import herglotz as hz
+import numpy as np
 import pytest
 
 PENDULUM = "theta'^2/2 + cos(theta) + gamma*z"
@@ -39,9 +40,39 @@ def test_ctrl_c_ends_a_run_and_keeps_what_was_computed():
     assert again.resume(again.t_end + 0.1).success
 
 
-def test_ctrl_c_ends_an_ensemble():
-    import numpy as np
+def test_an_interrupted_run_goes_on_to_the_last_bit():
+    def asked():
+        # Some seconds.
+        return hz.solve(
+            PENDULUM,
+            [1.0],
+            [0.0],
+            np.linspace(0.0, 1e6, 1001),
+            integrator="gauss_2",
+            steps=20_000_000,
+            coordinates=["theta"],
+            parameters={"gamma": -1e-7},
+            events={"bottom": hz.Event("theta", direction="rising")},
+            observe={"scaled": "exp(1e-7*t)*theta"},
+            conformal_factor=True,
+        )
 
+    whole = asked()
+    press(0.5)
+    with pytest.raises(hz.Interrupted) as caught:
+        asked()
+    first = pickle.loads(pickle.dumps(caught.value)).solution
+    rest = first.resume()
+    assert 1 <= len(first.t) < len(whole.t) and rest.success and rest.t_end == whole.t_end
+    for name in ("t", "q", "v", "p", "z", "energy", "log_factor"):
+        parts = [getattr(first, name), getattr(rest, name)]
+        assert np.array_equal(np.concatenate(parts), getattr(whole, name)), name
+    assert np.array_equal(np.concatenate([first["scaled"], rest["scaled"]]), whole["scaled"])
+    crossed = [first.events["bottom"].t, rest.events["bottom"].t]
+    assert len(crossed[1]) > 0 and np.array_equal(np.concatenate(crossed), whole.events["bottom"].t)
+
+
+def test_ctrl_c_ends_an_ensemble():
     press(0.4)
     begin = time.monotonic()
     many = np.ones((200_000, 1))

@@ -26,6 +26,9 @@ pub enum RuntimeError {
     /// A checkpoint.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// The system has no room for a thread.
+    #[error("a thread could not be started: {0}; end other programs and try again")]
+    Thread(#[from] std::io::Error),
     /// A vector has not as many entries as there are coordinates.
     #[error("`{what}` has {found} numbers, where the system has {expected} coordinates")]
     Length {

@@ -1,6 +1,6 @@
 //! Motions of Lagrangians whose formula and dimension are known when the program runs.
 //!
-//! The libraries below are generic in the number of coordinates and in the Lagrangian; here is one type for all formulas of 1 to 8
+//! The libraries below are generic in the number of coordinates and in the Lagrangian; here is one type for all formulas of 1 to 16
 //! coordinates, behind which they are compiled once. [`System`] is a formula with its integrators, [`Motion`] what is asked of a
 //! motion, [`Ensemble`] of many.
 //!

@@ -81,8 +81,8 @@ pub trait Watch {
         std::ops::ControlFlow::Continue(())
     }
 
-    /// The motion as it would go on from where [`poll`](Self::poll) or [`row`](Self::row) has ended it, where it is
-    /// [resumable](crate::Motion::resumable).
+    /// The motion as it would go on from where [`poll`](Self::poll) has ended it, where its steps can be saved; those of a
+    /// [resumable](crate::Motion::resumable) one can.
     fn interrupted(&mut self, _at: discrete_herglotz::Interrupted) {}
 }
 

@@ -118,7 +118,7 @@ pub struct Motion {
     pub conformal_factor: bool,
     /// Whether every step is handed to [`Watch::node`](crate::Watch::node).
     pub nodes: bool,
-    /// Whether the motion can be interrupted and [resumed](crate::System::resume).
+    /// Whether it is refused where it could not be interrupted and [resumed](crate::System::resume).
     pub resumable: bool,
 }
 

@@ -17,7 +17,7 @@ pub enum SeenSymmetry {
     Rotation(usize, usize),
 }
 
-/// A Lagrangian by its formula, in 1 to 8 coordinates, with all that integrators need. Cloning is cheap.
+/// A Lagrangian by its formula, in 1 to 16 coordinates, with all that integrators need. Cloning is cheap.
 ///
 /// ```
 /// use runtime_herglotz::{Motion, Start, System, Way};

@@ -57,8 +57,8 @@ pub(crate) struct ExactEnd {
 }
 
 thread_local! {
-    /// The table that was made last: a plan and its run, and a run after a run, have the same.
-    static LAST: RefCell<Option<Arc<Condensed>>> = const { RefCell::new(None) };
+    /// The tables that were asked for last: a plan and its run, and a run after a run, have the same, and each run compares some steps with halves.
+    static LAST: RefCell<[Option<Arc<Condensed>>; 2]> = const { RefCell::new([None, None]) };
 }
 
 impl Condensed {
@@ -67,15 +67,16 @@ impl Condensed {
     /// # Errors
     /// Those of [`new`](Self::new).
     pub fn of(s: usize, h: f64, gamma: f64) -> Result<Arc<Self>, InputError> {
-        let last = LAST.with_borrow(Clone::clone);
         let same = |table: &Arc<Self>| {
             table.s == s && table.h.to_bits() == h.to_bits() && table.gamma.to_bits() == gamma.to_bits()
         };
-        if let Some(last) = last.filter(same) {
-            return Ok(last);
-        }
-        let table = Arc::new(Self::new(s, h, gamma)?);
-        LAST.set(Some(table.clone()));
+        let [last, before] = LAST.take();
+        let (table, other) = match (last, before) {
+            (Some(last), before) if same(&last) => (last, before),
+            (last, Some(before)) if same(&before) => (before, last),
+            (last, _) => (Arc::new(Self::new(s, h, gamma)?), last),
+        };
+        LAST.set([Some(table.clone()), other]);
         Ok(table)
     }
 
@@ -340,6 +341,9 @@ mod tests {
             let _ = Condensed::of(4, 0.5, -0.1).unwrap();
             let other = Condensed::of(s, h, gamma).unwrap();
             assert_eq!((other.s, other.h, other.gamma), (s, h, gamma));
+            // Two are kept, whichever of them was asked for last.
+            assert!(Arc::ptr_eq(&table, &Condensed::of(4, 0.5, -0.1).unwrap()));
+            assert!(Arc::ptr_eq(&other, &Condensed::of(s, h, gamma).unwrap()));
         }
     }
 

@@ -4,6 +4,7 @@ use super::pilot::{BUDGET, Elsewhere, Marks, PilotEnd, Pilots, Track};
 use super::{MOST_STEPS, Problem, Request, Shared};
 use crate::gauss::MOST;
 use crate::{ClockedGauss, GaussCollocation, InputError, Obstacle};
+use contact_geom::nalgebra::SMatrix;
 use contact_geom::{Derivatives, Lagrangian, larger};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -215,7 +216,7 @@ fn chosen<'p, L: Lagrangian<N>, const N: usize>(
 fn first_guess<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, stages: usize, goal: f64) -> usize {
     let Request { problem: Problem { lagrangian, start, t0, .. }, span, .. } = request;
     let h = lagrangian.hessian(*t0, start);
-    let frequency = h.vv.try_inverse().map_or(0.0, |inverse| (inverse * h.qq).norm()).sqrt();
+    let frequency = h.vv.try_inverse().map_or(0.0, |inverse| spectral_radius(inverse * h.qq)).sqrt();
     // The error of a step of x radians is about x^(2s+1) s!^4 / (2s)!^3.
     let s = stages as f64;
     let logarithm = |n: usize| (1..=n).map(|i| (i as f64).ln()).sum::<f64>();
@@ -225,6 +226,22 @@ fn first_guess<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, st
     let count = span.abs() * frequency / (0.5 * radians).min(s / 3.0).min(PI);
     // What is stiff at its start need not be resolved, and what is free there may be anything later.
     if count.is_finite() { (count.ceil() as usize).clamp(1, 1 << 20) } else { 1 }
+}
+
+/// The largest absolute eigenvalue, by the norm of the eighth power: at most `N^(1/16)` times too large for a symmetric matrix. Not finite where
+/// the matrix is not.
+fn spectral_radius<const N: usize>(matrix: SMatrix<f64, N, N>) -> f64 {
+    let (mut power, mut logarithm) = (matrix, 0.0);
+    for squared in 0..=3 {
+        let norm = power.norm();
+        if norm == 0.0 || !norm.is_finite() {
+            return norm;
+        }
+        logarithm += norm.ln() / f64::from(1 << squared);
+        power /= norm;
+        power *= power;
+    }
+    logarithm.exp()
 }
 
 /// Finds the runs that agree.

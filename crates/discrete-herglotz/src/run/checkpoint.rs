@@ -52,7 +52,14 @@ impl Interrupted {
     /// # Errors
     /// A [`CheckpointError`] where it is not one of a run.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, CheckpointError> {
-        let bytes = std::fs::read(path)?;
+        Self::from_bytes(&std::fs::read(path)?)
+    }
+
+    /// From what [`to_bytes`](Self::to_bytes) has made.
+    ///
+    /// # Errors
+    /// A [`CheckpointError`] where the bytes are not those of a run.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, CheckpointError> {
         let words: Vec<u64> =
             bytes.chunks_exact(8).map(|c| u64::from_le_bytes(c.try_into().unwrap_or_default())).collect();
         match words.as_slice() {
@@ -74,12 +81,8 @@ impl Interrupted {
         Some(Interrupted { fingerprint, taken, log_factor, suspicion, words: from.to_vec() })
     }
 
-    /// To a file that is there whole or not at all, for [`read`](Self::read).
-    ///
-    /// # Errors
-    /// Those of the file.
-    pub fn write(&self, path: impl AsRef<Path>) -> std::io::Result<()> {
-        let path = path.as_ref();
+    /// As bytes, with their digest, for [`from_bytes`](Self::from_bytes): the contents of a checkpoint's file.
+    pub fn to_bytes(&self) -> Vec<u8> {
         let mut body = vec![self.fingerprint];
         self.taken.save(&mut body);
         self.log_factor.save(&mut body);
@@ -87,9 +90,18 @@ impl Interrupted {
         body.extend_from_slice(&self.words);
         let sum = digest(&body);
         let words = [MAGIC, VERSION].into_iter().chain(body).chain([sum]);
+        words.flat_map(u64::to_le_bytes).collect()
+    }
+
+    /// To a file that is there whole or not at all, for [`read`](Self::read).
+    ///
+    /// # Errors
+    /// Those of the file.
+    pub fn write(&self, path: impl AsRef<Path>) -> std::io::Result<()> {
+        let path = path.as_ref();
         let part = path.with_extension("part");
         let mut file = std::fs::File::create(&part)?;
-        file.write_all(&words.flat_map(u64::to_le_bytes).collect::<Vec<u8>>())?;
+        file.write_all(&self.to_bytes())?;
         file.sync_all()?;
         std::fs::rename(part, path)
     }

@@ -101,10 +101,17 @@ pub(crate) fn columns(
         ));
     }
     let of = |name: &At<String>| match Column::parse(name, formula) {
-        Ok(column) => Ok(((**name).clone(), column)),
+        Ok(column) => Ok((name_of(name).to_owned(), column)),
         Err(error) => Err(with_nearest(of_formula(text, name.span(), &error), formula)),
     };
     columns.iter().map(of).collect()
+}
+
+/// A column is called by the name that its last value is given, as in `E1 = x'^2/2 + x^2/2`, or by its text.
+fn name_of(column: &str) -> &str {
+    let is_name = |text: &&str| !text.is_empty() && text.chars().all(|c| c.is_alphanumeric() || c == '_');
+    let last = column.trim().rsplit(['\n', ';']).next().and_then(|last| last.split_once('='));
+    last.map(|(name, _)| name.trim()).filter(is_name).unwrap_or(column)
 }
 
 /// An unknown name of a column may be that of something else than a formula is made of.

@@ -1,4 +1,4 @@
-"""The exact discrete Lagrangian and the contact exponential map, of one to three coordinates."""
+"""The exact discrete Lagrangian and the contact exponential map, of one to eight coordinates."""
 
 from typing import NamedTuple
 
@@ -41,7 +41,7 @@ def exponential(L, h, q0, v0, z0=0.0, t=0.0, *, coordinates=None, parameters=Non
     Parameters
     ----------
     L, coordinates, parameters
-        As of `solve`; of one to three coordinates.
+        As of `solve`; of one to eight coordinates.
     h, z0, t : float
     q0, v0 : arrays of shape (n,)
 
@@ -60,7 +60,7 @@ def retract(L, h, q0, q1, z0=0.0, t=0.0, *, coordinates=None, parameters=None):
     Parameters
     ----------
     L, coordinates, parameters
-        As of `solve`; of one to three coordinates.
+        As of `solve`; of one to eight coordinates.
     h, z0, t : float
     q0, q1 : arrays of shape (n,)
 
@@ -79,7 +79,7 @@ def exact_lagrangian(L, h, q0, q1, z0=0.0, t=0.0, *, coordinates=None, parameter
     Parameters
     ----------
     L, coordinates, parameters
-        As of `solve`; of one to three coordinates.
+        As of `solve`; of one to eight coordinates.
     h, z0, t : float
     q0, q1 : arrays of shape (n,)
 

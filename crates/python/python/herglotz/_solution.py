@@ -85,7 +85,7 @@ class Solution:
         self.energy, self.log_factor = record.energy, record.log_factor
         self.status, self.success, self.suspicion = record.status, record.success, record.suspicion
         self.steps, self.evaluations = record.steps, record.evaluations
-        self._end = record.end
+        self._end, self._halted = record.end, record.halted
         self._observed = observed
         self._columns = record.columns
         self.events = crossings(Crossings, record.crossings, event_names, system.dimension) if event_names else []
@@ -148,7 +148,8 @@ class Solution:
         ----------
         t : float or array, optional
             The new end; or the times of the rows, beyond the end of this motion, of which the first may be that end. What
-            was asked for and not reached, if nothing is said.
+            was asked for and not reached, if nothing is said: a motion that Ctrl-C has interrupted then goes on to the
+            last bit as if it had not been, with the rows and crossings that are left.
 
         Returns
         -------
@@ -156,6 +157,9 @@ class Solution:
             From the end of this motion on.
         """
         from ._solve import run
+
+        if t is None and self._halted is not None:
+            return run(self.system, self._request, self._event_names, self._observed, (self._halted, self.t_end))
 
         at, q, p, z = self._end
         if z is None:

@@ -88,9 +88,10 @@ def solve(
     return run(L, request, event_names, tuple(observe) if observe else ())
 
 
-def run(L, request, event_names, observed):
-    """The solution of a request."""
-    record = _core.run(_core.Motion(L, *request))
+def run(L, request, event_names, observed, halted=None):
+    """The solution of a request, or the rest of it from where it was interrupted."""
+    motion = _core.Motion(L, *request)
+    record = _core.run(motion) if halted is None else _core.resume(motion, *halted)
     sol = Solution(L, request, record, event_names, observed)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):

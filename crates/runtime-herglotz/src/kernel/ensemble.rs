@@ -1,8 +1,8 @@
 //! Many motions at once.
 
-use super::Sized;
 use super::observed::{Observed, Seen};
 use super::recorder::{Crossings, number};
+use super::{Sized, coordinates};
 use crate::{Column, Ending, EnsembleWatch, Event, MemberEnd, RuntimeError, Varied, Way};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint};
@@ -101,7 +101,7 @@ impl<const N: usize> Block<'_, N> {
     fn run_as_one(&mut self, members: Range<usize>, observed: bool) -> Result<(), EnsembleError> {
         let Block { system, ensemble, .. } = *self;
         let crate::Ensemble { t0, end, way, columns, events, .. } = *ensemble;
-        let first = members.start;
+        let (first, n) = (members.start, system.0.formula().dimension());
         let start = |i: usize| system.start_of_member(&(ensemble.start)(first + i));
         let own: Option<Vec<Option<Own<N>>>> = ensemble.varied.as_ref().map(|varied| {
             let with = |i: usize| {
@@ -154,9 +154,9 @@ impl<const N: usize> Block<'_, N> {
                     suspicion: ending.suspicion,
                     steps: ending.steps,
                     t: ending.t,
-                    q: row.q.as_slice().to_vec(),
-                    v: row.v.unwrap_or_else(|| SVector::repeat(f64::NAN)).as_slice().to_vec(),
-                    p: row.p.as_slice().to_vec(),
+                    q: coordinates(&row.q, n).to_vec(),
+                    v: coordinates(&row.v.unwrap_or_else(|| SVector::repeat(f64::NAN)), n).to_vec(),
+                    p: coordinates(&row.p, n).to_vec(),
                     z: ending.state.z,
                     columns: own_columns(member.index).iter().map(|column| number(column, &row)).collect(),
                 }

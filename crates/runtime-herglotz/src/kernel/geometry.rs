@@ -1,19 +1,26 @@
 //! The geometry at a point.
 
-use super::Sized;
+use super::{Sized, coordinates};
 use crate::{Geometry, RuntimeError, Start};
+use contact_geom::nalgebra::DMatrix;
 use contact_geom::{
-    ContactForm, Derivatives, Lagrangian, LagrangianForm, Triple, herglotz_field, legendre, regularity,
+    ContactForm, Derivatives, Lagrangian, LagrangianForm, Regularity, Triple, herglotz_field, legendre,
 };
 
-/// The components of a vector on TQ x R.
-fn components<const N: usize>(x: &Triple<N>) -> Vec<f64> {
-    x.to_vector().as_slice().to_vec()
+/// The components of a vector on TQ x R over the first so many coordinates.
+fn components<const N: usize>(x: &Triple<N>, n: usize) -> Vec<f64> {
+    [coordinates(&x.x, n), coordinates(&x.y, n), &[x.z]].concat()
+}
+
+/// How many times as large `eta ^ (d eta)^n`, which is `(-1)^(n(n-1)/2) n! det W` of the coordinate vectors, is with `all` of them in place of
+/// n, where W is one on those that were added.
+fn added(n: usize, all: usize) -> f64 {
+    (n + 1..=all).map(|k| if k.is_multiple_of(2) { -(k as f64) } else { k as f64 }).product()
 }
 
 pub(super) fn at<const N: usize>(system: &Sized<N>, at: &Start) -> Result<Geometry, RuntimeError> {
     let problem = system.problem(at)?;
-    let (lagrangian, t, x) = (&system.0, at.t, problem.start());
+    let (lagrangian, t, x, n) = (&system.0, at.t, problem.start(), system.0.formula().dimension());
     let form = LagrangianForm { lagrangian, t };
     let point = Triple::from(*x);
     let (g, w) = (lagrangian.gradient(t, x), lagrangian.hessian(t, x).vv);
@@ -21,14 +28,14 @@ pub(super) fn at<const N: usize>(system: &Sized<N>, at: &Start) -> Result<Geomet
     let p = legendre(lagrangian, t, x).p;
     Ok(Geometry {
         lagrangian: value,
-        momentum: p.as_slice().to_vec(),
+        momentum: coordinates(&p, n).to_vec(),
         energy: p.dot(&x.v) - value,
         rate: g.z,
-        mass: w.row_iter().map(|row| row.iter().copied().collect()).collect(),
-        condition: regularity(lagrangian, t, x).condition(),
-        eta: components(&form.eta(&point)?),
-        reeb: components(&form.reeb(&point)?),
-        volume: form.volume(&point)?,
-        herglotz_field: components(&herglotz_field(lagrangian, t, x)?),
+        mass: w.row_iter().take(n).map(|row| row.iter().take(n).copied().collect()).collect(),
+        condition: Regularity::of(DMatrix::from_fn(n, n, |i, j| w[(i, j)])).condition(),
+        eta: components(&form.eta(&point)?, n),
+        reeb: components(&form.reeb(&point)?, n),
+        volume: form.volume(&point)? / added(n, N),
+        herglotz_field: components(&herglotz_field(lagrangian, t, x)?, n),
     })
 }

@@ -37,26 +37,33 @@ pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, FormulaErr
     macro_rules! of {
         ($($n:literal)*) => {
             match formula.dimension() {
-                $($n => Ok(Arc::new(Sized(formula.lagrangian::<$n>()?)) as Arc<dyn Kernel>),)*
+                $(found if found <= $n => Ok(Arc::new(Sized(formula.lagrangian_within::<$n>()?)) as Arc<dyn Kernel>),)*
                 found => Err(FormulaError::Dimension { found }),
             }
         };
     }
-    of!(1 2 3 4 5 6 7 8)
+    // Beyond eight each would cost more to compile than what is unused costs a motion.
+    of!(1 2 3 4 5 6 7 8 16)
 }
 
-/// A system with its dimension.
+/// A system with its dimension, or with more: what is beyond the coordinates of its formula is at rest, and not seen from outside.
 struct Sized<const N: usize>(FormulaLagrangian<N>);
+
+/// The first so many coordinates of a vector.
+fn coordinates<const N: usize>(x: &SVector<f64, N>, n: usize) -> &[f64] {
+    x.as_slice().get(..n).unwrap_or(&[])
+}
 
 impl<const N: usize> Sized<N> {
     /// A vector of so many numbers as there are coordinates, all finite.
     fn vector(&self, what: &'static str, numbers: &[f64]) -> Result<SVector<f64, N>, RuntimeError> {
-        if numbers.len() != N {
-            return Err(RuntimeError::Length { what, found: numbers.len(), expected: N });
+        let expected = self.formula().dimension();
+        if numbers.len() != expected {
+            return Err(RuntimeError::Length { what, found: numbers.len(), expected });
         }
         match numbers.iter().enumerate().find(|(_, x)| !x.is_finite()) {
             Some((i, value)) => Err(RuntimeError::NotFinite { what: format!("{what}[{i}]"), value: *value }),
-            None => Ok(SVector::from_column_slice(numbers)),
+            None => Ok(SVector::from_fn(|i, _| numbers.get(i).copied().unwrap_or(0.0))),
         }
     }
 
@@ -86,7 +93,7 @@ impl<const N: usize> Sized<N> {
             let w = self.0.closed_hessian(t, x).map(|h| h.vv);
             let names = self.formula().coordinates();
             let flat = |i: &usize| w.is_some_and(|w| w.row(*i).iter().all(|e| *e == 0.0));
-            let flat: Vec<String> = (0..N).filter(flat).map(|i| crate::velocity_name(&names[i])).collect();
+            let flat: Vec<String> = (0..names.len()).filter(flat).map(|i| crate::velocity_name(&names[i])).collect();
             if !flat.is_empty() {
                 return RuntimeError::NotRegular { velocities: flat.join(", ") };
             }
@@ -148,6 +155,17 @@ impl<const N: usize> Kernel for Sized<N> {
     }
 
     fn check(&self, motion: &Motion, places: usize) -> Result<Check, RuntimeError> {
-        check::check(self, motion, places)
+        with_room(|| check::check(self, motion, places))
     }
+}
+
+/// The stack of what takes third derivatives: in sixteen coordinates a number with those has 300 kB.
+const ROOM: usize = 1 << 26;
+
+/// Does work with a large stack, whatever that of the caller.
+fn with_room<R: Send>(work: impl FnOnce() -> Result<R, RuntimeError> + Send) -> Result<R, RuntimeError> {
+    std::thread::scope(|scope| {
+        let worker = std::thread::Builder::new().stack_size(ROOM).spawn_scoped(scope, work)?;
+        worker.join().unwrap_or_else(|panicked| std::panic::resume_unwind(panicked))
+    })
 }

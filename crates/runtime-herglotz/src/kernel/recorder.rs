@@ -1,5 +1,6 @@
 //! The one observer of a motion: rows, events, nodes, and whether it is to go on.
 
+use super::coordinates;
 use crate::{Column, Crossing, Direction, Motion, RuntimeError, Watch, When};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
@@ -23,6 +24,7 @@ pub(super) struct Recorder<'r, const N: usize> {
     nodes: bool,
     needs: Needs,
     course: Option<Course>,
+    dimension: usize,
     watch: &'r mut dyn Watch,
 }
 
@@ -46,6 +48,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
             nodes: motion.nodes,
             needs: of_rows.and(of_all),
             course: None,
+            dimension: lagrangian.formula().dimension(),
             watch,
         })
     }
@@ -68,13 +71,13 @@ impl<'r, const N: usize> Recorder<'r, N> {
     fn see(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
         if self.nodes {
             let PhasePoint { q, p, z } = &at.state;
-            self.watch.node(at.t, q.as_slice(), p.as_slice(), *z);
+            self.watch.node(at.t, coordinates(q, self.dimension), coordinates(p, self.dimension), *z);
         }
         if at.k.is_multiple_of(POLL)
             && let Some(Course { t0, t_end, .. }) = self.course
             && self.watch.poll((at.t - t0) / (t_end - t0)).is_break()
         {
-            if let Some(interrupted) = at.interrupted().filter(|_| self.needs.saved) {
+            if let Some(interrupted) = at.interrupted() {
                 self.watch.interrupted(interrupted);
             }
             return ControlFlow::Break(Stop::here("its watch"));
@@ -148,6 +151,7 @@ pub(super) struct Crossings<'r, const N: usize> {
     events: Events<'r, N>,
     /// Whether one of them has the action in it.
     action: bool,
+    dimension: usize,
 }
 
 impl<'r, const N: usize> Crossings<'r, N> {
@@ -155,7 +159,8 @@ impl<'r, const N: usize> Crossings<'r, N> {
     pub fn of(lagrangian: &'r FormulaLagrangian<N>, events: &'r [crate::Event]) -> Option<Self> {
         let action = events.iter().any(|event| event.function.has_action());
         let all = || Events::new(events.iter().map(|event| of(lagrangian, event)));
-        (!events.is_empty()).then(|| Crossings { events: all(), action })
+        let dimension = lagrangian.formula().dimension();
+        (!events.is_empty()).then(|| Crossings { events: all(), action, dimension })
     }
 
     pub fn needs(&self) -> Needs {
@@ -181,7 +186,7 @@ impl<'r, const N: usize> Crossings<'r, N> {
             let PhasePoint { q, p, z } = crossing.state;
             // The velocity of the step's end is near enough to find it from.
             let v = at.velocity_at(crossing.t, &crossing.state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
-            let [q, v, p] = [q, v, p].map(|x| x.as_slice().to_vec());
+            let [q, v, p] = [q, v, p].map(|x| coordinates(&x, self.dimension).to_vec());
             if hand_on(Crossing { t: crossing.t, event: crossing.event, q, v, p, z }).is_break() {
                 return ControlFlow::Break(Stop::here("its watch"));
             }

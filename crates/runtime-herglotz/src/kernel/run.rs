@@ -1,7 +1,7 @@
 //! One motion.
 
-use super::Sized;
 use super::recorder::Recorder;
+use super::{Sized, coordinates};
 use crate::{Motion, Outcome, Plan, RuntimeError, Watch, Way};
 use discrete_herglotz::{Interrupted, Problem, Run, Until};
 use formula_lagrangian::FormulaLagrangian;
@@ -49,15 +49,15 @@ pub(super) fn run<const N: usize>(
         Some(from) => run.resume(from),
         None => run,
     };
-    let outcome = run.run(Until::Time(motion.end))?;
+    let (outcome, n) = (run.run(Until::Time(motion.end))?, system.0.formula().dimension());
     Ok(Outcome {
         status: outcome.status,
         suspicion: outcome.suspicion,
         steps: outcome.steps,
         t: outcome.t,
-        q: outcome.q.as_slice().to_vec(),
-        p: outcome.p.as_slice().to_vec(),
-        v: outcome.v.map(|v| v.as_slice().to_vec()),
+        q: coordinates(&outcome.q, n).to_vec(),
+        p: coordinates(&outcome.p, n).to_vec(),
+        v: outcome.v.map(|v| coordinates(&v, n).to_vec()),
         z: outcome.z,
         log_factor: outcome.log_factor,
         evaluations: outcome.evaluations,
