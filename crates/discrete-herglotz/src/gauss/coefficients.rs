@@ -1,7 +1,10 @@
 //! Coefficients of Gauss collocation, in double-double precision.
 
+use super::double_double::ExactRow;
+use super::instructions::Instructions;
 use contact_geom::legendre_polynomials;
 use num_traits::{One, Zero};
+use pulp::{Simd, WithSimd};
 use qd::Quad;
 use std::array::from_fn;
 use std::sync::OnceLock;
@@ -41,74 +44,145 @@ impl Coefficients {
     }
 
     fn new(s: usize) -> Self {
-        let (one, half, n) = (Quad::one(), Quad::from(0.5), Quad::from(s as f64));
-        let nodes: [Quad; MOST] = from_fn(|i| {
+        Instructions::new().dispatch(Make { s })
+    }
+}
+
+/// Computes the coefficients, all nodes or columns at once in the lanes of an instruction set: a program pays for them before its first step.
+struct Make {
+    s: usize,
+}
+
+/// Numbers for the nodes.
+type Row = ExactRow<MOST>;
+
+/// The first Legendre polynomials at points, and zeros.
+#[inline(always)]
+fn legendre_rows(s: usize, x: &Row) -> [Row; POLYNOMIALS] {
+    let mut rows = [Row::ZERO; POLYNOMIALS];
+    rows[0] = Row::from_fn(|_| Quad::one());
+    rows[1] = *x;
+    for k in 1..s {
+        let below = Quad::from((k + 1) as f64);
+        let (before, last) = (rows[k - 1], rows[k]);
+        rows[k + 1].add(odd(k) / below, &last.times(x));
+        rows[k + 1].add(-Quad::from(k as f64) / below, &before);
+    }
+    rows
+}
+
+fn odd(k: usize) -> Quad {
+    Quad::from((2 * k + 1) as f64)
+}
+
+impl WithSimd for Make {
+    type Output = Coefficients;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Coefficients {
+        let s = self.s;
+        let (one, half, n) = (Quad::one(), Quad::from(0.5), s as f64);
+        let slope = |x: f64, [below, p]: [f64; 2]| n * (x * p - below) / (x * x - 1.0);
+        let guess = |i: usize| {
             if i >= s {
                 return Quad::zero();
             }
-            // Tricomi's guess, then Newton: quadratic, so that six steps are more than enough for 30 digits.
-            let mut x = Quad::from(-(std::f64::consts::PI * (i as f64 + 0.75) / (s as f64 + 0.5)).cos());
-            for _ in 0..6 {
-                let p = legendre_polynomials::<_, POLYNOMIALS>(s, x);
-                x = x - p[s] * (x * x - one) / (n * (x * p[s] - p[s - 1]));
+            // Tricomi's, then Newton's method to the round-off of one number.
+            let mut x = -(std::f64::consts::PI * (i as f64 + 0.75) / (n + 0.5)).cos();
+            for _ in 0..5 {
+                let p = legendre_polynomials::<f64, POLYNOMIALS>(s, x);
+                x -= p[s] / slope(x, [p[s - 1], p[s]]);
             }
-            x
-        });
-        let at = nodes.map(|x| legendre_polynomials::<_, POLYNOMIALS>(s, x));
-        let odd = |k: usize| Quad::from((2 * k + 1) as f64);
-        let c = nodes.map(|x| (x + one) * half);
-        let b: [Quad; MOST] = from_fn(|j| {
-            let below = n * at[j][s - 1];
-            if j < s { (one - nodes[j] * nodes[j]) / (below * below) } else { Quad::zero() }
+            Quad::from(x)
+        };
+        let mut nodes = Row::from_fn(guess);
+        // Corrections of which half the digits count, of an error that is squared.
+        for _ in 0..2 {
+            let p = legendre_rows(s, &nodes);
+            let corrected = |i: usize| {
+                let (x, p, below) = (nodes.at(i), p[s].at(i), p[s - 1].at(i));
+                if i < s { x - Quad::from(p.0 / slope(x.0, [below.0, p.0])) } else { x }
+            };
+            nodes = Row::from_fn(corrected);
+        }
+        let at = legendre_rows(s, &nodes);
+        let c = Row::from_fn(|i| (nodes.at(i) + one) * half);
+        let b = Row::from_fn(|j| {
+            let (x, below) = (nodes.at(j), Quad::from(n) * at[s - 1].at(j));
+            if j < s { (one - x * x) / (below * below) } else { Quad::zero() }
         });
         // The Lagrange polynomial of node j is b_j sum (2k+1) P_k(x_j) P_k, and the integral of P_k a difference of two.
         let a = from_fn(|i| {
-            from_fn(|j| {
-                let rest = (1..s).fold(Quad::zero(), |sum, k| sum + at[j][k] * (at[i][k + 1] - at[i][k - 1]));
-                if i < s { b[j] * (c[i] + half * rest) } else { Quad::zero() }
-            })
+            if i >= s {
+                return [Quad::zero(); MOST];
+            }
+            let mut row = Row::from_fn(|_| c.at(i));
+            for k in 1..s {
+                row.add(half * (at[k + 1].at(i) - at[k - 1].at(i)), &at[k]);
+            }
+            let row = b.times(&row);
+            from_fn(|j| row.at(j))
         });
-        let ahead = from_fn(|i| {
-            let p = legendre_polynomials::<_, POLYNOMIALS>(s, nodes[i] + one + one);
-            from_fn(|j| {
-                let sum = (0..s).fold(Quad::zero(), |sum, k| sum + odd(k) * at[j][k] * p[k]);
-                if i < s { (b[j] * sum).0 } else { 0.0 }
-            })
-        });
+        // The values of the Lagrange polynomials from those of the Legendre polynomials at a point.
+        let values = |p: &dyn Fn(usize) -> Quad| -> [f64; MOST] {
+            let mut row = Row::ZERO;
+            for (k, at) in at.iter().enumerate().take(s) {
+                row.add(odd(k) * p(k), at);
+            }
+            let row = b.times(&row);
+            from_fn(|j| row.at(j).0)
+        };
+        let beyond = legendre_rows(s, &Row::from_fn(|i| nodes.at(i) + one + one));
+        let ahead = from_fn(|i| if i < s { values(&|k| beyond[k].at(i)) } else { [0.0; MOST] });
         // Gauss' weights integrate products with the Legendre polynomials exactly.
         let last = from_fn(|i| {
             let k = (s - 1).saturating_sub(i);
-            from_fn(|j| if j < s { (odd(k) * b[j] * at[j][k]).0 } else { 0.0 })
+            from_fn(|j| (odd(k) * b.at(j) * at[k].at(j)).0)
         });
         // P_k(-1) = (-1)^k and P_k(1) = 1.
-        let ends = [-one, one].map(|end| {
-            let p = legendre_polynomials::<_, POLYNOMIALS>(s, end);
-            from_fn(|j| {
-                let sum = (0..s).fold(Quad::zero(), |sum, k| sum + odd(k) * at[j][k] * p[k]);
-                if j < s { (b[j] * sum).0 } else { 0.0 }
-            })
-        });
-        Coefficients { c, b, a, ahead, last, ends }
+        let ends = [-one, one].map(|end| values(&|k| if k % 2 == 0 { one } else { end }));
+        Coefficients { c: from_fn(|i| c.at(i)), b: from_fn(|j| b.at(j)), a, ahead, last, ends }
     }
 }
 
 /// The values at some points of `[0, 1]` of the polynomials of degree `s - 1` that are 1 at one node and 0 at the others, and
 /// their integrals from 0: `[i][j]` for point i and node j.
 pub(crate) fn lagrange_rows(s: usize, points: &[f64; MOST]) -> [[[f64; MOST]; MOST]; 2] {
-    let g = Coefficients::of(s);
-    let polynomials = |x: f64| legendre_polynomials::<_, POLYNOMIALS>(s, Quad::from(x)).map(|p| p.0);
-    let at: [_; MOST] = from_fn(|j| polynomials(2.0 * g.c[j].0 - 1.0));
-    let mut rows = [[[0.0; MOST]; MOST]; 2];
-    for (i, x) in points.iter().enumerate() {
-        let p = polynomials(2.0 * x - 1.0);
-        for j in 0..s {
-            let value = (0..s).fold(0.0, |sum, k| sum + (2 * k + 1) as f64 * at[j][k] * p[k]);
-            let rest = (1..s).fold(0.0, |sum, k| sum + at[j][k] * (p[k + 1] - p[k - 1]));
-            rows[0][i][j] = g.b[j].0 * value;
-            rows[1][i][j] = g.b[j].0 * (x + 0.5 * rest);
+    Instructions::new().dispatch(Lagrange { s, points })
+}
+
+struct Lagrange<'a> {
+    s: usize,
+    points: &'a [f64; MOST],
+}
+
+impl WithSimd for Lagrange<'_> {
+    type Output = [[[f64; MOST]; MOST]; 2];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let Lagrange { s, points } = self;
+        let g = Coefficients::of(s);
+        let at = legendre_rows(s, &Row::from_fn(|j| Quad::from(2.0 * g.c[j].0 - 1.0)));
+        let p = legendre_rows(s, &Row::from_fn(|i| Quad::from(2.0 * points[i] - 1.0)));
+        let mut rows = [[[0.0; MOST]; MOST]; 2];
+        for (i, x) in points.iter().enumerate() {
+            let p = |k: usize| p[k].at(i).0;
+            let (mut value, mut rest) = ([0.0; MOST], [0.0; MOST]);
+            for (k, at) in at.iter().enumerate().take(s) {
+                let (factor, of_integral) = ((2 * k + 1) as f64 * p(k), if k > 0 { p(k + 1) - p(k - 1) } else { 0.0 });
+                for j in 0..s {
+                    value[j] += factor * at.at(j).0;
+                    rest[j] += of_integral * at.at(j).0;
+                }
+            }
+            for j in 0..s {
+                rows[0][i][j] = g.b[j].0 * value[j];
+                rows[1][i][j] = g.b[j].0 * (x + 0.5 * rest[j]);
+            }
         }
+        rows
     }
-    rows
 }
 
 #[cfg(test)]
