@@ -28,10 +28,10 @@ pub struct Expression {
 }
 
 impl Expression {
-    pub(crate) fn parse(formula: &Formula, text: &str) -> Result<Self, FormulaError> {
+    pub(crate) fn parse(formula: &Formula, text: &str, named: bool) -> Result<Self, FormulaError> {
         let (names, values) = (formula.names.clone(), formula.values.clone());
         let mut graph = Graph::new();
-        let root = Parser::parse(text, &names, &mut graph, true)?;
+        let root = Parser::parse(text, &names, &mut graph, named)?;
         let tape = Tape::new(&graph, &[root], names.dimension).ok_or(FormulaError::TooLarge { limit: MOST_NODES })?;
         let inputs = graph.inputs(root);
         let mut expression = Expression { names, graph, tape, values, inputs };

@@ -97,12 +97,20 @@ impl Formula {
         FormulaLagrangian::within(self)
     }
 
-    /// Another expression over the same names: a column, or a function whose zeros are events.
+    /// Another expression over the same names, such as a function whose zeros are events.
     ///
     /// # Errors
     /// [`FormulaError::Parse`], [`FormulaError::TooLarge`].
     pub fn expression(&self, text: &str) -> Result<Expression, FormulaError> {
-        Expression::parse(self, text)
+        Expression::parse(self, text, false)
+    }
+
+    /// The same where the value may be given a name, as in `E = x'^2/2 + x^2/2`: one that is not taken.
+    ///
+    /// # Errors
+    /// Those of [`expression`](Self::expression).
+    pub fn named_expression(&self, text: &str) -> Result<Expression, FormulaError> {
+        Expression::parse(self, text, true)
     }
 
     /// The number of coordinates.

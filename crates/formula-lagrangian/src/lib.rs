@@ -27,7 +27,7 @@
 //! | `q[0]`, `v[0]` | the coordinate of index 0, and its velocity, whatever its name; indices begin with 0 |
 //! | `u[i]`, `u'[i]` | entries of an array, given as the coordinate `"u[3]"` |
 //! | `z`, `t`, `pi`, `n` | the action, the time, 3.14159..., the number of coordinates |
-//! | `r = sqrt(x^2 + y^2)` | a definition, on a line of its own or before a `;`. The last line is L, with `L =` or without; that of a column or an event may have any name |
+//! | `r = sqrt(x^2 + y^2)` | a definition, on a line of its own or before a `;`. The last line is L, with `L =` or without; that of a column may have any name |
 //! | `+ - * /`, `^` or `**` | powers bind most, and to the right: `-x^2` is `-(x^2)`, `2^3^2` is `2^9` |
 //! | `sum(i, 1, n-1, (q[i] - q[i-1])^2)` | the sum over i from 1 to n - 1; an empty one is 0 |
 //! | `if(a < b, c, d)` | c where a < b, else d; also with `>` |

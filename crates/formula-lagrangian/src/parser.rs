@@ -63,11 +63,13 @@ impl<'a> Parser<'a> {
                 let value = self.expression(0)?;
                 let more = self.ends_line()?;
                 if !more {
-                    return if name == "L" || self.named {
-                        Ok(value)
-                    } else {
-                        Err(self.error(self.word(0), format!("after the definition of `{name}` a value is expected")))
-                    };
+                    if self.named {
+                        self.define(name, first, value)?;
+                    } else if name != "L" {
+                        let message = format!("after the definition of `{name}` a value is expected");
+                        return Err(self.error(self.word(0), message));
+                    }
+                    return Ok(value);
                 }
                 self.define(name, first, value)?;
                 continue;

@@ -218,3 +218,16 @@ fn texts_without_measure() {
         .lagrangian::<2>()
         .unwrap();
 }
+
+/// A column may have a name that is not taken; the function of an event is no equation.
+#[test]
+fn values_with_names() {
+    let formula = Formula::parse("x'^2/2 - k*x^2/2", &["x"], &[("k", 2.0)]).unwrap();
+    let energy = formula.named_expression("kinetic = x'^2/2; E = kinetic + k*x^2/2").unwrap();
+    assert_eq!(energy.at(0.0, &[1.0], &[2.0], 0.0), 3.0);
+    for taken in ["x = 1", "k = x", "t = x", "sin = x", "a = x; a = 2*a"] {
+        let error = formula.named_expression(taken).unwrap_err().to_string();
+        assert!(error.contains("is taken"), "{taken}: {error}");
+    }
+    assert!(formula.expression("x = 1").is_err() && formula.expression("y = x").is_err());
+}

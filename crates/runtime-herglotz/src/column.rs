@@ -26,7 +26,7 @@ pub enum Column {
 
 impl Column {
     /// Reads a column over the names of a formula: `t`, `x`, `x'`, `z`; `p_x` for the momentum of `x` (`p_q[0]` in an array), `energy`,
-    /// `log_factor`, unless a coordinate or a parameter has the name; else any expression.
+    /// `log_factor`, unless a coordinate or a parameter has the name; else any expression, with a name or without.
     ///
     /// # Errors
     /// [`RuntimeError::Formula`] with the place in the text.
@@ -51,7 +51,7 @@ impl Column {
         if !taken && let Some(i) = name.strip_prefix("p_").and_then(index) {
             return Ok(Column::Momentum(i));
         }
-        Ok(Column::Expression(Box::new(formula.expression(text)?)))
+        Ok(Column::Expression(Box::new(formula.named_expression(text)?)))
     }
 
     /// All that a state has: `t`, the coordinates, the velocities and `z`, with their names.

@@ -91,7 +91,7 @@ pub(crate) struct RowsTable {
     pub at: Option<At<Vec<At<f64>>>>,
     /// The number of steps between two rows.
     pub every_step: Option<At<usize>>,
-    /// `t`, coordinates, velocities, `z`, momenta `p_x`, `energy`, `log_factor`, and any expressions; without it, the whole state.
+    /// `t`, coordinates, velocities, `z`, momenta `p_x`, `energy`, `log_factor`, and any expressions, with a name (`E = ...`) or without; without it, the whole state.
     pub columns: Option<At<Vec<At<String>>>>,
 }
 
