@@ -34,7 +34,15 @@ pub const ATTACKS: &[Attack] = &[
     Attack { on: &["Discrete::new", "Facts::of_discrete", "Run::accuracy"], run: orders },
     Attack { on: &["Stepper::save", "Stepper::restore"], run: saved },
     Attack {
-        on: &["Checkpoint::every", "Moment::interrupted", "Interrupted::read", "Interrupted::write", "Run::resume"],
+        on: &[
+            "Checkpoint::every",
+            "Moment::interrupted",
+            "Interrupted::read",
+            "Interrupted::write",
+            "Interrupted::from_bytes",
+            "Interrupted::to_bytes",
+            "Run::resume",
+        ],
         run: resumed,
     },
 ];
@@ -181,6 +189,15 @@ fn resumed(report: &mut Report) {
             kept.write(&path).unwrap();
             let read = Interrupted::read(&path).unwrap();
             report.check(read == kept && seven(&problem, by).resume(read).run(until) == Ok(whole), || "by hand".into());
+            let bytes = kept.to_bytes();
+            report.check(std::fs::read(&path).unwrap() == bytes, || "the bytes are not those of the file".into());
+            for place in [0, 8, 20, bytes.len() / 2, bytes.len() - 1] {
+                let mut other = bytes.clone();
+                other[place] ^= 4;
+                let cut = &bytes[..place];
+                let read = [other.as_slice(), cut].map(Interrupted::from_bytes);
+                report.check(read.iter().all(Result::is_err), || format!("{place} of {}: {read:?}", bytes.len()));
+            }
         }
         for value in HOSTILE.into_iter().filter(|value| value.abs() < 10.0) {
             let other = Problem::new(&Claiming, 0.0, VelocityPoint::new([value], [0.7], 0.2)).unwrap();
