@@ -55,6 +55,7 @@
 //! among them.
 
 mod derivatives;
+mod derived;
 mod error;
 mod evaluation;
 mod expression;

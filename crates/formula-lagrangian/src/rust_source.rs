@@ -1,8 +1,9 @@
 //! The same Lagrangian as Rust source.
 
+use crate::derived::Derived;
 use crate::node::Inputs;
 use crate::{FormulaError, FormulaLagrangian, Function, Graph, Id, Node, Operation};
-use contact_geom::{Lagrangian, Structure};
+use contact_geom::Structure;
 use std::fmt::{Display, Formatter, Write};
 
 /// The words of Rust that cannot be names of fields.
@@ -41,14 +42,16 @@ impl<const N: usize> FormulaLagrangian<N> {
         }
         let mut text = String::new();
         // Writing to a string does not fail.
-        let _ = self.write_rust(&mut text, name);
+        let _ = self.derived.write_rust(&mut text, name);
         Ok(text)
     }
+}
 
+impl Derived {
     fn write_rust(&self, out: &mut String, name: &str) -> std::fmt::Result {
-        let (graph, root, n) = (&self.formula().graph, self.formula().root, self.formula().dimension());
-        let fields: Vec<String> = self.formula().parameters().map(|(name, _)| field(name)).collect();
-        let coordinates = self.formula().coordinates().join(", ");
+        let (graph, root, n) = (&self.formula.graph, self.formula.root, self.formula.dimension());
+        let fields: Vec<String> = self.formula.parameters().map(|(name, _)| field(name)).collect();
+        let coordinates = self.formula.coordinates().join(", ");
         writeln!(
             out,
             "//! A Lagrangian of the coordinates {coordinates}, made from its formula by formula-lagrangian.\n"
@@ -60,7 +63,7 @@ impl<const N: usize> FormulaLagrangian<N> {
             writeln!(out, "pub struct {name};\n")?;
         } else {
             writeln!(out, "pub struct {name} {{")?;
-            for ((parameter, value), field) in self.formula().parameters().zip(&fields) {
+            for ((parameter, value), field) in self.formula.parameters().zip(&fields) {
                 writeln!(out, "    /// The parameter {parameter}, {value} in the formula.\n    pub {field}: f64,")?;
             }
             writeln!(out, "}}\n")?;
@@ -79,16 +82,22 @@ impl<const N: usize> FormulaLagrangian<N> {
         let triple = format!("Option<Triple<{n}, T>>");
         writeln!(out, "    fn closed_gradient<T: Scalar>(&self, {t}: T, {x}: &VelocityPoint<{n}, T>) -> {triple} {{")?;
         write!(out, "{body}")?;
+        // Before them are all of q, and those beyond the formula's coordinates.
+        let first_velocity = self.partials.len() / 2;
         let part = |from: usize| {
             let ids = self.partials.iter().skip(from).take(n);
             ids.map(|id| body.number(*id)).collect::<Vec<_>>().join(", ")
         };
         let z = self.partials.last().map(|id| body.number(*id)).unwrap_or_default();
-        writeln!(out, "        let (l_q, l_v) = (SVector::from([{}]), SVector::from([{}]));", part(0), part(N))?;
+        writeln!(
+            out,
+            "        let (l_q, l_v) = (SVector::from([{}]), SVector::from([{}]));",
+            part(0),
+            part(first_velocity)
+        )?;
         writeln!(out, "        Some(Triple {{ x: l_q, y: l_v, z: {z} }})\n    }}\n")?;
 
-        let Structure { autonomous, z_affine, constant_rate, separable, quadratic, constant_mass, .. } =
-            self.structure();
+        let Structure { autonomous, z_affine, constant_rate, separable, quadratic, constant_mass, .. } = self.structure;
         // Not what the present value of a parameter gives: fields can be changed.
         let z_free = !graph.inputs(root).meets(Inputs::ACTION);
         writeln!(out, "    fn structure(&self) -> Structure {{\n        Structure {{")?;

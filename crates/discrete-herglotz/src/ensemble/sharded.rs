@@ -5,7 +5,7 @@ use super::shards::WINDOW_OF_A_THREAD;
 use super::{Ensemble, EnsembleError, Member, SHARD, Shard, Tally, Task};
 use crate::Until;
 use contact_geom::Lagrangian;
-use std::collections::BTreeMap;
+use std::collections::VecDeque;
 
 /// An [`Ensemble`] after its checks, in shards: a few hundred members each, that are computed, sent and kept together.
 ///
@@ -54,7 +54,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         let open = |path| Shards::open(path, sharded.fingerprint(), sharded.count());
         let file = self.checkpoint.as_deref().map(open).transpose()?;
         let progress = self.progress.as_deref();
-        Ok(Merge { sharded, progress, file, waiting: BTreeMap::new(), handed_on: 0, tally: Tally::default() })
+        Ok(Merge { sharded, progress, file, waiting: VecDeque::new(), handed_on: 0, tally: Tally::default() })
     }
 }
 
@@ -82,8 +82,8 @@ pub struct Merge<'s, 'e, 'a, L, const N: usize> {
     sharded: &'s ShardedEnsemble<'e, 'a, L, N>,
     progress: Option<&'s (dyn Fn(f64) + 'a)>,
     file: Option<Shards>,
-    /// Those that came before their turn; only where there is no file that they can be read from.
-    waiting: BTreeMap<usize, Shard<N>>,
+    /// Those that came before their turn, in order; only where there is no file that they can be read from.
+    waiting: VecDeque<(usize, Shard<N>)>,
     handed_on: usize,
     tally: Tally,
 }
@@ -92,7 +92,12 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
     /// Whether a shard has come, or was in the checkpoint.
     pub fn has(&self, shard: usize) -> bool {
         let kept = |file: &Shards| file.has(shard);
-        shard < self.handed_on || self.waiting.contains_key(&shard) || self.file.as_ref().is_some_and(kept)
+        shard < self.handed_on || self.place(shard).is_ok() || self.file.as_ref().is_some_and(kept)
+    }
+
+    /// Where a shard waits, or would.
+    fn place(&self, shard: usize) -> Result<usize, usize> {
+        self.waiting.binary_search_by_key(&shard, |(number, _)| *number)
     }
 
     /// The shards whose members were handed to the fold: those before this one.
@@ -159,8 +164,8 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
             self.hand_on(shard, fold);
             return self.resume(fold);
         }
-        if self.file.is_none() {
-            self.waiting.insert(index, shard);
+        if let (None, Err(place)) = (&self.file, self.place(index)) {
+            self.waiting.insert(place, (index, shard));
         }
         Ok(())
     }
@@ -169,7 +174,10 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
     fn waiting_next(&mut self) -> Result<Option<Shard<N>>, EnsembleError> {
         match &mut self.file {
             Some(file) => file.read(self.handed_on, self.sharded.task.members_of(self.handed_on).len()),
-            None => Ok(self.waiting.remove(&self.handed_on)),
+            None if self.waiting.front().is_some_and(|(number, _)| *number == self.handed_on) => {
+                Ok(self.waiting.pop_front().map(|(_, shard)| shard))
+            }
+            None => Ok(None),
         }
     }
 

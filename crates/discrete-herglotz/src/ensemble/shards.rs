@@ -1,6 +1,5 @@
 //! Work in shards, by several threads, handed on in order.
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -13,7 +12,8 @@ struct Window<R> {
     next: usize,
     /// The shards that were handed on.
     handed_on: usize,
-    done: BTreeMap<usize, R>,
+    /// Those that are done and were not handed on, with their numbers: a few.
+    done: Vec<(usize, R)>,
     /// No more are wanted, or a thread has panicked.
     over: bool,
 }
@@ -66,7 +66,7 @@ pub(super) fn in_order<R: Send>(
         }
         return;
     }
-    let window = Window { next: 0, handed_on: 0, done: BTreeMap::new(), over: false };
+    let window = Window { next: 0, handed_on: 0, done: Vec::new(), over: false };
     let shared = Shared { window: Mutex::new(window), changed: Condvar::new() };
     let threads = threads.min(count);
     let most = WINDOW_OF_A_THREAD * threads;
@@ -83,16 +83,16 @@ pub(super) fn in_order<R: Send>(
                     window.next += 1;
                     drop(window);
                     let result = work(shard);
-                    shared.change(|window| {
-                        window.done.insert(shard, result);
-                    });
+                    shared.change(|window| window.done.push((shard, result)));
                 }
             });
         }
         let _guard = AtTheEnd(&shared, true);
         for shard in 0..count {
-            let mut window = shared.wait_while(|w| !w.over && !w.done.contains_key(&shard));
-            let Some(result) = window.done.remove(&shard) else { return };
+            let place = |w: &Window<R>| w.done.iter().position(|(number, _)| *number == shard);
+            let mut window = shared.wait_while(|w| !w.over && place(w).is_none());
+            let Some(place) = place(&window) else { return };
+            let (_, result) = window.done.swap_remove(place);
             drop(window);
             if hand_on(result).is_break() {
                 return;

@@ -14,6 +14,7 @@ use super::table::StageTable;
 use crate::gauss::lanes::Lanes;
 use crate::run::saved::saved;
 use crate::solve::inverse::invert_complex;
+use contact_geom::nalgebra::linalg::try_invert_to;
 use contact_geom::nalgebra::{Complex, SMatrix, SVector};
 use contact_geom::{Hessian, Scalar, Triple, larger};
 use pulp::{Simd, WithSimd};
@@ -295,7 +296,8 @@ fn invert<const N: usize>(m: &mut Matrix<N>) -> bool {
     if !m.iter().all(|e| e.is_finite()) {
         return false;
     }
-    let inverted = if const { N > 4 && N <= 8 } { m.try_inverse_mut() } else { invert_complex(m.as_mut_slice(), N) };
+    let inverted =
+        if const { N > 4 && N <= 8 } { try_invert_to(m.clone_owned(), m) } else { invert_complex(m.as_mut_slice(), N) };
     inverted && m.iter().all(|e| e.is_finite())
 }
 

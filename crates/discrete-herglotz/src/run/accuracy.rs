@@ -3,6 +3,7 @@
 use super::pilot::{BUDGET, Elsewhere, Marks, PilotEnd, Pilots, Track};
 use super::{MOST_STEPS, Problem, Request, Shared};
 use crate::gauss::MOST;
+use crate::rules::step_equations::inverted;
 use crate::{ClockedGauss, GaussCollocation, InputError, Obstacle};
 use contact_geom::nalgebra::SMatrix;
 use contact_geom::{Derivatives, Lagrangian, larger};
@@ -216,7 +217,7 @@ fn chosen<'p, L: Lagrangian<N>, const N: usize>(
 fn first_guess<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, stages: usize, goal: f64) -> usize {
     let Request { problem: Problem { lagrangian, start, t0, .. }, span, .. } = request;
     let h = lagrangian.hessian(*t0, start);
-    let frequency = h.vv.try_inverse().map_or(0.0, |inverse| spectral_radius(inverse * h.qq)).sqrt();
+    let frequency = inverted(&h.vv).map_or(0.0, |inverse| spectral_radius(*inverse * h.qq)).sqrt();
     // The error of a step of x radians is about x^(2s+1) s!^4 / (2s)!^3.
     let s = stages as f64;
     let logarithm = |n: usize| (1..=n).map(|i| (i as f64).ln()).sum::<f64>();

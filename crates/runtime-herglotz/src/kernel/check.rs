@@ -1,11 +1,10 @@
 //! Steps of a motion as maps.
 
-use super::Sized;
+use super::theorems::{Points, theorems};
+use super::{Sized, coordinates};
 use crate::{Check, MomentumThere, Motion, Place, RuntimeError, Stated, Way};
-use contact_geom::{DiscretePoint, OneParameterGroup, PhasePoint, Symmetry, Triple, larger, largest};
-use discrete_herglotz::{
-    AnyIntegrator, DiscreteLagrangian, Gauss, InputError, Problem, Start, Steps, Until, statements,
-};
+use contact_geom::{OneParameterGroup, PhasePoint, Triple, larger, largest};
+use discrete_herglotz::{AnyIntegrator, InputError, Problem, Start, Steps, Until};
 use formula_lagrangian::FormulaLagrangian;
 
 /// The distance of differences, relative to the size of a state.
@@ -117,11 +116,11 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
             momenta,
         });
     }
-    let of_statements: Vec<_> = states.iter().step_by(states.len().div_ceil(PLACES)).collect();
+    let of_theorems: Vec<_> = states.iter().step_by(states.len().div_ceil(PLACES)).collect();
     let stages = plan.integrator.collocation.unwrap_or(STAGES);
     let mut shorter = h;
     let stated = loop {
-        match evaluate(lagrangian, stages, &symmetries, (shorter, &of_statements)) {
+        match theorems_with(system, stages, (shorter, &of_theorems)) {
             // The discrete Lagrangian is defined for points that are near enough.
             Err(RuntimeError::Geometry(_) | RuntimeError::Step(_)) if (h / shorter) < SHORTEST => shorter *= 0.5,
             ended => break ended?,
@@ -130,35 +129,18 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
     Ok(Check { integrator: plan.integrator.name.to_string(), step_size: h, places: along, statements: stated })
 }
 
-/// The theorems for the discrete Lagrangian of contact Gauss collocation, worst of some places.
-fn evaluate<const N: usize>(
-    lagrangian: &FormulaLagrangian<N>,
+/// The theorems for the discrete Lagrangian of contact Gauss collocation with a step, worst of the steps from some places.
+fn theorems_with<const N: usize>(
+    system: &Sized<N>,
     stages: usize,
-    symmetries: &[Symmetry<N>],
     (h, places): (f64, &[&(f64, PhasePoint<N>, f64)]),
 ) -> Result<Vec<Stated>, RuntimeError> {
-    let gauss = Gauss::new::<N>(lagrangian, stages, h)?;
-    let by = AnyIntegrator::Gauss { stages };
+    let n = system.0.formula().dimension();
     let mut points = Vec::with_capacity(places.len());
     for (t, x, _) in places {
-        let q1 = step(lagrangian, (by, h, 1), *t, x)?.0.q;
-        points.push((*t, DiscretePoint { q0: x.q, q1, z0: x.z }));
+        let q1 = step(&system.0, (AnyIntegrator::Gauss { stages }, h, 1), *t, x)?.0.q;
+        let [q0, q1] = [&x.q, &q1].map(|q| coordinates(q, n).to_vec());
+        points.push(Points { t: *t, q0, q1, z0: x.z });
     }
-    // Newton's method for the discrete Lagrangian measures the momentum at its start by itself, and finds no end where that is 0.
-    if points.iter().any(|(t, x)| gauss.second_jet(*t, x).is_ok()) {
-        points.retain(|(t, x)| gauss.second_jet(*t, x).is_ok());
-    }
-    let mut stated = Vec::new();
-    for statement in statements::STATEMENTS {
-        let mut worst: Option<f64> = None;
-        for (t, point) in &points {
-            if let Some(residual) = statements::residual(statement, &gauss, symmetries, *t, point)? {
-                worst = Some(worst.map_or(residual, |worst| larger(worst, residual)));
-            }
-        }
-        if let Some(residual) = worst {
-            stated.push(Stated { statement, method: by.to_string(), step_size: h, residual });
-        }
-    }
-    Ok(stated)
+    theorems(system.0.formula(), stages, h, &points)
 }

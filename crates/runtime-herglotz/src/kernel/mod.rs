@@ -6,6 +6,7 @@ mod geometry;
 mod observed;
 mod recorder;
 mod run;
+mod theorems;
 
 use crate::{
     Check, Ensemble, EnsembleWatch, Geometry, Motion, Outcome, Plan, Rate, RuntimeError, SeenSymmetry, Start, Watch,

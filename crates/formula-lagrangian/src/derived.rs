@@ -1,0 +1,145 @@
+//! What is derived of a formula, for any number of coordinates: compiled once, with this crate.
+
+use crate::formula::index;
+use crate::parser::MOST_NODES;
+use crate::structure::{Partials, kinks, proved};
+use crate::tape::Tape;
+use crate::{Formula, FormulaError, Graph, Id};
+use contact_geom::Structure;
+
+/// The most nodes that a formula has with its gradient, and with its second derivatives.
+const WITH_GRADIENT: usize = 10 * MOST_NODES;
+const WITH_HESSIAN: usize = 20 * MOST_NODES;
+
+/// A formula with its derivatives on tapes, and what is proved of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Derived {
+    pub formula: Formula,
+    /// Proved for all values of the parameters, but for `z_free`, which is so for a rate of zero.
+    pub structure: Structure,
+    pub smooth: bool,
+    pub cyclic: Vec<bool>,
+    /// `L_q`, `L_v` and `L_z`.
+    pub partials: Vec<Id>,
+    pub value: Tape,
+    pub force: Tape,
+    /// The value, and `L_q`.
+    pub with_force: Tape,
+    pub gradient: Tape,
+    /// `L_q`, `L_v`, `L_z`, and the value.
+    pub with_gradient: Tape,
+    /// `W` by columns.
+    pub mass: Tape,
+    /// All second derivatives in the order qq, qv, vv, qz, vz, zz.
+    pub second: Tape,
+}
+
+impl Derived {
+    /// Of a formula, among `n` coordinates: those beyond its own are of free particles. `n` is not less than the formula has.
+    ///
+    /// # Errors
+    /// [`FormulaError::TooLarge`].
+    pub fn new(formula: &Formula, n: usize) -> Result<Self, FormulaError> {
+        let (mut graph, mut root) = (formula.graph.clone(), formula.root);
+        let half = graph.number(0.5);
+        for i in formula.dimension()..n {
+            let v = graph.velocity(i as u32);
+            let square = graph.mul(v, v);
+            let kinetic = graph.mul(square, half);
+            root = graph.add(root, kinetic);
+        }
+        let too_large = FormulaError::TooLarge { limit: WITH_GRADIENT };
+        let variables = variables(&mut graph, n);
+        let partials = graph.gradient(root, &variables, WITH_GRADIENT).ok_or(too_large.clone())?;
+        let tape = |graph: &Graph, nodes: &[Id]| Tape::new(graph, nodes, n).ok_or(too_large.clone());
+        let (value, force) = (tape(&graph, &[root])?, tape(&graph, partials.get(..n).unwrap_or(&[]))?);
+        let of_kick: Vec<Id> = std::iter::once(root).chain(partials.iter().copied().take(n)).collect();
+        let with_force = tape(&graph, &of_kick)?;
+        let gradient = tape(&graph, &partials)?;
+        let all: Vec<Id> = partials.iter().copied().chain([root]).collect();
+        let with_gradient = tape(&graph, &all)?;
+
+        let second = second_derivatives(&mut graph, &partials, &variables).ok_or(too_large.clone())?;
+        let constants = graph.constants(&formula.values);
+        let size = 2 * n + 1;
+        let entry = |i: usize, j: usize| second.get(i * size + j).copied().unwrap_or(root);
+        let pairs = |a: usize, b: usize| (0..n * n).map(move |k| entry(a + k % n, b + k / n));
+        let mass: Vec<Id> = pairs(n, n).collect();
+        let in_order = pairs(0, 0).chain(pairs(0, n)).chain(pairs(n, n));
+        let all: Vec<Id> = in_order.chain((0..size).map(|i| entry(i, 2 * n))).collect();
+        let of_motion: Vec<Id> = (0..4 * n * n).map(|k| entry(k / (2 * n), k % (2 * n))).collect();
+        let (q, v) = partials.split_at(n);
+        let (v, z) = v.split_at(n);
+        let z = z.first().copied().unwrap_or(root);
+        let structure = {
+            let partials = Partials { value: root, q, v, z, second: &of_motion, mass: &mass };
+            proved(&mut graph, &partials, &constants)
+        };
+        let (mass, second) = (Tape::new(&graph, &mass, n), Tape::new(&graph, &all, n));
+        let (Some(mass), Some(second)) = (mass, second) else { return Err(too_large) };
+        let needed = graph.needed(root);
+        let mut free = |i: usize| needed.get(graph.position(i as u32).index()) != Some(&true);
+        let cyclic = (0..n).map(&mut free).collect();
+        let smooth = kinks(&graph, root) == crate::node::Inputs::NONE;
+        let formula = Formula { graph, ..formula.clone() };
+        let mut derived = Derived {
+            formula,
+            structure,
+            smooth,
+            cyclic,
+            partials,
+            value,
+            force,
+            with_force,
+            gradient,
+            with_gradient,
+            mass,
+            second,
+        };
+        derived.set_constants();
+        Ok(derived)
+    }
+
+    /// See [`FormulaLagrangian::set`](crate::FormulaLagrangian::set).
+    pub fn set(&mut self, parameter: &str, value: f64) -> Result<(), FormulaError> {
+        let i = index(&self.formula.names, parameter, value)?;
+        if let Some(old) = self.formula.values.get_mut(i) {
+            *old = value;
+        }
+        self.set_constants();
+        Ok(())
+    }
+
+    fn set_constants(&mut self) {
+        let constants = self.formula.graph.constants(&self.formula.values);
+        let Derived { value, force, with_force, gradient, with_gradient, mass, second, .. } = &mut *self;
+        for tape in [value, force, with_force, gradient, with_gradient, mass, second] {
+            tape.set_constants(&constants);
+        }
+        let rate = self.partials.last().filter(|_| self.structure.constant_rate);
+        let rate = rate.and_then(|z| constants.get(z.index()));
+        self.structure.z_free = rate == Some(&0.0);
+    }
+}
+
+/// The nodes of q, v and z.
+fn variables(graph: &mut Graph, n: usize) -> Vec<Id> {
+    let mut variables: Vec<Id> = (0..n).map(|i| graph.position(i as u32)).collect();
+    variables.extend((0..n).map(|i| graph.velocity(i as u32)));
+    variables.push(graph.action());
+    variables
+}
+
+/// The matrix of second derivatives, by rows; the half of it is derived. `None` where it is too large.
+fn second_derivatives(graph: &mut Graph, partials: &[Id], variables: &[Id]) -> Option<Vec<Id>> {
+    let size = variables.len();
+    let mut second = vec![*partials.first()?; size * size];
+    for (i, partial) in partials.iter().enumerate() {
+        let row = graph.gradient(*partial, variables.get(i..)?, WITH_HESSIAN)?;
+        for (j, entry) in row.into_iter().enumerate() {
+            *second.get_mut(i * size + i + j)? = entry;
+            *second.get_mut((i + j) * size + i)? = entry;
+        }
+    }
+    Some(second)
+}
