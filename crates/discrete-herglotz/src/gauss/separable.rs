@@ -20,8 +20,17 @@ use contact_geom::{Derivatives, Lagrangian, Scalar, VelocityPoint, largest};
 use pulp::Simd;
 use std::sync::Arc;
 
-/// The steps after which a matrix is expected to last.
-const LASTING: usize = 64;
+mod slope;
+
+/// How much worse than nothing what the step before foretells may be: its error is rough, and the first sweeps take it away, where that of
+/// nothing is smooth and lasts.
+const ROUGH: f64 = 16.0;
+
+/// The steps after which what the step before foretells is tried again.
+const UNFORETOLD: u32 = 31;
+
+/// The largest relative change of a sweep after which the last two values of a force tell its slope.
+const TELLING: f64 = 0.1;
 
 /// The largest relative change of a sweep after which its values are near enough for the parts that matrices' rounding leaves out.
 const NEAR: f64 = 1e-3;
@@ -64,6 +73,8 @@ pub(super) struct SeparableStages<'a, L, const N: usize> {
     positions: Option<Box<PositionNewton<N>>>,
     /// Whether the stages of the next step are solved, and `rest` is theirs.
     solved: bool,
+    /// The steps left for which the guess is a motion by the linear force alone.
+    unforetold: u32,
     /// The steps that Newton's Jacobian has served.
     age: u32,
     tail: Tail,
@@ -104,6 +115,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             parked: None,
             positions: None,
             solved: false,
+            unforetold: 0,
             age: 0,
             tail,
             misfit: 0.0,
@@ -235,11 +247,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         let s = self.table.s;
         let m = blocks::<S>(s);
         let solved = std::mem::take(&mut self.solved);
-        if self.warm && !solved {
+        let foretells = self.warm && !solved && (self.unforetold == 0 || self.newton.is_some());
+        if foretells {
             for d in 0..N {
                 let before = self.rest[d];
                 self.table.ahead.apply(&before, s, &mut self.rest[d], |_| Lanes::<S>::splat(0.0));
             }
+        } else if !solved {
+            self.rest = [Stages::ZERO; N];
+            self.unforetold = self.unforetold.saturating_sub(1);
         }
         if let Some(newton) = &mut self.newton {
             newton.a = self.rest;
@@ -258,6 +274,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         let (mut small, mut again) = (at_once.then_some(weight), true);
         self.far &= !tails;
         let mut sweeps = Sweeps::until(1.0 / 16.0, 1.0 / 64.0);
+        // The positions and what the force adds there, of the sweep before.
+        let mut before = [Stages::ZERO; 2];
         let outcome = loop {
             if again {
                 self.begin::<S>(small);
@@ -300,6 +318,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
                 AfterSweep::Going => (again, due) = (again || due, false),
                 done => break done,
             }
+            if const { N == 1 } && self.newton.is_none() {
+                let ahead = sweeps.contracts() && change <= TELLING * size;
+                self.sweep_ahead::<S>(&mut before, ahead);
+            }
         };
         if let (AfterSweep::Done, Some(_)) = (outcome, &self.newton) {
             // Stiff forces magnify the round-off of the positions, and the correction takes it back.
@@ -311,6 +333,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             // What an iteration leaves that does not contract is worse than nothing.
             self.rest = [Stages::ZERO; N];
             return outcome;
+        }
+        if foretells && const { N == 1 } && sweeps.first_change() > ROUGH * self.largest_rest::<S>() {
+            self.unforetold = UNFORETOLD;
         }
         let foretold = sweeps.first() <= FORETOLD && !solved;
         let h = self.table.h;
@@ -337,14 +362,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             *size = size.max(a[d].abs()).max(linear.abs());
             self.rest[d].set(r, rest);
             self.a[d].set(r, a[d]);
-        }
-    }
-
-    /// Looks at the slope of the force, and refines matrices that last.
-    fn look_again(&mut self) {
-        self.adapt();
-        if self.taken >= LASTING {
-            self.left.refine(&self.table);
         }
     }
 
@@ -443,38 +460,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         }
         action
     }
-
-    /// Takes the slope of the force anew from the stages of the last step, by least squares, where it has changed enough to
-    /// be worth a new matrix.
-    #[inline(never)]
-    fn adapt(&mut self) {
-        let s = self.table.s;
-        let (mut products, mut squares) = (0.0, 0.0);
-        for d in 0..N {
-            let (x, a) = (&self.x[d].0[..s], &self.a[d].0[..s]);
-            let mean = |y: &[f64]| y.iter().sum::<f64>() / s as f64;
-            let (mx, ma) = (mean(x), mean(a));
-            for (x, a) in x.iter().zip(a) {
-                products += (x - mx) * (a - ma);
-                squares += (x - mx) * (x - mx);
-            }
-        }
-        let kappa = -products / squares;
-        if !kappa.is_finite() || (kappa - self.left.kappa).abs() <= 0.02 * kappa.abs() {
-            return;
-        }
-        if let Some(left) = self.table.preconditioned(kappa) {
-            let change = kappa - self.left.kappa;
-            for (rest, x) in self.rest.iter_mut().zip(&self.x) {
-                rest.0.iter_mut().zip(&x.0).for_each(|(r, x)| *r += change * x);
-            }
-            self.left = left;
-        }
-    }
 }
 
 saved!([L, const N: usize] SeparableStages<'_, L, N> {
-    rest, x, a, base, q, v, z, far, warm, solved, age, misfit, taken, review, evaluations,
+    rest, x, a, base, q, v, z, far, warm, solved, unforetold, age, misfit, taken, review, evaluations,
 } and save_solution, load_solution);
 
 impl<L, const N: usize> SeparableStages<'_, L, N> {

@@ -82,6 +82,16 @@ impl Sweeps {
         self.first.0 / self.first.1
     }
 
+    /// The change of the first sweep.
+    pub fn first_change(&self) -> f64 {
+        self.first.0
+    }
+
+    /// Whether the changes fall, and there is more than one sweep to come.
+    pub fn contracts(&self) -> bool {
+        self.count > 1 && self.ratio < 0.5 && !self.last
+    }
+
     /// Judges a sweep by its largest change and the largest term.
     #[inline(always)]
     pub fn judge(&mut self, change: f64, size: f64) -> AfterSweep {
