@@ -29,9 +29,6 @@ const ROUGH: f64 = 16.0;
 /// The steps after which what the step before foretells is tried again.
 const UNFORETOLD: u32 = 31;
 
-/// The largest relative change of a sweep after which the last two values of a force tell its slope.
-const TELLING: f64 = 0.1;
-
 /// The largest relative change of a sweep after which its values are near enough for the parts that matrices' rounding leaves out.
 const NEAR: f64 = 1e-3;
 
@@ -273,7 +270,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         let mut aside = !at_once && !due;
         let (mut small, mut again) = (at_once.then_some(weight), true);
         self.far &= !tails;
-        let mut sweeps = Sweeps::until(1.0 / 16.0, 1.0 / 64.0);
+        // With sweeps ahead changes fall so fast that to leave less costs nothing.
+        let mut sweeps = Sweeps::until(1.0 / 16.0, if const { N == 1 } { 1.0 / 256.0 } else { 1.0 / 64.0 });
         // The positions and what the force adds there, of the sweep before.
         let mut before = [Stages::ZERO; 2];
         let outcome = loop {
@@ -319,10 +317,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
                 done => break done,
             }
             if const { N == 1 } && self.newton.is_none() {
-                let ahead = sweeps.contracts() && change <= TELLING * size;
+                let ahead = sweeps.go_ahead(change / size);
                 self.sweep_ahead::<S>(&mut before, ahead);
             }
         };
+        if const { N == 1 } && outcome == AfterSweep::Done && sweeps.ends_ahead() {
+            self.sweep_ahead::<S>(&mut before, true);
+            let kappa = Lanes::<S>::splat(self.left.kappa);
+            for r in 0..m {
+                self.a[0].set(r, self.rest[0].block::<S>(r) - kappa * self.x[0].block(r));
+            }
+        }
         if let (AfterSweep::Done, Some(_)) = (outcome, &self.newton) {
             // Stiff forces magnify the round-off of the positions, and the correction takes it back.
             self.a = self.rest;

@@ -36,6 +36,9 @@ impl From<AfterSweep> for StepError {
 /// The sweeps after which an iteration counts as not contracting.
 const LIMIT: u32 = 60;
 
+/// The largest relative change of a sweep after which the last two values of a force tell its slope.
+const TELLING: f64 = 0.1;
+
 /// The sweeps of Newton's method above which its Jacobian is taken anew: three times the usual number.
 pub(super) const SLOW: u32 = 18;
 
@@ -57,6 +60,9 @@ pub(super) struct Sweeps {
     first: (f64, f64),
     before: f64,
     ratio: f64,
+    /// Whether a sweep ahead, without forces, lies between the last change and the next, and whether one is to follow the last.
+    ahead: bool,
+    ends_ahead: bool,
     risen: u32,
     /// Whether the last sweep has not moved the positions but for their round-off: where forces are stiff that alone changes
     /// the accelerations by more than theirs.
@@ -87,9 +93,16 @@ impl Sweeps {
         self.first.0
     }
 
-    /// Whether the changes fall, and there is more than one sweep to come.
-    pub fn contracts(&self) -> bool {
-        self.count > 1 && self.ratio < 0.5 && !self.last
+    /// Whether a sweep ahead is worth it after this change, relative to the terms: the changes fall, and they are small enough to tell the
+    /// slope of a force. Then it is taken.
+    pub fn go_ahead(&mut self, change: f64) -> bool {
+        self.ahead = self.count > 1 && self.ratio < 0.5 && change <= TELLING;
+        self.ahead
+    }
+
+    /// Whether what is left is small after one more sweep ahead, as there was one before each of the last sweeps.
+    pub fn ends_ahead(&self) -> bool {
+        self.ends_ahead
     }
 
     /// Judges a sweep by its largest change and the largest term.
@@ -97,7 +110,12 @@ impl Sweeps {
     pub fn judge(&mut self, change: f64, size: f64) -> AfterSweep {
         self.count += 1;
         let round_off = 0.5 * f64::EPSILON * size;
-        if change <= self.enough * round_off || self.last && change <= 256.0 * round_off {
+        let ahead = std::mem::take(&mut self.ahead);
+        if change <= self.enough * round_off {
+            return AfterSweep::Done;
+        }
+        if self.last && change <= 256.0 * round_off {
+            self.ends_ahead = ahead;
             return AfterSweep::Done;
         }
         if !(change + size).is_finite() {
@@ -111,6 +129,7 @@ impl Sweeps {
             let expected = f64::max(ratio, if self.count > 2 { self.ratio } else { 0.1 });
             let next = change * expected;
             if next <= self.left * round_off {
+                self.ends_ahead = ahead;
                 return AfterSweep::Done;
             }
             self.last = next * expected <= self.left * round_off;
