@@ -1,13 +1,13 @@
 //! A tape at work on numbers of any kind.
 
 use crate::functions::{atan2, hypot};
-use crate::node::Inputs;
-use crate::tape::{Code, Instruction, PREVIOUS, Tape};
+use crate::tape::{Code, InputRegisters, Instruction, PREVIOUS, Tape};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 
 /// The numbers of registers that lie on the stack; a tape that needs more has them on the heap. They are cleared before each evaluation, so
 /// that a short tape has few.
+const TINY: usize = 3;
 const SMALL: usize = 8;
 const MIDDLE: usize = 32;
 const LARGE: usize = 256;
@@ -39,6 +39,8 @@ impl Tape {
         // Nothing that takes many steps evaluates nested duals.
         if T::NESTED || self.registers > LARGE {
             self.interpret(at, &mut vec![T::zero(); self.registers], results);
+        } else if self.registers <= TINY {
+            self.interpret(at, &mut OnStack([T::zero(); TINY]).0, results);
         } else if self.registers <= SMALL {
             self.interpret(at, &mut OnStack([T::zero(); SMALL]).0, results);
         } else if self.registers <= MIDDLE {
@@ -65,19 +67,23 @@ impl Tape {
 
     #[inline(always)]
     fn run<T: Scalar>(&self, at: At<'_, T>, registers: &mut [T], results: &mut [&mut [T]]) {
-        // Plain loops: chained iterators, and copies of slices, cost more than all the work of a short tape.
-        let n = at.q.len() as u16;
-        for (x, i) in at.q.iter().zip(0..) {
-            set(registers, i, *x);
-        }
-        if self.reads.meets(Inputs::VELOCITY) {
-            for (x, i) in at.v.iter().zip(n..) {
+        // Plain loops and branches: chained iterators, and what moves numbers about, cost more than all the work of a short tape.
+        let InputRegisters { q, v, z, t } = self.inputs;
+        if let Some(first) = q {
+            for (x, i) in at.q.iter().zip(first..) {
                 set(registers, i, *x);
             }
         }
-        if self.reads.meets(Inputs::ACTION.and(Inputs::TIME)) {
-            set(registers, 2 * n, at.z);
-            set(registers, 2 * n + 1, at.t);
+        if let Some(first) = v {
+            for (x, i) in at.v.iter().zip(first..) {
+                set(registers, i, *x);
+            }
+        }
+        if let Some(z) = z {
+            set(registers, z, at.z);
+        }
+        if let Some(t) = t {
+            set(registers, t, at.t);
         }
         let mut previous = T::zero();
         for instruction in &self.code {
@@ -87,7 +93,8 @@ impl Tape {
         let mut places = self.results.iter();
         for part in results.iter_mut() {
             for (result, place) in part.iter_mut().zip(&mut places) {
-                *result = if *place == PREVIOUS { previous } else { get(registers, *place) };
+                let value = if place.register == PREVIOUS { previous } else { get(registers, place.register) };
+                *result = if place.negative { -value } else { value };
             }
         }
     }

@@ -78,16 +78,31 @@ impl Instruction {
     }
 }
 
-/// Straight code that computes some nodes of a graph: the inputs are in the first registers, in the order q, v, z, t.
+/// Where a result is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    pub register: u16,
+    /// Whether it is the negative of what is there: as most forces are, of slopes.
+    pub negative: bool,
+}
+
+/// The first registers of the inputs of each kind; `None` of those that are not read.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct InputRegisters {
+    pub q: Option<u16>,
+    pub v: Option<u16>,
+    pub z: Option<u16>,
+    pub t: Option<u16>,
+}
+
+/// Straight code that computes some nodes of a graph: the inputs that it reads are in the first registers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tape {
     pub code: Vec<Instruction>,
-    /// The registers that hold the results.
-    pub results: Vec<u16>,
+    pub results: Vec<Place>,
     /// How many registers there are.
     pub registers: usize,
-    /// Which inputs it reads.
-    pub reads: Inputs,
+    pub inputs: InputRegisters,
     /// The instructions with a constant, and the nodes of these.
     constants: Vec<(usize, Id)>,
 }
@@ -101,7 +116,6 @@ struct Builder<'g> {
     /// How often each node is still read.
     uses: Vec<u32>,
     free: Vec<u16>,
-    dimension: usize,
 }
 
 impl Tape {
@@ -122,15 +136,24 @@ impl Tape {
             }
         }
         let reads = nodes.iter().fold(Inputs::NONE, |all, id| all.and(graph.inputs(*id)));
-        let tape = Tape { registers: 2 * dimension + 2, reads, ..Tape::default() };
+        let mut registers = 0;
+        let mut of = |kind: Inputs, count: usize| {
+            let first = u16::try_from(registers).ok().filter(|_| reads.meets(kind));
+            registers += first.map_or(0, |_| count);
+            first
+        };
+        let (q, v) = (of(Inputs::POSITION, dimension), of(Inputs::VELOCITY, dimension));
+        let inputs = InputRegisters { q, v, z: of(Inputs::ACTION, 1), t: of(Inputs::TIME, 1) };
+        let tape = Tape { registers, inputs, ..Tape::default() };
         let (place, free) = (vec![None; last], Vec::new());
-        let mut builder = Builder { graph, tape, place, uses, free, dimension };
-        for id in nodes {
+        let mut builder = Builder { graph, tape, place, uses, free };
+        let results: Vec<(Id, bool)> = nodes.iter().map(|id| builder.without_sign(*id)).collect();
+        for (id, _) in &results {
             builder.compute(*id)?;
         }
-        for id in nodes {
-            let register = builder.register(*id)?;
-            builder.tape.results.push(register);
+        for (id, negative) in results {
+            let register = builder.register(id)?;
+            builder.tape.results.push(Place { register, negative });
         }
         let mut tape = builder.tape;
         for i in 1..tape.code.len() {
@@ -138,7 +161,7 @@ impl Tape {
             tape.code[i].follow(written);
         }
         if let Some(last) = tape.code.last() {
-            tape.results.iter_mut().filter(|place| **place == last.to).for_each(|place| *place = PREVIOUS);
+            tape.results.iter_mut().filter(|p| p.register == last.to).for_each(|p| p.register = PREVIOUS);
         }
         Some(tape)
     }
@@ -173,6 +196,18 @@ impl Builder<'_> {
             stack.extend(operands.into_iter().map(|a| (a, false)));
         }
         Some(())
+    }
+
+    /// A result without its sign, and whether it has one. As a constant it has none.
+    fn without_sign(&mut self, id: Id) -> (Id, bool) {
+        match self.graph.node(id) {
+            Node::Unary(Function::Neg, a) if !self.graph.is_constant(id) => {
+                // One reader more, for good: its register is kept.
+                self.uses[a.index()] += 1;
+                (a, true)
+            }
+            _ => (id, false),
+        }
     }
 
     /// The factors of a node that becomes a part of the sum that it is read by alone.
@@ -230,16 +265,16 @@ impl Builder<'_> {
 
     /// The register of a node that is an input, is computed, or is a constant, which is put there.
     fn register(&mut self, id: Id) -> Option<u16> {
-        let n = self.dimension;
+        let InputRegisters { q, v, z, t } = self.tape.inputs;
         let input = match self.graph.node(id) {
-            Node::Position(i) => Some(i as usize),
-            Node::Velocity(i) => Some(n + i as usize),
-            Node::Action => Some(2 * n),
-            Node::Time => Some(2 * n + 1),
+            Node::Position(i) => Some((q, i)),
+            Node::Velocity(i) => Some((v, i)),
+            Node::Action => Some((z, 0)),
+            Node::Time => Some((t, 0)),
             _ => None,
         };
-        if let Some(input) = input {
-            return u16::try_from(input).ok();
+        if let Some((first, i)) = input {
+            return u16::try_from(i).ok().and_then(|i| first?.checked_add(i));
         }
         if let Some(place) = self.place[id.index()] {
             return Some(place);
