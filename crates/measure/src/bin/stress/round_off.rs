@@ -432,8 +432,8 @@ fn diagram(all: &[Ensemble], found: &[Result<(Growth, Option<f64>), InputError>]
             x_label: "steps".into(),
             y_label: format!("relative error of the {what}, rms"),
             x: Axis::Logarithmic(1, 6, 1),
-            y: Axis::Logarithmic(-17, -9, 1),
-            legend: (0.03, 0.98),
+            y: Axis::Logarithmic(-17, -12, 1),
+            legend: (1.0, 0.98),
             curves,
             marks: Vec::new(),
         }
