@@ -89,7 +89,9 @@ fn an_accuracy_holds_for_every_member() {
             assert!(error <= most, "{by:?}, {}: {error}", member.index);
         }
         let steps = all[0].ending.unwrap().steps;
-        assert!(all[50].ending.unwrap().steps > 2 * steps, "{by:?}");
+        // It takes its own, as many as its pilot runs find: at least half as many again, and how many more depends on the order.
+        let own = all[50].ending.unwrap().steps;
+        assert!(2 * own > 3 * steps, "{by:?}: {own} beside {steps}");
         // Otherwise they are those of so many steps.
         let given = of().by(by.unwrap_or(gauss(if wanted < 1e-10 { 12 } else { 8 })));
         let given = members(&given.steps(Steps::Count(steps)).rows_every(1), until);
