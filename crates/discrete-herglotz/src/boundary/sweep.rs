@@ -84,8 +84,9 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
         Ok(p)
     }
 
-    /// The second jet of a step, all of whose entries are finite.
-    #[inline(always)]
+    /// The second jet of a step, all of whose entries are finite. Compiled once, apart from the elimination: what the elimination
+    /// [without exchanges](Sweep::without_exchanges) gains by its own copy of it is rare here.
+    #[inline(never)]
     pub fn jet(
         &self,
         k: usize,

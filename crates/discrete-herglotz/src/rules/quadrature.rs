@@ -361,7 +361,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
 
     /// By the chain rule from the Hessian of L at the nodes, along the total directions of `(q0, q1, z0)`:
     /// `z1` moves with them by `(D1, D2, sigma_d)`.
-    #[inline]
+    #[inline(always)]
     fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
         let first = self.jet(t, x)?;
         let (h, z1) = (self.h, x.z0 + first.value);
