@@ -64,3 +64,23 @@ pub(crate) struct Drift {
     pub damping: f64,
     pub lift: f64,
 }
+
+impl Drift {
+    /// Over no time.
+    pub const NONE: Drift = Drift { length: 0.0, damping: 0.0, lift: 0.0 };
+
+    /// Moves velocities, and positions to others.
+    #[inline(always)]
+    pub fn go(&self, q: &[f64], v: &mut [f64], next: &mut [f64]) {
+        for ((next, q), v) in next.iter_mut().zip(q).zip(v) {
+            *next = fused(self.length, *v, *q);
+            *v = fused(self.damping, *v, *v);
+        }
+    }
+}
+
+/// `a * b + c`, fused where the build has the instruction: elsewhere it would be a call.
+#[inline(always)]
+fn fused(a: f64, b: f64, c: f64) -> f64 {
+    if cfg!(target_feature = "fma") { a.mul_add(b, c) } else { a * b + c }
+}

@@ -2,6 +2,7 @@
 
 use crate::Potential;
 use crate::blocks::BLOCK;
+use crate::drag::Drift;
 use crate::elements::{Elements, Piece, Run};
 use crate::implicit::Pattern;
 use crate::lanes::{LANES, Lanes};
@@ -17,10 +18,19 @@ pub(crate) enum Weight<'a> {
     Masses(f64, &'a [f64]),
 }
 
+/// The drift after a kick, and where the positions of the block go by it.
+pub(crate) struct Then<'a> {
+    pub drift: Drift,
+    pub next: &'a mut [f64],
+}
+
 /// A list of potentials, whatever the number of their unknowns.
 pub(crate) trait PotentialList: Send + Sync {
     /// Adds the weighted forces `-V_q` on the unknowns of a block. `q` begins with a fixed place and ends with one.
-    fn kick(&self, block: usize, t: f64, q: &[f64], weight: Weight, v: &mut [f64]);
+    ///
+    /// Tells whether it took the drift too, which it does while the velocities are in registers: where all unknowns have the same
+    /// mass, and this list goes to each of them once.
+    fn kick(&self, block: usize, t: f64, q: &[f64], weight: Weight, v: &mut [f64], then: Option<Then>) -> bool;
 
     /// The energy of the elements that begin in a block.
     fn energy(&self, block: usize, blocks: usize, t: f64, q: &[f64]) -> f64;
@@ -45,18 +55,38 @@ pub(crate) struct Kind<V, const K: usize, const P: usize> {
 }
 
 impl<V: Potential<K, P>, const K: usize, const P: usize> PotentialList for Kind<V, K, P> {
-    fn kick(&self, block: usize, t: f64, q: &[f64], weight: Weight, v: &mut [f64]) {
+    fn kick(&self, block: usize, t: f64, q: &[f64], weight: Weight, v: &mut [f64], then: Option<Then>) -> bool {
         let all = if K == 32 { u32::MAX } else { (1 << K) - 1 };
-        for piece in self.elements.pieces.of(block) {
-            let Some(run) = self.elements.runs.get(piece.run as usize) else { continue };
+        let (pieces, loose) = (self.elements.pieces.of(block), self.elements.loose_of.of(block));
+        let of = |piece: &Piece| self.elements.runs.get(piece.run as usize);
+        if let ([piece], [], Weight::Same(w), Some(then)) = (pieces, loose, weight, then)
+            && piece.slots == all
+            && (piece.from, piece.to as usize) == (0, v.len())
+            && let Some(run) = of(piece)
+        {
+            self.kick_piece::<true, false, true>(block, t, q, run, piece, w, &[], v, then);
+            return true;
+        }
+        for piece in pieces {
+            let Some(run) = of(piece) else { continue };
+            let none = Then { drift: Drift::NONE, next: &mut [] };
             match (weight, piece.slots == all) {
-                (Weight::Same(w), true) => self.kick_piece::<true, false>(block, t, q, run, piece, w, &[], v),
-                (Weight::Same(w), false) => self.kick_piece::<false, false>(block, t, q, run, piece, w, &[], v),
-                (Weight::Masses(w, m), true) => self.kick_piece::<true, true>(block, t, q, run, piece, w, m, v),
-                (Weight::Masses(w, m), false) => self.kick_piece::<false, true>(block, t, q, run, piece, w, m, v),
+                (Weight::Same(w), true) => {
+                    self.kick_piece::<true, false, false>(block, t, q, run, piece, w, &[], v, none);
+                }
+                (Weight::Same(w), false) => {
+                    self.kick_piece::<false, false, false>(block, t, q, run, piece, w, &[], v, none);
+                }
+                (Weight::Masses(w, m), true) => {
+                    self.kick_piece::<true, true, false>(block, t, q, run, piece, w, m, v, none);
+                }
+                (Weight::Masses(w, m), false) => {
+                    self.kick_piece::<false, true, false>(block, t, q, run, piece, w, m, v, none);
+                }
             }
         }
         self.kick_loose(block, t, q, weight, v);
+        false
     }
 
     fn energy(&self, block: usize, blocks: usize, t: f64, q: &[f64]) -> f64 {
@@ -128,13 +158,14 @@ pub(crate) fn unknowns_part<const K: usize>(q: &[f64], run: &Run<K>, e: usize, c
 
 impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
     /// The kick of the unknowns of a piece: each is gone to once, and has its forces from all elements of the run there. An element is
-    /// evaluated once for each of its unknowns, which costs less than to write its forces and to read them again.
+    /// evaluated once for each of its unknowns, which costs less than to write its forces and to read them again. With `DRIFT` the
+    /// drift follows.
     #[inline(always)]
     #[expect(
         clippy::too_many_arguments,
         reason = "of slices by themselves the compiler knows that they do not overlap"
     )]
-    fn kick_piece<'a, const FULL: bool, const MASSES: bool>(
+    fn kick_piece<'a, const FULL: bool, const MASSES: bool, const DRIFT: bool>(
         &'a self,
         block: usize,
         t: f64,
@@ -144,6 +175,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         weight: f64,
         inverse_masses: &'a [f64],
         v: &mut [f64],
+        then: Then,
     ) {
         let (from, to) = (piece.from as usize, piece.to as usize);
         let Some(v) = v.get_mut(from..to) else { return };
@@ -166,6 +198,12 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
             std::array::from_fn(|p| of(&self.elements.run_parameters[p], run.first + first(k)))
         });
         let masses = if MASSES { of(inverse_masses, 0) } else { &[] };
+        let Drift { length, damping, .. } = then.drift;
+        let (moved, moved_rest) = then.next.as_chunks_mut::<LANES>();
+        let here = if DRIFT { of(q, place) } else { &[] };
+        if DRIFT && (here.len() != count || moved.len() != count || moved_rest.len() != rest.len()) {
+            return;
+        }
         let inside = |slices: &[&[[f64; LANES]]]| slices.iter().all(|s| s.len() == count);
         if !(0..K).all(|k| !acts(k) || inside(&x[k]) && inside(&c[k])) || MASSES && masses.len() != count {
             return;
@@ -180,7 +218,12 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
                 }
             }
             let factor = if MASSES { Lanes::new(masses[number]) * weight } else { Lanes::splat(weight) };
-            *chunk = force.mul_add(factor, Lanes::new(*chunk)).to_array();
+            let mut velocity = force.mul_add(factor, Lanes::new(*chunk));
+            if DRIFT {
+                moved[number] = velocity.mul_add(Lanes::splat(length), Lanes::new(here[number])).to_array();
+                velocity = velocity.mul_add(Lanes::splat(damping), velocity);
+            }
+            *chunk = velocity.to_array();
         }
         if rest.is_empty() {
             return;
@@ -197,6 +240,9 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         let factor = if MASSES { Lanes::load_part(inverse_masses, done, count) * weight } else { Lanes::splat(weight) };
         for (v, kick) in rest.iter_mut().zip((force * factor).to_array()) {
             *v += kick;
+        }
+        if DRIFT {
+            then.drift.go(q.get(place + done..).unwrap_or(&[]), rest, moved_rest);
         }
     }
 

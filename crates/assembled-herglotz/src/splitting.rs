@@ -4,7 +4,7 @@ use crate::AssemblyError;
 use crate::aligned::Aligned;
 use crate::blocks::{self, BLOCK};
 use crate::drag::{Drag, Drift};
-use crate::kernels::Weight;
+use crate::kernels::{Then, Weight};
 use crate::system::{AssembledSystem, Masses, State};
 use discrete_herglotz::{Halt, InputError, SplittingScheme, StepError};
 use rayon::prelude::*;
@@ -160,7 +160,7 @@ impl<'a> AssembledSplitting<'a> {
             let here = BLOCK.min(n - from);
             force.fill(0.0);
             for list in &system.potentials {
-                list.kick(block, start.t, &splitting.q, Weight::Same(1.0), &mut force[..here]);
+                list.kick(block, start.t, &splitting.q, Weight::Same(1.0), &mut force[..here], None);
             }
             if let Some(i) = force[..here].iter().position(|f| !f.is_finite()) {
                 return Err(AssemblyError::Undefined { unknown: from + i });
@@ -289,15 +289,20 @@ impl Pass<'_> {
     }
 
     fn block(&self, block: usize, v: &mut [f64], next: &mut [f64], energies: Option<&mut [f64; 2]>) {
-        let Stage { kick, drift: Drift { length, damping, .. }, .. } = self.stage;
+        let Stage { kick, drift, .. } = self.stage;
         let from = block * BLOCK;
         let weight = match self.inverse {
             InverseMasses::Same(inverse) => Weight::Same(kick * inverse),
             InverseMasses::Each(inverse) => Weight::Masses(kick, &inverse[from..from + v.len()]),
         };
         if kick != 0.0 {
-            for list in &self.system.potentials {
-                list.kick(block, self.t, self.q, weight, v);
+            let lists = &self.system.potentials;
+            for (i, list) in lists.iter().enumerate() {
+                // The energies are those between the kick and the drift.
+                let last = i + 1 == lists.len() && energies.is_none();
+                if list.kick(block, self.t, self.q, weight, v, last.then_some(Then { drift, next: &mut *next })) {
+                    return;
+                }
             }
         }
         if let Some(energies) = energies {
@@ -311,17 +316,8 @@ impl Pass<'_> {
                 Masses::Each(masses) => masses[from..from + v.len()].iter().zip(&*v).map(|(m, v)| m * v * v).sum(),
             };
         }
-        for ((next, q), v) in next.iter_mut().zip(&self.q[from + 1..]).zip(v) {
-            *next = fused(length, *v, *q);
-            *v = fused(damping, *v, *v);
-        }
+        drift.go(&self.q[from + 1..], v, next);
     }
-}
-
-/// `a * b + c`, fused where the build has the instruction: elsewhere it would be a call.
-#[inline(always)]
-fn fused(a: f64, b: f64, c: f64) -> f64 {
-    if cfg!(target_feature = "fma") { a.mul_add(b, c) } else { a * b + c }
 }
 
 /// The sum of squares, in eight partial sums so that the compiler may use vector registers.

@@ -173,7 +173,7 @@ impl AssembledSystem {
         for (block, force) in q.chunks_mut(BLOCK).enumerate() {
             force.fill(0.0);
             for list in &self.potentials {
-                list.kick(block, at.t, at.q, Weight::Same(1.0), force);
+                list.kick(block, at.t, at.q, Weight::Same(1.0), force, None);
             }
         }
         let velocities = at.v.iter().skip(1);

@@ -272,7 +272,7 @@ impl<'a> AssembledMidpoint<'a> {
         for (block, force) in self.residual.chunks_mut(BLOCK).enumerate() {
             force.fill(0.0);
             for list in &self.system.potentials {
-                list.kick(block, t, &self.middle, Weight::Same(1.0), force);
+                list.kick(block, t, &self.middle, Weight::Same(1.0), force, None);
             }
         }
     }
