@@ -134,13 +134,18 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         let All { packs, lanes, stride } = self;
+        // As with splittings.
         if const { N == 1 } {
-            packs.all::<S, 3, ACTION>(lanes, stride);
+            packs.all::<S, 4, ACTION>(lanes, stride);
         } else {
-            packs.all::<S, 1, ACTION>(lanes, stride);
+            packs.all::<S, 2, ACTION>(lanes, stride);
         }
     }
 }
+
+/// The most packs that take a stage one after the other: what one waits for, the work of the next ones fills. Their numbers lie in
+/// the first cache.
+const ABREAST: usize = 2;
 
 /// The state and the workspace of the motions of a pack.
 struct Moving<S: Simd, const K: usize, const N: usize> {
@@ -155,6 +160,11 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     /// 1 in lanes whose sweeps go on; and in those that have failed.
     going: Pack<S, K>,
     failed: Pack<S, K>,
+    /// Whether the sweeps of a lane go on; the largest change and the largest term of the last.
+    open: bool,
+    change: Pack<S, K>,
+    size: Pack<S, K>,
+    judge: Judge<S, K>,
     /// The largest velocity of the last steps, and 1 in lanes with a step in doubt.
     fast: Pack<S, K>,
     doubt: Pack<S, K>,
@@ -164,6 +174,7 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
 const LIMIT: u32 = 60;
 
 /// See `Sweeps` of `gauss/sweeps.rs`, lane by lane.
+#[derive(Clone, Copy)]
 struct Judge<S: Simd, const K: usize> {
     before: Pack<S, K>,
     ratio: Pack<S, K>,
@@ -214,34 +225,50 @@ impl<S: Simd, const K: usize> Judge<S, K> {
 impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
     #[inline(always)]
     fn all<S: Simd, const K: usize, const ACTION: bool>(&self, lanes: &mut [Lane<N>], stride: usize) {
-        let zero = Pack::<S, K>::zero();
-        for some in lanes.chunks_mut(Pack::<S, K>::COUNT) {
-            // What is beyond the last repeats it.
-            let last = some.len() - 1;
-            let lane =
-                |f: &dyn Fn(&PhasePoint<N>) -> f64| Summed::from(Pack::from_lanes(|i| f(&some[i.min(last)].state)));
-            let mut m = Moving {
-                q: std::array::from_fn(|d| lane(&|state| state.q[d])),
-                v: std::array::from_fn(|d| lane(&|state| self.form.velocity(&state.p)[d])),
-                z: lane(&|state| state.z),
-                a: [[zero; N]; MOST],
-                x: [[zero; N]; MOST],
-                base: [[zero; N]; MOST],
-                going: zero,
-                failed: zero,
-                fast: zero,
-                doubt: zero,
-            };
+        let width = Pack::<S, K>::COUNT;
+        let mut moving = Vec::with_capacity(ABREAST);
+        for some in lanes.chunks_mut(ABREAST * width) {
+            moving.clear();
+            for own in some.chunks(width) {
+                moving.push(self.start::<S, K>(own));
+            }
             for k in 0..self.steps {
-                self.step::<S, K, ACTION>(&mut m, self.t0 + k as f64 * self.h, k > 0);
+                self.step::<S, K, ACTION>(&mut moving, self.t0 + k as f64 * self.h, k > 0);
                 let taken = k + 1;
                 if taken % stride == 0 || taken == self.steps {
-                    for (i, lane) in some.iter_mut().enumerate() {
-                        lane.reach(self.t0 + taken as f64 * self.h, self.state(&m, i));
-                        lane.doubtful = m.doubt.lanes()[i] != 0.0;
+                    for (own, m) in some.chunks_mut(width).zip(&moving) {
+                        for (i, lane) in own.iter_mut().enumerate() {
+                            lane.reach(self.t0 + taken as f64 * self.h, self.state(m, i));
+                            lane.doubtful = m.doubt.lanes()[i] != 0.0;
+                        }
                     }
                 }
             }
+        }
+    }
+
+    /// From some motions; what is beyond the last repeats it.
+    #[inline(always)]
+    fn start<S: Simd, const K: usize>(&self, some: &[Lane<N>]) -> Moving<S, K, N> {
+        let zero = Pack::zero();
+        let of = |f: &dyn Fn(&PhasePoint<N>) -> f64| {
+            Summed::from(Pack::from_lanes(|i| some.get(i).or(some.last()).map_or(0.0, |lane| f(&lane.state))))
+        };
+        Moving {
+            q: std::array::from_fn(|d| of(&|state| state.q[d])),
+            v: std::array::from_fn(|d| of(&|state| self.form.velocity(&state.p)[d])),
+            z: of(&|state| state.z),
+            a: [[zero; N]; MOST],
+            x: [[zero; N]; MOST],
+            base: [[zero; N]; MOST],
+            going: zero,
+            failed: zero,
+            open: false,
+            change: zero,
+            size: zero,
+            judge: Judge::new(),
+            fast: zero,
+            doubt: zero,
         }
     }
 
@@ -256,48 +283,73 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
     }
 
     #[inline(always)]
-    fn step<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64, warm: bool) {
-        let Table { s, b, ahead, .. } = &*self.table;
-        let s = (*s).min(MOST);
-        let zero = Pack::<S, K>::zero();
-        let last = m.a[0];
-        if warm {
-            let before = m.a;
-            for i in 0..s {
-                m.a[i] = combined(&ahead[i], &before, s);
+    fn step<S: Simd, const K: usize, const ACTION: bool>(&self, moving: &mut [Moving<S, K, N>], t: f64, warm: bool) {
+        let s = self.table.s.min(MOST);
+        let [zero, one] = [0.0, 1.0].map(Pack::splat);
+        let mut last = [[zero; N]; ABREAST];
+        let mut open = false;
+        for (m, last) in moving.iter_mut().zip(&mut last) {
+            *last = m.a[0];
+            if warm {
+                let before = m.a;
+                for i in 0..s {
+                    m.a[i] = combined(&self.table.ahead[i], &before, s);
+                }
+            } else {
+                m.a = [[zero; N]; MOST];
             }
-        } else {
-            m.a = [[zero; N]; MOST];
+            self.begin(m, s);
+            (m.going, m.judge) = (one - m.failed, Judge::new());
+            m.open = m.going.any();
+            open |= m.open;
         }
-        self.begin(m, s);
-        m.going = Pack::splat(1.0) - m.failed;
-        let mut judge = Judge::new();
-        while m.going.any() {
-            let (mut change, mut size) = (zero, zero);
+        while open {
             for i in 0..s {
-                let sum = combined(&b[i], &m.a, s);
-                let x: [Pack<S, K>; N] = std::array::from_fn(|d| m.base[i][d] + sum[d]);
-                let a = self.accelerations(t + self.table.times[i], &x);
-                for d in 0..N {
-                    let before = m.a[i][d];
-                    change = change.larger((a[d] - before).abs());
-                    size = size.larger(a[d].abs());
-                    m.a[i][d] = m.going.at_most(zero, before, a[d]);
-                    if ACTION {
-                        m.x[i][d] = m.going.at_most(zero, m.x[i][d], x[d]);
+                for m in moving.iter_mut() {
+                    if m.open {
+                        self.stage::<S, K, ACTION>(m, t, i, s);
                     }
                 }
             }
-            let [going, given_up] = judge.judge(change, size);
-            m.failed += given_up * m.going;
-            m.going = m.going * going * (Pack::splat(1.0) - given_up);
-            if !warm && judge.count == 1 {
-                // The first guess was no motion at all.
-                self.begin(m, s);
+            open = false;
+            for m in moving.iter_mut() {
+                if !m.open {
+                    continue;
+                }
+                let [going, given_up] = m.judge.judge(m.change, m.size);
+                m.failed += given_up * m.going;
+                m.going = m.going * going * (one - given_up);
+                (m.change, m.size) = (zero, zero);
+                if !warm && m.judge.count == 1 {
+                    // The first guess was no motion at all.
+                    self.begin(m, s);
+                }
+                m.open = m.going.any();
+                open |= m.open;
             }
         }
-        self.look(m, warm.then_some(&last), s);
-        self.finish::<S, K, ACTION>(m, t, s);
+        for (m, last) in moving.iter_mut().zip(&last) {
+            self.look(m, warm.then_some(last), s);
+            self.finish::<S, K, ACTION>(m, t, s);
+        }
+    }
+
+    /// The acceleration of one stage, from the newest of the others.
+    #[inline(always)]
+    fn stage<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64, i: usize, s: usize) {
+        let zero = Pack::zero();
+        let sum = combined(&self.table.b[i], &m.a, s);
+        let x: [Pack<S, K>; N] = std::array::from_fn(|d| m.base[i][d] + sum[d]);
+        let a = self.accelerations(t + self.table.times[i], &x);
+        for d in 0..N {
+            let before = m.a[i][d];
+            m.change = m.change.larger((a[d] - before).abs());
+            m.size = m.size.larger(a[d].abs());
+            m.a[i][d] = m.going.at_most(zero, before, a[d]);
+            if ACTION {
+                m.x[i][d] = m.going.at_most(zero, m.x[i][d], x[d]);
+            }
+        }
     }
 
     /// Looks whether a step resolves the motion, before it is taken: by its accelerations, and the first of the step before.
@@ -387,19 +439,25 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
     }
 }
 
-/// The sum over the stages of a row of coefficients with the values there.
+/// The sum over the stages of a row of coefficients with the values there; in two parts, which do not wait for each other.
 #[inline(always)]
 fn combined<S: Simd, const K: usize, const N: usize>(
     row: &[f64; MOST],
     values: &[[Pack<S, K>; N]; MOST],
     s: usize,
 ) -> [Pack<S, K>; N] {
-    let mut sum = [Pack::zero(); N];
-    for (c, value) in row[..s].iter().zip(&values[..s]) {
-        let c = Pack::splat(*c);
+    let (mut sum, mut odd) = ([Pack::zero(); N], [Pack::zero(); N]);
+    let (coefficients, values) = (row[..s].chunks_exact(2), values[..s].chunks_exact(2));
+    if let ([c], [value]) = (coefficients.remainder(), values.remainder()) {
         for d in 0..N {
-            sum[d] = c.mul_add(value[d], sum[d]);
+            odd[d] = Pack::splat(*c) * value[d];
         }
     }
-    sum
+    for (c, value) in coefficients.zip(values) {
+        for d in 0..N {
+            sum[d] = Pack::splat(c[0]).mul_add(value[0][d], sum[d]);
+            odd[d] = Pack::splat(c[1]).mul_add(value[1][d], odd[d]);
+        }
+    }
+    std::array::from_fn(|d| sum[d] + odd[d])
 }

@@ -12,6 +12,7 @@ use std::ops::Neg;
 /// A lane's bits depend on that lane alone, and are the same in all instruction sets: products that are fused are so in all of them. A formula that asks for one value of the lanes
 /// (`re`, `extent`, `==`) gets none, whether they agree or not: see [`branched`](crate::gauss::lanes::branched).
 #[derive(Clone, Copy)]
+#[repr(align(64))] // Registers that lie across cache lines are slow to read after they were written.
 pub(super) struct Pack<S: Simd, const K: usize>(pub [S::f64s; K]);
 
 impl<S: Simd, const K: usize> Pack<S, K> {

@@ -89,14 +89,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     }
 }
 
-/// The registers of a pack: as many as hide the latency of a sum of products, and leave room for what else a step holds.
-const fn registers(n: usize) -> usize {
-    match n {
-        1 => 4,
-        2 => 2,
-        _ => 1,
-    }
-}
+/// The most packs that take a stage one after the other: what one waits for, the work of the next ones fills. Their numbers lie in
+/// the first cache.
+const ABREAST: usize = 4;
 
 /// All motions of a slice in the lanes of one instruction set.
 struct All<'s, 'a, L, const N: usize, const ACTION: bool, const WATCH: bool> {
@@ -114,10 +109,11 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const WATCH: bool> Wi
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         let All { packs, lanes, stride } = self;
-        match const { registers(N) } {
-            4 => packs.all::<S, 4, ACTION, WATCH>(lanes, stride),
-            2 => packs.all::<S, 2, ACTION, WATCH>(lanes, stride),
-            _ => packs.all::<S, 1, ACTION, WATCH>(lanes, stride),
+        // The registers of a pack share the constants that a stage reads; more of them than the processor has would wait in memory.
+        if const { N == 1 } {
+            packs.all::<S, 4, ACTION, WATCH>(lanes, stride);
+        } else {
+            packs.all::<S, 2, ACTION, WATCH>(lanes, stride);
         }
     }
 }
@@ -138,6 +134,22 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
 }
 
 impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
+    /// From some motions; what is beyond the last repeats it.
+    #[inline(always)]
+    fn from_lanes(some: &[Lane<N>]) -> Self {
+        let of = |f: &dyn Fn(&PhasePoint<N>) -> f64| {
+            Pack::from_lanes(|i| some.get(i).or(some.last()).map_or(0.0, |lane| f(&lane.state)))
+        };
+        let (q, p) = (SVector::from_fn(|d, _| of(&|at| at.q[d])), SVector::from_fn(|d, _| of(&|at| at.p[d])));
+        Moving { q, p, z: of(&|at| at.z), ..Self::zero() }
+    }
+
+    #[inline(always)]
+    fn zero() -> Self {
+        let (zero, still) = (Pack::splat(0.0), SVector::from_element(Pack::splat(0.0)));
+        Moving { q: still, p: still, carry: still, z: zero, force: still, value: zero, fast: zero, doubt: zero }
+    }
+
     /// The state in a lane.
     fn state(&self, i: usize) -> PhasePoint<N> {
         let of = |x: &SVector<Pack<S, K>, N>| SVector::from_fn(|d, _| x[d].lanes()[i]);
@@ -152,19 +164,15 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
         lanes: &mut [Lane<N>],
         stride: usize,
     ) {
-        let zero = Pack::<S, K>::splat(0.0);
-        for some in lanes.chunks_mut(Pack::<S, K>::COUNT) {
-            // What is beyond the last repeats it.
-            let last = some.len() - 1;
-            let (q, p) = (
-                SVector::from_fn(|d, _| Pack::from_lanes(|i| some[i.min(last)].state.q[d])),
-                SVector::from_fn(|d, _| Pack::from_lanes(|i| some[i.min(last)].state.p[d])),
-            );
-            let z = Pack::from_lanes(|i| some[i.min(last)].state.z);
-            let m =
-                Moving { q, p, carry: SVector::from_element(zero), z, force: q, value: zero, fast: zero, doubt: zero };
-            self.take_steps::<S, K, ACTION, WATCH>(m, stride, |t, at| {
-                for (i, lane) in some.iter_mut().enumerate() {
+        let width = Pack::<S, K>::COUNT;
+        for some in lanes.chunks_mut(ABREAST * width) {
+            let mut moving = [Moving::zero(); ABREAST];
+            let moving = &mut moving[..some.len().div_ceil(width)];
+            for (own, m) in some.chunks(width).zip(moving.iter_mut()) {
+                *m = Moving::from_lanes(own);
+            }
+            self.take_steps::<S, K, ACTION, WATCH>(moving, stride, |t, w, at| {
+                for (i, lane) in some.iter_mut().skip(w * width).take(width).enumerate() {
                     lane.reach(t, at.state(i));
                     lane.doubtful = at.doubt.lanes()[i] != 0.0;
                 }
@@ -176,13 +184,15 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
     #[inline(always)]
     fn take_steps<S: Simd, const K: usize, const ACTION: bool, const WATCH: bool>(
         &self,
-        mut m: Moving<S, K, N>,
+        moving: &mut [Moving<S, K, N>],
         stride: usize,
-        mut reach: impl FnMut(f64, &Moving<S, K, N>),
+        mut reach: impl FnMut(f64, usize, &Moving<S, K, N>),
     ) {
         let SplittingPacks { t0, h, steps, .. } = self;
         let mut table = Cow::Borrowed(&self.table);
-        self.take_force(&mut m, *t0);
+        for m in moving.iter_mut() {
+            self.take_force::<S, K, ACTION>(m, *t0);
+        }
         let mut taken = 0;
         while taken < *steps {
             let next = taken.saturating_add(stride).min(*steps);
@@ -190,42 +200,40 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
                 let t = t0 + k as f64 * h;
                 self.set_time(&mut table, t);
                 let stages = if k == 0 { &table.first } else { &table.joined };
-                if !WATCH {
-                    for stage in stages {
-                        self.kick_and_drift::<S, K, ACTION>(&mut m, stage);
-                        self.take_force(&mut m, t + stage.time);
+                for (i, stage) in stages.iter().enumerate() {
+                    let time = t + stage.time;
+                    if WATCH && i == self.look.stage {
+                        for m in moving.iter_mut() {
+                            let before = m.force;
+                            self.kick_and_drift::<S, K, ACTION>(m, stage);
+                            self.take_force::<S, K, ACTION>(m, time);
+                            self.look_at(m, &before);
+                        }
+                        continue;
                     }
-                    continue;
-                }
-                // The drift that is looked at by itself: along the others no register is held for the look.
-                let (ahead, from) = stages.split_at(self.look.stage);
-                let (looked_at, after) = from.split_at(1);
-                for part in [ahead, looked_at, after] {
-                    let before = m.force;
-                    for stage in part {
-                        self.kick_and_drift::<S, K, ACTION>(&mut m, stage);
-                        self.take_force(&mut m, t + stage.time);
-                    }
-                    if std::ptr::eq(part, looked_at) {
-                        self.look_at(&mut m, &before, self.look.span);
+                    for m in moving.iter_mut() {
+                        self.kick_and_drift::<S, K, ACTION>(m, stage);
+                        self.take_force::<S, K, ACTION>(m, time);
                     }
                 }
             }
             taken = next;
-            // Completed on a copy: what the next step has in common with the last goes on.
-            let mut at = m;
-            self.kick_and_drift::<S, K, ACTION>(&mut at, &table.closing);
-            reach(t0 + taken as f64 * h, &at);
+            for (w, m) in moving.iter().enumerate() {
+                // Completed on a copy: what the next step has in common with the last goes on.
+                let mut at = *m;
+                self.kick_and_drift::<S, K, ACTION>(&mut at, &table.closing);
+                reach(t0 + taken as f64 * h, w, &at);
+            }
         }
     }
 
-    /// Looks at a drift of this length, by the force before it.
+    /// Looks at the drift, by the force before it.
     #[inline(always)]
-    fn look_at<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, before: &SVector<Pack<S, K>, N>, span: f64) {
+    fn look_at<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, before: &SVector<Pack<S, K>, N>) {
         let zero = Pack::splat(0.0);
         let (mut turn, mut fast, mut wide) = (zero, zero, zero);
         for d in 0..N {
-            let change = (m.force[d] - before[d]) * span;
+            let change = (m.force[d] - before[d]) * self.look.span;
             turn = change.mul_add(change, turn);
             fast = m.p[d].mul_add(m.p[d], fast);
             wide = m.q[d].mul_add(m.q[d], wide);
@@ -237,10 +245,15 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
     }
 
     #[inline(always)]
-    fn take_force<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, t: f64) {
+    fn take_force<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64) {
         let zero = Pack::splat(0.0);
         let rest = VelocityPoint { q: m.q, v: SVector::from_element(zero), z: zero };
-        (m.value, m.force) = self.form.lagrangian.with_force(Pack::splat(t), &rest);
+        let (value, force) = self.form.lagrangian.with_force(Pack::splat(t), &rest);
+        m.force = force;
+        // What is stored is computed.
+        if ACTION {
+            m.value = value;
+        }
     }
 
     #[inline(always)]
