@@ -254,18 +254,21 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         for group in self.elements.loose_of.of(block).chunks(LANES) {
             let (x, c) = self.elements.gathered(q, group.len(), |lane| group[lane] as usize);
             let gradient = self.term.gradient(t, &x, &c);
+            let mut forces = [[0.0; LANES]; K];
             for k in 0..K {
-                for (e, g) in group.iter().zip(gradient[k].to_array()) {
+                forces[k] = gradient[k].to_array();
+            }
+            for (lane, e) in group.iter().enumerate() {
+                let Some(places) = self.elements.loose.get(*e as usize) else { continue };
+                for k in 0..K {
                     // A fixed place, or one of another block, is none of these unknowns.
-                    let Some(place) = self.elements.loose.get(*e as usize).map(|places| places[k] as usize) else {
-                        continue;
-                    };
-                    let Some(at) = place.checked_sub(first) else { continue };
+                    let Some(at) = (places[k] as usize).checked_sub(first) else { continue };
                     if let Some(v) = v.get_mut(at) {
-                        *v -= g * match weight {
-                            Weight::Same(w) => w,
-                            Weight::Masses(w, m) => w * m.get(at).copied().unwrap_or(0.0),
-                        };
+                        *v -= forces[k][lane]
+                            * match weight {
+                                Weight::Same(w) => w,
+                                Weight::Masses(w, m) => w * m.get(at).copied().unwrap_or(0.0),
+                            };
                     }
                 }
             }
@@ -302,16 +305,23 @@ impl<const K: usize, const P: usize> Elements<K, P> {
         count: usize,
         element: impl Fn(usize) -> usize,
     ) -> (SVector<Lanes, K>, [Lanes; P]) {
-        let of = |lane: usize| element(if lane < count { lane } else { 0 });
-        let elements: [usize; LANES] = std::array::from_fn(of);
-        let nan = f64::NAN;
-        let places = elements.map(|e| self.loose.get(e).copied().unwrap_or([0; K]));
-        let x = std::array::from_fn(|i| {
-            Lanes::new(std::array::from_fn(|lane| q.get(places[lane][i] as usize).copied().unwrap_or(nan)))
-        });
-        let c = std::array::from_fn(|p| {
-            Lanes::new(elements.map(|e| self.loose_parameters[p].get(e).copied().unwrap_or(nan)))
-        });
+        // By loops: maps of arrays would be calls.
+        let (mut x, mut c) = ([[f64::NAN; LANES]; K], [[f64::NAN; LANES]; P]);
+        for lane in 0..LANES {
+            let e = element(if lane < count { lane } else { 0 });
+            let Some(places) = self.loose.get(e) else { continue };
+            for k in 0..K {
+                if let Some(value) = q.get(places[k] as usize) {
+                    x[k][lane] = *value;
+                }
+            }
+            for (c, parameter) in c.iter_mut().zip(&self.loose_parameters) {
+                if let Some(value) = parameter.get(e) {
+                    c[lane] = *value;
+                }
+            }
+        }
+        let (x, c) = (std::array::from_fn(|k| Lanes::new(x[k])), std::array::from_fn(|p| Lanes::new(c[p])));
         (column(x), c)
     }
 }
