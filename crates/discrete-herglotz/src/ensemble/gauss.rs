@@ -3,6 +3,7 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
+use super::judge::Judge;
 use super::lane::{Lane, Wants};
 use super::pack::Pack;
 use super::twofold::{Pair, Summed};
@@ -16,14 +17,15 @@ use crate::splitting::separable::SeparableForm;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint};
-use num_traits::Zero;
+use num_traits::{One, Zero};
 use pulp::{Simd, WithSimd};
 use qd::Quad;
 
 /// The steps of contact Gauss collocation condensed to the positions, for many motions of one Lagrangian: the equations are those of
 /// [`Condensed`], which see.
 ///
-/// A sweep takes the stages in their order, each from the newest accelerations of the others (Gauss and Seidel's iteration). Lanes end their
+/// A sweep takes the stages in their order, each from the newest accelerations of the others (Gauss and Seidel's iteration); the first takes the
+/// newest of all, those of the step before among them, as points of a polynomial, which guesses a step one stage at a time. Lanes end their
 /// sweeps each for itself, by the rules of `gauss/sweeps.rs`; what has ended is kept while others go on.
 pub(super) struct GaussPacks<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
@@ -42,7 +44,7 @@ struct Table {
     d: [[f64; MOST]; MOST],
     inverse_rho: [f64; MOST],
     times: [f64; MOST],
-    ahead: [[f64; MOST]; MOST],
+    first: [[f64; MOST]; MOST],
     end_u: Pair,
     end_b: [Pair; MOST],
     grow: Pair,
@@ -74,7 +76,7 @@ impl Table {
             d: exact.d.map(|row| row.map(|e| e.0)),
             inverse_rho: condensed.inverse_rho.0,
             times: condensed.times.0,
-            ahead: std::array::from_fn(|i| std::array::from_fn(|j| condensed.ahead.0[j].0[i])),
+            first: first_sweep(condensed),
             end_u: pair(exact.end_u),
             end_b: exact.end_b.map(pair),
             grow: pair(exact.grow),
@@ -170,58 +172,6 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     doubt: Pack<S, K>,
 }
 
-/// The sweeps after which an iteration counts as not contracting.
-const LIMIT: u32 = 60;
-
-/// See `Sweeps` of `gauss/sweeps.rs`, lane by lane.
-#[derive(Clone, Copy)]
-struct Judge<S: Simd, const K: usize> {
-    before: Pack<S, K>,
-    ratio: Pack<S, K>,
-    /// 1 where the next sweep is the last.
-    last: Pack<S, K>,
-    risen: Pack<S, K>,
-    count: u32,
-}
-
-impl<S: Simd, const K: usize> Judge<S, K> {
-    #[inline(always)]
-    fn new() -> Self {
-        let zero = Pack::zero();
-        Judge { before: zero, ratio: zero, last: zero, risen: zero, count: 0 }
-    }
-
-    /// Judges a sweep by the largest change and the largest term of each lane: 1 where it goes on, in the second where it is given up.
-    #[inline(always)]
-    fn judge(&mut self, change: Pack<S, K>, size: Pack<S, K>) -> [Pack<S, K>; 2] {
-        let [zero, one] = [0.0, 1.0].map(Pack::splat);
-        self.count += 1;
-        let round_off = size * (0.5 * f64::EPSILON);
-        let near = round_off * 256.0;
-        // Not `less` the other way: a NaN goes on, and is given up below.
-        let enough = change.at_most(round_off * (1.0 / 16.0), one, self.last * change.at_most(near, one, zero));
-        let mut going = one - enough;
-        let mut given_up = one - (change + size).at_most(Pack::splat(f64::MAX), one, zero);
-        if self.count > 1 {
-            let ratio = change / self.before;
-            let slower = if self.count > 2 { self.ratio } else { Pack::splat(0.1) };
-            let expected = ratio.at_most(slower, slower, ratio);
-            let next = change * expected;
-            let left = round_off * (1.0 / 64.0);
-            going = next.at_most(left, zero, going);
-            self.last = (next * expected).at_most(left, one, zero);
-            let rises = one.at_most(ratio, one, zero);
-            going = (rises * change.at_most(near, one, zero)).at_most(zero, going, zero);
-            self.risen += rises;
-            let slow = if self.count > LIMIT { one } else { self.risen.at_most(Pack::splat(3.0), zero, one) };
-            given_up = slow.at_most(zero, given_up, one);
-            self.ratio = ratio;
-        }
-        self.before = change;
-        [going, given_up * going]
-    }
-}
-
 impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
     #[inline(always)]
     fn all<S: Simd, const K: usize, const ACTION: bool>(&self, lanes: &mut [Lane<N>], stride: usize) {
@@ -287,30 +237,24 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
         let s = self.table.s.min(MOST);
         let [zero, one] = [0.0, 1.0].map(Pack::splat);
         let mut last = [[zero; N]; ABREAST];
-        let mut open = false;
         for (m, last) in moving.iter_mut().zip(&mut last) {
             *last = m.a[0];
-            if warm {
-                let before = m.a;
-                for i in 0..s {
-                    m.a[i] = combined(&self.table.ahead[i], &before, s);
-                }
-            } else {
+            if !warm {
                 m.a = [[zero; N]; MOST];
             }
-            self.begin(m, s);
+            self.begin(m, s, false);
             (m.going, m.judge) = (one - m.failed, Judge::new());
             m.open = m.going.any();
+        }
+        self.sweep::<S, K, ACTION>(moving, if warm { &self.table.first } else { &self.table.b }, false, t);
+        let mut open = false;
+        for m in moving.iter_mut() {
+            self.begin(m, s, true);
+            (m.change, m.size) = (zero, zero);
             open |= m.open;
         }
         while open {
-            for i in 0..s {
-                for m in moving.iter_mut() {
-                    if m.open {
-                        self.stage::<S, K, ACTION>(m, t, i, s);
-                    }
-                }
-            }
+            self.sweep::<S, K, ACTION>(moving, &self.table.b, true, t);
             open = false;
             for m in moving.iter_mut() {
                 if !m.open {
@@ -320,10 +264,6 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
                 m.failed += given_up * m.going;
                 m.going = m.going * going * (one - given_up);
                 (m.change, m.size) = (zero, zero);
-                if !warm && m.judge.count == 1 {
-                    // The first guess was no motion at all.
-                    self.begin(m, s);
-                }
                 m.open = m.going.any();
                 open |= m.open;
             }
@@ -334,17 +274,43 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
         }
     }
 
+    /// The accelerations of all stages in their order, by a matrix that takes them to positions.
+    #[inline(always)]
+    fn sweep<S: Simd, const K: usize, const ACTION: bool>(
+        &self,
+        moving: &mut [Moving<S, K, N>],
+        rows: &[[f64; MOST]; MOST],
+        judged: bool,
+        t: f64,
+    ) {
+        for (i, row) in rows[..self.table.s].iter().enumerate() {
+            for m in moving.iter_mut() {
+                if m.open {
+                    self.stage::<S, K, ACTION>(m, t, (i, row), judged);
+                }
+            }
+        }
+    }
+
     /// The acceleration of one stage, from the newest of the others.
     #[inline(always)]
-    fn stage<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64, i: usize, s: usize) {
+    fn stage<S: Simd, const K: usize, const ACTION: bool>(
+        &self,
+        m: &mut Moving<S, K, N>,
+        t: f64,
+        (i, row): (usize, &[f64; MOST]),
+        judged: bool,
+    ) {
         let zero = Pack::zero();
-        let sum = combined(&self.table.b[i], &m.a, s);
+        let sum = combined(row, &m.a, self.table.s);
         let x: [Pack<S, K>; N] = std::array::from_fn(|d| m.base[i][d] + sum[d]);
         let a = self.accelerations(t + self.table.times[i], &x);
         for d in 0..N {
             let before = m.a[i][d];
-            m.change = m.change.larger((a[d] - before).abs());
-            m.size = m.size.larger(a[d].abs());
+            if judged {
+                m.change = m.change.larger((a[d] - before).abs());
+                m.size = m.size.larger(a[d].abs());
+            }
             m.a[i][d] = m.going.at_most(zero, before, a[d]);
             if ACTION {
                 m.x[i][d] = m.going.at_most(zero, m.x[i][d], x[d]);
@@ -386,12 +352,12 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
         m.doubt = (turn * h).at_most(fast * TURN, m.doubt, moves);
     }
 
-    /// What the sweeps of a step have in common.
+    /// What the sweeps of a step have in common; with the parts that rounding of the coefficients leaves out, once accelerations are about known.
     #[inline(always)]
-    fn begin<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, s: usize) {
+    fn begin<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, s: usize, tails: bool) {
         for i in 0..s {
             let [u, u_tail] = self.table.u[i].map(Pack::splat);
-            let of_tails = combined(&self.table.b_tail[i], &m.a, s);
+            let of_tails = if tails { combined(&self.table.b_tail[i], &m.a, s) } else { [Pack::zero(); N] };
             for d in 0..N {
                 let (q, v) = (m.q[d], m.v[d]);
                 // The small terms first: a sum that has been rounded would not know them.
@@ -439,6 +405,43 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
     }
 }
 
+/// The matrix `B` of the first sweep of a step: row i takes the last accelerations that are known there, those of the step's stages before i and of the
+/// step before it from i on, to the position that the polynomial through them foretells.
+fn first_sweep(condensed: &Condensed) -> [[f64; MOST]; MOST] {
+    let (s, c) = (condensed.s, &Coefficients::of(condensed.s).c);
+    let zero = Quad::zero();
+    // From the nodes of a step to those of this one and of the one before, and one over them.
+    let (mut apart, mut inverse) = ([[[zero; MOST]; MOST]; 2], [[[zero; MOST]; MOST]; 2]);
+    for (j, k, before) in (0..2 * s * s).map(|at| (at / 2 % s, at / 2 / s, at % 2)) {
+        let distance = c[j] - c[k] + Quad::from(before as f64);
+        apart[before][j][k] = distance;
+        inverse[before][j][k] = if distance.0 == 0.0 { zero } else { distance.recip() };
+    }
+    let mut rows = [[0.0; MOST]; MOST];
+    for i in 0..s {
+        let before = |k: usize| usize::from(k >= i);
+        let mut row = condensed.b[i];
+        row[i..].fill(zero);
+        let scale: [Quad; MOST] = std::array::from_fn(|k| {
+            let others = (0..s).filter(|m| *m != k);
+            others.fold(Quad::one(), |product, m| match (before(k), before(m)) {
+                (0, 1) => product * inverse[1][k][m],
+                (1, 0) => -product * inverse[1][m][k],
+                _ => product * inverse[0][k][m],
+            })
+        });
+        // Lagrange's polynomials of the nodes k at the nodes j: all distances of j but the one to k, over those of k to the others.
+        for j in i..s {
+            let all = (0..s).fold(condensed.b[i][j], |all, m| all * apart[before(m)][j][m]);
+            for k in 0..s {
+                row[k] += all * inverse[before(k)][j][k] * scale[k];
+            }
+        }
+        rows[i] = row.map(|e| e.0);
+    }
+    rows
+}
+
 /// The sum over the stages of a row of coefficients with the values there; in two parts, which do not wait for each other.
 #[inline(always)]
 fn combined<S: Simd, const K: usize, const N: usize>(
@@ -460,4 +463,33 @@ fn combined<S: Simd, const K: usize, const N: usize>(
         }
     }
     std::array::from_fn(|d| sum[d] + odd[d])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where the accelerations of two steps are a polynomial that the stages of one determine, the first sweep has the positions that the others
+    /// converge to, to the round-off of its sums: of s terms, and of what the coefficients were rounded by.
+    #[test]
+    fn first_sweeps_foretell_polynomials() {
+        for (s, h, gamma) in [(1, 0.3, -0.1), (2, 0.7, 0.0), (5, 1.1, -0.2), (10, 1.1, 0.1), (16, 2.0, -1.0)] {
+            let condensed = Condensed::new(s, h, gamma).unwrap();
+            let (rows, c) = (first_sweep(&condensed), &Coefficients::of(s).c);
+            // Chebyshev's polynomial of degree s - 1 over the two steps, of size one.
+            let a = |x: f64| ((s - 1) as f64 * x.acos()).cos();
+            for i in 0..s {
+                let before = |j: usize| a(if j < i { c[j].0 } else { c[j].0 - 1.0 });
+                let (mut foretold, mut position, mut size) = (0.0, 0.0, 0.0);
+                for j in 0..s {
+                    foretold += rows[i][j] * before(j);
+                    position += condensed.b[i][j].0 * a(c[j].0);
+                    size += rows[i][j].abs() + condensed.b[i][j].0.abs();
+                }
+                // The values of the polynomial are off by eps s^2, by how steep it is.
+                let bound = ((s * s) as f64 + 4.0) * f64::EPSILON * size;
+                assert!((foretold - position).abs() <= bound, "{s} stages, {i}: {foretold:e} {position:e}");
+            }
+        }
+    }
 }

@@ -4,6 +4,7 @@ mod accuracy;
 mod checkpoint;
 mod error;
 mod gauss;
+mod judge;
 mod lane;
 mod member;
 mod observed;
