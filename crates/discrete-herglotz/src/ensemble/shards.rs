@@ -23,6 +23,28 @@ struct Shared<R> {
     changed: Condvar,
 }
 
+impl<R> Window<R> {
+    /// Whether a shard may be taken, of so many.
+    fn has_work(&self, count: usize, most: usize) -> bool {
+        self.next < count && self.next - self.handed_on < most
+    }
+
+    fn take(&mut self) -> usize {
+        self.next += 1;
+        self.next - 1
+    }
+
+    /// The result of a shard, where it is done.
+    fn result(&mut self, shard: usize) -> Option<R> {
+        let place = self.done.iter().position(|(number, _)| *number == shard)?;
+        Some(self.done.swap_remove(place).1)
+    }
+
+    fn is_done(&self, shard: usize) -> bool {
+        self.done.iter().any(|(number, _)| *number == shard)
+    }
+}
+
 impl<R> Shared<R> {
     fn lock(&self) -> MutexGuard<'_, Window<R>> {
         self.window.lock().unwrap_or_else(PoisonError::into_inner)
@@ -50,37 +72,30 @@ impl<R> Drop for AtTheEnd<'_, R> {
     }
 }
 
-/// Does so many shards by so many threads, and hands each result on, in the order of the shards, on the
+/// Does so many shards by so many threads, the caller's among them, and hands each result on, in the order of the shards, on the
 /// thread of the caller, until that breaks. At most [`WINDOW_OF_A_THREAD`] results a thread are kept at a time.
+///
+/// The caller computes too: with a thread that only waits to hand on, the others would make room for it after each shard.
 pub(super) fn in_order<R: Send>(
     threads: usize,
     count: usize,
     work: impl Fn(usize) -> R + Sync,
     mut hand_on: impl FnMut(R) -> ControlFlow<()>,
 ) {
-    if threads < 2 || count < 2 {
-        for shard in 0..count {
-            if hand_on(work(shard)).is_break() {
-                return;
-            }
-        }
-        return;
-    }
     let window = Window { next: 0, handed_on: 0, done: Vec::new(), over: false };
     let shared = Shared { window: Mutex::new(window), changed: Condvar::new() };
     let threads = threads.min(count);
     let most = WINDOW_OF_A_THREAD * threads;
     std::thread::scope(|scope| {
-        for _ in 0..threads {
+        for _ in 1..threads {
             scope.spawn(|| {
                 let _guard = AtTheEnd(&shared, false);
                 loop {
-                    let mut window = shared.wait_while(|w| !w.over && w.next < count && w.next - w.handed_on >= most);
+                    let mut window = shared.wait_while(|w| !w.over && w.next < count && !w.has_work(count, most));
                     if window.over || window.next >= count {
                         return;
                     }
-                    let shard = window.next;
-                    window.next += 1;
+                    let shard = window.take();
                     drop(window);
                     let result = work(shard);
                     shared.change(|window| window.done.push((shard, result)));
@@ -88,16 +103,25 @@ pub(super) fn in_order<R: Send>(
             });
         }
         let _guard = AtTheEnd(&shared, true);
-        for shard in 0..count {
-            let place = |w: &Window<R>| w.done.iter().position(|(number, _)| *number == shard);
-            let mut window = shared.wait_while(|w| !w.over && place(w).is_none());
-            let Some(place) = place(&window) else { return };
-            let (_, result) = window.done.swap_remove(place);
-            drop(window);
-            if hand_on(result).is_break() {
+        let mut shard = 0;
+        while shard < count {
+            let mut window = shared.wait_while(|w| !w.over && !w.is_done(shard) && !w.has_work(count, most));
+            if window.over {
                 return;
             }
-            shared.change(|window| window.handed_on = shard + 1);
+            if let Some(result) = window.result(shard) {
+                drop(window);
+                if hand_on(result).is_break() {
+                    return;
+                }
+                shard += 1;
+                shared.change(|window| window.handed_on = shard);
+            } else {
+                let own = window.take();
+                drop(window);
+                let result = work(own);
+                shared.lock().done.push((own, result));
+            }
         }
     });
 }
