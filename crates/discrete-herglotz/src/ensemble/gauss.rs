@@ -162,8 +162,9 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     /// 1 in lanes whose sweeps go on; and in those that have failed.
     going: Pack<S, K>,
     failed: Pack<S, K>,
-    /// Whether the sweeps of a lane go on; the largest change and the largest term of the last.
+    /// Whether the sweeps of a lane go on, and of all; the largest change and the largest term of the last.
     open: bool,
+    whole: bool,
     change: Pack<S, K>,
     size: Pack<S, K>,
     judge: Judge<S, K>,
@@ -214,6 +215,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
             going: zero,
             failed: zero,
             open: false,
+            whole: true,
             change: zero,
             size: zero,
             judge: Judge::new(),
@@ -244,7 +246,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
             }
             self.begin(m, s, false);
             (m.going, m.judge) = (one - m.failed, Judge::new());
-            m.open = m.going.any();
+            (m.open, m.whole) = (m.going.any(), !m.failed.any());
         }
         self.sweep::<S, K, ACTION>(moving, if warm { &self.table.first } else { &self.table.b }, false, t);
         let mut open = false;
@@ -264,7 +266,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
                 m.failed += given_up * m.going;
                 m.going = m.going * going * (one - given_up);
                 (m.change, m.size) = (zero, zero);
-                m.open = m.going.any();
+                (m.open, m.whole) = (m.going.any(), !(one - m.going).any());
                 open |= m.open;
             }
         }
@@ -311,9 +313,10 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
                 m.change = m.change.larger((a[d] - before).abs());
                 m.size = m.size.larger(a[d].abs());
             }
-            m.a[i][d] = m.going.at_most(zero, before, a[d]);
+            // What has ended stays, whatever its neighbours do.
+            m.a[i][d] = if m.whole { a[d] } else { m.going.at_most(zero, before, a[d]) };
             if ACTION {
-                m.x[i][d] = m.going.at_most(zero, m.x[i][d], x[d]);
+                m.x[i][d] = if m.whole { x[d] } else { m.going.at_most(zero, m.x[i][d], x[d]) };
             }
         }
     }

@@ -28,18 +28,23 @@ pub(super) struct Lane<const N: usize> {
 impl<const N: usize> Lane<N> {
     /// At its start, with room for so many rows where they are recorded.
     pub fn new(t0: f64, state: PhasePoint<N>, rows: Option<usize>, action: bool) -> Self {
-        let mut lane = Lane { state, rows: rows.map(Vec::with_capacity), doubtful: false, action };
-        lane.reach(t0, state);
-        lane
+        let rows = rows.map(|most| {
+            let mut rows = Vec::with_capacity(most);
+            rows.push(row(t0, state, action));
+            rows
+        });
+        Lane { state, rows, doubtful: false, action }
     }
 
     /// Takes in a state of which a row is recorded, where any are.
     pub fn reach(&mut self, t: f64, state: PhasePoint<N>) {
         self.state = state;
         if let Some(rows) = &mut self.rows {
-            let PhasePoint { q, p, z } = state;
-            let z = self.action.then_some(z);
-            rows.push(Row { t, q, v: None, p, z, energy: None, log_factor: None, columns: Vec::new() });
+            rows.push(row(t, state, self.action));
         }
     }
+}
+
+fn row<const N: usize>(t: f64, PhasePoint { q, p, z }: PhasePoint<N>, action: bool) -> Row<N> {
+    Row { t, q, v: None, p, z: action.then_some(z), energy: None, log_factor: None, columns: Vec::new() }
 }

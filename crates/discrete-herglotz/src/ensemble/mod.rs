@@ -397,12 +397,9 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     /// Runs the members of a shard.
     fn shard(&self, shard: usize) -> Shard<N> {
         let range = self.members_of(shard);
-        let mut members: Vec<Member<N>> = Vec::with_capacity(range.len());
-        let mut starts = Vec::with_capacity(range.len());
-        for index in range {
-            starts.push((self.members)(index));
-            members.push(Member { index, ending: Err(InputError::NoSteps), rows: Vec::new() });
-        }
+        let starts: Vec<_> = range.clone().map(self.members).collect();
+        let member = |index| Member { index, ending: Err(InputError::NoSteps), rows: Vec::new() };
+        let mut members: Vec<_> = range.map(member).collect();
         let mut in_lanes = 0;
         let mut from = 0;
         // Members in sequence that have one Lagrangian.
@@ -417,7 +414,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     fn group(&self, starts: &[(&'a L, Start<N>)], members: &mut [Member<N>]) -> usize {
         let Some(lagrangian) = starts.first().map(|start| start.0) else { return 0 };
         let (Common { t0, action, rows, length, .. }, (h, steps)) = (self.common, self.plan);
-        let (mut places, mut lanes) = (Vec::with_capacity(starts.len()), Vec::with_capacity(starts.len()));
+        let (mut places, mut states) = (Vec::with_capacity(starts.len()), Vec::with_capacity(starts.len()));
         let mut own = None;
         let [kernel, finer] = self.kernels.as_ref().unwrap_or_else(|| {
             let state = starts.iter().find_map(|(_, start)| start.state(lagrangian, t0));
@@ -429,17 +426,18 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
                     && !tiny(&state, h)
                 {
                     places.push(place);
-                    lanes.push(Lane::new(t0, state, rows.map(|_| self.common.rows_of(steps)), action));
+                    states.push(state);
                 }
             }
         }
+        let most_rows = rows.map(|_| self.common.rows_of(steps));
+        let mut lanes: Vec<_> = states.iter().map(|state| Lane::new(t0, *state, most_rows, action)).collect();
         let mut done = [false; SHARD];
         let mut in_lanes = 0;
         let wants = Wants { rows, watched: self.watched };
         forget_branches();
         if let Some(wanted) = length.wanted() {
-            let at_start = lanes.iter().map(|lane: &Lane<N>| Lane::new(t0, lane.state, None, false));
-            let mut ends: Vec<Lane<N>> = at_start.collect();
+            let mut ends: Vec<_> = states.iter().map(|state| Lane::new(t0, *state, None, false)).collect();
             finer.run(self.instructions, &mut ends, false, Wants { rows: None, watched: false });
             kernel.run(self.instructions, &mut lanes, action, wants);
             accuracy::refuse_beyond(wanted, &mut lanes, &ends);

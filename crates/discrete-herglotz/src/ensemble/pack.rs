@@ -98,6 +98,7 @@ impl<S: Simd, const K: usize> Pack<S, K> {
 }
 
 impl<S: Simd, const K: usize> Register for Pack<S, K> {
+    const FUSED: bool = true;
     #[inline(always)]
     fn splat(x: f64) -> Self {
         Pack::splat(x)

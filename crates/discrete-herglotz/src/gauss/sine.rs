@@ -8,8 +8,11 @@ pub(crate) const REDUCIBLE: f64 = 5e5;
 /// 1.5 * 2^52: a number of a smaller size added to it is rounded to an integer, whose last digit is the last of the sum's.
 const ROUNDING: f64 = 6_755_399_441_055_744.0;
 
-/// pi to 140 binary digits: 33, 33 and the rest. The products of the first two with the turns are exact.
-const PI: [f64; 3] = [
+/// pi to 107 binary digits. With fused products the first difference is exact: a multiple of the last digits of both, and below 2.
+const PI: [f64; 2] = [std::f64::consts::PI, f64::from_bits(0x3ca1_a626_3314_5c07)];
+
+/// pi to 140 binary digits: 33, 33 and the rest. The products of the first two with the turns are exact without fusing.
+const PI_IN_PARTS: [f64; 3] = [
     f64::from_bits(0x4009_21fb_5440_0000),
     f64::from_bits(0x3de0_b461_1a60_0000),
     f64::from_bits(0x3bb3_198a_2e03_7073),
@@ -30,6 +33,8 @@ const SINE: [f64; 8] = [
 
 /// What the functions of this module ask of registers.
 pub(crate) trait Register: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// Whether [`mul_add`](Self::mul_add) rounds once for certain.
+    const FUSED: bool;
     /// A constant in all lanes.
     fn splat(x: f64) -> Self;
     /// `self b + c`.
@@ -38,7 +43,7 @@ pub(crate) trait Register: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<
     fn turned(self, of: Self) -> Self;
 }
 
-/// `sin x` for `|x|` below [`REDUCIBLE`], within 2 units in the last place.
+/// `sin x` for `|x|` below [`REDUCIBLE`], within 2 units in the last place and `1e-33 |x|`, which two parts of pi leave out.
 #[inline(always)]
 pub(crate) fn sine<R: Register>(x: R) -> R {
     let rounded = x.mul_add(R::splat(std::f64::consts::FRAC_1_PI), R::splat(ROUNDING));
@@ -57,9 +62,8 @@ pub(crate) fn cosine<R: Register>(x: R) -> R {
 /// `(-1)^k sin(x - turns pi)` where the last binary digit of `rounded` is that of k.
 #[inline(always)]
 fn reduced<R: Register>(x: R, turns: R, rounded: R) -> R {
-    let r = turns.mul_add(R::splat(-PI[0]), x);
-    let r = turns.mul_add(R::splat(-PI[1]), r);
-    let r = turns.mul_add(R::splat(-PI[2]), r);
+    let part = |r: R, part: f64| turns.mul_add(R::splat(-part), r);
+    let r = if const { R::FUSED } { PI.into_iter().fold(x, part) } else { PI_IN_PARTS.into_iter().fold(x, part) };
     let y = r * r;
     let mut sum = R::splat(SINE[0]);
     for c in &SINE[1..] {
