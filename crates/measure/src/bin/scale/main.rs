@@ -15,6 +15,7 @@ mod ensembles;
 mod lattice;
 mod memory;
 mod path;
+mod peer;
 mod report;
 mod seconds;
 mod solar;

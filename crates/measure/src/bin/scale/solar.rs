@@ -1,13 +1,12 @@
 //! The outer solar system with a drag over 1e4 years, beside REBOUND's IAS15.
 
 use crate::chain::refused;
+use crate::peer::python;
 use crate::report::Report;
 use assembled_herglotz::systems::OuterSolarSystem;
 use assembled_herglotz::{AssembledSplitting, AssembledSystem, State};
 use contact_examples::{Failure, print};
 use discrete_herglotz::SplittingScheme;
-use std::io::Write;
-use std::process::{Command, Stdio};
 use std::time::Instant;
 
 const CASE: &str = "solar";
@@ -92,22 +91,10 @@ fn ias15(days: f64, exact: &[f64]) -> Result<Option<Vec<Found>>, Failure> {
             input += &format!("{x:e}\n");
         }
     }
-    let python = Command::new("python3")
-        .args(["-c", include_str!("solar_ias15.py")])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn();
-    let Ok(mut python) = python else { return Ok(None) };
-    // Where it has ended already there is nothing to read.
-    let _ = python.stdin.take().map(|mut stdin| stdin.write_all(input.as_bytes()));
-    let output = python.wait_with_output().map_err(Failure::Terminal)?;
-    if !output.status.success() {
-        return Ok(None);
-    }
+    let Some(output) = python(include_str!("solar_ias15.py"), &input)? else { return Ok(None) };
     let row = |line: &str| {
         let numbers: Vec<f64> = line.split(' ').filter_map(|x| x.parse().ok()).collect();
         (distance(numbers.get(2..).unwrap_or(&[]), exact), numbers.get(1).copied().unwrap_or(f64::NAN))
     };
-    Ok(Some(String::from_utf8_lossy(&output.stdout).lines().map(row).collect()))
+    Ok(Some(output.lines().map(row).collect()))
 }
