@@ -187,27 +187,25 @@ fn reduce<const N: usize>(
         let size = pivot.abs();
         sound &= size >= LEAST_PIVOT * diagonal[j] && size > 0.0 && size < f64::INFINITY;
         let inverse = 1.0 / pivot;
-        let mut others = block.column(j).into_owned();
-        others[j] = 0.0;
+        let others = SVector::<f64, N>::from_fn(|i, _| block[(i, j)]);
+        // Whole columns at a time: one entry that is written by itself would have its column waited for.
+        let reduced = |i: usize, x: f64, entry: f64| if i == j { entry } else { x - others[i] * entry };
         for c in j + 1..N {
             let entry = block[(j, c)] * inverse;
             for i in 0..N {
-                block[(i, c)] -= others[i] * entry;
+                block[(i, c)] = reduced(i, block[(i, c)], entry);
             }
-            block[(j, c)] = entry;
         }
         for c in 0..N {
             let entry = next[(j, c)] * inverse;
             for i in 0..N {
-                next[(i, c)] -= others[i] * entry;
+                next[(i, c)] = reduced(i, next[(i, c)], entry);
             }
-            next[(j, c)] = entry;
         }
         let entry = rhs[j] * inverse;
         for i in 0..N {
-            rhs[i] -= others[i] * entry;
+            rhs[i] = reduced(i, rhs[i], entry);
         }
-        rhs[j] = entry;
     }
     sound
 }
