@@ -188,14 +188,20 @@ impl<const N: usize> Measured<N> {
     /// Takes a residual in, with the sizes of its terms.
     #[inline(always)]
     pub fn take(&mut self, value: &SVector<f64, N>, size: &SVector<f64, N>) {
+        // Few points exceed all before them: the rest is done for all coordinates at once, without a quotient. What is not a number does exceed.
+        let mut exceeds = false;
         for i in 0..N {
             let off = value[i].abs();
-            self.residual = larger(self.residual, off);
             self.squares[i] += off * off;
             self.sizes[i] = larger(self.sizes[i], size[i]);
-            // A quotient at each point would cost as much as the rest; one that is not a number stays.
-            if off > self.relative * size[i] || off.is_nan() || size[i].is_nan() {
-                self.relative = larger(self.relative, off / size[i]);
+            exceeds |= !(off <= self.relative * size[i]) | !(off <= self.residual);
+        }
+        if exceeds {
+            for (off, size) in value.iter().map(|x| x.abs()).zip(size) {
+                self.residual = larger(self.residual, off);
+                if !(off <= self.relative * size) {
+                    self.relative = larger(self.relative, off / size);
+                }
             }
         }
     }
