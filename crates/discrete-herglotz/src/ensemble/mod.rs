@@ -47,7 +47,7 @@ pub enum InLanes {
 }
 
 /// The members that are computed, kept and handed on together: whole packs of one to four registers of at most eight lanes.
-const SHARD: usize = 768;
+const SHARD: usize = 384;
 
 /// The members of an ensemble that get all checks of a run before it begins.
 const SAMPLE: usize = 4;
