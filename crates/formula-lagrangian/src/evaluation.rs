@@ -1,5 +1,6 @@
 //! A tape at work on numbers of any kind.
 
+use crate::Function;
 use crate::functions::{atan2, hypot};
 use crate::tape::{Code, InputRegisters, Instruction, PREVIOUS, Tape};
 use contact_geom::Scalar;
@@ -56,28 +57,16 @@ impl Tape {
         self.interpret(at, &mut OnStack([T::zero(); LARGE]).0, results);
     }
 
-    /// One copy of the code for each kind of numbers, whatever the number of registers: it is long, and compiled for each dimension.
+    /// What is moved in and out is part of the caller, which knows how many numbers there are. The code is run in one place for each kind of
+    /// numbers, whatever the number of registers: it is long, and compiled for each dimension.
     #[inline(always)]
     fn interpret<T: Scalar>(&self, at: At<'_, T>, registers: &mut [T], results: &mut [&mut [T]]) {
-        T::apart(
-            #[inline(always)]
-            || self.run(at, registers, results),
-        );
-    }
-
-    #[inline(always)]
-    fn run<T: Scalar>(&self, at: At<'_, T>, registers: &mut [T], results: &mut [&mut [T]]) {
-        // Plain loops and branches: chained iterators, and what moves numbers about, cost more than all the work of a short tape.
         let InputRegisters { q, v, z, t } = self.inputs;
         if let Some(first) = q {
-            for (x, i) in at.q.iter().zip(first..) {
-                set(registers, i, *x);
-            }
+            copy(registers, first, at.q);
         }
         if let Some(first) = v {
-            for (x, i) in at.v.iter().zip(first..) {
-                set(registers, i, *x);
-            }
+            copy(registers, first, at.v);
         }
         if let Some(z) = z {
             set(registers, z, at.z);
@@ -85,18 +74,41 @@ impl Tape {
         if let Some(t) = t {
             set(registers, t, at.t);
         }
-        let mut previous = T::zero();
-        for instruction in &self.code {
-            previous = perform(instruction, registers, previous);
-            set(registers, instruction.to, previous);
+        let mut last = T::zero();
+        if !self.code.is_empty() {
+            let code = self.code.as_slice();
+            last = T::apart(
+                #[inline(always)]
+                || run(code, registers),
+            );
         }
         let mut places = self.results.iter();
         for part in results.iter_mut() {
             for (result, place) in part.iter_mut().zip(&mut places) {
-                let value = if place.register == PREVIOUS { previous } else { get(registers, place.register) };
+                let value = if place.register == PREVIOUS { last } else { get(registers, place.register) };
                 *result = if place.negative { -value } else { value };
             }
         }
+    }
+}
+
+/// Performs the instructions; returns the last result.
+#[inline(always)]
+fn run<T: Scalar>(code: &[Instruction], registers: &mut [T]) -> T {
+    let mut previous = T::zero();
+    for instruction in code {
+        previous = perform(instruction, registers, previous);
+        set(registers, instruction.to, previous);
+    }
+    previous
+}
+
+/// Numbers to the registers from the first on.
+#[inline(always)]
+fn copy<T: Scalar>(registers: &mut [T], first: u16, from: &[T]) {
+    let first = usize::from(first);
+    if let Some(places) = registers.get_mut(first..first + from.len()) {
+        places.copy_from_slice(from);
     }
 }
 
@@ -133,15 +145,49 @@ fn perform<T: Scalar>(instruction: &Instruction, registers: &[T], previous: T) -
         Code::DivConstant => a() / k,
         Code::ConstantDiv => T::from(k) / a(),
         Code::MulConstantAdd => a() * k + b(),
-        Code::Function(function) => function.value(a()),
+        Code::Function(function) => value(function, a()),
         Code::Min => Scalar::min(a(), b()),
         Code::Max => Scalar::max(a(), b()),
-        Code::Atan2 => atan2(a(), b()),
-        Code::Hypot => hypot(a(), b()),
-        Code::Power => power(a(), k),
+        Code::Atan2 => {
+            let (y, x) = (a(), b());
+            T::apart(
+                #[inline(always)]
+                || atan2(y, x),
+            )
+        }
+        Code::Hypot => {
+            let (x, y) = (a(), b());
+            T::apart(
+                #[inline(always)]
+                || hypot(x, y),
+            )
+        }
+        Code::Power => {
+            let x = a();
+            T::apart(
+                #[inline(always)]
+                || power(x, k),
+            )
+        }
         Code::Powi => a().powi(instruction.extra as u32 as i32),
         Code::Select => a().if_less(b(), r(c), r(d)),
         Code::Constant => T::from(k),
+    }
+}
+
+/// A function of one number. Those that are rare in mechanics are a piece of code of their own, so that what is read most often stays short.
+#[inline(always)]
+fn value<T: Scalar>(function: Function, x: T) -> T {
+    match function {
+        Function::Neg => -x,
+        Function::Recip => x.recip(),
+        Function::Sqrt => x.sqrt(),
+        Function::Sin => x.sin(),
+        Function::Cos => x.cos(),
+        rare => T::apart(
+            #[inline(always)]
+            || rare.value(x),
+        ),
     }
 }
 
