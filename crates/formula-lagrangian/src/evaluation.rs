@@ -74,10 +74,9 @@ impl Tape {
         if let Some(t) = t {
             set(registers, t, at.t);
         }
-        let mut last = T::zero();
         if !self.code.is_empty() {
             let code = self.code.as_slice();
-            last = T::apart(
+            T::apart(
                 #[inline(always)]
                 || run(code, registers),
             );
@@ -85,22 +84,21 @@ impl Tape {
         let mut places = self.results.iter();
         for part in results.iter_mut() {
             for (result, place) in part.iter_mut().zip(&mut places) {
-                let value = if place.register == PREVIOUS { last } else { get(registers, place.register) };
+                let value = get(registers, place.register);
                 *result = if place.negative { -value } else { value };
             }
         }
     }
 }
 
-/// Performs the instructions; returns the last result.
+/// Performs the instructions. It returns no number: that would have the place of the result before, which then is not in a register.
 #[inline(always)]
-fn run<T: Scalar>(code: &[Instruction], registers: &mut [T]) -> T {
+fn run<T: Scalar>(code: &[Instruction], registers: &mut [T]) {
     let mut previous = T::zero();
     for instruction in code {
         previous = perform(instruction, registers, previous);
         set(registers, instruction.to, previous);
     }
-    previous
 }
 
 /// Numbers to the registers from the first on.
@@ -139,36 +137,39 @@ fn perform<T: Scalar>(instruction: &Instruction, registers: &[T], previous: T) -
         Code::Mul => a() * b(),
         Code::Div => a() / b(),
         Code::MulAdd => a() * b() + r(c),
+        Code::MulSub => r(c) - a() * b(),
         Code::AddConstant => a() + k,
         Code::ConstantSub => -a() + k,
         Code::MulConstant => a() * k,
         Code::DivConstant => a() / k,
         Code::ConstantDiv => T::from(k) / a(),
         Code::MulConstantAdd => a() * k + b(),
+        Code::MulConstantSub => b() - a() * k,
+        Code::ScaledProduct => a() * b() * k,
         Code::Function(function) => value(function, a()),
         Code::Min => Scalar::min(a(), b()),
         Code::Max => Scalar::max(a(), b()),
         Code::Atan2 => {
             let (y, x) = (a(), b());
-            T::apart(
+            apart(
+                y,
                 #[inline(always)]
-                || atan2(y, x),
+                move |y| atan2(y, x),
             )
         }
         Code::Hypot => {
             let (x, y) = (a(), b());
-            T::apart(
+            apart(
+                x,
                 #[inline(always)]
-                || hypot(x, y),
+                move |x| hypot(x, y),
             )
         }
-        Code::Power => {
-            let x = a();
-            T::apart(
-                #[inline(always)]
-                || power(x, k),
-            )
-        }
+        Code::Power => apart(
+            a(),
+            #[inline(always)]
+            move |x| power(x, k),
+        ),
         Code::Powi => a().powi(instruction.extra as u32 as i32),
         Code::Select => a().if_less(b(), r(c), r(d)),
         Code::Constant => T::from(k),
@@ -184,11 +185,23 @@ fn value<T: Scalar>(function: Function, x: T) -> T {
         Function::Sqrt => x.sqrt(),
         Function::Sin => x.sin(),
         Function::Cos => x.cos(),
-        rare => T::apart(
+        rare => apart(
+            x,
             #[inline(always)]
-            || rare.value(x),
+            move |x| rare.value(x),
         ),
     }
+}
+
+/// Work on a number as a function of its own. What that writes to is a place of its own too: one that others see is not kept in a register,
+/// and the result of the instruction before would be in it.
+#[inline(always)]
+fn apart<T: Scalar>(mut x: T, work: impl FnOnce(T) -> T) -> T {
+    T::apart(
+        #[inline(always)]
+        || x = work(x),
+    );
+    x
 }
 
 /// `x^a`; a parameter may be an integer, with which the power of a negative number is defined.
