@@ -13,6 +13,10 @@ const SMALL: usize = 8;
 const MIDDLE: usize = 32;
 const LARGE: usize = 256;
 
+/// The coordinates up to which numbers are moved in and out by the caller of an interpreter, which knows how many they are: of more that is
+/// slow to compile.
+const FEW: usize = 2;
+
 /// The point at which a tape is evaluated.
 #[derive(Clone, Copy)]
 pub(crate) struct At<'a, T> {
@@ -34,33 +38,59 @@ impl<'a, T: Scalar> At<'a, T> {
 struct OnStack<T, const R: usize>([T; R]);
 
 impl Tape {
-    /// Evaluates it and writes the results to slices, one after the other.
+    /// Evaluates it over N coordinates, or over any number of them where N is 0, and writes the results to slices, one after the other.
     #[inline(always)]
-    pub fn evaluate<T: Scalar>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
+    pub fn evaluate<T: Scalar, const N: usize>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
         // Nothing that takes many steps evaluates nested duals.
         if T::NESTED || self.registers > LARGE {
-            self.interpret(at, &mut vec![T::zero(); self.registers], results);
+            self.interpret::<T, N>(at, &mut vec![T::zero(); self.registers], results);
         } else if self.registers <= TINY {
-            self.interpret(at, &mut OnStack([T::zero(); TINY]).0, results);
+            self.interpret::<T, N>(at, &mut OnStack([T::zero(); TINY]).0, results);
         } else if self.registers <= SMALL {
-            self.interpret(at, &mut OnStack([T::zero(); SMALL]).0, results);
+            self.interpret::<T, N>(at, &mut OnStack([T::zero(); SMALL]).0, results);
         } else if self.registers <= MIDDLE {
-            self.interpret(at, &mut OnStack([T::zero(); MIDDLE]).0, results);
+            self.interpret::<T, N>(at, &mut OnStack([T::zero(); MIDDLE]).0, results);
         } else {
-            self.evaluate_large(at, results);
+            self.evaluate_large::<T, N>(at, results);
         }
     }
 
     /// A frame of the stack by itself.
     #[inline(never)]
-    fn evaluate_large<T: Scalar>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
-        self.interpret(at, &mut OnStack([T::zero(); LARGE]).0, results);
+    fn evaluate_large<T: Scalar, const N: usize>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
+        self.interpret::<T, N>(at, &mut OnStack([T::zero(); LARGE]).0, results);
     }
 
-    /// What is moved in and out is part of the caller, which knows how many numbers there are. The code is run in one place for each kind of
-    /// numbers, whatever the number of registers: it is long, and compiled for each dimension.
+    /// What is moved in and out is part of the caller where it is little.
     #[inline(always)]
-    fn interpret<T: Scalar>(&self, at: At<'_, T>, registers: &mut [T], results: &mut [&mut [T]]) {
+    fn interpret<T: Scalar, const N: usize>(&self, at: At<'_, T>, registers: &mut [T], results: &mut [&mut [T]]) {
+        if const { N == 0 || N > FEW } {
+            self.interpret_apart(at, registers, results);
+            return;
+        }
+        self.enter(at, registers);
+        if !self.code.is_empty() {
+            run_apart(&self.code, registers);
+        }
+        self.leave(registers, results);
+    }
+
+    /// One copy of the code for each kind of numbers, whatever the dimension and the number of registers: it is long.
+    #[inline(always)]
+    fn interpret_apart<T: Scalar>(&self, at: At<'_, T>, registers: &mut [T], results: &mut [&mut [T]]) {
+        T::apart(
+            #[inline(always)]
+            || {
+                self.enter(at, registers);
+                run(&self.code, registers);
+                self.leave(registers, results);
+            },
+        );
+    }
+
+    /// Moves the inputs to their registers.
+    #[inline(always)]
+    fn enter<T: Scalar>(&self, at: At<'_, T>, registers: &mut [T]) {
         let InputRegisters { q, v, z, t } = self.inputs;
         if let Some(first) = q {
             copy(registers, first, at.q);
@@ -74,13 +104,11 @@ impl Tape {
         if let Some(t) = t {
             set(registers, t, at.t);
         }
-        if !self.code.is_empty() {
-            let code = self.code.as_slice();
-            T::apart(
-                #[inline(always)]
-                || run(code, registers),
-            );
-        }
+    }
+
+    /// Moves the results to where they are wanted.
+    #[inline(always)]
+    fn leave<T: Scalar>(&self, registers: &[T], results: &mut [&mut [T]]) {
         let mut places = self.results.iter();
         for part in results.iter_mut() {
             for (result, place) in part.iter_mut().zip(&mut places) {
@@ -89,6 +117,15 @@ impl Tape {
             }
         }
     }
+}
+
+/// The same of the instructions alone.
+#[inline(always)]
+fn run_apart<T: Scalar>(code: &[Instruction], registers: &mut [T]) {
+    T::apart(
+        #[inline(always)]
+        || run(code, registers),
+    );
 }
 
 /// Performs the instructions. It returns no number: that would have the place of the result before, which then is not in a register.
