@@ -43,7 +43,7 @@ impl Expression {
     pub fn at<T: Scalar>(&self, t: T, q: &[T], v: &[T], z: T) -> T {
         let mut value = T::from(f64::NAN);
         if let (Some(q), Some(v)) = (q.get(..self.names.dimension), v.get(..self.names.dimension)) {
-            self.tape.evaluate(At { q, v, z, t }, &mut [std::slice::from_mut(&mut value)]);
+            self.tape.evaluate::<T, 0>(At { q, v, z, t }, &mut [std::slice::from_mut(&mut value)]);
         }
         value
     }

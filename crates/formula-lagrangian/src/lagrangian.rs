@@ -93,7 +93,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         let mut value = T::zero();
-        self.derived.value.evaluate(At::new(t, q, v, z), &mut [std::slice::from_mut(&mut value)]);
+        self.derived.value.evaluate::<T, N>(At::new(t, q, v, z), &mut [std::slice::from_mut(&mut value)]);
         value
     }
 
@@ -101,7 +101,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
         let mut g = Triple::from(*x);
         let results = &mut [g.x.as_mut_slice(), g.y.as_mut_slice(), std::slice::from_mut(&mut g.z)];
-        self.derived.gradient.evaluate(At::new(t, &x.q, &x.v, x.z), results);
+        self.derived.gradient.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
         Some(g)
     }
 
@@ -110,14 +110,14 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
         let (mut g, mut value) = (Triple::from(*x), x.z);
         let (z, value_slice) = (std::slice::from_mut(&mut g.z), std::slice::from_mut(&mut value));
         let results = &mut [g.x.as_mut_slice(), g.y.as_mut_slice(), z, value_slice];
-        self.derived.with_gradient.evaluate(At::new(t, &x.q, &x.v, x.z), results);
+        self.derived.with_gradient.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
         Some((value, g))
     }
 
     #[inline(always)]
     fn closed_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
         let mut force = x.q;
-        self.derived.force.evaluate(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
+        self.derived.force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
         Some(force)
     }
 
@@ -125,14 +125,14 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
         let (mut value, mut force) = (x.z, x.q);
         let results = &mut [std::slice::from_mut(&mut value), force.as_mut_slice()];
-        self.derived.with_force.evaluate(At::new(t, &x.q, &x.v, x.z), results);
+        self.derived.with_force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
         Some((value, force))
     }
 
     #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
         let mut w: SMatrix<T, N, N> = SMatrix::from_element(x.z);
-        self.derived.mass.evaluate(At::new(t, &x.q, &x.v, x.z), &mut [w.as_mut_slice()]);
+        self.derived.mass.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [w.as_mut_slice()]);
         Some(w)
     }
 
@@ -142,7 +142,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
         let mut h = Hessian { qq: matrix, qv: matrix, vv: matrix, qz: x.q, vz: x.v, zz: x.z };
         let [qq, qv, vv] = [&mut h.qq, &mut h.qv, &mut h.vv].map(|m| m.as_mut_slice());
         let results = &mut [qq, qv, vv, h.qz.as_mut_slice(), h.vz.as_mut_slice(), std::slice::from_mut(&mut h.zz)];
-        self.derived.second.evaluate(At::new(t, &x.q, &x.v, x.z), results);
+        self.derived.second.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
         Some(h)
     }
 

@@ -26,6 +26,8 @@ pub(crate) enum Code {
     Div,
     /// `a b + c`, each rounded, as Rust code is.
     MulAdd,
+    /// `c - a b`, likewise.
+    MulSub,
     /// `a + k`.
     AddConstant,
     /// `k - a`.
@@ -38,6 +40,10 @@ pub(crate) enum Code {
     ConstantDiv,
     /// `a k + b`, each rounded.
     MulConstantAdd,
+    /// `b - a k`, likewise.
+    MulConstantSub,
+    /// `a b k`, from the left.
+    ScaledProduct,
     Function(Function),
     Min,
     Max,
@@ -72,7 +78,9 @@ impl Instruction {
         let after = |c: u16, d: u16| u64::from(follow(c)) | u64::from(follow(d)) << 16;
         match self.code {
             Code::Constant => {}
-            Code::Select | Code::MulAdd => (self.a, self.b, self.extra) = (follow(self.a), follow(self.b), after(c, d)),
+            Code::Select | Code::MulAdd | Code::MulSub => {
+                (self.a, self.b, self.extra) = (follow(self.a), follow(self.b), after(c, d))
+            }
             _ => (self.a, self.b) = (follow(self.a), follow(self.b)),
         }
     }
@@ -160,9 +168,6 @@ impl Tape {
             let written = tape.code[i - 1].to;
             tape.code[i].follow(written);
         }
-        if let Some(last) = tape.code.last() {
-            tape.results.iter_mut().filter(|p| p.register == last.to).for_each(|p| p.register = PREVIOUS);
-        }
         Some(tape)
     }
 
@@ -224,25 +229,40 @@ impl Builder<'_> {
 
     /// The operands that are registers when a node is written.
     fn parts(&self, id: Id) -> [Option<Id>; 4] {
-        match self.graph.node(id) {
-            Node::Binary(Operation::Add, a, b) => match self.fused(a, b) {
-                Some(([x, y], c)) => [Some(x), Some(y), Some(c), None],
-                None => [Some(a), Some(b), None, None],
-            },
-            node => {
-                let mut operands = node.operands();
-                std::array::from_fn(|_| operands.next())
-            }
+        let node = self.graph.node(id);
+        if let Some(([x, y], c)) = self.fused(node) {
+            return [Some(x), Some(y), Some(c), None];
         }
+        if let Some(([x, y], _)) = self.scaled(node) {
+            return [Some(x), Some(y), None, None];
+        }
+        let mut operands = node.operands();
+        std::array::from_fn(|_| operands.next())
     }
 
-    /// A sum with a product, as the factors and the other summand.
-    fn fused(&self, a: Id, b: Id) -> Option<([Id; 2], Id)> {
+    /// A sum with a product, or a number less a product, as the factors and the other term.
+    fn fused(&self, node: Node) -> Option<([Id; 2], Id)> {
         let of = |product: Id, other: Id| {
             let (x, y) = self.product(product).filter(|_| product != other && !self.graph.is_constant(other))?;
             Some(([x, y], other))
         };
-        of(b, a).or_else(|| of(a, b))
+        match node {
+            Node::Binary(Operation::Add, a, b) => of(b, a).or_else(|| of(a, b)),
+            Node::Binary(Operation::Sub, a, b) => of(b, a),
+            _ => None,
+        }
+    }
+
+    /// A product of two registers times a constant, as the factors and that.
+    fn scaled(&self, node: Node) -> Option<([Id; 2], Id)> {
+        let constant = |id: Id| self.graph.is_constant(id);
+        let (product, k) = match node {
+            Node::Binary(Operation::Mul, a, k) if constant(k) => (a, k),
+            Node::Binary(Operation::Mul, k, a) if constant(k) => (a, k),
+            _ => return None,
+        };
+        let (x, y) = self.product(product).filter(|(x, y)| !constant(*x) && !constant(*y))?;
+        Some(([x, y], k))
     }
 
     fn allocate(&mut self) -> Option<u16> {
@@ -311,58 +331,66 @@ impl Builder<'_> {
             return Some(());
         }
         let constant = |id: Id| self.graph.is_constant(id);
-        let (code, read, slot) = match node {
-            Node::Binary(Operation::Add, a, b) => match self.fused(a, b) {
-                Some(([x, y], c)) if constant(y) => (Code::MulConstantAdd, vec![x, c], Some(y)),
-                Some(([x, y], c)) if constant(x) => (Code::MulConstantAdd, vec![y, c], Some(x)),
-                Some(([x, y], c)) => (Code::MulAdd, vec![x, y, c], None),
-                None if constant(b) => (Code::AddConstant, vec![a], Some(b)),
-                None if constant(a) => (Code::AddConstant, vec![b], Some(a)),
-                None => (Code::Add, vec![a, b], None),
-            },
-            Node::Binary(Operation::Sub, a, b) if constant(a) => (Code::ConstantSub, vec![b], Some(a)),
-            Node::Binary(Operation::Mul, a, b) if constant(b) => (Code::MulConstant, vec![a], Some(b)),
-            Node::Binary(Operation::Mul, a, b) if constant(a) => (Code::MulConstant, vec![b], Some(a)),
-            Node::Binary(Operation::Div, a, b) if constant(b) => (Code::DivConstant, vec![a], Some(b)),
-            Node::Binary(Operation::Div, a, b) if constant(a) => (Code::ConstantDiv, vec![b], Some(a)),
-            Node::Binary(Operation::Power, a, b) => (Code::Power, vec![a], Some(b)),
-            Node::Binary(operation, a, b) => {
-                let code = match operation {
-                    Operation::Add => Code::Add,
-                    Operation::Sub => Code::Sub,
-                    Operation::Mul => Code::Mul,
-                    Operation::Div => Code::Div,
-                    Operation::Min => Code::Min,
-                    Operation::Max => Code::Max,
-                    Operation::Atan2 => Code::Atan2,
-                    Operation::Hypot => Code::Hypot,
-                    Operation::Power => Code::Power,
-                };
-                (code, vec![a, b], None)
+        let (code, read, slot) = if let Some(([x, y], c)) = self.fused(node) {
+            let (scaled, product) = match node {
+                Node::Binary(Operation::Sub, ..) => (Code::MulConstantSub, Code::MulSub),
+                _ => (Code::MulConstantAdd, Code::MulAdd),
+            };
+            match (constant(x), constant(y)) {
+                (_, true) => (scaled, vec![x, c], Some(y)),
+                (true, _) => (scaled, vec![y, c], Some(x)),
+                _ => (product, vec![x, y, c], None),
             }
-            Node::Unary(f, a) => (Code::Function(f), vec![a], None),
-            Node::Powi(a, 3) => {
-                // The square has a register of its own, then the cube.
-                let from = self.register(a)?;
-                let square = self.allocate()?;
-                self.emit(Code::Mul, square, [from, from], 0);
-                self.free.push(square);
-                self.release(a);
-                let to = self.allocate()?;
-                self.emit(Code::Mul, to, [square, from], 0);
-                self.place[id.index()] = Some(to);
-                return Some(());
+        } else if let Some(([x, y], k)) = self.scaled(node) {
+            (Code::ScaledProduct, vec![x, y], Some(k))
+        } else {
+            match node {
+                Node::Binary(Operation::Add, a, b) if constant(b) => (Code::AddConstant, vec![a], Some(b)),
+                Node::Binary(Operation::Add, a, b) if constant(a) => (Code::AddConstant, vec![b], Some(a)),
+                Node::Binary(Operation::Sub, a, b) if constant(a) => (Code::ConstantSub, vec![b], Some(a)),
+                Node::Binary(Operation::Mul, a, b) if constant(b) => (Code::MulConstant, vec![a], Some(b)),
+                Node::Binary(Operation::Mul, a, b) if constant(a) => (Code::MulConstant, vec![b], Some(a)),
+                Node::Binary(Operation::Div, a, b) if constant(b) => (Code::DivConstant, vec![a], Some(b)),
+                Node::Binary(Operation::Div, a, b) if constant(a) => (Code::ConstantDiv, vec![b], Some(a)),
+                Node::Binary(Operation::Power, a, b) => (Code::Power, vec![a], Some(b)),
+                Node::Binary(operation, a, b) => {
+                    let code = match operation {
+                        Operation::Add => Code::Add,
+                        Operation::Sub => Code::Sub,
+                        Operation::Mul => Code::Mul,
+                        Operation::Div => Code::Div,
+                        Operation::Min => Code::Min,
+                        Operation::Max => Code::Max,
+                        Operation::Atan2 => Code::Atan2,
+                        Operation::Hypot => Code::Hypot,
+                        Operation::Power => Code::Power,
+                    };
+                    (code, vec![a, b], None)
+                }
+                Node::Unary(f, a) => (Code::Function(f), vec![a], None),
+                Node::Powi(a, 3) => {
+                    // The square has a register of its own, then the cube.
+                    let from = self.register(a)?;
+                    let square = self.allocate()?;
+                    self.emit(Code::Mul, square, [from, from], 0);
+                    self.free.push(square);
+                    self.release(a);
+                    let to = self.allocate()?;
+                    self.emit(Code::Mul, to, [square, from], 0);
+                    self.place[id.index()] = Some(to);
+                    return Some(());
+                }
+                Node::Powi(a, n) => {
+                    let from = self.register(a)?;
+                    self.release(a);
+                    let to = self.allocate()?;
+                    self.emit(Code::Powi, to, [from, 0], u64::from(n as u32));
+                    self.place[id.index()] = Some(to);
+                    return Some(());
+                }
+                Node::Select(all) => (Code::Select, all.to_vec(), None),
+                _ => return None,
             }
-            Node::Powi(a, n) => {
-                let from = self.register(a)?;
-                self.release(a);
-                let to = self.allocate()?;
-                self.emit(Code::Powi, to, [from, 0], u64::from(n as u32));
-                self.place[id.index()] = Some(to);
-                return Some(());
-            }
-            Node::Select(all) => (Code::Select, all.to_vec(), None),
-            _ => return None,
         };
         let mut registers = Vec::with_capacity(4);
         for a in &read {

@@ -6,11 +6,12 @@
 use super::coefficients::{Coefficients, MOST, lagrange_rows};
 use super::condensed::Condensed;
 use super::dense::Solved;
+use super::pair::Pair;
 use super::stages::{StageMap, Stages, blocks};
 use super::time_transformation::TimeTransformation;
 use crate::gauss::lanes::Lanes;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint, larger, largest};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, largest};
 use pulp::{Simd, WithSimd};
 use std::array::from_fn;
 use std::sync::OnceLock;
@@ -124,6 +125,19 @@ impl<const N: usize> Curve<N> {
                 }
                 self.force[i].set(r, force * rho);
             }
+        }
+        let (mut first, m) = (0, blocks::<S>(table.s));
+        if const { L::INTERPRETED } {
+            while first < 2 * Pair::<S>::among(m) {
+                let q = SVector::from_fn(|d, _| Pair::<S>::of(&x[d], first));
+                let v = SVector::from_fn(|d, _| Pair::of(&self.v[d], first));
+                let l = lagrangian.value(Pair::of(&table.times, first) + self.t, &q, &v, 0.0.into());
+                self.l.set(first, l.0);
+                self.l.set(first + 1, l.1);
+                first += 2;
+            }
+        }
+        for r in first..m {
             let q = SVector::from_fn(|d, _| x[d].block::<S>(r));
             let v = SVector::from_fn(|d, _| self.v[d].block::<S>(r));
             let t = table.times.block::<S>(r) + self.t;
@@ -231,6 +245,7 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
         }
         let (mut of_value, mut kinetic, mut largest_l) = (zero, zero, zero);
         let (mut misfit, mut size, mut of_z, mut size_z, mut all) = (zero, zero, zero, zero, zero);
+        let mut other: Option<(Lanes<S>, Triple<N, Lanes<S>>)> = None;
         for r in 0..blocks::<S>(s) {
             let mut x = VelocityPoint {
                 q: SVector::from_fn(|d, _| q[d].block::<S>(r)),
@@ -244,7 +259,20 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
                 (slower, long) = (rate.recip(), long * rate);
                 x.v *= slower;
             }
-            let (value, g) = lagrangian.with_gradient(between.points.block::<S>(r) * h + t, &x);
+            let (value, g) = match other.take() {
+                Some(other) => other,
+                None if const { L::INTERPRETED && P::PHYSICAL } && r + 1 < 2 * Pair::<S>::among(blocks::<S>(s)) => {
+                    let pair = VelocityPoint {
+                        q: SVector::from_fn(|d, _| Pair::of(&q[d], r)),
+                        v: SVector::from_fn(|d, _| Pair::of(&v[d], r)),
+                        z: Pair::of(&z, r),
+                    };
+                    let (l, g) = lagrangian.with_gradient(Pair::of(&between.points, r) * h + t, &pair);
+                    other = Some((l.1, Triple { x: g.x.map(|e| e.1), y: g.y.map(|e| e.1), z: g.z.1 }));
+                    (l.0, Triple { x: g.x.map(|e| e.0), y: g.y.map(|e| e.0), z: g.z.0 })
+                }
+                None => lagrangian.with_gradient(between.points.block::<S>(r) * h + t, &x),
+            };
             let inverse = (Lanes::<S>::splat(1.0) - one_minus_rho.block::<S>(r)).recip();
             let mut work = zero;
             let drag = (rate.block::<S>(r) * inverse * slower - g.z) * long;

@@ -14,18 +14,38 @@ A Lagrangian L(t, q, v, z) that depends on its own action z has friction in it: 
 ((1001, 1), 'completed')
 """
 
+from importlib import import_module as _import_module
+
 from ._core import System
 from ._core import catalogue as _catalogue
 from ._core import integrators as _integrators
-from ._ensemble import Ensemble, MemberCrossings, ensemble
-from ._exact import DiscreteLagrangian, Exponential, Retraction, exact_lagrangian, exponential, retract
-from ._looks import Check, Comparison, Contact, Geometry, check, compare, geometry, is_contact
+from ._first import compute as _compute_first_motions
 from ._solution import Crossings, Interrupted, Plan, Solution, States
 from ._solve import Event, solve
 from ._system import system
 from ._trace import array, where
 
 __version__ = "0.1.0"
+
+# What a single motion does not need is loaded when it is first asked for: that is half of what there is to load.
+_LATER = {
+    "_ensemble": "Ensemble MemberCrossings ensemble",
+    "_exact": "DiscreteLagrangian Exponential Retraction exact_lagrangian exponential retract",
+    "_looks": "Check Comparison Contact Geometry check compare geometry is_contact",
+}
+_LATER = {name: module for module, names in _LATER.items() for name in names.split()}
+
+
+def __getattr__(name):
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(_import_module(f".{_LATER[name]}", __name__), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__():
+    return sorted({*globals(), *_LATER})
 
 
 def integrators():
@@ -70,3 +90,5 @@ __all__ = [
     "system",
     "where",
 ]
+
+_compute_first_motions()
