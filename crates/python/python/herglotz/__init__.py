@@ -19,7 +19,6 @@ from importlib import import_module as _import_module
 from ._core import System
 from ._core import catalogue as _catalogue
 from ._core import integrators as _integrators
-from ._first import compute as _compute_first_motions
 from ._solution import Crossings, Interrupted, Plan, Solution, States
 from ._solve import Event, solve
 from ._system import system
@@ -90,5 +89,3 @@ __all__ = [
     "system",
     "where",
 ]
-
-_compute_first_motions()
