@@ -189,17 +189,18 @@ impl<const N: usize> Measured<N> {
     #[inline(always)]
     pub fn take(&mut self, value: &SVector<f64, N>, size: &SVector<f64, N>) {
         // Few points exceed all before them: the rest is done for all coordinates at once, without a quotient. What is not a number does exceed.
-        let mut exceeds = false;
+        let mut within = true;
         for i in 0..N {
             let off = value[i].abs();
             self.squares[i] += off * off;
             self.sizes[i] = larger(self.sizes[i], size[i]);
-            exceeds |= !(off <= self.relative * size[i]) | !(off <= self.residual);
+            within &= (off <= self.relative * size[i]) & (off <= self.residual);
         }
-        if exceeds {
+        if !within {
             for (off, size) in value.iter().map(|x| x.abs()).zip(size) {
                 self.residual = larger(self.residual, off);
-                if !(off <= self.relative * size) {
+                let within = off <= self.relative * size;
+                if !within {
                     self.relative = larger(self.relative, off / size);
                 }
             }
