@@ -260,6 +260,24 @@ proptest! {
     }
 }
 
+/// A step ends in each lane for itself: among neighbours whose steps take more sweeps and fewer, a member is what it is among members of its own start.
+#[test]
+fn a_lane_that_has_ended_stays_while_others_go_on() {
+    let pendulum = Pendulum { gamma: -1e-3 };
+    let start = |i: usize| VelocityPoint::new([[0.01, 2.9, 1.5, 0.3][i % 4]], [0.0], 0.0);
+    for stages in [5, 8] {
+        let run = |start: &(dyn Fn(usize) -> VelocityPoint<1> + Sync)| {
+            let ensemble =
+                Ensemble::new(&pendulum, 0.0, 64, start).by(gauss(stages)).steps(Steps::Count(400)).threads(1);
+            members(&ensemble, Until::Time(300.0))
+        };
+        let mixed = run(&start);
+        for own in 0..4 {
+            assert_eq!(mixed[own].ending, run(&|_| start(own))[own].ending, "gauss_{stages}, {own}");
+        }
+    }
+}
+
 #[test]
 fn a_member_that_fails_says_why_and_the_others_go_on() {
     // From q = 0.5 with v = 5 the edge is crossed; at 2 L is not defined.
