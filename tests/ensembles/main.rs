@@ -271,9 +271,8 @@ fn a_lane_that_has_ended_stays_while_others_go_on() {
                 Ensemble::new(&pendulum, 0.0, 64, start).by(gauss(stages)).steps(Steps::Count(400)).threads(1);
             members(&ensemble, Until::Time(300.0))
         };
-        let mixed = run(&start);
-        for own in 0..4 {
-            assert_eq!(mixed[own].ending, run(&|_| start(own))[own].ending, "gauss_{stages}, {own}");
+        for (own, member) in run(&start).iter().enumerate().take(4) {
+            assert_eq!(member.ending, run(&|_| start(own))[own].ending, "gauss_{stages}, {own}");
         }
     }
 }
