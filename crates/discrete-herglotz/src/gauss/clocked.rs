@@ -90,7 +90,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         }
         let extension = Extension::new(Fictitious(clock), t0, -energy);
         let (table, mass) = (StageTable::new(s, h), Mass::new(&structure, inverse));
-        let general = Box::new(General::new(lagrangian, extension, table, mass, &state, &start.v));
+        let general = Box::new(General::new(lagrangian, extension, table, mass, false, &state, &start.v));
         Ok(ClockedStepper { general, arch: Instructions::new(), h, tau: 0.0, taken: 0, from: None, suspicion: None })
     }
 

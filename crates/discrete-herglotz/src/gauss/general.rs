@@ -32,6 +32,10 @@ const MOST_IN_LANES: usize = 8;
 /// `rho = 1 - hA (rho g L_z)`, `rho L_v = p0 + hA (rho g L_q - grad g (rho E + p_t0))`, since `rho p_t = p_t0`, the momentum of
 /// the time at the start, where L does not depend on t.
 ///
+/// Herglotz' principle says what the action takes over from the positions: among curves with the same start, near a motion, `dZ = L_v dQ`.
+/// So a sweep that has moved the stages by dQ has moved their actions by that, to first order, and need not evaluate L to know it. Where
+/// z acts on the motion other than by a rate, this spares one sweep in ten to twenty per cent of them.
+///
 /// A rate that is the same in every step is rounded the same in every step: so `1 - rho`, which is small where the rate is, is
 /// carried instead of rho, and enters by sums of which the rounding depends on the motion.
 ///
@@ -56,6 +60,8 @@ pub(super) struct General<'a, L, P, const N: usize> {
     pub extension: Extension<P>,
     pub table: StageTable,
     pub mass: Mass<N>,
+    /// Whether the actions of the stages follow their positions within a sweep.
+    pub(super) follows: bool,
     pub q: [Compensated; N],
     pub p: [Compensated; N],
     pub z: Compensated,
@@ -77,12 +83,13 @@ pub(super) struct General<'a, L, P, const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a, L, P, N> {
-    /// From a state with a velocity that belongs to it, or a guess of it.
+    /// From a state with a velocity that belongs to it, or a guess of it; `driven` says that z acts on the motion other than by a rate.
     pub fn new(
         lagrangian: &'a L,
         extension: Extension<P>,
         table: StageTable,
         mass: Mass<N>,
+        driven: bool,
         state: &PhasePoint<N>,
         v: &SVector<f64, N>,
     ) -> Self {
@@ -93,6 +100,8 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             extension,
             table,
             mass,
+            // By a clock the times of the stages move too.
+            follows: driven && P::PHYSICAL,
             q: [0.0.into(); N],
             p: [0.0.into(); N],
             z: 0.0.into(),
@@ -380,11 +389,18 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
                 self.v[i].set(r, v);
             }
         }
-        let before = self.z_stages;
+        let (before, left) = (self.z_stages, self.x);
         self.place::<S>();
         let (mut dz, mut sz) = (zero, zero);
         for r in 0..m {
-            let z = self.z_stages.block::<S>(r);
+            let mut z = self.z_stages.block::<S>(r);
+            if self.follows {
+                for d in 0..N {
+                    let moved = self.x[d].block::<S>(r) - left[d].block(r);
+                    z = self.l_v[d].block::<S>(r).mul_add(moved, z);
+                }
+                self.z_stages.set(r, z);
+            }
             dz = dz.max((z - before.block(r)).abs());
             sz = sz.max(z.abs());
         }

@@ -130,8 +130,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             }
         } else {
             let mass = Mass::new(&structure, inverse);
-            let physical = Extension::new(Physical, t0, 0.0);
-            Route::General(General::new(lagrangian, physical, StageTable::new(s, h), mass, &state, &start.v))
+            let (physical, driven) = (Extension::new(Physical, t0, 0.0), !structure.is_affine_in_z());
+            Route::General(General::new(lagrangian, physical, StageTable::new(s, h), mass, driven, &state, &start.v))
         };
         let from = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
         Ok(GaussStepper {

@@ -3,6 +3,7 @@
 use super::*;
 use crate::Gauss;
 use crate::{DiscreteLagrangian, Solver, Transition};
+use contact_geom::systems::QuadraticInZ;
 use contact_geom::{Scalar, Structure};
 use pulp::Arch;
 
@@ -97,6 +98,29 @@ fn what_is_chosen_lane_by_lane_is_what_numbers_choose() {
                 assert!(across >= 4, "{across} steps go across the kink");
                 assert_eq!(by_newton, 0, "{how:?} {route:?} {set:?}");
             }
+        }
+    }
+}
+
+/// Actions that follow the positions within a sweep spare at least one sweep in twenty of these motions, and the motion is the same to the
+/// rounding of its steps.
+#[test]
+fn actions_that_follow_spare_sweeps_and_change_nothing() {
+    let (steps, start) = (100, PhasePoint::new([1.0], [0.5], 0.8));
+    for (stages, h) in [(4, 0.1), (8, 0.5), (8, 1.0), (16, 0.5), (16, 1.0)] {
+        let gauss = Gauss::new(QuadraticInZ::default(), stages, h).unwrap();
+        let [(with, a), (without, b)] = [true, false].map(|follows| {
+            let mut run = gauss.stepper(0.0, start, SVector::zeros()).unwrap();
+            let Route::General(general) = &mut *run.route else { panic!("z does not drive the motion") };
+            general.follows &= follows;
+            run.advance(steps).unwrap();
+            assert_eq!(run.newton_steps(), 0);
+            (run.evaluations(), run.state())
+        });
+        assert!(with as f64 <= 0.95 * without as f64, "{stages} stages, h = {h}: {with} for {without} evaluations");
+        let tolerance = 4.0 * steps as f64 * f64::EPSILON;
+        for (a, b) in [(a.q[0], b.q[0]), (a.p[0], b.p[0]), (a.z, b.z)] {
+            assert!((a - b).abs() <= tolerance, "{stages} stages, h = {h}: {a} and {b}");
         }
     }
 }
