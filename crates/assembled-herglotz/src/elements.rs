@@ -1,6 +1,7 @@
 //! Lists of elements: the unknowns of each, and where they follow each other.
 
 use crate::AssemblyError;
+use crate::batch::{self, Batch};
 use crate::blocks::{self, BLOCK, ByBlock};
 
 /// Instead of an unknown of an element: a place that is held at 0, as by a wall.
@@ -77,8 +78,8 @@ pub(crate) struct Elements<const K: usize, const P: usize> {
     /// The places of the elements that are in no run.
     pub loose: Vec<[u32; K]>,
     pub loose_parameters: [Vec<f64>; P],
-    /// Which of them have unknowns in each block.
-    pub loose_of: ByBlock<u32>,
+    /// Those with unknowns in each block.
+    pub batches: ByBlock<Batch<K, P>>,
 }
 
 impl<const K: usize, const P: usize> Elements<K, P> {
@@ -96,7 +97,7 @@ impl<const K: usize, const P: usize> Elements<K, P> {
             spans: ByBlock::new(0, Vec::new()),
             loose: Vec::new(),
             loose_parameters: std::array::from_fn(|_| Vec::new()),
-            loose_of: ByBlock::new(0, Vec::new()),
+            batches: ByBlock::new(0, Vec::new()),
         };
         let mut open: Option<Run<K>> = None;
         for (element, data) in elements.into_iter().enumerate() {
@@ -150,18 +151,10 @@ impl<const K: usize, const P: usize> Elements<K, P> {
                 from = to;
             }
         }
-        let mut loose_of = Vec::new();
-        for (e, places) in self.loose.iter().enumerate() {
-            let real = places.iter().filter(|p| (1..=unknowns).contains(&(**p as usize)));
-            let mut of: Vec<u32> = real.map(|p| (*p - 1) / BLOCK as u32).collect();
-            of.sort_unstable();
-            of.dedup();
-            loose_of.extend(of.into_iter().map(|block| (block, e as u32)));
-        }
         let blocks = blocks::count(unknowns);
         self.pieces = ByBlock::new(blocks, pieces);
         self.spans = ByBlock::new(blocks, spans);
-        self.loose_of = ByBlock::new(blocks, loose_of);
+        self.batches = batch::batches(self, unknowns);
     }
 }
 

@@ -57,9 +57,9 @@ pub(crate) struct Kind<V, const K: usize, const P: usize> {
 impl<V: Potential<K, P>, const K: usize, const P: usize> PotentialList for Kind<V, K, P> {
     fn kick(&self, block: usize, t: f64, q: &[f64], weight: Weight, v: &mut [f64], then: Option<Then>) -> bool {
         let all = if K == 32 { u32::MAX } else { (1 << K) - 1 };
-        let (pieces, loose) = (self.elements.pieces.of(block), self.elements.loose_of.of(block));
+        let (pieces, batches) = (self.elements.pieces.of(block), self.elements.batches.of(block));
         let of = |piece: &Piece| self.elements.runs.get(piece.run as usize);
-        if let ([piece], [], Weight::Same(w), Some(then)) = (pieces, loose, weight, then)
+        if let ([piece], [], Weight::Same(w), Some(then)) = (pieces, batches, weight, then)
             && piece.slots == all
             && (piece.from, piece.to as usize) == (0, v.len())
             && let Some(run) = of(piece)
@@ -85,7 +85,10 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> PotentialList for Kind<
                 }
             }
         }
-        self.kick_loose(block, t, q, weight, v);
+        let t = Lanes::splat(t);
+        for batch in batches {
+            batch.kick(&self.term, t, q, weight, v);
+        }
         false
     }
 
@@ -243,35 +246,6 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         }
         if DRIFT {
             then.drift.go(q.get(place + done..).unwrap_or(&[]), rest, moved_rest);
-        }
-    }
-
-    /// The kick of a block by the elements that are in no run.
-    #[inline(always)]
-    fn kick_loose(&self, block: usize, t: f64, q: &[f64], weight: Weight, v: &mut [f64]) {
-        let t = Lanes::splat(t);
-        let first = block * BLOCK + 1;
-        for group in self.elements.loose_of.of(block).chunks(LANES) {
-            let (x, c) = self.elements.gathered(q, group.len(), |lane| group[lane] as usize);
-            let gradient = self.term.gradient(t, &x, &c);
-            let mut forces = [[0.0; LANES]; K];
-            for k in 0..K {
-                forces[k] = gradient[k].to_array();
-            }
-            for (lane, e) in group.iter().enumerate() {
-                let Some(places) = self.elements.loose.get(*e as usize) else { continue };
-                for k in 0..K {
-                    // A fixed place, or one of another block, is none of these unknowns.
-                    let Some(at) = (places[k] as usize).checked_sub(first) else { continue };
-                    if let Some(v) = v.get_mut(at) {
-                        *v -= forces[k][lane]
-                            * match weight {
-                                Weight::Same(w) => w,
-                                Weight::Masses(w, m) => w * m.get(at).copied().unwrap_or(0.0),
-                            };
-                    }
-                }
-            }
         }
     }
 }

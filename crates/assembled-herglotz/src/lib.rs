@@ -20,6 +20,7 @@
 //! ```
 
 mod aligned;
+mod batch;
 mod blocks;
 mod drag;
 mod elements;
@@ -29,6 +30,7 @@ mod kernels;
 mod lanes;
 mod local;
 mod memory;
+mod pass;
 mod splitting;
 mod system;
 pub mod systems;

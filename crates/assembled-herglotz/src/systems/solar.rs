@@ -25,7 +25,9 @@ impl Potential<3, 1> for Gravitation {
 /// Bodies in space with Newton's gravitation of each pair and linear drag,
 /// `L = sum m_i v_i^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z`. Body i has the unknowns `3i, 3i + 1, 3i + 2`.
 ///
-/// Each pair is an element: the cost grows with the square of the number of bodies.
+/// Each pair is an element: the cost grows with the square of the number of bodies. Over many revolutions take
+/// [`AssembledSplitting::compensated`](crate::AssembledSplitting::compensated); few bodies are a small system too,
+/// [`contact_geom::systems::Bodies`], which Gauss collocation takes further for less.
 ///
 /// # Errors
 /// [`AssemblyError::Unknowns`] for no bodies; [`AssemblyError::Parameter`] where a mass or `g` is not finite.

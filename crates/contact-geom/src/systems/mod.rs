@@ -3,6 +3,7 @@
 //! Every theorem test of the workspace runs over all of them; a new system joins [`visit_catalogue`] and is tested at once.
 
 mod as_one;
+mod bodies;
 mod chain;
 mod charged_particle;
 mod closed_form;
@@ -23,6 +24,7 @@ mod spherical_pendulum;
 mod uniform_field;
 mod van_der_pol;
 
+pub use bodies::Bodies;
 pub use chain::{Chain, Ends};
 pub use charged_particle::ChargedParticle;
 pub use coupled_in_z::CoupledInZ;

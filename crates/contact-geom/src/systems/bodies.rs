@@ -1,0 +1,107 @@
+//! Bodies in space that attract each other, with drag.
+
+use crate::{Lagrangian, Scalar, Structure, Triple, VelocityPoint};
+use nalgebra::SVector;
+
+/// Bodies in space with Newton's gravitation of each pair and linear drag,
+/// `L = sum m_i |v_i|^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z`. Body i has the coordinates `3i, 3i + 1, 3i + 2` of N: a planet and its sun
+/// are `Bodies<6>`. Units are those of G.
+///
+/// Herglotz' equation is `q_i'' = sum_j G m_j (q_j - q_i)/|q_j - q_i|^3 + gamma q_i'`; nonlinear, singular where two bodies meet, W diagonal.
+/// Translations and common rotations are symmetries: total and angular momentum decay as `e^(gamma t)`.
+///
+/// For few bodies over many revolutions Gauss collocation is the integrator to take: two to five steps in a period of the fastest. Its kernels are
+/// compiled for each N, so that this system is not one of [`visit_catalogue`](super::visit_catalogue). Any number of bodies:
+/// `bodies` of the crate `assembled-herglotz`.
+///
+/// ```
+/// use contact_geom::{Lagrangian, systems::Bodies};
+/// let pair = Bodies::<6>::new(|i| [1.0, 1e-3][i], 1.0, -1e-4);
+/// let q = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0].into();
+/// assert_eq!(pair.value(0.0, &q, &[0.0; 6].into(), 0.0), 1e-3);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bodies<const N: usize> {
+    /// The mass of each coordinate: that of its body.
+    masses: SVector<f64, N>,
+    /// The constant of gravitation.
+    pub g: f64,
+    /// The rate `L_z` of the conformal factor, negative for dissipation.
+    pub gamma: f64,
+}
+
+impl<const N: usize> Bodies<N> {
+    /// Of bodies with these masses.
+    pub fn new(mass: impl Fn(usize) -> f64, g: f64, gamma: f64) -> Self {
+        const { assert!(N >= 6 && N.is_multiple_of(3), "two bodies have six coordinates, each further one has three") };
+        Bodies { masses: SVector::from_fn(|d, _| mass(d / 3)), g, gamma }
+    }
+
+    /// The mass of a body.
+    pub fn mass(&self, body: usize) -> f64 {
+        self.masses[3 * body]
+    }
+
+    /// From body i to body j, with the square of the distance and `G m_i m_j`.
+    #[inline(always)]
+    fn pair<T: Scalar>(&self, q: &SVector<T, N>, i: usize, j: usize) -> ([T; 3], T, f64) {
+        let r = [q[3 * j] - q[3 * i], q[3 * j + 1] - q[3 * i + 1], q[3 * j + 2] - q[3 * i + 2]];
+        (r, r[0] * r[0] + r[1] * r[1] + r[2] * r[2], self.g * self.mass(i) * self.mass(j))
+    }
+
+    #[inline(always)]
+    fn forces<T: Scalar>(&self, q: &SVector<T, N>) -> SVector<T, N> {
+        let mut force = SVector::from_element(T::zero());
+        for j in 0..N / 3 {
+            for i in 0..j {
+                let (r, square, strength) = self.pair(q, i, j);
+                let pull = (square * square.sqrt()).recip() * strength;
+                for d in 0..3 {
+                    let along = r[d] * pull;
+                    force[3 * i + d] += along;
+                    force[3 * j + d] -= along;
+                }
+            }
+        }
+        force
+    }
+}
+
+impl<const N: usize> Lagrangian<N> for Bodies<N> {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+        let mut l = z * self.gamma;
+        for d in 0..N {
+            l += v[d] * v[d] * (0.5 * self.masses[d]);
+        }
+        for j in 0..N / 3 {
+            for i in 0..j {
+                let (_, square, strength) = self.pair(q, i, j);
+                l += square.sqrt().recip() * strength;
+            }
+        }
+        l
+    }
+
+    #[inline(always)]
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+        let y = SVector::from_fn(|d, _| x.v[d] * self.masses[d]);
+        Some(Triple { x: self.forces(&x.q), y, z: T::from(self.gamma) })
+    }
+
+    #[inline(always)]
+    fn closed_force<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
+        Some(self.forces(&x.q))
+    }
+
+    fn structure(&self) -> Structure {
+        Structure {
+            autonomous: true,
+            z_free: self.gamma == 0.0,
+            z_affine: true,
+            separable: true,
+            constant_mass: true,
+            ..Structure::default()
+        }
+    }
+}
