@@ -86,11 +86,11 @@ impl<const K: usize, const P: usize> Batch<K, P> {
         for (slopes, group) in slopes.iter_mut().zip(&self.groups) {
             // By loops: maps of arrays would be calls.
             let (mut x, mut c) = ([Lanes::splat(0.0); K], [Lanes::splat(0.0); P]);
-            for k in 0..K {
-                x[k] = gathered(q, last, &group.places[k]);
+            for (x, places) in x.iter_mut().zip(&group.places) {
+                *x = gathered(q, last, places);
             }
-            for p in 0..P {
-                c[p] = Lanes::new(group.parameters[p]);
+            for (c, parameters) in c.iter_mut().zip(&group.parameters) {
+                *c = Lanes::new(*parameters);
             }
             let gradient = term.gradient(t, &column(x), &c);
             for k in 0..K {
