@@ -29,7 +29,7 @@ pub(crate) struct At<'a, T> {
 impl<'a, T: Scalar> At<'a, T> {
     #[inline(always)]
     pub fn new<const N: usize>(t: T, q: &'a SVector<T, N>, v: &'a SVector<T, N>, z: T) -> Self {
-        At { q: q.as_slice(), v: v.as_slice(), z, t }
+        At { q: q.as_slice(), v: v.as_slice(), z: whole(z), t: whole(t) }
     }
 }
 
@@ -113,7 +113,7 @@ impl Tape {
         for part in results.iter_mut() {
             for (result, place) in part.iter_mut().zip(&mut places) {
                 let value = get(registers, place.register);
-                *result = if place.negative { -value } else { value };
+                *result = if place.negative { -value } else { whole(value) };
             }
         }
     }
@@ -138,12 +138,27 @@ fn run<T: Scalar>(code: &[Instruction], registers: &mut [T]) {
     }
 }
 
+/// A number as it is, moved as a number. A vector that is only moved the compiler takes for bytes, and moves by halves where it prefers those; who
+/// reads the whole then waits until both are written.
+#[inline(always)]
+pub(crate) fn whole<T: Scalar>(x: T) -> T {
+    -(-x)
+}
+
+/// The same of a vector's.
+#[inline(always)]
+pub(crate) fn whole_vector<T: Scalar, const N: usize>(x: &SVector<T, N>) -> SVector<T, N> {
+    SVector::from_fn(|i, _| whole(x[i]))
+}
+
 /// Numbers to the registers from the first on.
 #[inline(always)]
 fn copy<T: Scalar>(registers: &mut [T], first: u16, from: &[T]) {
     let first = usize::from(first);
     if let Some(places) = registers.get_mut(first..first + from.len()) {
-        places.copy_from_slice(from);
+        for (place, x) in places.iter_mut().zip(from) {
+            *place = whole(*x);
+        }
     }
 }
 
@@ -156,7 +171,7 @@ fn get<T: Scalar>(registers: &[T], register: u16) -> T {
 #[inline(always)]
 fn set<T: Scalar>(registers: &mut [T], register: u16, value: T) {
     if let Some(place) = registers.get_mut(usize::from(register)) {
-        *place = value;
+        *place = whole(value);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Formulas as Lagrangians.
 
 use crate::derived::Derived;
-use crate::evaluation::At;
+use crate::evaluation::{At, whole, whole_vector};
 use crate::{Formula, FormulaError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Hessian, Lagrangian, Scalar, Structure, Symmetry, Triple, VelocityPoint};
@@ -86,6 +86,19 @@ impl<const N: usize> FormulaLagrangian<N> {
     }
 }
 
+/// What results are written to.
+#[inline(always)]
+fn blank<T: Scalar, const N: usize>() -> Triple<N, T> {
+    let zero = SVector::from_element(T::zero());
+    Triple { x: zero, y: zero, z: T::zero() }
+}
+
+/// See [`whole`].
+#[inline(always)]
+fn whole_triple<T: Scalar, const N: usize>(g: &Triple<N, T>) -> Triple<N, T> {
+    Triple { x: whole_vector(&g.x), y: whole_vector(&g.y), z: whole(g.z) }
+}
+
 impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     const PROVED: bool = true;
     const INTERPRETED: bool = true;
@@ -94,39 +107,39 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         let mut value = T::zero();
         self.derived.value.evaluate::<T, N>(At::new(t, q, v, z), &mut [std::slice::from_mut(&mut value)]);
-        value
+        whole(value)
     }
 
     #[inline(always)]
     fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
-        let mut g = Triple::from(*x);
+        let mut g = blank::<T, N>();
         let results = &mut [g.x.as_mut_slice(), g.y.as_mut_slice(), std::slice::from_mut(&mut g.z)];
         self.derived.gradient.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
-        Some(g)
+        Some(whole_triple(&g))
     }
 
     #[inline(always)]
     fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, Triple<N, T>)> {
-        let (mut g, mut value) = (Triple::from(*x), x.z);
+        let (mut g, mut value) = (blank::<T, N>(), T::zero());
         let (z, value_slice) = (std::slice::from_mut(&mut g.z), std::slice::from_mut(&mut value));
         let results = &mut [g.x.as_mut_slice(), g.y.as_mut_slice(), z, value_slice];
         self.derived.with_gradient.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
-        Some((value, g))
+        Some((whole(value), whole_triple(&g)))
     }
 
     #[inline(always)]
     fn closed_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
-        let mut force = x.q;
+        let mut force = SVector::<T, N>::from_element(T::zero());
         self.derived.force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
-        Some(force)
+        Some(whole_vector(&force))
     }
 
     #[inline(always)]
     fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
-        let (mut value, mut force) = (x.z, x.q);
+        let (mut value, mut force) = (T::zero(), SVector::<T, N>::from_element(T::zero()));
         let results = &mut [std::slice::from_mut(&mut value), force.as_mut_slice()];
         self.derived.with_force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
-        Some((value, force))
+        Some((whole(value), whole_vector(&force)))
     }
 
     #[inline(always)]

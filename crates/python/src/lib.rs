@@ -43,6 +43,14 @@ mod _core {
     use crate::system::{System, velocity_names};
     #[pymodule_export]
     use crate::{catalogue, integrators};
+    use pyo3::prelude::*;
+
+    /// Looks up NumPy's functions, as each extension module does that makes arrays.
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        numpy::PyArray1::<f64>::zeros(module.py(), 0, false);
+        Ok(())
+    }
 }
 
 /// An entry of the catalogue: name, about, coordinates, Lagrangian, parameters, position and velocity of the start.

@@ -23,7 +23,8 @@ impl Stages {
 
     #[inline(always)]
     pub fn block<S: Simd>(&self, r: usize) -> Lanes<S> {
-        Lanes(S::as_simd_f64s(&self.0).0[r])
+        // As a number: what is only moved the compiler takes for bytes, and moves by halves where it prefers those.
+        -(-Lanes(S::as_simd_f64s(&self.0).0[r]))
     }
 
     #[inline(always)]
