@@ -8,7 +8,7 @@ use contact_geom::nalgebra::SVector;
 
 /// The numbers of registers that lie on the stack; a tape that needs more has them on the heap. They are cleared before each evaluation, so
 /// that a short tape has few.
-const TINY: usize = 3;
+const TINY: usize = 4;
 const SMALL: usize = 8;
 const MIDDLE: usize = 32;
 const LARGE: usize = 256;

@@ -89,7 +89,7 @@ impl<const N: usize> FormulaLagrangian<N> {
 /// What results are written to.
 #[inline(always)]
 fn blank<T: Scalar, const N: usize>() -> Triple<N, T> {
-    let zero = SVector::from_element(T::zero());
+    let zero = SVector::from_fn(|_, _| T::zero());
     Triple { x: zero, y: zero, z: T::zero() }
 }
 
@@ -129,14 +129,14 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
 
     #[inline(always)]
     fn closed_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
-        let mut force = SVector::<T, N>::from_element(T::zero());
+        let mut force = SVector::<T, N>::from_fn(|_, _| T::zero());
         self.derived.force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
         Some(whole_vector(&force))
     }
 
     #[inline(always)]
     fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
-        let (mut value, mut force) = (T::zero(), SVector::<T, N>::from_element(T::zero()));
+        let (mut value, mut force) = (T::zero(), SVector::<T, N>::from_fn(|_, _| T::zero()));
         let results = &mut [std::slice::from_mut(&mut value), force.as_mut_slice()];
         self.derived.with_force.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
         Some((whole(value), whole_vector(&force)))
@@ -144,7 +144,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
 
     #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
-        let mut w: SMatrix<T, N, N> = SMatrix::from_element(x.z);
+        let mut w: SMatrix<T, N, N> = SMatrix::from_fn(|_, _| T::zero());
         self.derived.mass.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [w.as_mut_slice()]);
         Some(w)
     }

@@ -51,7 +51,7 @@ impl<const N: usize> Bodies<N> {
 
     #[inline(always)]
     fn forces<T: Scalar>(&self, q: &SVector<T, N>) -> SVector<T, N> {
-        let mut force = SVector::from_element(T::zero());
+        let mut force = SVector::from_fn(|_, _| T::zero());
         for j in 0..N / 3 {
             for i in 0..j {
                 let (r, square, strength) = self.pair(q, i, j);

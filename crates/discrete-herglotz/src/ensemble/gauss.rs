@@ -374,7 +374,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
     #[inline(always)]
     fn accelerations<S: Simd, const K: usize>(&self, t: f64, x: &[Pack<S, K>; N]) -> SVector<Pack<S, K>, N> {
         let zero = Pack::zero();
-        let at = VelocityPoint { q: SVector::from_fn(|d, _| x[d]), v: SVector::from_element(zero), z: zero };
+        let at = VelocityPoint { q: SVector::from_fn(|d, _| x[d]), v: SVector::from_fn(|_, _| zero), z: zero };
         let (_, force) = self.form.lagrangian.with_force(Pack::splat(t), &at);
         super::splitting::velocity(&self.form, &force)
     }

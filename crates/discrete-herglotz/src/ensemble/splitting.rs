@@ -146,7 +146,7 @@ impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
 
     #[inline(always)]
     fn zero() -> Self {
-        let (zero, still) = (Pack::splat(0.0), SVector::from_element(Pack::splat(0.0)));
+        let (zero, still) = (Pack::splat(0.0), SVector::from_fn(|_, _| Pack::splat(0.0)));
         Moving { q: still, p: still, carry: still, z: zero, force: still, value: zero, fast: zero, doubt: zero }
     }
 
@@ -247,7 +247,7 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
     #[inline(always)]
     fn take_force<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64) {
         let zero = Pack::splat(0.0);
-        let rest = VelocityPoint { q: m.q, v: SVector::from_element(zero), z: zero };
+        let rest = VelocityPoint { q: m.q, v: SVector::from_fn(|_, _| zero), z: zero };
         let (value, force) = self.form.lagrangian.with_force(Pack::splat(t), &rest);
         m.force = force;
         // What is stored is computed.

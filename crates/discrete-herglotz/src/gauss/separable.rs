@@ -212,7 +212,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
 
     #[inline(always)]
     fn force_of<T: Scalar>(&self, t: T, q: impl Fn(usize) -> T) -> SVector<T, N> {
-        let x = VelocityPoint { q: SVector::from_fn(|d, _| q(d)), v: SVector::from_element(T::zero()), z: T::zero() };
+        let x = VelocityPoint { q: SVector::from_fn(|d, _| q(d)), v: SVector::from_fn(|_, _| T::zero()), z: T::zero() };
         self.lagrangian.force(t, &x)
     }
 
@@ -223,7 +223,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         match &self.inverse_mass {
             None => force,
             Some(inverse) => {
-                let mut accelerations = SVector::from_element(zero);
+                let mut accelerations = SVector::from_fn(|_, _| zero);
                 for i in 0..N {
                     for j in 0..N {
                         accelerations[i] += force[j] * inverse[(i, j)];
