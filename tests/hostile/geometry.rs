@@ -17,6 +17,8 @@ pub const EXCEPTIONS: Exceptions = &[
     ("System::*", "the implementor's: constants and samples"),
     ("ClosedFlow::*", "the implementor's"),
     ("systems::*", "walk the catalogue, and take no number"),
+    ("Bodies::new", "holds what it is given; every start looks at it"),
+    ("Bodies::masses", "takes no number"),
     ("Chain::free", "takes no number"),
     ("Duffing::forced", "takes no number"),
     ("Lienard::initial", "takes no number"),

@@ -96,18 +96,22 @@ fn bodies_of_both_libraries() {
     let bodies = Bodies::<N>::new(|i| OuterSolarSystem::MASSES[i], OuterSolarSystem::G, gamma);
     let system = OuterSolarSystem::system(3, gamma).unwrap();
     let (q, v) = (OuterSolarSystem::positions(3), OuterSolarSystem::velocities(3));
-    let p = SVector::<f64, N>::from_fn(|d, _| bodies.mass(d / 3) * v[d]);
+    let p = SVector::<f64, N>::from_fn(|d, _| bodies.masses()[d] * v[d]);
     let from = PhasePoint { q: SVector::<f64, N>::from_column_slice(&q), p, z: 0.1 };
     let at = VelocityPoint { q: from.q, v: SVector::from_column_slice(&v), z: 0.1 };
     // In units of the round-off of the terms.
     let (gradient, _) = check_closed_derivatives(&bodies, 0.0, &at);
     assert!(gradient.is_some_and(|off| off <= 1e-14), "{gradient:?}");
+    for wrong in [f64::NAN, f64::INFINITY, 0.0] {
+        let bodies = Bodies::<N>::new(|i| if i == 1 { wrong } else { 1.0 }, 1.0, gamma);
+        assert!(Splitting::new(&bodies, &SCHEME, 100.0, 0.0, from).is_err(), "a mass of {wrong}");
+    }
     let mut small = Splitting::new(&bodies, &SCHEME, 100.0, 0.0, from).unwrap();
     small.advance(50).unwrap();
     let large = after(&system, State { t: 0.0, q: &q, v: &v, z: 0.1 }, 100.0, 50, true);
     let state = small.state();
     for d in 0..N {
-        let (dq, dp) = (state.q[d] - large.0[d], state.p[d] - bodies.mass(d / 3) * large.1[d]);
+        let (dq, dp) = (state.q[d] - large.0[d], state.p[d] - bodies.masses()[d] * large.1[d]);
         // Roundings of positions up to 10 au, along a revolution of Jupiter.
         assert!(dq.abs() <= 1e-13 && dp.abs() <= 1e-15, "{d}: {dq:e}, {dp:e}");
     }

@@ -37,16 +37,16 @@ impl<const N: usize> Bodies<N> {
         Bodies { masses: SVector::from_fn(|d, _| mass(d / 3)), g, gamma }
     }
 
-    /// The mass of a body.
-    pub fn mass(&self, body: usize) -> f64 {
-        self.masses[3 * body]
+    /// The mass of each coordinate.
+    pub fn masses(&self) -> &SVector<f64, N> {
+        &self.masses
     }
 
     /// From body i to body j, with the square of the distance and `G m_i m_j`.
     #[inline(always)]
     fn pair<T: Scalar>(&self, q: &SVector<T, N>, i: usize, j: usize) -> ([T; 3], T, f64) {
         let r = [q[3 * j] - q[3 * i], q[3 * j + 1] - q[3 * i + 1], q[3 * j + 2] - q[3 * i + 2]];
-        (r, r[0] * r[0] + r[1] * r[1] + r[2] * r[2], self.g * self.mass(i) * self.mass(j))
+        (r, r[0] * r[0] + r[1] * r[1] + r[2] * r[2], self.g * self.masses[3 * i] * self.masses[3 * j])
     }
 
     #[inline(always)]

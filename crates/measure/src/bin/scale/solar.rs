@@ -85,7 +85,7 @@ fn collocation(stages: usize, days: f64, steps: usize) -> Result<(Vec<f64>, f64)
     const N: usize = 3 * BODIES;
     let bodies = Bodies::<N>::new(|i| OuterSolarSystem::MASSES[i], OuterSolarSystem::G, GAMMA);
     let (q, v) = (OuterSolarSystem::positions(BODIES), OuterSolarSystem::velocities(BODIES));
-    let p = SVector::<f64, N>::from_fn(|d, _| bodies.mass(d / 3) * v[d]);
+    let p = SVector::<f64, N>::from_fn(|d, _| bodies.masses()[d] * v[d]);
     let (start, v) = (PhasePoint { q: SVector::from_column_slice(&q), p, z: 0.0 }, SVector::from_column_slice(&v));
     let gauss = Gauss::new::<N>(bodies, stages, days / steps as f64)?;
     best_of_two(|| {
