@@ -23,6 +23,12 @@ const GAMMA: f64 = -1e-8;
 /// A run: its error in au, its time in seconds.
 type Found = (f64, f64);
 
+/// Runs of the peer: the positions at the end of its finest, and what all have found.
+struct Peer {
+    finest: Vec<f64>,
+    runs: Vec<Found>,
+}
+
 pub fn run(report: &mut Report) -> Result<(), Failure> {
     let years = if report.quick { 1000 } else { 10_000 };
     let days = 365.25 * years as f64;
@@ -31,7 +37,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     let finest = motion(&system, &scheme, days, (days / 60.0).ceil() as usize)?.0;
     // Of each side the errors are those against the other's finest run.
     let theirs = ias15(days, &finest)?;
-    let exact = theirs.as_ref().map_or(&finest, |(positions, _)| positions);
+    let exact = theirs.as_ref().map_or(&finest, |peer| &peer.finest);
     report.verdict(CASE, "difference of the two finest runs, in au", distance(exact, &finest), 1e-9);
     let mut ours: Vec<Found> = Vec::new();
     let schemes = [SplittingScheme::BLANES_MOAN_6, SplittingScheme::BLANES_CASAS_8, scheme];
@@ -65,12 +71,12 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
             ours.push((error, seconds));
         }
     }
-    let Some((_, theirs)) = &theirs else {
+    let Some(theirs) = &theirs else {
         return print(
             "            REBOUND is not there (python3 with the package rebound, and cc): nothing to compare with\n",
         );
     };
-    for (error, seconds) in theirs {
+    for (error, seconds) in &theirs.runs {
         report.row(CASE, &format!("REBOUND's IAS15 to {error:.0e} au"), years, *seconds, None);
         // What is below the difference of the two finest runs is round-off, of both.
         let level = f64::max(*error, distance(exact, &finest));
@@ -128,7 +134,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 
 /// REBOUND's IAS15: its positions at the end with the smallest tolerance, and its errors against others with several; `None` where it is not
 /// installed.
-fn ias15(days: f64, exact: &[f64]) -> Result<Option<(Vec<f64>, Vec<Found>)>, Failure> {
+fn ias15(days: f64, exact: &[f64]) -> Result<Option<Peer>, Failure> {
     let mut input = format!("{:e}\n{GAMMA:e}\n{days:e}\n", OuterSolarSystem::G);
     for i in 0..BODIES {
         let [p, v] = [OuterSolarSystem::POSITIONS[i], OuterSolarSystem::VELOCITIES[i]];
@@ -142,5 +148,5 @@ fn ias15(days: f64, exact: &[f64]) -> Result<Option<(Vec<f64>, Vec<Found>)>, Fai
     let positions = |run: &Vec<f64>| run.get(2..).unwrap_or(&[]).to_vec();
     let found = |run: &Vec<f64>| (distance(&positions(run), exact), run.get(1).copied().unwrap_or(f64::NAN));
     let finest = runs.last().map(positions).unwrap_or_default();
-    Ok(Some((finest, runs.iter().map(found).collect())))
+    Ok(Some(Peer { finest, runs: runs.iter().map(found).collect() }))
 }
