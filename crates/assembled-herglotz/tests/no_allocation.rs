@@ -3,7 +3,7 @@
 // What a test cannot go on without is a failure of it.
 #![allow(clippy::unwrap_used)]
 
-use assembled_herglotz::systems::{FputBond, SineGordon, fput_chain, lattice};
+use assembled_herglotz::systems::{FputBond, OuterSolarSystem, SineGordon, fput_chain, lattice};
 use assembled_herglotz::{AssembledGauss, AssembledMidpoint, AssembledSplitting, AssemblyError, State};
 use discrete_herglotz::SplittingScheme;
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
@@ -60,6 +60,17 @@ fn steps() {
     let found = allocations(|| {
         explicit.advance(300).unwrap();
         explicit.state();
+    });
+    assert_eq!(found, 0);
+    // With compensated sums, and with elements that are in no run.
+    let planets = OuterSolarSystem::system(5, -1e-8).unwrap();
+    let (at, moving) = (OuterSolarSystem::positions(5), OuterSolarSystem::velocities(5));
+    let begin = State { t: 0.0, q: &at, v: &moving, z: 0.0 };
+    let mut bodies =
+        AssembledSplitting::new(&planets, &SplittingScheme::BLANES_MOAN_6, 100.0, begin).unwrap().compensated();
+    let found = allocations(|| {
+        bodies.advance(300).unwrap();
+        bodies.state();
     });
     assert_eq!(found, 0);
     let mut implicit = AssembledMidpoint::new(&chain, 0.05, start, None).unwrap();

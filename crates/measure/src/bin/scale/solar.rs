@@ -6,9 +6,9 @@ use crate::report::Report;
 use assembled_herglotz::systems::OuterSolarSystem;
 use assembled_herglotz::{AssembledSplitting, AssembledSystem, State};
 use contact_examples::{Failure, print};
-use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Bodies;
+use contact_geom::{PhasePoint, larger};
 use discrete_herglotz::{Gauss, SplittingScheme, Stepper};
 use std::time::Instant;
 
@@ -38,7 +38,9 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     // Of each side the errors are those against the other's finest run.
     let theirs = ias15(days, &finest)?;
     let exact = theirs.as_ref().map_or(&finest, |peer| &peer.finest);
-    report.verdict(CASE, "difference of the two finest runs, in au", distance(exact, &finest), 1e-9);
+    if theirs.is_some() {
+        report.verdict(CASE, "difference of the two finest runs, in au", distance(exact, &finest), 1e-9);
+    }
     let mut ours: Vec<Found> = Vec::new();
     let schemes = [SplittingScheme::BLANES_MOAN_6, SplittingScheme::BLANES_CASAS_8, scheme];
     for scheme in &schemes {
@@ -79,7 +81,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     for (error, seconds) in &theirs.runs {
         report.row(CASE, &format!("REBOUND's IAS15 to {error:.0e} au"), years, *seconds, None);
         // What is below the difference of the two finest runs is round-off, of both.
-        let level = f64::max(*error, distance(exact, &finest));
+        let level = larger(*error, distance(exact, &finest));
         let here = ours.iter().filter(|f| f.0 <= level).map(|f| f.1).fold(f64::INFINITY, f64::min);
         report.verdict(CASE, &format!("time to {error:.0e} au over IAS15's"), here / seconds, 0.5);
     }
@@ -128,7 +130,11 @@ fn motion(
     })
 }
 
+/// Not a number where one of them has fewer numbers, as of a program that has ended early.
 fn distance(a: &[f64], b: &[f64]) -> f64 {
+    if a.len() != b.len() {
+        return f64::NAN;
+    }
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
