@@ -41,6 +41,7 @@ macro_rules! either {
 }
 
 /// The module of a build in which there is one set.
+#[allow(unused_macros)] // In builds for any processor there is a choice.
 macro_rules! only {
     ($set:ident) => {
         mod chosen {
