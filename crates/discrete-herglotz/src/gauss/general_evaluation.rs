@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::general::General;
-use super::pair::Pair;
+use super::pair::{Registers, over_registers};
 use super::stages::blocks;
 use super::time_transformation::TimeTransformation;
 use crate::gauss::lanes::Lanes;
@@ -24,31 +24,22 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
         }
     }
 
-    /// Evaluates L and its gradient at the stages; returns the largest change of a clock's rates, relative to the largest.
+    /// Evaluates L and its gradient at the stages; returns the largest change of a clock's rates, relative to the largest, or 0 without one.
     #[inline(always)]
     pub(super) fn evaluate<S: Simd>(&mut self, t: f64) -> f64 {
-        let (mut dg, mut sg) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
-        let (m, mut first) = (blocks::<S>(self.table.s), 0);
-        if const { L::INTERPRETED && P::PHYSICAL } {
-            while first < 2 * Pair::<S>::among(m) {
-                let point = VelocityPoint {
-                    q: SVector::from_fn(|d, _| Pair::<S>::of(&self.x[d], first)),
-                    v: SVector::from_fn(|d, _| Pair::of(&self.v[d], first)),
-                    z: Pair::of(&self.z_stages, first),
-                };
-                let (l, d) = self.lagrangian.with_gradient(Pair::of(&self.table.times, first) + t, &point);
-                self.weigh(first, l.0, &Triple { x: d.x.map(|e| e.0), y: d.y.map(|e| e.0), z: d.z.0 });
-                self.weigh(first + 1, l.1, &Triple { x: d.x.map(|e| e.1), y: d.y.map(|e| e.1), z: d.z.1 });
-                first += 2;
+        let m = blocks::<S>(self.table.s);
+        self.evaluations += self.table.s as u64;
+        if const { P::PHYSICAL } {
+            let mut r = 0;
+            while r < m {
+                r = over_registers!(self.take_gradients(t, r); L, S, m - r);
             }
+            return 0.0;
         }
-        for r in first..m {
+        let (mut dg, mut sg) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
+        for r in 0..m {
             let at = self.table.times.block::<S>(r) + t;
             let (re, d) = self.lagrangian.with_gradient(at, &self.point::<S>(r));
-            if const { P::PHYSICAL } {
-                self.weigh(r, re, &d);
-                continue;
-            }
             let (mut weight, falling) = (self.table.weights.block::<S>(r), -self.falling.block::<S>(r));
             let point = self.point::<S>(r);
             let q = SVector::<_, N>::from_fn(|i, _| {
@@ -72,8 +63,23 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
                 self.l_v[i].set(r, d.y[i]);
             }
         }
-        self.evaluations += self.table.s as u64;
-        if P::PHYSICAL { 0.0 } else { dg.largest() / sg.largest() }
+        dg.largest() / sg.largest()
+    }
+
+    /// L and its gradient at the blocks of stages that T holds, from the r-th on, in physical time.
+    #[inline(always)]
+    fn take_gradients<S: Simd, T: Registers<S>>(&mut self, t: f64, r: usize) -> usize {
+        let point = VelocityPoint {
+            q: SVector::from_fn(|d, _| T::of(&self.x[d], r)),
+            v: SVector::from_fn(|d, _| T::of(&self.v[d], r)),
+            z: T::of(&self.z_stages, r),
+        };
+        let (l, d) = self.lagrangian.with_gradient(T::of(&self.table.times, r) + t, &point);
+        for i in 0..T::COUNT {
+            let of = |x: &SVector<T, N>| SVector::from_fn(|d, _| x[d].register(i));
+            self.weigh(r + i, l.register(i), &Triple { x: of(&d.x), y: of(&d.y), z: d.z.register(i) });
+        }
+        r + T::COUNT
     }
 
     /// Takes L and its gradient at one block of stages, with the weights of physical time.

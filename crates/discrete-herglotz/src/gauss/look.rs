@@ -6,7 +6,7 @@
 use super::coefficients::{Coefficients, MOST, lagrange_rows};
 use super::condensed::Condensed;
 use super::dense::Solved;
-use super::pair::Pair;
+use super::pair::{Registers, Two, by_two};
 use super::stages::{StageMap, Stages, blocks};
 use super::time_transformation::TimeTransformation;
 use crate::gauss::lanes::Lanes;
@@ -126,23 +126,31 @@ impl<const N: usize> Curve<N> {
                 self.force[i].set(r, force * rho);
             }
         }
-        let (mut first, m) = (0, blocks::<S>(table.s));
-        if const { L::INTERPRETED } {
-            while first < 2 * Pair::<S>::among(m) {
-                let q = SVector::from_fn(|d, _| Pair::<S>::of(&x[d], first));
-                let v = SVector::from_fn(|d, _| Pair::of(&self.v[d], first));
-                let l = lagrangian.value(Pair::of(&table.times, first) + self.t, &q, &v, 0.0.into());
-                self.l.set(first, l.0);
-                self.l.set(first + 1, l.1);
-                first += 2;
-            }
+        let (mut r, m) = (0, blocks::<S>(table.s));
+        while r < m {
+            r = if const { L::INTERPRETED && by_two::<S>() } && r + 2 <= m {
+                self.take_values::<S, Two<S>, L>(lagrangian, table, x, r)
+            } else {
+                self.take_values::<S, Lanes<S>, L>(lagrangian, table, x, r)
+            };
         }
-        for r in first..m {
-            let q = SVector::from_fn(|d, _| x[d].block::<S>(r));
-            let v = SVector::from_fn(|d, _| self.v[d].block::<S>(r));
-            let t = table.times.block::<S>(r) + self.t;
-            self.l.set(r, lagrangian.value(t, &q, &v, Lanes::splat(0.0)));
+    }
+
+    /// `L` at the blocks of stages that T holds, from the r-th on.
+    #[inline(always)]
+    fn take_values<S: Simd, T: Registers<S>, L: Lagrangian<N>>(
+        &mut self,
+        lagrangian: &L,
+        table: &Condensed,
+        x: &[Stages; N],
+        r: usize,
+    ) -> usize {
+        let (q, v) = (SVector::from_fn(|d, _| T::of(&x[d], r)), SVector::from_fn(|d, _| T::of(&self.v[d], r)));
+        let l = lagrangian.value(T::of(&table.times, r) + self.t, &q, &v, T::zero());
+        for i in 0..T::COUNT {
+            self.l.set(r + i, l.register(i));
         }
+        r + T::COUNT
     }
 }
 
@@ -261,13 +269,13 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
             }
             let (value, g) = match other.take() {
                 Some(other) => other,
-                None if const { L::INTERPRETED && P::PHYSICAL } && r + 1 < 2 * Pair::<S>::among(blocks::<S>(s)) => {
+                None if const { L::INTERPRETED && P::PHYSICAL && by_two::<S>() } && r + 1 < blocks::<S>(s) => {
                     let pair = VelocityPoint {
-                        q: SVector::from_fn(|d, _| Pair::of(&q[d], r)),
-                        v: SVector::from_fn(|d, _| Pair::of(&v[d], r)),
-                        z: Pair::of(&z, r),
+                        q: SVector::from_fn(|d, _| Two::<S>::of(&q[d], r)),
+                        v: SVector::from_fn(|d, _| Two::of(&v[d], r)),
+                        z: Two::of(&z, r),
                     };
-                    let (l, g) = lagrangian.with_gradient(Pair::of(&between.points, r) * h + t, &pair);
+                    let (l, g) = lagrangian.with_gradient(Two::of(&between.points, r) * h + t, &pair);
                     other = Some((l.1, Triple { x: g.x.map(|e| e.1), y: g.y.map(|e| e.1), z: g.z.1 }));
                     (l.0, Triple { x: g.x.map(|e| e.0), y: g.y.map(|e| e.0), z: g.z.0 })
                 }

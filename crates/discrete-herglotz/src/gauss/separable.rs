@@ -6,7 +6,7 @@
 use super::compensated::{Compensated, Twofold, add, finite};
 use super::condensed::{Condensed, Preconditioned};
 use super::instructions::Instructions;
-use super::pair::Pair;
+use super::pair::{Registers, over_registers};
 use super::position_newton::{At, PositionNewton, curvature};
 use super::resolution::{FORETOLD, Tail};
 use super::simplified::SlopeNewton;
@@ -16,7 +16,7 @@ use crate::StepError;
 use crate::gauss::lanes::{Lanes, branched};
 use crate::run::saved::{Saved, load_option, save_option, saved};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Lagrangian, Scalar, VelocityPoint, largest};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, largest};
 use pulp::Simd;
 use std::sync::Arc;
 
@@ -197,23 +197,19 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         }
     }
 
-    /// The forces at positions, one block of stages.
+    /// Takes the forces at the positions of the blocks of stages that T holds, from the r-th on.
     #[inline(always)]
-    fn force<S: Simd>(&self, t: f64, r: usize) -> SVector<Lanes<S>, N> {
-        self.force_of(self.table.times.block::<S>(r) + t, |d| self.x[d].block(r))
-    }
-
-    /// The same of this one and the next.
-    #[inline(always)]
-    fn forces<S: Simd>(&self, t: f64, r: usize) -> [SVector<Lanes<S>, N>; 2] {
-        let force = self.force_of(Pair::<S>::of(&self.table.times, r) + t, |d| Pair::of(&self.x[d], r));
-        [SVector::from_fn(|d, _| force[d].0), SVector::from_fn(|d, _| force[d].1)]
-    }
-
-    #[inline(always)]
-    fn force_of<T: Scalar>(&self, t: T, q: impl Fn(usize) -> T) -> SVector<T, N> {
-        let x = VelocityPoint { q: SVector::from_fn(|d, _| q(d)), v: SVector::from_fn(|_, _| T::zero()), z: T::zero() };
-        self.lagrangian.force(t, &x)
+    fn take_forces<S: Simd, T: Registers<S>>(&mut self, t: f64, r: usize, most: &mut [Lanes<S>; 2]) -> usize {
+        let x = VelocityPoint {
+            q: SVector::from_fn(|d, _| T::of(&self.x[d], r)),
+            v: SVector::from_fn(|_, _| T::zero()),
+            z: T::zero(),
+        };
+        let force = self.lagrangian.force(T::of(&self.table.times, r) + t, &x);
+        for i in 0..T::COUNT {
+            self.take(r + i, SVector::from_fn(|d, _| force[d].register(i)), most);
+        }
+        r + T::COUNT
     }
 
     /// The accelerations of forces.
@@ -289,18 +285,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
                 self.begin::<S>(small);
             }
             let mut most = [Lanes::<S>::splat(0.0); 2];
-            let mut first = 0;
-            if const { L::INTERPRETED } {
-                while first < 2 * Pair::<S>::among(m) {
-                    let [one, other] = self.forces::<S>(t, first);
-                    self.take(first, one, &mut most);
-                    self.take(first + 1, other, &mut most);
-                    first += 2;
-                }
-            }
-            for r in first..m {
-                let force = self.force::<S>(t, r);
-                self.take(r, force, &mut most);
+            let mut r = 0;
+            while r < m {
+                r = over_registers!(self.take_forces(t, r, &mut most); L, S, m - r);
             }
             let [change, size] = most;
             self.evaluations += s as u64;
@@ -437,6 +424,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         AfterSweep::Done
     }
 
+    /// `L - gamma z` at the blocks of stages that T holds, from the r-th on.
+    #[inline(always)]
+    fn take_values<S: Simd, T: Registers<S>>(&self, t: f64, r: usize, v: &[Stages; N], to: &mut Stages) -> usize {
+        let (q, v) = (SVector::from_fn(|d, _| T::of(&self.x[d], r)), SVector::from_fn(|d, _| T::of(&v[d], r)));
+        let l = self.lagrangian.value(T::of(&self.table.times, r) + t, &q, &v, T::zero());
+        for i in 0..T::COUNT {
+            to.set(r + i, l.register(i));
+        }
+        r + T::COUNT
+    }
+
     /// `L - gamma z` at the stages.
     #[inline(always)]
     fn action<S: Simd>(&self, t: f64) -> Stages {
@@ -447,21 +445,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             table.d.apply(&self.a[d], s, &mut velocities[d], |r| table.inverse_rho.block(r) * v);
         }
         let (mut action, m) = (Stages::ZERO, blocks::<S>(s));
-        let mut first = 0;
-        if const { L::INTERPRETED } {
-            while first < 2 * Pair::<S>::among(m) {
-                let q = SVector::from_fn(|d, _| Pair::<S>::of(&self.x[d], first));
-                let v = SVector::from_fn(|d, _| Pair::of(&velocities[d], first));
-                let l = self.lagrangian.value(Pair::of(&table.times, first) + t, &q, &v, 0.0.into());
-                action.set(first, l.0);
-                action.set(first + 1, l.1);
-                first += 2;
-            }
-        }
-        for r in first..m {
-            let q = SVector::from_fn(|d, _| self.x[d].block::<S>(r));
-            let v = SVector::from_fn(|d, _| velocities[d].block::<S>(r));
-            action.set(r, self.lagrangian.value(table.times.block::<S>(r) + t, &q, &v, Lanes::splat(0.0)));
+        let mut r = 0;
+        while r < m {
+            r = over_registers!(self.take_values(t, r, &velocities, &mut action); L, S, m - r);
         }
         action
     }
