@@ -98,34 +98,45 @@ impl StageMap {
 
     /// `y = start + M x`.
     ///
-    /// Two registers at a time, even and odd columns apart: four sums under way keep the multipliers busy.
+    /// Several registers at a time, even and odd columns apart: the sums that are under way keep the multipliers busy.
     #[inline(always)]
     pub fn apply<S: Simd>(&self, x: &Stages, s: usize, y: &mut Stages, start: impl Fn(usize) -> Lanes<S>) {
         let m = blocks::<S>(s);
         let mut r = 0;
-        while r + 1 < m {
-            let (mut even, mut odd) = ([start(r), start(r + 1)], [Lanes::<S>::splat(0.0); 2]);
-            for pair in 0..s.min(MOST).div_ceil(2) {
-                let (k, l) = (2 * pair, 2 * pair + 1);
-                let (a, b) = (Lanes::splat(x.0[k]), Lanes::splat(x.0[l]));
-                even[0] = self.0[k].block(r).mul_add(a, even[0]);
-                even[1] = self.0[k].block(r + 1).mul_add(a, even[1]);
-                odd[0] = self.0[l].block(r).mul_add(b, odd[0]);
-                odd[1] = self.0[l].block(r + 1).mul_add(b, odd[1]);
-            }
-            y.set(r, even[0] + odd[0]);
-            y.set(r + 1, even[1] + odd[1]);
-            r += 2;
+        while const { 4 * S::F64_LANES <= MOST } && r + 4 <= m {
+            r = self.rows::<S, 4>(x, s, y, &start, r);
+        }
+        while r + 2 <= m {
+            r = self.rows::<S, 2>(x, s, y, &start, r);
         }
         if r < m {
-            let (mut even, mut odd) = (start(r), Lanes::<S>::splat(0.0));
-            for pair in 0..s.min(MOST).div_ceil(2) {
-                let (k, l) = (2 * pair, 2 * pair + 1);
-                even = self.0[k].block(r).mul_add(Lanes::splat(x.0[k]), even);
-                odd = self.0[l].block(r).mul_add(Lanes::splat(x.0[l]), odd);
-            }
-            y.set(r, even + odd);
+            self.rows::<S, 1>(x, s, y, &start, r);
         }
+    }
+
+    /// The same for K registers from the r-th on.
+    #[inline(always)]
+    fn rows<S: Simd, const K: usize>(
+        &self,
+        x: &Stages,
+        s: usize,
+        y: &mut Stages,
+        start: &impl Fn(usize) -> Lanes<S>,
+        r: usize,
+    ) -> usize {
+        let (mut even, mut odd): ([_; K], _) = (from_fn(|i| start(r + i)), [Lanes::<S>::splat(0.0); K]);
+        for pair in 0..s.min(MOST).div_ceil(2) {
+            let (k, l) = (2 * pair, 2 * pair + 1);
+            let (a, b) = (Lanes::splat(x.0[k]), Lanes::splat(x.0[l]));
+            for i in 0..K {
+                even[i] = self.0[k].block(r + i).mul_add(a, even[i]);
+                odd[i] = self.0[l].block(r + i).mul_add(b, odd[i]);
+            }
+        }
+        for i in 0..K {
+            y.set(r + i, even[i] + odd[i]);
+        }
+        r + K
     }
 }
 
