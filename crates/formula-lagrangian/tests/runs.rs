@@ -25,7 +25,7 @@ fn a_pendulum_by_gauss() {
     assert_eq!(l.d[0], -1f64.sin());
 }
 
-/// As many stages as there are, so that one, two or more vector registers hold them: formulas are evaluated for two of them at once, types for
+/// As many stages as there are, so that one, two or more vector registers hold them: formulas are evaluated for two or four at once, types for
 /// one, to the same bits. By accelerations (the pendulum) and by the general route (drag of the second degree in z).
 #[test]
 fn gauss_steps_of_any_number_of_stages_are_those_of_the_type() {
