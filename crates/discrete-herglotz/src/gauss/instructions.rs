@@ -69,43 +69,35 @@ either! {
     all(
         not(test),
         target_arch = "x86_64",
-        target_feature = "avx512bw",
-        target_feature = "avx512cd",
-        target_feature = "avx512dq",
-        target_feature = "avx512vl",
+        target_feature = "avx2",
         target_feature = "bmi1",
         target_feature = "bmi2",
         target_feature = "fma",
         target_feature = "fxsr",
         target_feature = "lzcnt",
         target_feature = "popcnt"
-    ) => only! { V4 }
-    otherwise either! {
+    ) => either! {
         all(
-            not(test),
-            target_arch = "x86_64",
-            target_feature = "avx2",
-            target_feature = "bmi1",
-            target_feature = "bmi2",
-            target_feature = "fma",
-            target_feature = "fxsr",
-            target_feature = "lzcnt",
-            target_feature = "popcnt"
-        ) => only! { V3 }
-        otherwise mod chosen {
-            use pulp::{Arch, WithSimd};
+            target_feature = "avx512bw",
+            target_feature = "avx512cd",
+            target_feature = "avx512dq",
+            target_feature = "avx512vl"
+        ) => only! { V4 }
+        otherwise only! { V3 }
+    }
+    otherwise mod chosen {
+        use pulp::{Arch, WithSimd};
 
-            pub type Set = Arch;
+        pub type Set = Arch;
 
-            #[inline]
-            pub fn set() -> Set {
-                Arch::new()
-            }
+        #[inline]
+        pub fn set() -> Set {
+            Arch::new()
+        }
 
-            #[inline(always)]
-            pub fn run<K: WithSimd>(set: Set, kernel: K) -> K::Output {
-                set.dispatch(kernel)
-            }
+        #[inline(always)]
+        pub fn run<K: WithSimd>(set: Set, kernel: K) -> K::Output {
+            set.dispatch(kernel)
         }
     }
 }
