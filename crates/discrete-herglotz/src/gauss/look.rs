@@ -7,6 +7,7 @@ use super::coefficients::{Coefficients, MOST, lagrange_rows};
 use super::condensed::Condensed;
 use super::dense::Solved;
 use super::pair::{Registers, Two, by_two};
+use super::stage_values::StageValues;
 use super::stages::{StageMap, Stages, blocks};
 use super::time_transformation::TimeTransformation;
 use crate::gauss::lanes::Lanes;
@@ -126,31 +127,7 @@ impl<const N: usize> Curve<N> {
                 self.force[i].set(r, force * rho);
             }
         }
-        let (mut r, m) = (0, blocks::<S>(table.s));
-        while r < m {
-            r = if const { L::INTERPRETED && by_two::<S>() } && r + 2 <= m {
-                self.take_values::<S, Two<S>, L>(lagrangian, table, x, r)
-            } else {
-                self.take_values::<S, Lanes<S>, L>(lagrangian, table, x, r)
-            };
-        }
-    }
-
-    /// `L` at the blocks of stages that T holds, from the r-th on.
-    #[inline(always)]
-    fn take_values<S: Simd, T: Registers<S>, L: Lagrangian<N>>(
-        &mut self,
-        lagrangian: &L,
-        table: &Condensed,
-        x: &[Stages; N],
-        r: usize,
-    ) -> usize {
-        let (q, v) = (SVector::from_fn(|d, _| T::of(&x[d], r)), SVector::from_fn(|d, _| T::of(&self.v[d], r)));
-        let l = lagrangian.value(T::of(&table.times, r) + self.t, &q, &v, T::zero());
-        for i in 0..T::COUNT {
-            self.l.set(r + i, l.register(i));
-        }
-        r + T::COUNT
+        self.l = StageValues { lagrangian, times: &table.times, t: self.t, x, v: &self.v }.all::<S>(table.s);
     }
 }
 

@@ -27,6 +27,7 @@ mod separable;
 mod simplified;
 pub(crate) mod sine;
 mod stage_equations;
+mod stage_values;
 mod stages;
 mod stepper;
 mod sweeps;

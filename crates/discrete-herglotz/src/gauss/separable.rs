@@ -10,6 +10,7 @@ use super::pair::{Registers, over_registers};
 use super::position_newton::{At, PositionNewton, curvature};
 use super::resolution::{FORETOLD, Tail};
 use super::simplified::SlopeNewton;
+use super::stage_values::StageValues;
 use super::stages::{Stages, blocks};
 use super::sweeps::{AGE, AfterSweep, SLOW, Sweeps};
 use crate::StepError;
@@ -424,17 +425,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         AfterSweep::Done
     }
 
-    /// `L - gamma z` at the blocks of stages that T holds, from the r-th on.
-    #[inline(always)]
-    fn take_values<S: Simd, T: Registers<S>>(&self, t: f64, r: usize, v: &[Stages; N], to: &mut Stages) -> usize {
-        let (q, v) = (SVector::from_fn(|d, _| T::of(&self.x[d], r)), SVector::from_fn(|d, _| T::of(&v[d], r)));
-        let l = self.lagrangian.value(T::of(&self.table.times, r) + t, &q, &v, T::zero());
-        for i in 0..T::COUNT {
-            to.set(r + i, l.register(i));
-        }
-        r + T::COUNT
-    }
-
     /// `L - gamma z` at the stages.
     #[inline(always)]
     fn action<S: Simd>(&self, t: f64) -> Stages {
@@ -444,12 +434,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             let v = Lanes::<S>::splat(self.v[d].value);
             table.d.apply(&self.a[d], s, &mut velocities[d], |r| table.inverse_rho.block(r) * v);
         }
-        let (mut action, m) = (Stages::ZERO, blocks::<S>(s));
-        let mut r = 0;
-        while r < m {
-            r = over_registers!(self.take_values(t, r, &velocities, &mut action); L, S, m - r);
-        }
-        action
+        StageValues { lagrangian: self.lagrangian, times: &table.times, t, x: &self.x, v: &velocities }.all::<S>(s)
     }
 }
 

@@ -1,0 +1,39 @@
+//! The values of a Lagrangian at the stages of a condensed step.
+
+use super::pair::{Registers, over_registers};
+use super::stages::{Stages, blocks};
+use contact_geom::Lagrangian;
+use contact_geom::nalgebra::SVector;
+use pulp::Simd;
+
+/// `L(t, q, v, 0)` at the stages of a step that begins at the time t.
+pub(super) struct StageValues<'a, L, const N: usize> {
+    pub lagrangian: &'a L,
+    pub times: &'a Stages,
+    pub t: f64,
+    pub x: &'a [Stages; N],
+    pub v: &'a [Stages; N],
+}
+
+impl<L: Lagrangian<N>, const N: usize> StageValues<'_, L, N> {
+    /// At all s stages.
+    #[inline(always)]
+    pub fn all<S: Simd>(&self, s: usize) -> Stages {
+        let (mut values, mut r, m) = (Stages::ZERO, 0, blocks::<S>(s));
+        while r < m {
+            r = over_registers!(self.take(r, &mut values); L, S, m - r);
+        }
+        values
+    }
+
+    /// At the blocks of stages that T holds, from the r-th on.
+    #[inline(always)]
+    fn take<S: Simd, T: Registers<S>>(&self, r: usize, values: &mut Stages) -> usize {
+        let (q, v) = (SVector::from_fn(|d, _| T::of(&self.x[d], r)), SVector::from_fn(|d, _| T::of(&self.v[d], r)));
+        let l = self.lagrangian.value(T::of(self.times, r) + self.t, &q, &v, T::zero());
+        for i in 0..T::COUNT {
+            values.set(r + i, l.register(i));
+        }
+        r + T::COUNT
+    }
+}
