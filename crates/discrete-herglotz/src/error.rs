@@ -208,6 +208,25 @@ pub enum StepError {
         /// The smallest singular value of the derivative of the end position in the initial velocity, a time.
         smallest: f64,
     },
+    /// The Lagrangian switches without end within a step.
+    #[error(
+        "the Lagrangian switches at its kinks or jumps without end near t = {t}: the motion is held on a surface from both sides, or \
+         crosses it ever faster; smooth the kink, or end the run before"
+    )]
+    Switching {
+        /// The time that is reached.
+        t: f64,
+    },
+    /// The Lagrangian jumps across a surface that depends on the velocity or on the action, where the corner conditions do not say how a motion
+    /// goes on.
+    #[error(
+        "the Lagrangian jumps at t = {t} across a surface that depends on the velocity or on z, or that the motion only touches, where \
+         the principle does not say how the motion goes on; smooth the jump, or end the run before"
+    )]
+    JumpAlong {
+        /// The time of the jump.
+        t: f64,
+    },
     /// A coordinate or a derivative is infinite or not a number.
     #[error("a value is not finite: the motion leaves the domain of the Lagrangian, or grows without bound")]
     NonFinite,

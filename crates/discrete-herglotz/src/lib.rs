@@ -31,6 +31,7 @@ pub mod rules;
 mod run;
 mod solve;
 mod splitting;
+mod switching;
 mod theory;
 
 pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus, branch, continuation};

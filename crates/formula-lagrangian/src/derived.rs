@@ -2,7 +2,7 @@
 
 use crate::formula::index;
 use crate::parser::MOST_NODES;
-use crate::structure::{Partials, kinks, proved};
+use crate::structure::{Partials, kinks, proved, switching_functions};
 use crate::tape::Tape;
 use crate::{Formula, FormulaError, Graph, Id};
 use contact_geom::Structure;
@@ -32,6 +32,8 @@ pub(crate) struct Derived {
     pub mass: Tape,
     /// All second derivatives in the order qq, qv, vv, qz, vz, zz.
     pub second: Tape,
+    /// The functions at whose zeros L has kinks and jumps.
+    pub switching: Tape,
 }
 
 impl Derived {
@@ -81,6 +83,8 @@ impl Derived {
         let mut free = |i: usize| needed.get(graph.position(i as u32).index()) != Some(&true);
         let cyclic = (0..n).map(&mut free).collect();
         let smooth = kinks(&graph, root) == crate::node::Inputs::NONE;
+        let switching = switching_functions(&mut graph, root);
+        let switching = Tape::new(&graph, &switching, n).ok_or(FormulaError::TooLarge { limit: WITH_GRADIENT })?;
         let formula = Formula { graph, ..formula.clone() };
         let mut derived = Derived {
             formula,
@@ -95,6 +99,7 @@ impl Derived {
             with_gradient,
             mass,
             second,
+            switching,
         };
         derived.set_constants();
         Ok(derived)
@@ -112,8 +117,8 @@ impl Derived {
 
     fn set_constants(&mut self) {
         let constants = self.formula.graph.constants(&self.formula.values);
-        let Derived { value, force, with_force, gradient, with_gradient, mass, second, .. } = &mut *self;
-        for tape in [value, force, with_force, gradient, with_gradient, mass, second] {
+        let Derived { value, force, with_force, gradient, with_gradient, mass, second, switching, .. } = &mut *self;
+        for tape in [value, force, with_force, gradient, with_gradient, mass, second, switching] {
             tape.set_constants(&constants);
         }
         let rate = self.partials.last().filter(|_| self.structure.constant_rate);

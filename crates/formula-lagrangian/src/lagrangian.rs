@@ -162,4 +162,14 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     fn structure(&self) -> Structure {
         self.derived.structure
     }
+
+    /// The arguments of `abs` and `sign`, and the differences by which `min`, `max` and `if` choose.
+    fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
+        let (tape, first) = (&self.derived.switching, values.len());
+        if !tape.results.is_empty() {
+            values.resize(first + tape.results.len(), 0.0);
+            let results = values.get_mut(first..).unwrap_or(&mut []);
+            tape.evaluate::<f64, N>(At::new(t, &x.q, &x.v, x.z), &mut [results]);
+        }
+    }
 }

@@ -73,6 +73,25 @@ pub(crate) fn kinks(graph: &Graph, of: Id) -> Inputs {
     })
 }
 
+/// The functions at whose zeros a node has a kink or a jump: the arguments of `abs` and `sign`, and the differences that `min`, `max` and `if`
+/// choose by. Each once, whatever its sign; what is constant never changes its sign.
+pub(crate) fn switching_functions(graph: &mut Graph, of: Id) -> Vec<Id> {
+    let needed = graph.needed(of);
+    let mut functions: Vec<Id> = Vec::new();
+    for id in (0..=of.index()).filter(|i| needed[*i]).map(|i| Id(i as u32)) {
+        let function = match graph.node(id) {
+            Node::Unary(f, a) if !f.is_smooth() => a,
+            Node::Binary(Operation::Min | Operation::Max, a, b) | Node::Select([a, b, ..]) => graph.sub(a, b),
+            _ => continue,
+        };
+        let opposite = graph.neg(function);
+        if !graph.is_constant(function) && !functions.contains(&function) && !functions.contains(&opposite) {
+            functions.push(function);
+        }
+    }
+    functions
+}
+
 impl Graph {
     /// Which nodes up to `of` it is made of.
     pub(crate) fn needed(&self, of: Id) -> Vec<bool> {

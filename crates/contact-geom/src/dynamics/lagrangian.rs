@@ -80,6 +80,14 @@ pub trait Lagrangian<const N: usize> {
         Structure::default()
     }
 
+    /// The switching functions `g_i(t, q, v, z)`, at whose zeros L has a kink or a jump: appends their values at a point, always as many and in
+    /// the same order. A run ends a step on each zero that its motion crosses, so that integrators keep their order there; where L itself
+    /// jumps across a surface in the positions, the motion is refracted or reflected by the corner conditions of Weierstrass and Erdmann (the
+    /// momentum changes along the normal, the energy not at all). The default is none: L is smooth.
+    ///
+    /// A spring that only pushes, `q.if_less(0, q^2/2, 0)`, has the one switching function q.
+    fn switching_functions(&self, _t: f64, _x: &VelocityPoint<N>, _values: &mut Vec<f64>) {}
+
     /// The rate `g(q) = dt/dtau` of the [`Clock`](crate::Clock) by whose time tau the steps of this motion are best equal, for
     /// autonomous Lagrangians: it should fall as the motion gets faster, and be positive. With [`HAS_CLOCK`](Self::HAS_CLOCK); the
     /// default is the time itself.
@@ -102,6 +110,9 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<L> {
     }
     fn structure(&self) -> Structure {
         self.0.structure()
+    }
+    fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
+        self.0.switching_functions(t, x, values);
     }
     #[inline(always)]
     fn clock_rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
@@ -144,6 +155,9 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
     }
     fn structure(&self) -> Structure {
         (**self).structure()
+    }
+    fn switching_functions(&self, t: f64, x: &VelocityPoint<N>, values: &mut Vec<f64>) {
+        (**self).switching_functions(t, x, values);
     }
     #[inline(always)]
     fn clock_rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {

@@ -26,6 +26,7 @@ use crate::gauss::instructions::Instructions;
 use crate::gauss::lanes::{branched, forget_branches};
 use crate::run::watch::size;
 use crate::run::{digest, rows};
+use crate::switching::has_switching_functions;
 use crate::{GaussCollocation, InputError, Integrator, Observer, Rows, SplittingScheme, Start, Status, Steps, Until};
 use accuracy::Length;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
@@ -339,6 +340,11 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
 
     fn kernel_of(&self, lagrangian: &'a L, state: Option<&PhasePoint<N>>, plan: (f64, usize)) -> Kernel<'a, L, N> {
         let (structure, Some(state)) = (lagrangian.structure(), state) else { return Kernel::OneByOne };
+        // Steps end on kinks at times of their own in each member.
+        let start = VelocityPoint { q: state.q, v: state.p, z: state.z };
+        if has_switching_functions(lagrangian, self.common.t0, &start) {
+            return Kernel::OneByOne;
+        }
         let kernel = match self.integrator.in_lanes() {
             Some(InLanes::Splitting(scheme)) if structure.separable && structure.is_affine_in_z() => {
                 SplittingPacks::new(lagrangian, &scheme, plan, self.common.t0, state).map(Kernel::Splitting)

@@ -34,6 +34,8 @@ pub(crate) struct Look {
     pub kinetic: f64,
     /// The values of L at the start and at the end of the step's curve.
     ends: [f64; 2],
+    /// Whether L may jump between the step before and this one.
+    pub follows_a_jump: bool,
 }
 
 impl Look {
@@ -41,6 +43,24 @@ impl Look {
     pub fn jump_to(&self, next: &Look) -> f64 {
         let (before, after) = (self.ends[1], next.ends[0]);
         beyond_rounding((after - before).abs(), larger(before.abs(), after.abs()))
+    }
+
+    /// Together with that of the next part of the same step, between which L may jump.
+    pub fn joined(self, next: Look) -> Look {
+        Look {
+            misfit: larger(self.misfit, next.misfit),
+            size: larger(self.size, next.size),
+            expected: larger(self.expected, next.expected),
+            of_value: larger(self.of_value, next.of_value),
+            kinetic: larger(self.kinetic, next.kinetic),
+            ends: [self.ends[0], next.ends[1]],
+            ..self
+        }
+    }
+
+    /// The same after a jump of L.
+    pub fn after_a_jump(self) -> Look {
+        Look { follows_a_jump: true, ..self }
     }
 
     /// Together with one at other points of the step.
@@ -305,6 +325,6 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
             expected += relative(tail(&curve.l) * h, size_z);
         }
         let ends = from_fn(|i| weighted(&g.ends[i], &curve.l) / curve.rates[i]);
-        Look { misfit, size, expected, of_value, kinetic: kinetic.largest(), ends }
+        Look { misfit, size, expected, of_value, kinetic: kinetic.largest(), ends, follows_a_jump: false }
     }
 }

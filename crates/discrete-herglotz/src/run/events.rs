@@ -239,7 +239,7 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
 /// A root of a function of `[0, 1]` between two points with values of opposite signs, to round-off, by the ITP method of
 /// Oliveira and Takahashi (ACM Transactions on Mathematical Software 47, 2021): the secant, truncated towards the middle and
 /// projected so that it never takes more evaluations than bisection by more than one.
-fn bracketed_root<E>(
+pub(crate) fn bracketed_root<E>(
     [mut a, mut b]: [f64; 2],
     [mut below, mut above]: [f64; 2],
     mut f: impl FnMut(f64) -> Result<f64, E>,

@@ -2,6 +2,7 @@
 
 use super::{Plan, Problem};
 use crate::run::watch::{rounding, size};
+use crate::switching::switches_between;
 use crate::{Doubt, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, herglotz_rates, larger, largest};
@@ -18,10 +19,22 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
     pub(super) fn settled(&self, doubt: &Doubt<N>) -> Option<Suspicion> {
         let halves = self.against_halves(doubt).unwrap_or(0.0);
         // Long steps of many stages are no cubic curves; and they see what jumps between their nodes.
-        let jump = if self.many_stages() { None } else { self.jump(doubt) };
+        let jump = if self.many_stages() || self.switches_along(doubt) { None } else { self.jump(doubt) };
         let misfit = larger(halves, jump.unwrap_or(0.0));
         // A NaN is a misfit too.
         if misfit <= 1.0 { None } else { Some(Suspicion { step: doubt.step + doubt.steps - 1, misfit }) }
+    }
+
+    /// Whether steps in doubt cross a kink or a jump that the Lagrangian states, on which they end.
+    fn switches_along(&self, Doubt { steps, t, from, to, .. }: &Doubt<N>) -> bool {
+        let Problem { lagrangian, start, .. } = *self.problem;
+        if !self.switches {
+            return false;
+        }
+        let end = t + *steps as f64 * self.h;
+        let ends = [(*t, from), (end, to)].map(|(t, x)| (t, legendre_inverse(lagrangian, t, x, &start.v)));
+        let [(t, Ok(before)), (end, Ok(after))] = ends else { return false };
+        switches_between(lagrangian, [(t, &before), (end, &after)])
     }
 
     /// The misfit of the largest second difference of the acceleration along the cubic curve through both ends: a jump has it however
@@ -53,7 +66,12 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
 }
 
 /// The cubic curve through two points with their velocities, at some time after the first; straight on beside them.
-fn between<const N: usize>(start: &VelocityPoint<N>, end: &VelocityPoint<N>, span: f64, at: f64) -> VelocityPoint<N> {
+pub(crate) fn between<const N: usize>(
+    start: &VelocityPoint<N>,
+    end: &VelocityPoint<N>,
+    span: f64,
+    at: f64,
+) -> VelocityPoint<N> {
     // In units of the span, which is negative where the run goes back.
     let u = at / span;
     if u <= 0.0 {

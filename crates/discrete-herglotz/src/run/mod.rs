@@ -29,14 +29,17 @@ pub(crate) use checkpoint::digest;
 pub use checkpoint::{Checkpoint, CheckpointError, Interrupted};
 #[cfg(feature = "csv")]
 pub use csv_rows::CsvRows;
+pub(crate) use events::bracketed_root;
 pub use events::{Crossing, Event, Events};
 pub(crate) use explain::DECOUPLED;
 pub use explain::Item;
 pub use integrator::{Facts, Integrator, Wants};
+pub(crate) use jump::between;
 pub use momentum::{MomentumDecay, MomentumRow};
 pub use observer::{Course, LastStep, Moment, Needs, Observer, Stop};
 pub use outcome::Outcome;
 pub use plan::Plan;
+pub(crate) use plan::{first, step_error};
 pub use problem::{Problem, Start};
 pub(crate) use problem::{check_time, start_of};
 pub use progress::Progress;

@@ -4,7 +4,8 @@ use super::accuracy::Choice;
 use super::{Plan, Problem, Request, Shared, Wants};
 use crate::gauss::{Look, SETS};
 use crate::run::verified::refuted;
-use crate::{ClockedGauss, GaussCollocation, GaussRoute, Halt, InputError, StepError, Stepper};
+use crate::switching::{SwitchingStepper, has_switching_functions};
+use crate::{ClockedGauss, GaussCollocation, GaussRoute, GaussStepper, Halt, InputError, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Lagrangian, larger};
 
@@ -168,7 +169,8 @@ struct PilotLooks {
 impl PilotLooks {
     /// Takes in a look at the next step, and says whether the step resolves the motion.
     fn resolves(&mut self, look: &Look) -> bool {
-        let jump = self.before.replace(*look).map_or(0.0, |before| before.jump_to(look));
+        let before = self.before.replace(*look).filter(|_| !look.follows_a_jump);
+        let jump = before.map_or(0.0, |before| before.jump_to(look));
         (self.size, self.kinetic) = (larger(self.size, look.size), larger(self.kinetic, look.kinetic));
         let of_value = larger(look.of_value, jump);
         // What does not move crosses nothing, and values of L that have underflowed tell nothing.
@@ -235,7 +237,21 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
             let ending = self.watch(&mut stepper, &course, 1, |run, sets| (run.look(sets), 0))?;
             return Ok(ending.with_tau(stepper.tau()));
         }
-        let mut stepper = match (GaussCollocation { stages }).run(problem, h, Wants::default()) {
+        let make =
+            |problem: &Problem<'p, L, N>, h: f64| (GaussCollocation { stages }).run(problem, h, Wants::default());
+        if has_switching_functions(problem.lagrangian, problem.t0, &problem.start) {
+            let mut stepper = match SwitchingStepper::new(problem, h, make) {
+                Ok(stepper) => stepper.keeping_parts(),
+                Err(error) => return halted_at_the_start(error),
+            };
+            return self.watch(&mut stepper, &course, 1, |run, sets| {
+                let parts = run.last_step();
+                let looks = parts.iter().map(|part| part.look(sets)).reduce(|a, b| Some(a?.joined(b?)));
+                let look = looks.flatten().map(|look| if run.has_switched() { look.after_a_jump() } else { look });
+                (look, parts.iter().map(GaussStepper::newton_steps).sum())
+            });
+        }
+        let mut stepper = match make(problem, h) {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),
         };

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::gauss::FEW;
 use crate::run::verified::refuted;
+use crate::switching::{SwitchingStepper, has_switching_functions};
 use crate::{Doubt, InputError, Status, StepError, Stepper, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Derivatives, Lagrangian, PhasePoint, VelocityPoint};
@@ -28,8 +29,24 @@ fn halved_step(taken: usize, count: usize) -> usize {
 }
 
 /// The earlier of two.
-fn first(a: Option<Suspicion>, b: Option<Suspicion>) -> Option<Suspicion> {
+pub(crate) fn first(a: Option<Suspicion>, b: Option<Suspicion>) -> Option<Suspicion> {
     a.into_iter().chain(b).min_by_key(|s| s.step)
+}
+
+/// The stepper of an integrator, with steps that end on kinks and jumps where the Lagrangian states them.
+fn stepper_of<'p, L: Lagrangian<N>, const N: usize>(
+    integrator: &Shared<'p, L, N>,
+    switches: bool,
+    problem: &Problem<'p, L, N>,
+    h: f64,
+    wants: Wants,
+) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
+    if !switches {
+        return integrator.stepper(problem, h, wants);
+    }
+    let integrator = integrator.clone();
+    let make = move |problem: &Problem<'p, L, N>, h: f64| integrator.stepper(problem, h, wants);
+    Ok(Box::new(SwitchingStepper::new(problem, h, make)?))
 }
 
 /// A run after its checks, with step and route chosen; made by [`Run::plan`](super::Run::plan). Printed, it says what will be computed and
@@ -48,6 +65,8 @@ pub struct Plan<'p, L, const N: usize> {
     pub(super) account: Vec<Item>,
     /// Whether `sigma_d` is the same in all steps.
     pub(super) constant_rate: bool,
+    /// Whether the Lagrangian states switching functions.
+    pub(super) switches: bool,
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
@@ -55,17 +74,24 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     pub(super) fn new(request: &Request<'p, L, N>, choice: &Choice<'p, L, N>) -> Result<Self, InputError> {
         let Request { problem, t_end, needs, .. } = *request;
         let Choice { integrator, count, h, error } = choice.clone();
-        let stepper = integrator.stepper(problem, h, Wants::default())?;
+        let switches = has_switching_functions(problem.lagrangian, problem.t0, &problem.start);
+        let facts = integrator.facts();
+        if switches && facts.by_clock {
+            let hypothesis = "a Lagrangian without kinks and jumps, since its steps are equal in the time of a clock";
+            return Err(InputError::Hypothesis { hypothesis });
+        }
+        let stepper = stepper_of(&integrator, switches, problem, h, Wants::default())?;
         Ok(Plan {
             problem,
             t_end,
             h,
             count,
             error,
-            facts: integrator.facts(),
+            facts,
             needs,
             account: stepper.account(),
             constant_rate: stepper.has_constant_rate(),
+            switches,
             integrator,
         })
     }
@@ -107,7 +133,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         h: f64,
         watched: bool,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-        self.integrator.stepper(problem, h, Wants { action: self.needs.action, watched })
+        stepper_of(&self.integrator, self.switches, problem, h, Wants { action: self.needs.action, watched })
     }
 
     /// Whether steps look at themselves between the nodes of their many stages.
@@ -320,7 +346,7 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
 }
 
 /// Of what goes wrong along a motion.
-pub(super) fn step_error(error: InputError) -> StepError {
+pub(crate) fn step_error(error: InputError) -> StepError {
     match error {
         InputError::FirstStep(cause) => cause,
         InputError::Sigma { sigma } => StepError::SigmaVanished { sigma },

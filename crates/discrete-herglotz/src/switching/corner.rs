@@ -1,0 +1,237 @@
+//! What becomes of the momentum where the Lagrangian jumps.
+
+use super::surfaces::{Surfaces, TimedState};
+use crate::StepError;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, larger, largest, linear};
+
+/// The distance from the surface at which one side is read, relative to the position and to what a step moves: far beyond the rounding of a position,
+/// and so near that what is continuous differs by little.
+const BESIDE: f64 = 1e-9;
+
+/// By so many roundings of its terms L differs on both sides at the least where it jumps.
+const ROUNDINGS: f64 = 256.0;
+
+/// The distances, relative to the coordinates, of the differences for the normal of a surface: with differences of order six their error is the rounding
+/// of the function over this, 1e-13.
+const DIFFERENCE: f64 = 1e-3;
+
+/// Newton's iterations for one number or one velocity.
+const ITERATIONS: usize = 60;
+
+/// What a motion does at a zero of a switching function.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Corner<const N: usize> {
+    /// It passes, since L is continuous.
+    Continuous,
+    /// It passes with another momentum.
+    Refracted(SVector<f64, N>),
+    /// It stays on its side, since its energy does not suffice on the other.
+    Reflected(SVector<f64, N>),
+}
+
+/// L on one side of a surface, at the surface: extrapolated from three points beside it, so that it is exact to the third power of their distance.
+struct OneSided<'a, L, const N: usize> {
+    lagrangian: &'a L,
+    t: f64,
+    z: f64,
+    points: [SVector<f64, N>; 3],
+}
+
+/// The weights of the extrapolation from the distances 1, 2, 3 to 0.
+const WEIGHTS: [f64; 3] = [3.0, -3.0, 1.0];
+
+impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
+    fn new(lagrangian: &'a L, at: &TimedState<N>, toward: &SVector<f64, N>) -> Self {
+        let points = [1.0, 2.0, 3.0].map(|k| at.state.q + toward * k);
+        OneSided { lagrangian, t: at.t, z: at.state.z, points }
+    }
+
+    fn points<'s>(&'s self, v: &'s SVector<f64, N>) -> impl Iterator<Item = (f64, VelocityPoint<N>)> + 's {
+        WEIGHTS.into_iter().zip(self.points).map(|(weight, q)| (weight, VelocityPoint { q, v: *v, z: self.z }))
+    }
+
+    fn value(&self, v: &SVector<f64, N>) -> f64 {
+        self.points(v).map(|(weight, x)| weight * self.lagrangian.value(self.t, &x.q, &x.v, x.z)).sum()
+    }
+
+    fn momentum(&self, v: &SVector<f64, N>) -> SVector<f64, N> {
+        let of = |(weight, x): (f64, VelocityPoint<N>)| self.lagrangian.gradient(self.t, &x).y * weight;
+        self.points(v).map(of).fold(SVector::zeros(), |sum, p| sum + p)
+    }
+
+    fn mass(&self, v: &SVector<f64, N>) -> SMatrix<f64, N, N> {
+        let of = |(weight, x): (f64, VelocityPoint<N>)| self.lagrangian.hessian(self.t, &x).vv * weight;
+        self.points(v).map(of).fold(SMatrix::zeros(), |sum, w| sum + w)
+    }
+
+    /// The velocity that belongs to a momentum, and the energy.
+    fn velocity(&self, p: &SVector<f64, N>, guess: &SVector<f64, N>) -> Result<(SVector<f64, N>, f64), StepError> {
+        let (mut v, mut before) = (*guess, f64::INFINITY);
+        for _ in 0..ITERATIONS {
+            let mut change = self.momentum(&v) - p;
+            linear::solve(&mut self.mass(&v), &mut change).map_err(|e| StepError::Singular { pivot: e.pivot })?;
+            v -= change;
+            let size = largest(change.iter().copied());
+            if !size.is_finite() {
+                return Err(StepError::NonFinite);
+            }
+            // Down to the rounding of the extrapolation, where changes do not fall any more.
+            if size <= f64::EPSILON * largest(v.iter().copied())
+                || (size >= before && size <= 1e-10 * largest(v.iter().copied()))
+            {
+                break;
+            }
+            before = size;
+        }
+        Ok((v, p.dot(&v) - self.value(&v)))
+    }
+}
+
+/// The derivative of a switching function along a direction in time, position and velocity, by central differences of order six.
+fn slope<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    surfaces: &mut Surfaces,
+    index: usize,
+    along: impl Fn(f64) -> (f64, VelocityPoint<N>),
+    distance: f64,
+) -> f64 {
+    let mut difference = |k: f64| {
+        let [(t, x), (s, y)] = [k * distance, -k * distance].map(&along);
+        surfaces.value(lagrangian, index, (t, &x)) - surfaces.value(lagrangian, index, (s, &y))
+    };
+    let differences = [difference(1.0), difference(2.0), difference(3.0)];
+    (45.0 * differences[0] - 9.0 * differences[1] + differences[2]) / (60.0 * distance)
+}
+
+/// The corner conditions at a zero of a switching function, of a motion that comes from the side on which it is now; `reach` is what a step
+/// moves at most.
+///
+/// # Errors
+/// [`StepError::JumpAlong`] where L jumps across a surface that depends on the velocity or on z; those of the inverse Legendre transformation on
+/// either side.
+pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    surfaces: &mut Surfaces,
+    index: usize,
+    at: &TimedState<N>,
+    reach: f64,
+) -> Result<Corner<N>, StepError> {
+    let (x, side) = (at.point(), surfaces.side(index));
+    let scale = |q: f64| if larger(q.abs(), reach) > 0.0 { larger(q.abs(), reach) } else { 1.0 };
+    let mut of = |along: &dyn Fn(f64) -> (f64, VelocityPoint<N>), distance: f64| {
+        slope(lagrangian, surfaces, index, along, distance)
+    };
+    let moved =
+        |i: usize, by: f64| VelocityPoint { q: SVector::from_fn(|j, _| x.q[j] + if i == j { by } else { 0.0 }), ..x };
+    let normal: SVector<f64, N> = SVector::from_fn(|i, _| of(&|by| (at.t, moved(i, by)), DIFFERENCE * scale(x.q[i])));
+    let faster =
+        |i: usize, by: f64| VelocityPoint { v: SVector::from_fn(|j, _| x.v[j] + if i == j { by } else { 0.0 }), ..x };
+    let unit = |v: f64| if v == 0.0 { 1.0 } else { v.abs() };
+    let along_v = largest((0..N).map(|i| of(&|by| (at.t, faster(i, by)), DIFFERENCE * unit(x.v[i]))));
+    let along_z = of(&|by| (at.t, VelocityPoint { z: x.z + by, ..x }), DIFFERENCE * unit(x.z));
+    let rate_t = of(&|by| (at.t + by, x), DIFFERENCE * unit(at.t));
+
+    let size = normal.norm();
+    let beside = |toward: f64, of: f64| {
+        let length = BESIDE * scale(largest(x.q.iter().copied()));
+        OneSided::new(lagrangian, at, &(normal * (toward * side * length * of / size)))
+    };
+    if size == 0.0 {
+        // Time alone: z and the momentum are continuous. Velocity or action alone: both sides are read along these.
+        let depends = along_v != 0.0 || along_z != 0.0;
+        return if depends && jumps_along(lagrangian, at, index, surfaces) {
+            Err(StepError::JumpAlong { t: at.t })
+        } else {
+            Ok(Corner::Continuous)
+        };
+    }
+    // A jump stays what it is nearer to the surface; what is continuous falls.
+    let jump = |of: f64| beside(-1.0, of).value(&x.v) - beside(1.0, of).value(&x.v);
+    let (wide, near) = (jump(1.0), jump(0.125));
+    let (old, new) = (beside(1.0, 0.125), beside(-1.0, 0.125));
+    let terms = old.value(&x.v).abs() + at.state.p.dot(&x.v).abs();
+    if near.abs() <= ROUNDINGS * f64::EPSILON * terms || near.abs() < 0.7 * wide.abs() {
+        return Ok(Corner::Continuous);
+    }
+    if !near.is_finite() {
+        return Err(StepError::NonFinite);
+    }
+    if along_v != 0.0 || along_z != 0.0 {
+        return Err(StepError::JumpAlong { t: at.t });
+    }
+    let (v, energy) = old.velocity(&at.state.p, &x.v)?;
+    let approach = normal.dot(&v) + rate_t;
+    match conditions(&new, at, (&normal, rate_t), energy, (0.0, &v), approach)? {
+        Some(p) => Ok(Corner::Refracted(p)),
+        None => {
+            let mut w = old.mass(&v);
+            let mut across = normal;
+            linear::solve(&mut w, &mut across).map_err(|e| StepError::Singular { pivot: e.pivot })?;
+            let back = -2.0 * approach / normal.dot(&across);
+            let mirrored = v + across * back;
+            match conditions(&old, at, (&normal, rate_t), energy, (back, &mirrored), -approach)? {
+                Some(p) => Ok(Corner::Reflected(p)),
+                None => Err(StepError::JumpAlong { t: at.t }),
+            }
+        }
+    }
+}
+
+/// The momentum `p + lambda g_q` with `E = E- - lambda g_t` on a side, that leaves the surface in the sense of `approach`; `None` where there is none.
+/// The energy is convex in lambda and its slope is the rate of the switching function, so that Newton's method from outside finds the root or
+/// passes the smallest energy, where the rate changes its sign.
+fn conditions<L: Lagrangian<N>, const N: usize>(
+    side: &OneSided<'_, L, N>,
+    at: &TimedState<N>,
+    (normal, rate_t): (&SVector<f64, N>, f64),
+    energy: f64,
+    (mut lambda, guess): (f64, &SVector<f64, N>),
+    approach: f64,
+) -> Result<Option<SVector<f64, N>>, StepError> {
+    let (mut v, mut before) = (*guess, f64::INFINITY);
+    for _ in 0..ITERATIONS {
+        let p = at.state.p + normal * lambda;
+        let energy_here;
+        (v, energy_here) = side.velocity(&p, &v)?;
+        let rate = normal.dot(&v) + rate_t;
+        if rate.is_nan() || rate * approach <= 0.0 {
+            return Ok(None);
+        }
+        let change = (energy_here - energy + lambda * rate_t) / rate;
+        let size = (change * normal.norm()).abs();
+        lambda -= change;
+        let scale = larger(largest(p.iter().copied()), (lambda * normal.norm()).abs());
+        if size <= f64::EPSILON * scale || (size >= before && size <= 1e-10 * scale) {
+            return Ok(Some(at.state.p + normal * lambda));
+        }
+        before = size;
+    }
+    Ok(None)
+}
+
+/// Whether L or its momenta jump across a surface that depends on the velocity or on z alone.
+fn jumps_along<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    at: &TimedState<N>,
+    index: usize,
+    surfaces: &mut Surfaces,
+) -> bool {
+    let x = at.point();
+    let speed = largest(x.v.iter().copied());
+    let length = |of: f64| BESIDE * of * if speed > 0.0 { speed } else { 1.0 };
+    let moved = |by: f64| VelocityPoint { v: x.v.map(|v| v + by), z: x.z + by, ..x };
+    let here = |by: f64| lagrangian.value(at.t, &x.q, &moved(by).v, moved(by).z);
+    let crossed = |surfaces: &mut Surfaces, by: f64| surfaces.value(lagrangian, index, (at.t, &moved(by)));
+    // Along the diagonal of the velocities and z the function has both signs, or it says nothing.
+    if crossed(surfaces, length(1.0)) * crossed(surfaces, -length(1.0)) >= 0.0 {
+        return false;
+    }
+    let jump = |of: f64| {
+        let [a, b] = [length(of), -length(of)].map(|by| lagrangian.gradient(at.t, &moved(by)).y);
+        larger(largest((a - b).iter().copied()), (here(length(of)) - here(-length(of))).abs())
+    };
+    let (wide, near) = (jump(1.0), jump(0.125));
+    let terms = here(0.0).abs() + largest(at.state.p.iter().copied());
+    near > ROUNDINGS * f64::EPSILON * terms && near >= 0.7 * wide
+}

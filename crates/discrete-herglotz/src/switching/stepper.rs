@@ -1,0 +1,409 @@
+//! The steps of any integrator, ended on the zeros of switching functions.
+
+use super::corner::{Corner, corner};
+use super::surfaces::{SignChange, StepCurve, Surfaces, TimedState};
+use crate::run::bracketed_root;
+use crate::run::saved::{Saved, load_option, save_option, saved};
+use crate::run::{first, step_error};
+use crate::{
+    DenseStep, Doubt, GaussStepper, Halt, InputError, Item, Problem, StepError, Stepper, Suspicion, legendre_inverse,
+};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
+
+/// The parts that a step may have: beyond that the Lagrangian switches without end.
+const MOST_PARTS: usize = 4096;
+
+/// The changes of sign at one place: a motion that is pushed back to a surface from both sides has no end of them.
+const MOST_AT_A_PLACE: usize = 16;
+
+/// The attempts to find a zero by Newton's method before it is bracketed.
+const NEWTON: usize = 8;
+
+/// What is, or holds, a stepper.
+pub(crate) trait AsStepper<const N: usize> {
+    fn stepper(&self) -> &(dyn Stepper<N> + '_);
+    fn stepper_mut(&mut self) -> &mut (dyn Stepper<N> + '_);
+}
+
+impl<const N: usize> AsStepper<N> for Box<dyn Stepper<N> + '_> {
+    fn stepper(&self) -> &(dyn Stepper<N> + '_) {
+        &**self
+    }
+    fn stepper_mut(&mut self) -> &mut (dyn Stepper<N> + '_) {
+        &mut **self
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> AsStepper<N> for GaussStepper<'_, L, N> {
+    fn stepper(&self) -> &(dyn Stepper<N> + '_) {
+        self
+    }
+    fn stepper_mut(&mut self) -> &mut (dyn Stepper<N> + '_) {
+        self
+    }
+}
+
+/// Steps of one length by any integrator. A step along which a switching function changes its sign consists of parts, which end on the zeros.
+///
+/// `make` makes the integrator's stepper at a problem, for steps of a length.
+pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
+    problem: Problem<'a, L, N>,
+    make: M,
+    h: f64,
+    /// The steps taken.
+    k: usize,
+    /// The stepper of the steps since the last one with a zero in it, its start, and the steps before it.
+    base: S,
+    origin: TimedState<N>,
+    before: usize,
+    here: TimedState<N>,
+    surfaces: Surfaces,
+    sigma: f64,
+    /// The evaluations of the steppers before `base`.
+    spent: u64,
+    unresolved: Option<Suspicion>,
+    /// The steppers of the parts of the last step, where it had some and they are kept.
+    parts: Option<Vec<S>>,
+    switched: bool,
+}
+
+/// A part of a step.
+struct Part<S, const N: usize> {
+    stepper: Option<S>,
+    to: TimedState<N>,
+}
+
+impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
+where
+    L: Lagrangian<N>,
+    S: AsStepper<N>,
+    M: Fn(&Problem<'a, L, N>, f64) -> Result<S, InputError>,
+{
+    pub fn new(problem: &Problem<'a, L, N>, h: f64, make: M) -> Result<Self, InputError> {
+        let base = make(problem, h)?;
+        let here = TimedState { t: problem.t0, state: problem.state, v: problem.start.v };
+        Ok(SwitchingStepper {
+            problem: *problem,
+            make,
+            h,
+            k: 0,
+            base,
+            origin: here,
+            before: 0,
+            here,
+            surfaces: Surfaces::at(problem.lagrangian, problem.t0, &problem.start),
+            sigma: 1.0,
+            spent: 0,
+            unresolved: None,
+            parts: None,
+            switched: false,
+        })
+    }
+
+    /// The same, with the steppers of the parts of the last step.
+    pub fn keeping_parts(self) -> Self {
+        SwitchingStepper { parts: Some(Vec::new()), ..self }
+    }
+
+    /// The steppers of the last step: of its parts where it had some, else that of all steps.
+    pub fn last_step(&self) -> &[S] {
+        match &self.parts {
+            Some(parts) if self.switched => parts,
+            _ => std::slice::from_ref(&self.base),
+        }
+    }
+
+    /// Whether the last step had parts.
+    pub fn has_switched(&self) -> bool {
+        self.switched
+    }
+
+    /// The integrator's stepper at a state.
+    fn stepper_at(&self, at: &TimedState<N>, h: f64) -> Result<S, StepError> {
+        let start = VelocityPoint { q: at.state.q, v: at.v, z: at.state.z };
+        let problem = Problem { t0: at.t, start, state: at.state, ..self.problem };
+        (self.make)(&problem, h).map_err(step_error)
+    }
+
+    /// The state of a stepper with its velocity.
+    fn reached(&self, stepper: &dyn Stepper<N>, t: f64, guess: &TimedState<N>) -> Result<TimedState<N>, StepError> {
+        let state = stepper.state();
+        let v = legendre_inverse(self.problem.lagrangian, t, &state, &guess.v)?.v;
+        Ok(TimedState { t, state, v })
+    }
+
+    /// One step of a length from a state.
+    fn part(&mut self, at: &TimedState<N>, t: f64) -> Result<(S, TimedState<N>), StepError> {
+        let mut stepper = self.stepper_at(at, t - at.t)?;
+        let taken = stepper.stepper_mut().advance(1).map_err(|halt| halt.cause);
+        self.spent += stepper.stepper().evaluations();
+        taken?;
+        let to = self.reached(stepper.stepper(), t, at)?;
+        Ok((stepper, to))
+    }
+
+    /// The next step.
+    fn step(&mut self) -> Result<(), StepError> {
+        let from = self.here;
+        let t = self.problem.t0 + (self.k + 1) as f64 * self.h;
+        self.switched = false;
+        if self.base.stepper_mut().advance(1).is_ok()
+            && let Ok(to) = self.reached(self.base.stepper(), t, &from)
+        {
+            let curve = StepCurve { from, to, dense: self.base.stepper().dense() };
+            if self.surfaces.first_change(self.problem.lagrangian, &curve).is_none() {
+                (self.here, self.sigma) = (to, self.base.stepper().sigma());
+                return Ok(());
+            }
+        }
+        // What was noted before this step; the step itself has crossed a surface.
+        let earlier = self.base.stepper().suspicion().map(|s| Suspicion { step: s.step + self.before, ..s });
+        self.unresolved = first(self.unresolved, earlier.filter(|s| s.step < self.k));
+        self.spent += self.base.stepper().evaluations();
+        if let Some(parts) = &mut self.parts {
+            parts.clear();
+        }
+        let sides = self.surfaces.clone();
+        match self.in_parts(from, t).and_then(|(to, sigma)| Ok((to, sigma, self.stepper_at(&to, self.h)?))) {
+            Ok((to, sigma, base)) => {
+                (self.here, self.sigma, self.base) = (to, sigma, base);
+                (self.origin, self.before, self.switched) = (to, self.k + 1, true);
+                Ok(())
+            }
+            Err(cause) => {
+                self.surfaces = sides;
+                // The state is that before the step.
+                if let Ok(base) = self.stepper_at(&from, self.h) {
+                    (self.base, self.origin, self.before) = (base, from, self.k);
+                }
+                Err(cause)
+            }
+        }
+    }
+
+    /// A step in parts, which end on zeros.
+    fn in_parts(&mut self, from: TimedState<N>, t_end: f64) -> Result<(TimedState<N>, f64), StepError> {
+        let (mut at, mut sigma, mut at_a_place) = (from, 1.0, 0);
+        let span = t_end - from.t;
+        let spacing = 4.0 * f64::EPSILON * larger(larger(from.t.abs(), t_end.abs()), span.abs());
+        let mut longest = span.abs();
+        for _ in 0..MOST_PARTS {
+            let rest = t_end - at.t;
+            if rest * span <= 0.0 {
+                return Ok((at, sigma));
+            }
+            let t = if rest.abs() <= longest { t_end } else { at.t + longest.copysign(span) };
+            if longest <= spacing {
+                return Err(StepError::Switching { t: at.t });
+            }
+            let (stepper, to) = match self.part(&at, t) {
+                Ok(part) => part,
+                Err(cause) if (t - at.t).abs() <= 2.0 * spacing => return Err(cause),
+                Err(_) => {
+                    longest = 0.5 * (t - at.t).abs();
+                    continue;
+                }
+            };
+            let curve = StepCurve { from: at, to, dense: stepper.stepper().dense() };
+            let Some(change) = self.surfaces.first_change(self.problem.lagrangian, &curve) else {
+                sigma *= stepper.stepper().sigma();
+                self.keep(stepper);
+                (at, longest, at_a_place) = (to, larger(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
+                continue;
+            };
+            let Some(Part { stepper, to }) = self.locate(&curve, &change, spacing) else {
+                // The curve crosses, and the motion does not: that of a shorter part is nearer to it.
+                longest = 0.5 * (t - at.t).abs();
+                continue;
+            };
+            match stepper {
+                Some(stepper) => {
+                    sigma *= stepper.stepper().sigma();
+                    self.keep(stepper);
+                    at_a_place = 0;
+                }
+                None => at_a_place += 1,
+            }
+            if at_a_place > MOST_AT_A_PLACE {
+                return Err(StepError::Switching { t: at.t });
+            }
+            at = self.through(to, change.index, span)?;
+            longest = span.abs();
+        }
+        Err(StepError::Switching { t: at.t })
+    }
+
+    fn keep(&mut self, stepper: S) {
+        if let Some(parts) = &mut self.parts {
+            parts.push(stepper);
+        }
+    }
+
+    /// The state at a zero, on the side where the motion goes on.
+    fn through(&mut self, at: TimedState<N>, index: usize, span: f64) -> Result<TimedState<N>, StepError> {
+        let reach = largest(at.v.iter().map(|v| v * span));
+        let lagrangian = self.problem.lagrangian;
+        let p = match corner(lagrangian, &mut self.surfaces, index, &at, reach)? {
+            Corner::Continuous => {
+                self.surfaces.cross(index);
+                return Ok(at);
+            }
+            Corner::Refracted(p) => {
+                self.surfaces.cross(index);
+                p
+            }
+            Corner::Reflected(p) => p,
+        };
+        let state = PhasePoint { p, ..at.state };
+        let v = legendre_inverse(lagrangian, at.t, &state, &at.v)?.v;
+        Ok(TimedState { state, v, ..at })
+    }
+
+    /// The part that ends on a zero, to the spacing of time; no stepper where that is the start itself. `None` where the motion does not
+    /// cross.
+    fn locate(&mut self, curve: &StepCurve<N>, change: &SignChange, spacing: f64) -> Option<Part<S, N>> {
+        let SignChange { index, ends, about, slope } = *change;
+        let (lagrangian, from, span) = (self.problem.lagrangian, curve.from, curve.span());
+        let at_start = Part { stepper: None, to: from };
+        let mut slope = slope;
+        let mut length = about * span;
+        let mut last: Option<(f64, f64)> = None;
+        for _ in 0..NEWTON {
+            if length.abs() <= spacing {
+                return Some(at_start);
+            }
+            let (stepper, to) = self.part(&from, from.t + length).ok()?;
+            let value = self.surfaces.value(lagrangian, index, (to.t, &to.point()));
+            if let Some((l, g)) = last
+                && l != length
+                && (value - g) / (length - l) * slope > 0.0
+            {
+                slope = (value - g) / (length - l);
+            }
+            let change = value / slope;
+            if !change.is_finite() {
+                break;
+            }
+            if change.abs() <= spacing {
+                return Some(Part { stepper: Some(stepper), to });
+            }
+            last = Some((length, value));
+            length -= change;
+            if length * span < 0.0 || length.abs() > 1.5 * ends[1] * span.abs() {
+                break;
+            }
+        }
+        // Between ends at which the motion itself has both signs.
+        let side = self.surfaces.side(index);
+        let mut toward = |fraction: f64| -> Result<f64, StepError> {
+            if fraction * span.abs() <= spacing {
+                return Ok(f64::MIN_POSITIVE);
+            }
+            let (_, to) = self.part(&from, from.t + fraction * span)?;
+            Ok(side * self.surfaces.value(lagrangian, index, (to.t, &to.point())))
+        };
+        let [before, after] = [toward(ends[0]).ok()?, toward(ends[1]).ok()?];
+        if before.is_nan() || after.is_nan() || before <= 0.0 || after >= 0.0 {
+            return None;
+        }
+        let root = bracketed_root(ends, [before, after], toward).ok()?;
+        if root * span.abs() <= spacing {
+            return Some(at_start);
+        }
+        let (stepper, to) = self.part(&from, from.t + root * span).ok()?;
+        Some(Part { stepper: Some(stepper), to })
+    }
+}
+
+impl<'a, L, S, M, const N: usize> Stepper<N> for SwitchingStepper<'a, L, S, M, N>
+where
+    L: Lagrangian<N>,
+    S: AsStepper<N>,
+    M: Fn(&Problem<'a, L, N>, f64) -> Result<S, InputError>,
+{
+    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+        for taken in 0..steps {
+            self.step().map_err(|cause| Halt { taken, cause })?;
+            self.k += 1;
+        }
+        Ok(())
+    }
+
+    fn state(&self) -> PhasePoint<N> {
+        self.here.state
+    }
+
+    fn time(&self) -> f64 {
+        self.problem.t0 + self.k as f64 * self.h
+    }
+
+    fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.spent + self.base.stepper().evaluations()
+    }
+
+    fn dense(&self) -> Option<DenseStep<N>> {
+        if self.switched { None } else { self.base.stepper().dense() }
+    }
+
+    fn account(&self) -> Vec<Item> {
+        let mut items = self.base.stepper().account();
+        items.push(Item::computed(
+            "switching functions",
+            "L has kinks or jumps: steps end on those that the motion meets",
+        ));
+        items
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        [self.k, self.before].save(&mut words);
+        [self.origin, self.here].save(&mut words);
+        self.surfaces.sides.save(&mut words);
+        (self.sigma, self.spent).save(&mut words);
+        save_option(self.unresolved.as_ref(), &mut words);
+        words.extend(self.base.stepper().save()?);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.load(&mut words).is_some() && self.base.stepper_mut().restore(words)
+    }
+
+    fn suspicion(&self) -> Option<Suspicion> {
+        let of_base = self.base.stepper().suspicion().map(|s| Suspicion { step: s.step + self.before, ..s });
+        first(self.unresolved, of_base)
+    }
+
+    fn doubt(&mut self) -> Option<Doubt<N>> {
+        let doubt = self.base.stepper_mut().doubt()?;
+        Some(Doubt { step: doubt.step + self.before, ..doubt })
+    }
+}
+
+saved!([const N: usize] TimedState<N> { t, state, v });
+
+impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
+where
+    L: Lagrangian<N>,
+    S: AsStepper<N>,
+    M: Fn(&Problem<'a, L, N>, f64) -> Result<S, InputError>,
+{
+    /// Everything but the words of the base, which is made anew where it began.
+    fn load(&mut self, from: &mut &[u64]) -> Option<()> {
+        let mut counts = [self.k, self.before];
+        counts.load(from)?;
+        let mut states = [self.origin, self.here];
+        states.load(from)?;
+        self.surfaces.sides.load(from)?;
+        let mut numbers = (self.sigma, self.spent);
+        numbers.load(from)?;
+        self.unresolved = load_option(from, || Suspicion { step: 0, misfit: 0.0 })?;
+        self.base = self.stepper_at(&states[0], self.h).ok()?;
+        ([self.k, self.before], [self.origin, self.here], (self.sigma, self.spent)) = (counts, states, numbers);
+        Some(())
+    }
+}

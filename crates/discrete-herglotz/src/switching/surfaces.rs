@@ -1,0 +1,204 @@
+//! The switching functions of a Lagrangian along a step.
+
+use crate::DenseStep;
+use crate::run::between;
+use crate::run::bracketed_root;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
+use std::convert::Infallible;
+
+/// The parts in which a step without a curve of its own is searched for changes of sign.
+const PARTS: usize = 8;
+
+/// Halvings of the part after a zero, in which a function that has just changed its sign is searched for the place where it changes back.
+const HALVINGS: i32 = 30;
+
+/// Whether a Lagrangian states switching functions.
+pub(crate) fn has_switching_functions<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t: f64,
+    x: &VelocityPoint<N>,
+) -> bool {
+    let mut values = Vec::new();
+    lagrangian.switching_functions(t, x, &mut values);
+    !values.is_empty()
+}
+
+/// Whether a switching function has different signs at two points.
+pub(crate) fn switches_between<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    points: [(f64, &VelocityPoint<N>); 2],
+) -> bool {
+    let [before, after] = points.map(|(t, x)| {
+        let mut values = Vec::new();
+        lagrangian.switching_functions(t, x, &mut values);
+        values
+    });
+    before.iter().zip(&after).any(|(a, b)| a * b <= 0.0 && a != b)
+}
+
+/// A time and a state of the motion, with its velocity.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TimedState<const N: usize> {
+    pub t: f64,
+    pub state: PhasePoint<N>,
+    pub v: SVector<f64, N>,
+}
+
+impl<const N: usize> TimedState<N> {
+    pub fn point(&self) -> VelocityPoint<N> {
+        VelocityPoint { q: self.state.q, v: self.v, z: self.state.z }
+    }
+}
+
+/// A step between its ends: by its collocation polynomial, or by the cubic polynomial through both ends with their velocities.
+pub(super) struct StepCurve<const N: usize> {
+    pub from: TimedState<N>,
+    pub to: TimedState<N>,
+    pub dense: Option<DenseStep<N>>,
+}
+
+impl<const N: usize> StepCurve<N> {
+    fn parts(&self) -> usize {
+        self.dense.as_ref().map_or(PARTS, |dense| dense.stages() + 2)
+    }
+
+    pub fn span(&self) -> f64 {
+        self.to.t - self.from.t
+    }
+
+    fn at(&self, fraction: f64) -> (f64, VelocityPoint<N>) {
+        let t = self.from.t + fraction * self.span();
+        if fraction == 1.0 {
+            return (self.to.t, self.to.point());
+        }
+        let x = match &self.dense {
+            Some(dense) => {
+                let x = dense.at_fraction(fraction);
+                VelocityPoint { q: x.q, v: dense.velocity(t), z: x.z }
+            }
+            None => between(&self.from.point(), &self.to.point(), self.span(), fraction * self.span()),
+        };
+        (t, x)
+    }
+}
+
+/// A change of sign on the curve of a step: of which function, between which fractions of the step, and about where.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SignChange {
+    pub index: usize,
+    pub ends: [f64; 2],
+    pub about: f64,
+    /// The rate of the function there, per unit of time.
+    pub slope: f64,
+}
+
+/// The switching functions of a Lagrangian, and on which side of each zero the motion is.
+#[derive(Clone, Debug)]
+pub(super) struct Surfaces {
+    /// The signs; 0 of one that has had none yet.
+    pub sides: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Surfaces {
+    pub fn at<const N: usize>(lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>) -> Self {
+        let mut values = Vec::new();
+        lagrangian.switching_functions(t, x, &mut values);
+        let sides = values.iter().map(|g| sign(*g)).collect();
+        Surfaces { sides, values }
+    }
+
+    /// The value of a function, not a number where there is no such function.
+    pub fn value<const N: usize>(
+        &mut self,
+        lagrangian: &impl Lagrangian<N>,
+        index: usize,
+        (t, x): (f64, &VelocityPoint<N>),
+    ) -> f64 {
+        self.values.clear();
+        lagrangian.switching_functions(t, x, &mut self.values);
+        self.values.get(index).copied().unwrap_or(f64::NAN)
+    }
+
+    pub fn side(&self, index: usize) -> f64 {
+        self.sides.get(index).copied().unwrap_or(0.0)
+    }
+
+    /// The motion is now on the other side of a surface.
+    pub fn cross(&mut self, index: usize) {
+        if let Some(side) = self.sides.get_mut(index) {
+            *side = -*side;
+        }
+    }
+
+    /// The first change of sign along a step, as its curve shows it. Functions without a side so far get that of the first value beside 0.
+    pub fn first_change<const N: usize>(
+        &mut self,
+        lagrangian: &impl Lagrangian<N>,
+        curve: &StepCurve<N>,
+    ) -> Option<SignChange> {
+        let parts = curve.parts();
+        for part in 1..=parts {
+            let fraction = part as f64 / parts as f64;
+            let (t, x) = curve.at(fraction);
+            self.values.clear();
+            lagrangian.switching_functions(t, &x, &mut self.values);
+            let mut changed = false;
+            for (side, value) in self.sides.iter_mut().zip(&self.values) {
+                if *side == 0.0 {
+                    *side = sign(*value);
+                }
+                changed |= *side * sign(*value) < 0.0;
+            }
+            if changed {
+                let from = (part - 1) as f64 / parts as f64;
+                let of = |i: &usize| self.side(*i) * sign(self.values.get(*i).copied().unwrap_or(0.0)) < 0.0;
+                let indices: Vec<usize> = (0..self.sides.len()).filter(of).collect();
+                let changes = indices.into_iter().map(|index| self.change(lagrangian, curve, index, [from, fraction]));
+                return changes.min_by(|a, b| a.about.total_cmp(&b.about));
+            }
+        }
+        None
+    }
+
+    /// The zero of a function between two fractions of a step, at the second of which it is on the other side.
+    fn change<const N: usize>(
+        &mut self,
+        lagrangian: &impl Lagrangian<N>,
+        curve: &StepCurve<N>,
+        index: usize,
+        [mut from, to]: [f64; 2],
+    ) -> SignChange {
+        let side = self.side(index);
+        let mut toward = |fraction: f64| {
+            let (t, x) = curve.at(fraction);
+            side * self.value(lagrangian, index, (t, &x))
+        };
+        let (mut before, after) = (toward(from), toward(to));
+        if before.is_nan() || before <= 0.0 {
+            // The part begins at a zero: where is the function on its side?
+            let inside = (1..=HALVINGS).map(|k| from + (to - from) * f64::powi(2.0, -k));
+            match inside.map(|x| (x, toward(x))).find(|(_, value)| *value > 0.0) {
+                Some(place) => (from, before) = place,
+                None => return SignChange { index, ends: [from, to], about: from, slope: 0.0 },
+            }
+        }
+        let found = bracketed_root([from, to], [before, after], |x| Ok::<_, Infallible>(toward(x)));
+        let about = found.unwrap_or(from);
+        let beside = 1e-4 * (to - from);
+        let slope = (toward(about + beside) - toward(about - beside)) / (2.0 * beside * curve.span());
+        SignChange { index, ends: [from, to], about, slope: side * slope }
+    }
+}
+
+/// 1, -1, or 0 for what is neither.
+fn sign(x: f64) -> f64 {
+    if x > 0.0 {
+        1.0
+    } else if x < 0.0 {
+        -1.0
+    } else {
+        0.0
+    }
+}
