@@ -143,6 +143,9 @@ pub enum InputError {
         /// The size of what the claim says is zero; see [`Defect`](contact_geom::Defect).
         size: f64,
     },
+    /// A Lagrangian has switching functions, and does not say so.
+    #[error("the Lagrangian has `switching_functions`; state them by `const HAS_SWITCHING_FUNCTIONS: bool = true`")]
+    SwitchingUnstated,
     /// A method rests on a hypothesis that this Lagrangian does not satisfy.
     #[error("the method needs {hypothesis}; take another method or another Lagrangian")]
     Hypothesis {

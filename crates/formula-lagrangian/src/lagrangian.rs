@@ -102,6 +102,7 @@ fn whole_triple<T: Scalar, const N: usize>(g: &Triple<N, T>) -> Triple<N, T> {
 impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     const PROVED: bool = true;
     const INTERPRETED: bool = true;
+    const HAS_SWITCHING_FUNCTIONS: bool = true;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {

@@ -35,6 +35,10 @@ pub trait Lagrangian<const N: usize> {
     /// `formula-lagrangian` do: they are not probed, and no other derivatives are compiled.
     const PROVED: bool = false;
 
+    /// Whether this Lagrangian states [switching functions](Self::switching_functions): they are asked for, and what ends steps on them is
+    /// compiled, only then.
+    const HAS_SWITCHING_FUNCTIONS: bool = false;
+
     /// Whether an evaluation is dear to begin, whatever the numbers: L is then asked for many at once where that is possible.
     const INTERPRETED: bool = false;
 
@@ -85,7 +89,8 @@ pub trait Lagrangian<const N: usize> {
     /// jumps across a surface in the positions, the motion is refracted or reflected by the corner conditions of Weierstrass and Erdmann (the
     /// momentum changes along the normal, the energy not at all). The default is none: L is smooth.
     ///
-    /// A spring that only pushes, `q.if_less(0, q^2/2, 0)`, has the one switching function q.
+    /// With [`HAS_SWITCHING_FUNCTIONS`](Self::HAS_SWITCHING_FUNCTIONS). A spring that only pushes, `q.if_less(0, q^2/2, 0)`, has the one switching
+    /// function q.
     fn switching_functions(&self, _t: f64, _x: &VelocityPoint<N>, _values: &mut Vec<f64>) {}
 
     /// The rate `g(q) = dt/dtau` of the [`Clock`](crate::Clock) by whose time tau the steps of this motion are best equal, for
@@ -103,6 +108,7 @@ pub struct ValueOnly<L>(pub L);
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<L> {
     const HAS_CLOCK: bool = L::HAS_CLOCK;
+    const HAS_SWITCHING_FUNCTIONS: bool = L::HAS_SWITCHING_FUNCTIONS;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
@@ -122,6 +128,7 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<L> {
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
     const HAS_CLOCK: bool = L::HAS_CLOCK;
+    const HAS_SWITCHING_FUNCTIONS: bool = L::HAS_SWITCHING_FUNCTIONS;
     const PROVED: bool = L::PROVED;
     const INTERPRETED: bool = L::INTERPRETED;
 

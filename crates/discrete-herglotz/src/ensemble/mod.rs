@@ -342,7 +342,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let (structure, Some(state)) = (lagrangian.structure(), state) else { return Kernel::OneByOne };
         // Steps end on kinks at times of their own in each member.
         let start = VelocityPoint { q: state.q, v: state.p, z: state.z };
-        if has_switching_functions(lagrangian, self.common.t0, &start) {
+        if has_switching_functions(lagrangian, self.common.t0, &start) != Ok(false) {
             return Kernel::OneByOne;
         }
         let kernel = match self.integrator.in_lanes() {

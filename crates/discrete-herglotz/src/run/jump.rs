@@ -2,7 +2,6 @@
 
 use super::{Plan, Problem};
 use crate::run::watch::{rounding, size};
-use crate::switching::switches_between;
 use crate::{Doubt, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, herglotz_rates, larger, largest};
@@ -18,23 +17,11 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
     /// What becomes of a doubt: a mark, where shorter steps differ or the acceleration jumps.
     pub(super) fn settled(&self, doubt: &Doubt<N>) -> Option<Suspicion> {
         let halves = self.against_halves(doubt).unwrap_or(0.0);
-        // Long steps of many stages are no cubic curves; and they see what jumps between their nodes.
-        let jump = if self.many_stages() || self.switches_along(doubt) { None } else { self.jump(doubt) };
+        // Long steps of many stages are no cubic curves, and they see what jumps between their nodes; on jumps that L states steps end.
+        let jump = if self.many_stages() || self.switches { None } else { self.jump(doubt) };
         let misfit = larger(halves, jump.unwrap_or(0.0));
         // A NaN is a misfit too.
         if misfit <= 1.0 { None } else { Some(Suspicion { step: doubt.step + doubt.steps - 1, misfit }) }
-    }
-
-    /// Whether steps in doubt cross a kink or a jump that the Lagrangian states, on which they end.
-    fn switches_along(&self, Doubt { steps, t, from, to, .. }: &Doubt<N>) -> bool {
-        let Problem { lagrangian, start, .. } = *self.problem;
-        if !self.switches {
-            return false;
-        }
-        let end = t + *steps as f64 * self.h;
-        let ends = [(*t, from), (end, to)].map(|(t, x)| (t, legendre_inverse(lagrangian, t, x, &start.v)));
-        let [(t, Ok(before)), (end, Ok(after))] = ends else { return false };
-        switches_between(lagrangian, [(t, &before), (end, &after)])
     }
 
     /// The misfit of the largest second difference of the acceleration along the cubic curve through both ends: a jump has it however

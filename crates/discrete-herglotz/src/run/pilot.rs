@@ -4,7 +4,7 @@ use super::accuracy::Choice;
 use super::{Plan, Problem, Request, Shared, Wants};
 use crate::gauss::{Look, SETS};
 use crate::run::verified::refuted;
-use crate::switching::{SwitchingStepper, has_switching_functions};
+use crate::switching::{Reach, SwitchingStepper, has_switching_functions};
 use crate::{ClockedGauss, GaussCollocation, GaussRoute, GaussStepper, Halt, InputError, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Lagrangian, larger};
@@ -237,10 +237,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
             let ending = self.watch(&mut stepper, &course, 1, |run, sets| (run.look(sets), 0))?;
             return Ok(ending.with_tau(stepper.tau()));
         }
-        let make =
-            |problem: &Problem<'p, L, N>, h: f64| (GaussCollocation { stages }).run(problem, h, Wants::default());
-        if has_switching_functions(problem.lagrangian, problem.t0, &problem.start) {
-            let mut stepper = match SwitchingStepper::new(problem, h, make) {
+        let gauss = GaussCollocation { stages };
+        if const { L::HAS_SWITCHING_FUNCTIONS }
+            && has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?
+        {
+            let make = |problem: &Problem<'p, L, N>, h: f64, _: bool| gauss.run(problem, h, Wants::default());
+            let mut stepper = match SwitchingStepper::new(problem, h, Reach::Inside, make) {
                 Ok(stepper) => stepper.keeping_parts(),
                 Err(error) => return halted_at_the_start(error),
             };
@@ -251,7 +253,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
                 (look, parts.iter().map(GaussStepper::newton_steps).sum())
             });
         }
-        let mut stepper = match make(problem, h) {
+        let mut stepper = match gauss.run(problem, h, Wants::default()) {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),
         };

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::gauss::FEW;
 use crate::run::verified::refuted;
-use crate::switching::{SwitchingStepper, has_switching_functions};
+use crate::switching::{has_switching_functions, of_integrator};
 use crate::{Doubt, InputError, Status, StepError, Stepper, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Derivatives, Lagrangian, PhasePoint, VelocityPoint};
@@ -41,12 +41,10 @@ fn stepper_of<'p, L: Lagrangian<N>, const N: usize>(
     h: f64,
     wants: Wants,
 ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-    if !switches {
-        return integrator.stepper(problem, h, wants);
+    if const { L::HAS_SWITCHING_FUNCTIONS } && switches {
+        return of_integrator(integrator.clone(), problem, h, wants);
     }
-    let integrator = integrator.clone();
-    let make = move |problem: &Problem<'p, L, N>, h: f64| integrator.stepper(problem, h, wants);
-    Ok(Box::new(SwitchingStepper::new(problem, h, make)?))
+    integrator.stepper(problem, h, wants)
 }
 
 /// A run after its checks, with step and route chosen; made by [`Run::plan`](super::Run::plan). Printed, it says what will be computed and
@@ -74,7 +72,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     pub(super) fn new(request: &Request<'p, L, N>, choice: &Choice<'p, L, N>) -> Result<Self, InputError> {
         let Request { problem, t_end, needs, .. } = *request;
         let Choice { integrator, count, h, error } = choice.clone();
-        let switches = has_switching_functions(problem.lagrangian, problem.t0, &problem.start);
+        let switches = has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?;
         let facts = integrator.facts();
         if switches && facts.by_clock {
             let hypothesis = "a Lagrangian without kinks and jumps, since its steps are equal in the time of a clock";

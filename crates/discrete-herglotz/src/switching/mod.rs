@@ -9,5 +9,5 @@ mod corner;
 mod stepper;
 mod surfaces;
 
-pub(crate) use stepper::SwitchingStepper;
-pub(crate) use surfaces::{has_switching_functions, switches_between};
+pub(crate) use stepper::{Reach, SwitchingStepper, of_integrator};
+pub(crate) use surfaces::has_switching_functions;

@@ -6,9 +6,11 @@ use crate::run::bracketed_root;
 use crate::run::saved::{Saved, load_option, save_option, saved};
 use crate::run::{first, step_error};
 use crate::{
-    DenseStep, Doubt, GaussStepper, Halt, InputError, Item, Problem, StepError, Stepper, Suspicion, legendre_inverse,
+    DenseStep, Doubt, Gauss, GaussCollocation, GaussStepper, Halt, InputError, Integrator, Item, Problem, StepError,
+    Stepper, Suspicion, Wants, legendre_inverse,
 };
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
+use std::sync::Arc;
 
 /// The parts that a step may have: beyond that the Lagrangian switches without end.
 const MOST_PARTS: usize = 4096;
@@ -43,12 +45,53 @@ impl<L: Lagrangian<N>, const N: usize> AsStepper<N> for GaussStepper<'_, L, N> {
     }
 }
 
+/// Where an integrator evaluates L.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Reach {
+    /// Between the ends of its steps, as Gauss collocation does.
+    Inside,
+    /// At the ends too, or beyond them by this fraction of a step.
+    Beside(f64),
+}
+
+/// A fraction of a step that is beyond the rounding of its ends.
+const AT_ENDS: f64 = 1e-9;
+
+/// The most that substeps back and forth go beyond a step, in units of the step.
+const SUBSTEPS: f64 = 0.5;
+
+/// The highest order of parts.
+const HIGHEST: u32 = 2 * Gauss::<()>::STAGES as u32;
+
+/// The stepper of an integrator, with steps that end on kinks and jumps. What evaluates L at the ends of its steps or beyond would meet both sides
+/// of a surface there: its parts of a step, and steps beside a surface, are taken by contact Gauss collocation of the same order.
+pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
+    integrator: Arc<dyn Integrator<'a, L, N> + 'a>,
+    problem: &Problem<'a, L, N>,
+    h: f64,
+    wants: Wants,
+) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    let facts = integrator.facts();
+    let inside = facts.collocation.is_some() || facts.order > HIGHEST;
+    let reach = match (inside, facts.substeps) {
+        (true, _) => Reach::Inside,
+        (false, true) => Reach::Beside(SUBSTEPS),
+        (false, false) => Reach::Beside(AT_ENDS),
+    };
+    let parts = GaussCollocation { stages: (facts.order.div_ceil(2) as usize).clamp(1, Gauss::<()>::STAGES) };
+    let make = move |problem: &Problem<'a, L, N>, h: f64, is_part: bool| {
+        if is_part && !inside { parts.stepper(problem, h, wants) } else { integrator.stepper(problem, h, wants) }
+    };
+    Ok(Box::new(SwitchingStepper::new(problem, h, reach, make)?))
+}
+
 /// Steps of one length by any integrator. A step along which a switching function changes its sign consists of parts, which end on the zeros.
 ///
-/// `make` makes the integrator's stepper at a problem, for steps of a length.
+/// `make` makes a stepper at a problem, for steps of a length, and is given whether these are parts.
 pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
     problem: Problem<'a, L, N>,
     make: M,
+    reach: Reach,
     h: f64,
     /// The steps taken.
     k: usize,
@@ -77,14 +120,15 @@ impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
 where
     L: Lagrangian<N>,
     S: AsStepper<N>,
-    M: Fn(&Problem<'a, L, N>, f64) -> Result<S, InputError>,
+    M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
 {
-    pub fn new(problem: &Problem<'a, L, N>, h: f64, make: M) -> Result<Self, InputError> {
-        let base = make(problem, h)?;
+    pub fn new(problem: &Problem<'a, L, N>, h: f64, reach: Reach, make: M) -> Result<Self, InputError> {
+        let base = make(problem, h, false)?;
         let here = TimedState { t: problem.t0, state: problem.state, v: problem.start.v };
         Ok(SwitchingStepper {
             problem: *problem,
             make,
+            reach,
             h,
             k: 0,
             base,
@@ -119,10 +163,10 @@ where
     }
 
     /// The integrator's stepper at a state.
-    fn stepper_at(&self, at: &TimedState<N>, h: f64) -> Result<S, StepError> {
+    fn stepper_at(&self, at: &TimedState<N>, h: f64, is_part: bool) -> Result<S, StepError> {
         let start = VelocityPoint { q: at.state.q, v: at.v, z: at.state.z };
         let problem = Problem { t0: at.t, start, state: at.state, ..self.problem };
-        (self.make)(&problem, h).map_err(step_error)
+        (self.make)(&problem, h, is_part).map_err(step_error)
     }
 
     /// The state of a stepper with its velocity.
@@ -134,7 +178,7 @@ where
 
     /// One step of a length from a state.
     fn part(&mut self, at: &TimedState<N>, t: f64) -> Result<(S, TimedState<N>), StepError> {
-        let mut stepper = self.stepper_at(at, t - at.t)?;
+        let mut stepper = self.stepper_at(at, t - at.t, true)?;
         let taken = stepper.stepper_mut().advance(1).map_err(|halt| halt.cause);
         self.spent += stepper.stepper().evaluations();
         taken?;
@@ -151,7 +195,12 @@ where
             && let Ok(to) = self.reached(self.base.stepper(), t, &from)
         {
             let curve = StepCurve { from, to, dense: self.base.stepper().dense() };
-            if self.surfaces.first_change(self.problem.lagrangian, &curve).is_none() {
+            let (lagrangian, surfaces) = (self.problem.lagrangian, &mut self.surfaces);
+            let quiet = match self.reach {
+                Reach::Inside => true,
+                Reach::Beside(part) => !surfaces.are_near(lagrangian, &curve, part),
+            };
+            if quiet && surfaces.first_change(lagrangian, &curve).is_none() {
                 (self.here, self.sigma) = (to, self.base.stepper().sigma());
                 return Ok(());
             }
@@ -164,7 +213,7 @@ where
             parts.clear();
         }
         let sides = self.surfaces.clone();
-        match self.in_parts(from, t).and_then(|(to, sigma)| Ok((to, sigma, self.stepper_at(&to, self.h)?))) {
+        match self.in_parts(from, t).and_then(|(to, sigma)| Ok((to, sigma, self.stepper_at(&to, self.h, false)?))) {
             Ok((to, sigma, base)) => {
                 (self.here, self.sigma, self.base) = (to, sigma, base);
                 (self.origin, self.before, self.switched) = (to, self.k + 1, true);
@@ -173,7 +222,7 @@ where
             Err(cause) => {
                 self.surfaces = sides;
                 // The state is that before the step.
-                if let Ok(base) = self.stepper_at(&from, self.h) {
+                if let Ok(base) = self.stepper_at(&from, self.h, false) {
                     (self.base, self.origin, self.before) = (base, from, self.k);
                 }
                 Err(cause)
@@ -319,7 +368,7 @@ impl<'a, L, S, M, const N: usize> Stepper<N> for SwitchingStepper<'a, L, S, M, N
 where
     L: Lagrangian<N>,
     S: AsStepper<N>,
-    M: Fn(&Problem<'a, L, N>, f64) -> Result<S, InputError>,
+    M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
 {
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
         for taken in 0..steps {
@@ -390,7 +439,7 @@ impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
 where
     L: Lagrangian<N>,
     S: AsStepper<N>,
-    M: Fn(&Problem<'a, L, N>, f64) -> Result<S, InputError>,
+    M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
 {
     /// Everything but the words of the base, which is made anew where it began.
     fn load(&mut self, from: &mut &[u64]) -> Option<()> {
@@ -402,7 +451,7 @@ where
         let mut numbers = (self.sigma, self.spent);
         numbers.load(from)?;
         self.unresolved = load_option(from, || Suspicion { step: 0, misfit: 0.0 })?;
-        self.base = self.stepper_at(&states[0], self.h).ok()?;
+        self.base = self.stepper_at(&states[0], self.h, false).ok()?;
         ([self.k, self.before], [self.origin, self.here], (self.sigma, self.spent)) = (counts, states, numbers);
         Some(())
     }

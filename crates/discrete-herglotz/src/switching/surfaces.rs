@@ -1,8 +1,8 @@
 //! The switching functions of a Lagrangian along a step.
 
-use crate::DenseStep;
 use crate::run::between;
 use crate::run::bracketed_root;
+use crate::{DenseStep, InputError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 use std::convert::Infallible;
@@ -13,28 +13,22 @@ const PARTS: usize = 8;
 /// Halvings of the part after a zero, in which a function that has just changed its sign is searched for the place where it changes back.
 const HALVINGS: i32 = 30;
 
-/// Whether a Lagrangian states switching functions.
-pub(crate) fn has_switching_functions<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
+/// Whether a Lagrangian has switching functions.
+///
+/// # Errors
+/// [`InputError::SwitchingUnstated`] where it has some without saying so.
+pub(crate) fn has_switching_functions<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
     t: f64,
     x: &VelocityPoint<N>,
-) -> bool {
+) -> Result<bool, InputError> {
     let mut values = Vec::new();
     lagrangian.switching_functions(t, x, &mut values);
-    !values.is_empty()
-}
-
-/// Whether a switching function has different signs at two points.
-pub(crate) fn switches_between<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
-    points: [(f64, &VelocityPoint<N>); 2],
-) -> bool {
-    let [before, after] = points.map(|(t, x)| {
-        let mut values = Vec::new();
-        lagrangian.switching_functions(t, x, &mut values);
-        values
-    });
-    before.iter().zip(&after).any(|(a, b)| a * b <= 0.0 && a != b)
+    match values.is_empty() {
+        true => Ok(false),
+        false if const { L::HAS_SWITCHING_FUNCTIONS } => Ok(true),
+        false => Err(InputError::SwitchingUnstated),
+    }
 }
 
 /// A time and a state of the motion, with its velocity.
@@ -130,6 +124,24 @@ impl Surfaces {
         if let Some(side) = self.sides.get_mut(index) {
             *side = -*side;
         }
+    }
+
+    /// Whether a surface lies within a part of a step before its start or after its end, where its motion is continued straight on: an integrator that
+    /// evaluates L there, or at the ends themselves, may meet the other side.
+    pub fn are_near<const N: usize>(
+        &mut self,
+        lagrangian: &impl Lagrangian<N>,
+        curve: &StepCurve<N>,
+        beside: f64,
+    ) -> bool {
+        [-beside, 1.0 + beside].into_iter().any(|fraction| {
+            let span = curve.span();
+            let x = between(&curve.from.point(), &curve.to.point(), span, fraction * span);
+            self.values.clear();
+            lagrangian.switching_functions(curve.from.t + fraction * span, &x, &mut self.values);
+            // A surface on which the motion starts has no side yet.
+            self.sides.iter().zip(&self.values).any(|(side, value)| *side == 0.0 || side * sign(*value) < 0.0)
+        })
     }
 
     /// The first change of sign along a step, as its curve shows it. Functions without a side so far get that of the first value beside 0.
