@@ -11,3 +11,4 @@ mod surfaces;
 
 pub(crate) use stepper::{Reach, SwitchingStepper, of_integrator};
 pub(crate) use surfaces::has_switching_functions;
+pub use surfaces::jumps_between;

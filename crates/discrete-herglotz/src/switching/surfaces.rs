@@ -1,10 +1,11 @@
 //! The switching functions of a Lagrangian along a step.
 
+use super::corner::{Corner, corner};
 use crate::run::between;
 use crate::run::bracketed_root;
 use crate::{DenseStep, InputError};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, largest};
 use std::convert::Infallible;
 
 /// The parts in which a step without a curve of its own is searched for changes of sign.
@@ -29,6 +30,43 @@ pub(crate) fn has_switching_functions<L: Lagrangian<N>, const N: usize>(
         false if const { L::HAS_SWITCHING_FUNCTIONS } => Ok(true),
         false => Err(InputError::SwitchingUnstated),
     }
+}
+
+/// Whether the Lagrangian itself jumps on the way between two points of a motion, across one of its [switching
+/// functions](Lagrangian::switching_functions): there the motion has a corner, and no vector field has a flow. The way is taken to be the cubic curve
+/// through both points with their velocities.
+pub fn jumps_between<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    [from, to]: [(f64, VelocityPoint<N>); 2],
+) -> bool {
+    let of = |(t, x): (f64, VelocityPoint<N>)| {
+        let state = PhasePoint { q: x.q, p: lagrangian.gradient(t, &x).y, z: x.z };
+        TimedState { t, state, v: x.v }
+    };
+    let curve = StepCurve { from: of(from), to: of(to), dense: None };
+    let mut surfaces = Surfaces::at(lagrangian, from.0, &from.1);
+    let reach = curve.span() * largest(from.1.v.iter().copied());
+    let parts = curve.parts();
+    for part in 1..=parts {
+        let ends = [part - 1, part].map(|part| part as f64 / parts as f64);
+        let (t, x) = curve.at(ends[1]);
+        for index in 0..surfaces.sides.len() {
+            let after = sign(surfaces.value(lagrangian, index, (t, &x)));
+            if surfaces.side(index) * after < 0.0 {
+                let about = surfaces.change(lagrangian, &curve, index, ends).about;
+                if !matches!(
+                    corner(lagrangian, &mut surfaces, index, &of(curve.at(about)), reach),
+                    Ok(Corner::Continuous)
+                ) {
+                    return true;
+                }
+            }
+            if let Some(side) = surfaces.sides.get_mut(index).filter(|_| after != 0.0) {
+                *side = after;
+            }
+        }
+    }
+    false
 }
 
 /// A time and a state of the motion, with its velocity.

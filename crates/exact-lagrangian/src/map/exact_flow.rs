@@ -1,11 +1,12 @@
 //! The exact flow as an integrator.
 
-use crate::herglotz_flow;
+use crate::numerics::flow::flow_between_jumps;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, legendre};
 use discrete_herglotz::{Facts, Halt, InputError, Integrator, Item, Problem, StepError, Stepper, Wants};
 
-/// The flow of the Herglotz field as an [`Integrator`]: its steps, of whatever length, are those of [`herglotz_flow`], to round-off.
+/// The flow of the Herglotz field as an [`Integrator`]: its steps, of whatever length, are those of [`herglotz_flow`](crate::herglotz_flow), to round-off; they
+/// end on the jumps of L that it states.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -54,7 +55,7 @@ struct Run<'a, L, const N: usize> {
 impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Run<'_, L, N> {
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
         for taken in 0..steps {
-            let motion = herglotz_flow(self.lagrangian, self.time(), &self.x, self.h)
+            let motion = flow_between_jumps(self.lagrangian, self.time(), &self.x, self.h)
                 .map_err(|error| Halt { taken, cause: StepError::from(error) })?;
             (self.x, self.b) = (motion.end, motion.b);
             self.evaluations += motion.evaluations;

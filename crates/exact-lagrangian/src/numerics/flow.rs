@@ -7,6 +7,7 @@ use crate::ExactError;
 use crate::numerics::panel::{Floor, Panel, Problem, Rate, Rates, Refused, SMALLEST, Size, State, collocate};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{GeometryError, Lagrangian, Scalar, Triple, VelocityPoint, herglotz_rates, larger};
+use discrete_herglotz::jumps_between;
 
 /// The evaluations of the vector field that a motion, or the search for one between two points, may take, about a second's: over
 /// duals of n entries each counts n times.
@@ -25,6 +26,37 @@ impl<L: Lagrangian<N>, T: Scalar, const N: usize> Rates<N, T> for Herglotz<'_, L
         let (field, b) = herglotz_rates(self.0, T::from(t), &point)?;
         Ok(Rate { a: field.y, z: field.z, b })
     }
+
+    fn jumps_between(&self, ends: [(f64, &State<N, T>); 2]) -> bool {
+        if !const { L::HAS_SWITCHING_FUNCTIONS } {
+            return false;
+        }
+        jumps_between(
+            self.0,
+            ends.map(|(t, x)| (t, VelocityPoint { q: x.q.map(T::re), v: x.v.map(T::re), z: x.z.re() })),
+        )
+    }
+}
+
+/// The same where the steps of a run end on the jumps of L, and the rounding beyond one is nothing to be refused.
+pub(crate) struct BetweenJumps<'a, L>(pub Herglotz<'a, L>);
+
+impl<L: Lagrangian<N>, T: Scalar, const N: usize> Rates<N, T> for BetweenJumps<'_, L> {
+    #[inline]
+    fn at(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError> {
+        self.0.at(t, x)
+    }
+}
+
+/// See [`herglotz_flow`]; across jumps of L as if they were not there.
+pub(crate) fn flow_between_jumps<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t0: f64,
+    start: &VelocityPoint<N>,
+    duration: f64,
+) -> Result<Motion<N>, ExactError<N>> {
+    let from = State { q: start.q, v: start.v, z: start.z, b: 0.0 };
+    integrate(&BetweenJumps(Herglotz(lagrangian)), t0, &from, duration, ACCURACY, &mut Work::default())
 }
 
 /// A motion: where it ends, and what has grown along it. Over duals, with the derivatives of all of it.
@@ -64,7 +96,9 @@ impl<const N: usize, T: Scalar> Motion<N, T> {
 /// Gauss' shape `exp(-(s/w)^2)` in position or time, which is felt over `8 w`, is found if w is above a hundredth of the part between
 /// two places: w = 1e-3 of the span as a rule. What is narrower still may not be seen; take shorter durations where it is known to
 /// be. A force that is small beside another and faster than the nodes is found by what it does in the mean. A jump of a force or of
-/// the drag is found by the panel's ends, and passed in a panel so short that it changes nothing but the last digit.
+/// the drag is found by the panel's ends, and passed in a panel so short that it changes nothing but the last digit. Across a jump of L itself, which
+/// its [switching functions](Lagrangian::switching_functions) tell, there is no flow of a vector field: it is refused there, and a
+/// [`Run`](discrete_herglotz::Run) goes on by the corner conditions.
 ///
 /// Of numbers below the smallest normal one the last digit is the smallest number of all.
 ///
@@ -267,8 +301,18 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
             Ok(panel) if panel.error <= accuracy => {
                 panels += 1;
                 scale = larger(scale, h.abs());
+                let before = at;
                 sums.add(&panel);
                 at = sums.state();
+                if rates.jumps_between([(t, &before), (t + h, &at)]) {
+                    let cause = Some(GeometryError::Undefined { what: "the flow across a jump of the Lagrangian" });
+                    let [q, v] = [&before.q, &before.v].map(|x| x.map(T::re));
+                    return Err(ExactError::OutsideDomain {
+                        t,
+                        reached: VelocityPoint { q, v, z: before.z.re() },
+                        cause,
+                    });
+                }
                 done.add(h);
                 ended = ends;
                 start = panel.last;

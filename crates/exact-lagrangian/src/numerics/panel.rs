@@ -52,6 +52,11 @@ pub(crate) trait Rates<const N: usize, T> {
     /// # Errors
     /// A [`GeometryError`] where they are not defined.
     fn at(&self, t: f64, x: &State<N, T>) -> Result<Rate<N, T>, GeometryError>;
+
+    /// Whether the motion cannot go on from one state to another since what it follows jumps between them.
+    fn jumps_between(&self, _ends: [(f64, &State<N, T>); 2]) -> bool {
+        false
+    }
 }
 
 /// A panel that has been solved: the velocity at its start, what changes along it, and how exactly.

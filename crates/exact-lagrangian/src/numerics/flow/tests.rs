@@ -218,3 +218,38 @@ fn the_work_is_bounded() {
     let found = motion(&Spring, [1.0, 0.0, 0.0], 1e9);
     assert!(matches!(found, Err(ExactError::Unfinished { t, .. }) if t > 1e3), "{found:?}");
 }
+
+/// A free particle below a step of the potential at q = 0.7, whose height is given.
+struct Step(f64);
+
+impl Lagrangian<1> for Step {
+    const HAS_SWITCHING_FUNCTIONS: bool = true;
+
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 - q[0].if_less(T::from(0.7), T::zero(), T::from(self.0)) - z * 0.1
+    }
+    fn switching_functions(&self, _t: f64, x: &VelocityPoint<1>, values: &mut Vec<f64>) {
+        values.push(x.q[0] - 0.7);
+    }
+}
+
+/// No vector field has a flow across a jump of L: it is refused, and a run goes on by the corner conditions. Without a jump nothing is refused.
+#[test]
+fn a_jump_of_the_lagrangian_is_refused() {
+    use discrete_herglotz::{Problem, Steps, Until};
+    let start = VelocityPoint::new([0.0], [1.0], 0.0);
+    for height in [5.0, 0.2, -0.2] {
+        let system = Step(height);
+        let refused = herglotz_flow(&system, 0.0, &start, 2.0);
+        assert!(matches!(refused, Err(ExactError::OutsideDomain { t, .. }) if t < 0.8), "{height}: {refused:?}");
+        let problem = Problem::new(&system, 0.0, start).unwrap();
+        let run = problem.by(crate::ExactFlow).steps(Steps::Count(4)).run(Until::Time(2.0)).unwrap();
+        let eight = problem.accuracy(1e-12).run(Until::Time(2.0)).unwrap();
+        assert!((run.q[0] - eight.q[0]).abs() <= 1e-11, "{height}: {} and {}", run.q[0], eight.q[0]);
+        // Up to the step the velocity falls with the drag, and the energy is what decides beyond it.
+        assert!((run.q[0] > 0.7) == (height < 0.4), "{height}: {}", run.q[0]);
+    }
+    let flat = herglotz_flow(&Step(0.0), 0.0, &start, 2.0).unwrap();
+    let expected = (1.0 - (-0.2_f64).exp()) / 0.1;
+    assert!((flat.end.q[0] - expected).abs() <= 4.0 * f64::EPSILON * expected, "{}", flat.end.q[0]);
+}
