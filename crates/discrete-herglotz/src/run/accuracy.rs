@@ -330,7 +330,11 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         let growth = distances.last().copied().unwrap_or(0.0) / distances.first().copied().unwrap_or(0.0);
         let rounded = 2e-15 * larger(growth, 1.0) * (k as f64).sqrt();
         let agreed = error <= 0.25 * goal || (error <= 1e-2 && beyond <= 0.1 * goal && rounded <= 0.1 * goal);
+        let mut hidden = None;
         if falls && agreed {
+            hidden = beside_nodes(pilots, stages, k, compared, goal, fine)?;
+        }
+        if falls && agreed && hidden.is_none() {
             return Ok(Converged {
                 k,
                 errors: [error, beyond],
@@ -343,13 +347,16 @@ fn converge<L: Lagrangian<N>, const N: usize>(
                 rough: rough || narrows > 0 || fall > 2.0 * s,
             });
         }
-        rough |= !falls;
+        rough |= !falls || hidden.is_some();
+        let error = larger(error, hidden.unwrap_or(0.0));
         strikes = if error < 0.5 * best { 0 } else { strikes + 1 };
         cause = if !falls {
             Obstacle::Order { order }
         } else if before.is_nan() {
             // The first two runs show no order, and are the last if others would cost too much.
             Obstacle::Budget
+        } else if hidden.is_some() {
+            Obstacle::Order { order: (before / error).log2() }
         } else if fine.has_underflown() {
             Obstacle::RoundOff
         } else {
@@ -364,6 +371,28 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         k *= 2;
     }
     refuse(wanted, best, cause)
+}
+
+/// How far the end of a run with one step more is from that of two runs that agree, where that is too far: nodes of both lie on the ends of the k
+/// steps, and so on whatever kink or pulse begins at one of them. `None` where they agree too, or where nothing can hide: kinks of a formula that is
+/// proved end steps.
+fn beside_nodes<L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, '_, L, N>,
+    stages: usize,
+    k: usize,
+    compared: Compared,
+    goal: f64,
+    fine: &Track<N>,
+) -> Result<Option<f64>, InputError> {
+    let structure = &pilots.request.problem.structure;
+    if const { L::PROVED } || matches!(compared, Compared::Times) || structure.quadratic && structure.autonomous {
+        return Ok(None);
+    }
+    Ok(match pilots.gauss(stages, k + 1, &Marks::of(k + 1), false, false)? {
+        PilotEnd::Followed(track) => Some(track.distance_at_end(fine)).filter(|distance| !(*distance <= goal)),
+        PilotEnd::Exhausted => None,
+        _ => Some(f64::INFINITY),
+    })
 }
 
 /// What keeps runs from agreeing, by their distances along the motion and the order that they show.

@@ -105,17 +105,27 @@ fn norm<const N: usize>(x: &[SVector<f64, N>; 2]) -> f64 {
     size * x.iter().map(|x| (x / size).norm_squared()).sum::<f64>().sqrt()
 }
 
+/// The distance of a state from another, relative to the size of that, or to one that is given where it is larger.
+fn relative<const N: usize>(a: &[SVector<f64, N>; 2], b: &[SVector<f64, N>; 2], least: f64) -> f64 {
+    let (apart, size) = (norm(&[a[0] - b[0], a[1] - b[1]]), larger(norm(b), least));
+    // Numbers are known to no less than half of the smallest one.
+    if apart == 0.0 && size == 0.0 { 0.0 } else { larger(apart, SMALLEST) / size }
+}
+
 impl<const N: usize> Track<N> {
     /// The distances of the states of two tracks at the same marks, relative to the size of the second's at that time, or at the end
     /// where that is larger. Not a number where a state is not.
     pub fn distances(&self, of: &Self) -> Vec<f64> {
         let last = of.states.last().map_or(0.0, norm);
-        let relative = |(a, b): (&[SVector<f64, N>; 2], &[SVector<f64, N>; 2])| {
-            let (apart, size) = (norm(&[a[0] - b[0], a[1] - b[1]]), larger(norm(b), last));
-            // Numbers are known to no less than half of the smallest one.
-            if apart == 0.0 && size == 0.0 { 0.0 } else { larger(apart, SMALLEST) / size }
-        };
-        self.states.iter().zip(&of.states).map(relative).collect()
+        self.states.iter().zip(&of.states).map(|(a, b)| relative(a, b, last)).collect()
+    }
+
+    /// The same of the last states alone, of runs that need not have other marks in common.
+    pub fn distance_at_end(&self, of: &Self) -> f64 {
+        match (self.states.last(), of.states.last()) {
+            (Some(a), Some(b)) => relative(a, b, 0.0),
+            _ => f64::NAN,
+        }
     }
 
     /// Whether the motion ends with numbers that have lost digits since they are too small.

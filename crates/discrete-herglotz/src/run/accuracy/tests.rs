@@ -4,8 +4,9 @@ use super::choose_with;
 use crate::run::pilot::{BUDGET, Pilots};
 use crate::run::{Needs, Problem, Request, Shared, Until};
 use crate::{AnyIntegrator, GaussCollocation, Stepper, Wants};
+use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Duffing, Kepler, OneCoordinate, Pendulum, QuadraticInZ};
-use contact_geom::{Lagrangian, VelocityPoint};
+use contact_geom::{Lagrangian, Scalar, VelocityPoint};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -23,7 +24,7 @@ fn search<L: Lagrangian<N>, const N: usize>(
     (choice.integrator.facts().name, choice.count, BUDGET - pilots.left)
 }
 
-/// Pilot runs cost a small multiple of the run: those with k and 2k steps, and where these do not agree with 4k; before them one that
+/// Pilot runs cost a small multiple of the run: those with k, 2k and k + 1 steps, and where the first do not agree with 4k; before them one that
 /// ends where its misfit is seen to be too large. The run has more than k steps, or more than 1.2 k.
 #[test]
 fn pilot_runs_cost_little() {
@@ -35,7 +36,7 @@ fn pilot_runs_cost_little() {
         assert_eq!(count, run.steps);
         // Looks count twice their points, of which there are at least 2000 beside those of the steps.
         let (spent, looks) = (spent as f64, 2.5 * 2.0 * 2000.0);
-        let most = 7.0 * run.evaluations as f64 + looks;
+        let most = 8.0 * run.evaluations as f64 + looks;
         assert!(spent <= most, "{span}, {wanted:e}: {spent} evaluations for {}", run.evaluations);
     }
 }
@@ -98,4 +99,48 @@ fn pilot_runs_by_a_clock_cost_little() {
             assert!(spent as f64 <= most, "{e}: {spent} evaluations for {}", run.evaluations);
         }
     }
+}
+
+/// What a Lagrangian does not say of its kinks: a spring that is stiffer where it is pressed, and a force that begins at a time.
+enum Unstated {
+    Stiffer(f64),
+    Begins(f64),
+}
+
+impl Lagrangian<1> for Unstated {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        let (kinetic, potential) = (v[0] * v[0] * 0.5, q[0] * q[0] * 0.5);
+        match self {
+            Unstated::Stiffer(k) => kinetic - T::zero().if_less(q[0], potential, potential * *k),
+            Unstated::Begins(at) => kinetic - potential + T::from(*at).if_less(t, q[0], T::zero()),
+        }
+    }
+}
+
+/// Nodes of runs with k and 2k steps may all lie on the same kinks, and such runs agree on a wrong motion: whatever simple fraction of the span a kink
+/// is at, the motion is as exact as was asked for, or it is refused.
+#[test]
+fn kinks_at_nodes_do_not_hide() {
+    let tau = std::f64::consts::TAU;
+    let mut cases = vec![
+        (Unstated::Stiffer(9.0), 1.0, tau * 2.0 / 3.0, [1.0, 0.0]),
+        (Unstated::Stiffer(4.0), 1.0, 4.5 * tau, [1.0, 0.0]),
+    ];
+    for at in [0.25, 0.5, 0.75, 1.0, 4.0 / 3.0, 1.5] {
+        cases.push((Unstated::Begins(at), 0.0, 2.0, [1.0 - f64::cos(2.0 - at), f64::sin(2.0 - at)]));
+    }
+    let mut refused = 0;
+    for (system, q, span, [x, v]) in cases {
+        let problem = Problem::new(&system, 0.0, VelocityPoint::new([q], [0.0], 0.0)).unwrap();
+        for wanted in [1e-4, 1e-6, 1e-9] {
+            match problem.accuracy(wanted).run(Until::Time(span)) {
+                Ok(found) => {
+                    let off = f64::hypot(found.q[0] - x, found.p[0] - v) / x.hypot(v);
+                    assert!(off <= wanted, "{span}, {wanted:e}: {off:e} in {} steps", found.steps);
+                }
+                Err(_) => refused += 1,
+            }
+        }
+    }
+    println!("{refused} refused");
 }
