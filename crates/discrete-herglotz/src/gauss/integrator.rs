@@ -22,7 +22,7 @@ pub struct ClockedGauss {
 }
 
 /// Of either.
-fn facts(stages: usize, by_clock: bool) -> Facts {
+pub(crate) fn facts(stages: usize, by_clock: bool) -> Facts {
     Facts {
         name: format!("{}gauss_{stages}", if by_clock { "clocked_" } else { "" }).into(),
         order: 2 * stages as u32,
@@ -32,6 +32,7 @@ fn facts(stages: usize, by_clock: bool) -> Facts {
         by_clock,
         collocation: Some(stages),
         substeps: false,
+        divides: false,
         price: 1,
         source: "Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3, doi:10.1007/3-540-30666-8"
             .into(),

@@ -36,6 +36,7 @@ mod time_transformation;
 
 pub use clocked::ClockedStepper;
 pub use dense::DenseStep;
+pub(crate) use integrator::facts;
 pub use integrator::{ClockedGauss, GaussCollocation};
 pub(crate) use look::{Look, SETS};
 pub(crate) use stepper::FEW;

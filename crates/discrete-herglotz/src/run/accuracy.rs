@@ -1,6 +1,7 @@
 //! The integrator and the number of steps for a wanted error.
 
-use super::pilot::{BUDGET, Elsewhere, Marks, PilotEnd, Pilots, Track};
+use super::divided::divided_steps;
+use super::pilot::{Elsewhere, Marks, PilotEnd, Pilots, Track};
 use super::{MOST_STEPS, Problem, Request, Shared};
 use crate::gauss::MOST;
 use crate::rules::step_equations::inverted;
@@ -95,7 +96,7 @@ pub(super) fn choose<'p, L: Lagrangian<N>, const N: usize>(
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
-    choose_with(&mut Pilots { request, left: BUDGET, wanted, watches_clock: false, watches_newton: false })
+    choose_with(&mut Pilots::new(request, wanted))
 }
 
 /// The same with a budget.
@@ -131,6 +132,12 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
         found = by_equal_steps(pilots, &gauss(stages), stages);
     }
     pilots.watches_clock = false;
+    // Where a part of the motion asks for much shorter steps than the rest, those are divided; and they are refused for the first reason.
+    if let Err(Ended::Refused(refused @ InputError::Accuracy { cause, .. })) = &found
+        && !matches!(cause, Obstacle::RoundOff | Obstacle::Chaos { .. })
+    {
+        return divided_steps(pilots).map_err(|_| *refused);
+    }
     let Err(Ended::Elsewhere(Elsewhere::Clock)) = found else { return Ok(found?) };
     // Where the clock leads nowhere equal steps may.
     let clocked: Shared<'p, L, N> = Arc::new(ClockedGauss { stages: BY_CLOCK });
@@ -214,10 +221,17 @@ fn chosen<'p, L: Lagrangian<N>, const N: usize>(
 }
 
 /// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.
-fn first_guess<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, stages: usize, goal: f64) -> usize {
+pub(super) fn first_guess<L: Lagrangian<N>, const N: usize>(
+    request: &Request<'_, L, N>,
+    stages: usize,
+    goal: f64,
+) -> usize {
     let Request { problem: Problem { lagrangian, start, t0, .. }, span, .. } = request;
     let h = lagrangian.hessian(*t0, start);
-    let frequency = inverted(&h.vv).map_or(0.0, |inverse| spectral_radius(*inverse * h.qq)).sqrt();
+    // Of forces of position, and of those that turn the velocity as a magnetic field does.
+    let frequency = inverted(&h.vv).map_or(0.0, |inverse| {
+        larger(spectral_radius(*inverse * h.qq).sqrt(), spectral_radius(*inverse * (h.qv - h.qv.transpose())))
+    });
     // The error of a step of x radians is about x^(2s+1) s!^4 / (2s)!^3.
     let s = stages as f64;
     let logarithm = |n: usize| (1..=n).map(|i| (i as f64).ln()).sum::<f64>();
@@ -263,7 +277,7 @@ fn converge<L: Lagrangian<N>, const N: usize>(
     let mut k = first_guess(pilots.request, stages, goal);
     let mut marks = marks_of(k);
     let (mut best, mut strikes, mut narrows, mut halts) = (f64::INFINITY, 0, 0, (0, 0.0));
-    let mut cause = Obstacle::Unresolved { t: t0 };
+    let mut cause = Obstacle::Budget;
     // The finer of the last two runs, and their distance.
     let (mut known, mut before): (Option<Track<N>>, f64) = (None, f64::NAN);
     let (mut guessed, mut rough) = (false, false);
@@ -275,7 +289,7 @@ fn converge<L: Lagrangian<N>, const N: usize>(
             marks = marks_of(k);
             k = marks.whole(k as f64);
         }
-        let left = pilots.left;
+        let left = pilots.reserve;
         let mut tracks = Vec::with_capacity(2);
         for (multiple, closely) in [(1, false), (2, true)] {
             if let Some(track) = known.take() {
@@ -364,7 +378,8 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         };
         (best, before) = (if error < best { error } else { best }, error);
         // Not begun, if it cannot end.
-        if strikes == 3 || 2 * (left - pilots.left) > pilots.left {
+        let affordable = pilots.left.max(pilots.reserve);
+        if strikes == 3 || 2 * (left - pilots.reserve) > affordable {
             break;
         }
         known = Some(fine.clone());
@@ -396,7 +411,7 @@ fn beside_nodes<L: Lagrangian<N>, const N: usize>(
 }
 
 /// What keeps runs from agreeing, by their distances along the motion and the order that they show.
-fn obstacle(distances: &[f64], order: f64, wanted: f64, t0: f64, span: f64) -> Obstacle {
+pub(super) fn obstacle(distances: &[f64], order: f64, wanted: f64, t0: f64, span: f64) -> Obstacle {
     let (first, last) = (distances.first().copied().unwrap_or(0.0), distances.last().copied().unwrap_or(0.0));
     // The order that is left where runs differ by nothing but what they have rounded.
     let noise = order < 2.0;

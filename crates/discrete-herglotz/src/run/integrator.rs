@@ -23,6 +23,8 @@ pub struct Facts {
     pub collocation: Option<usize>,
     /// Whether a step consists of others, back and forth.
     pub substeps: bool,
+    /// Whether it divides its steps where the motion is fast, and at kinks and jumps of the Lagrangian.
+    pub divides: bool,
     /// What one of its [evaluations](Stepper::evaluations) costs, in evaluations of L at a stage of Gauss collocation.
     pub price: u64,
     /// Where it is from: authors, journal, year.
@@ -41,6 +43,7 @@ impl Facts {
             by_clock: false,
             collocation: None,
             substeps: false,
+            divides: false,
             // Newton's method takes second derivatives.
             price: 32 * N as u64,
             source: Cow::Borrowed(""),

@@ -5,6 +5,7 @@ mod any_integrator;
 mod checkpoint;
 #[cfg(feature = "csv")]
 mod csv_rows;
+mod divided;
 mod events;
 mod explain;
 mod halved;

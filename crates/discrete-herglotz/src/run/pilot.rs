@@ -4,13 +4,16 @@ use super::accuracy::Choice;
 use super::{Plan, Problem, Request, Shared, Wants};
 use crate::gauss::{Look, SETS};
 use crate::run::verified::refuted;
-use crate::switching::{Reach, SwitchingStepper, has_switching_functions};
+use crate::switching::{DividedGauss, Reach, SwitchingStepper, has_switching_functions};
 use crate::{ClockedGauss, GaussCollocation, GaussRoute, GaussStepper, Halt, InputError, StepError, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Lagrangian, larger};
 
 /// What all pilot runs of a plan may cost together, in evaluations of L at one stage: some seconds.
 pub(super) const BUDGET: u64 = 1 << 26;
+
+/// What those may cost together that come to their end, as those of long motions do: so that the budget grows with the run itself.
+pub(super) const RESERVE: u64 = 1 << 29;
 
 /// The misfit between the nodes beyond which a step does not resolve the motion: its momenta would be off by a twentieth.
 const RESOLVED: f64 = 0.05;
@@ -165,6 +168,11 @@ pub(super) enum Elsewhere {
     FewerStages,
 }
 
+/// A misfit in units of a size; as it is where that is 0.
+fn relative_to(misfit: f64, size: f64) -> f64 {
+    if misfit == 0.0 || size == 0.0 { misfit } else { misfit / size }
+}
+
 /// What the looks at a run have seen.
 #[derive(Default)]
 struct PilotLooks {
@@ -172,8 +180,10 @@ struct PilotLooks {
     /// The largest momentum, and the largest of what misfits of values change, on the way.
     size: f64,
     kinetic: f64,
-    /// The largest misfit, in units of these: of a motion that comes to rest only round-off is left.
-    misfit: f64,
+    /// The largest misfits, in the units of these: of a motion that comes to rest only round-off is left, and one that begins at rest has all
+    /// of its size before it.
+    of_momentum: f64,
+    of_value: f64,
 }
 
 impl PilotLooks {
@@ -185,11 +195,18 @@ impl PilotLooks {
         let of_value = larger(look.of_value, jump);
         // What does not move crosses nothing, and values of L that have underflowed tell nothing.
         let told = of_value != 0.0 && (self.kinetic >= UNDERFLOWN || self.kinetic.is_nan());
-        let of_value = if told { of_value / self.kinetic } else { 0.0 };
-        let of_run = look.misfit * if self.size > 0.0 { look.size / self.size } else { 1.0 };
-        self.misfit = larger(self.misfit, larger(of_run, of_value));
+        let of_value = if told { of_value } else { 0.0 };
+        let of_momentum = look.misfit * if look.size > 0.0 { look.size } else { 1.0 };
+        self.of_momentum = larger(self.of_momentum, of_momentum);
+        self.of_value = larger(self.of_value, of_value);
         // A NaN resolves nothing.
-        (look.misfit <= RESOLVED || of_run <= AT_REST) && of_value <= RESOLVED_VALUE
+        (look.misfit <= RESOLVED || of_momentum <= AT_REST * self.size || look.size < UNDERFLOWN)
+            && relative_to(of_value, self.kinetic) <= RESOLVED_VALUE
+    }
+
+    /// The largest misfit, relative to the largest momentum and to what misfits of values change.
+    fn misfit(&self) -> f64 {
+        larger(relative_to(self.of_momentum, self.size), relative_to(self.of_value, self.kinetic))
     }
 }
 
@@ -217,6 +234,8 @@ impl Uneven {
 pub(super) struct Pilots<'t, 'p, L, const N: usize> {
     pub request: &'t Request<'p, L, N>,
     pub left: u64,
+    /// What is left of the reserve for runs that come to their end.
+    pub reserve: u64,
     /// The error that is wanted.
     pub wanted: f64,
     /// Whether runs with equal steps end where a clock would take much fewer.
@@ -225,7 +244,12 @@ pub(super) struct Pilots<'t, 'p, L, const N: usize> {
     pub watches_newton: bool,
 }
 
-impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
+impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
+    /// For a request, with the whole budget.
+    pub fn new(request: &'t Request<'p, L, N>, wanted: f64) -> Self {
+        Pilots { request, left: BUDGET, reserve: RESERVE, wanted, watches_clock: false, watches_newton: false }
+    }
+
     /// Follows the motion by contact Gauss collocation, with a look between the nodes of each step: closely, at so many points of the
     /// span that nothing is narrower, or at a few of each step; and for what is narrow beside the steps or not.
     pub fn gauss(
@@ -274,6 +298,23 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
         self.watch(&mut stepper, &course, stride, |run, sets| (run.look(sets), run.newton_steps()))
     }
 
+    /// Follows the motion by Gauss collocation with steps that are divided where their misfit is larger than this.
+    pub fn divided(
+        &mut self,
+        integrator: DividedGauss,
+        count: usize,
+        marks: &Marks,
+    ) -> Result<PilotEnd<N>, InputError> {
+        let (problem, h) = (self.request.problem, self.step(count, marks));
+        let mut stepper = match integrator.run(problem, h, Wants::default()) {
+            Ok(stepper) => stepper,
+            Err(error) => return halted_at_the_start(error),
+        };
+        // Each step is looked at, which costs twice its stages.
+        let look = |run: &_, _: f64| (None, 2 * Stepper::evaluations(run));
+        Ok(self.follow(&mut stepper, count, marks, 1, look))
+    }
+
     /// The length of steps of which so many fill the span; by a clock, if its rate stayed what it is at the start.
     pub fn step(&self, count: usize, marks: &Marks) -> f64 {
         let Problem { lagrangian, start, .. } = self.request.problem;
@@ -310,7 +351,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
                 if !seen.resolves(&look) {
                     return Some(PilotEnd::Unresolved { part });
                 }
-                (*narrow && look.misfit > NARROW * look.expected + floor).then_some(PilotEnd::Narrow { part })
+                let narrow = *narrow && look.size >= UNDERFLOWN && look.misfit > NARROW * look.expected + floor;
+                narrow.then_some(PilotEnd::Narrow { part })
             });
             (ending, spent(looks))
         });
@@ -321,7 +363,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
             return Err(InputError::FalseClaim { claim, size });
         }
         Ok(match ending {
-            PilotEnd::Followed(track) => PilotEnd::Followed(Track { misfit: seen.misfit, cost, ..track }),
+            PilotEnd::Followed(track) => PilotEnd::Followed(Track { misfit: seen.misfit(), cost, ..track }),
             other => other,
         })
     }
@@ -373,11 +415,13 @@ impl<'p, L: Lagrangian<N>, const N: usize> Pilots<'_, 'p, L, N> {
                 let x = run.state();
                 states.push([x.q, x.p]);
             }
-            if spent > self.left {
+            // A run whose end is in sight may go on.
+            if spent > self.left && spent as f64 > part * self.reserve as f64 {
                 ending = Some(PilotEnd::Exhausted);
             }
         }
         self.left = self.left.saturating_sub(spent);
+        self.reserve = self.reserve.saturating_sub(spent);
         ending.unwrap_or(PilotEnd::Followed(Track { states, misfit: 0.0, cost: spent, tau: span }))
     }
 }

@@ -41,7 +41,7 @@ fn stepper_of<'p, L: Lagrangian<N>, const N: usize>(
     h: f64,
     wants: Wants,
 ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-    if const { L::HAS_SWITCHING_FUNCTIONS } && switches {
+    if const { L::HAS_SWITCHING_FUNCTIONS } && switches && !integrator.facts().divides {
         return of_integrator(integrator.clone(), problem, h, wants);
     }
     integrator.stepper(problem, h, wants)

@@ -18,6 +18,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
             by_clock: false,
             collocation: None,
             substeps: true,
+            divides: false,
             price: 4,
             source: Cow::Borrowed(self.source()),
         }

@@ -6,9 +6,11 @@
 //! Weierstrass and Erdmann hold, which Herglotz' principle shares with Hamilton's: `p+ - p- = lambda g_q`, `E+ - E- = -lambda g_t`.
 
 mod corner;
+mod divided;
 mod stepper;
 mod surfaces;
 
+pub(crate) use divided::DividedGauss;
 pub(crate) use stepper::{Reach, SwitchingStepper, of_integrator};
 pub(crate) use surfaces::has_switching_functions;
 pub use surfaces::jumps_between;

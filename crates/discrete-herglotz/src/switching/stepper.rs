@@ -25,6 +25,11 @@ const NEWTON: usize = 8;
 pub(crate) trait AsStepper<const N: usize> {
     fn stepper(&self) -> &(dyn Stepper<N> + '_);
     fn stepper_mut(&mut self) -> &mut (dyn Stepper<N> + '_);
+
+    /// The largest misfit of its last step between the nodes, relative to the momenta; 0 where that is not known.
+    fn misfit(&self) -> f64 {
+        0.0
+    }
 }
 
 impl<const N: usize> AsStepper<N> for Box<dyn Stepper<N> + '_> {
@@ -36,7 +41,14 @@ impl<const N: usize> AsStepper<N> for Box<dyn Stepper<N> + '_> {
     }
 }
 
+/// Momenta below this have lost digits in products: what does not fit there is rounding.
+const UNDERFLOWN: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+
 impl<L: Lagrangian<N>, const N: usize> AsStepper<N> for GaussStepper<'_, L, N> {
+    fn misfit(&self) -> f64 {
+        self.look(1).map_or(0.0, |look| if look.size < UNDERFLOWN { 0.0 } else { look.misfit })
+    }
+
     fn stepper(&self) -> &(dyn Stepper<N> + '_) {
         self
     }
@@ -101,6 +113,8 @@ pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
     before: usize,
     here: TimedState<N>,
     surfaces: Surfaces,
+    /// The misfit beyond which a step is divided.
+    most_misfit: f64,
     sigma: f64,
     /// The evaluations of the steppers before `base`.
     spent: u64,
@@ -136,6 +150,7 @@ where
             before: 0,
             here,
             surfaces: Surfaces::at(problem.lagrangian, problem.t0, &problem.start),
+            most_misfit: f64::INFINITY,
             sigma: 1.0,
             spent: 0,
             unresolved: None,
@@ -147,6 +162,17 @@ where
     /// The same, with the steppers of the parts of the last step.
     pub fn keeping_parts(self) -> Self {
         SwitchingStepper { parts: Some(Vec::new()), ..self }
+    }
+
+    /// The same, with steps divided where their misfit is larger than this: into parts that are as short as it asks for.
+    pub fn dividing(self, most_misfit: f64) -> Self {
+        SwitchingStepper { most_misfit, ..self }
+    }
+
+    /// Whether a step is to be divided.
+    fn is_too_long(&self, step: &S) -> bool {
+        // A NaN is too.
+        self.most_misfit < f64::INFINITY && !(step.misfit() <= self.most_misfit)
     }
 
     /// The steppers of the last step: of its parts where it had some, else that of all steps.
@@ -200,7 +226,7 @@ where
                 Reach::Inside => true,
                 Reach::Beside(part) => !surfaces.are_near(lagrangian, &curve, part),
             };
-            if quiet && surfaces.first_change(lagrangian, &curve).is_none() {
+            if quiet && surfaces.first_change(lagrangian, &curve).is_none() && !self.is_too_long(&self.base) {
                 (self.here, self.sigma) = (to, self.base.stepper().sigma());
                 return Ok(());
             }
@@ -254,7 +280,12 @@ where
                 }
             };
             let curve = StepCurve { from: at, to, dense: stepper.stepper().dense() };
-            let Some(change) = self.surfaces.first_change(self.problem.lagrangian, &curve) else {
+            let change = self.surfaces.first_change(self.problem.lagrangian, &curve);
+            if change.is_none() && self.is_too_long(&stepper) {
+                longest = 0.5 * (t - at.t).abs();
+                continue;
+            }
+            let Some(change) = change else {
                 sigma *= stepper.stepper().sigma();
                 self.keep(stepper);
                 (at, longest, at_a_place) = (to, larger(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
@@ -266,6 +297,10 @@ where
                 continue;
             };
             match stepper {
+                Some(stepper) if self.is_too_long(&stepper) => {
+                    longest = 0.5 * (to.t - at.t).abs();
+                    continue;
+                }
                 Some(stepper) => {
                     sigma *= stepper.stepper().sigma();
                     self.keep(stepper);

@@ -188,6 +188,9 @@ impl Surfaces {
         lagrangian: &impl Lagrangian<N>,
         curve: &StepCurve<N>,
     ) -> Option<SignChange> {
+        if self.sides.is_empty() {
+            return None;
+        }
         let parts = curve.parts();
         for part in 1..=parts {
             let fraction = part as f64 / parts as f64;

@@ -19,7 +19,7 @@ fn search<L: Lagrangian<N>, const N: usize>(
 ) -> (Cow<'static, str>, usize, u64) {
     let integrator = integrator.map(|by| Arc::new(by) as Shared<'_, L, N>);
     let request = Request { problem, t_end: span, span, integrator, needs: Needs::default() };
-    let mut pilots = Pilots { request: &request, left: BUDGET, wanted, watches_clock: false, watches_newton: false };
+    let mut pilots = Pilots::new(&request, wanted);
     let choice = choose_with(&mut pilots).unwrap();
     (choice.integrator.facts().name, choice.count, BUDGET - pilots.left)
 }

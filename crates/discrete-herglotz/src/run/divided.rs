@@ -1,0 +1,71 @@
+//! Steps of varying length for an accuracy, where equal steps would be too many.
+
+use super::accuracy::{Choice, first_guess, obstacle};
+use super::pilot::{Marks, PilotEnd, Pilots, Track};
+use crate::switching::DividedGauss;
+use crate::{InputError, Obstacle};
+use contact_geom::{Lagrangian, larger};
+use std::sync::Arc;
+
+/// The stages of the parts.
+const STAGES: usize = 8;
+
+/// The most steps that are divided: what is fast is left to the parts.
+const MOST_STEPS: usize = 1 << 14;
+
+/// The largest misfit that parts may have, and the smallest that is beyond rounding.
+const MISFITS: [f64; 2] = [0.02, 1e-11];
+
+/// The searches that may follow each other, each with a finer division.
+const ATTEMPTS: usize = 8;
+
+/// Chooses steps that are divided where the motion is fast, so that the error of (q, p) relative to their size is at most that wanted: a division and one
+/// of half the length must agree. The error of a part is about the square of its misfit, and the misfit of the half smaller by `2^s`.
+pub(super) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, 'p, L, N>,
+) -> Result<Choice<'p, L, N>, InputError> {
+    let (wanted, t0, span) = (pilots.wanted, pilots.request.problem.t0, pilots.request.span);
+    let finer = f64::powi(0.5, STAGES as i32);
+    let count = first_guess(pilots.request, STAGES, wanted).min(MOST_STEPS);
+    let marks = Marks::of(count);
+    let mut most_misfit = (0.3 * wanted.sqrt()).min(MISFITS[0]);
+    let (mut best, mut before, mut cause) = (f64::INFINITY, f64::NAN, Obstacle::Budget);
+    let mut coarse: Option<Track<N>> = None;
+    for _ in 0..ATTEMPTS {
+        let integrator = DividedGauss { stages: STAGES, most_misfit };
+        let mut track =
+            |most_misfit: f64| match pilots.divided(DividedGauss { most_misfit, ..integrator }, count, &marks)? {
+                PilotEnd::Followed(track) => Ok(Ok(track)),
+                PilotEnd::Halted { part, cause } => Ok(Err(Obstacle::Halted { t: t0 + part * span, cause })),
+                _ => Ok::<_, InputError>(Err(Obstacle::Budget)),
+            };
+        let first = match coarse.take() {
+            Some(track) => Ok(track),
+            None => track(most_misfit)?,
+        };
+        let tracks = match first {
+            Ok(first) => track(most_misfit * finer)?.map(|second| (first, second)),
+            Err(obstacle) => Err(obstacle),
+        };
+        let (first, second) = match tracks {
+            Ok(tracks) => tracks,
+            Err(obstacle) => {
+                cause = obstacle;
+                break;
+            }
+        };
+        let error = larger(first.distance(&second), 0.5 * f64::EPSILON);
+        if error <= 0.25 * wanted {
+            return Ok(Choice { integrator: Arc::new(integrator), count, h: span / count as f64, error: Some(error) });
+        }
+        let distances = first.distances(&second);
+        cause = obstacle(&distances, f64::log2(before / error), wanted, t0, span);
+        (best, before) = (best.min(error), error);
+        most_misfit *= finer;
+        if most_misfit < MISFITS[1] {
+            break;
+        }
+        coarse = Some(second);
+    }
+    Err(InputError::Accuracy { wanted, reached: best, cause })
+}
