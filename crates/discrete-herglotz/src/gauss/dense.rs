@@ -12,13 +12,17 @@ use std::array::from_fn;
 
 /// The state at the start of a step as a route holds it: momenta, or velocities in the condensed routes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct StepStart<const N: usize> {
+pub(crate) struct StepStart<const N: usize> {
     pub q: [f64; N],
     pub y: [f64; N],
     pub z: f64,
 }
 
 saved!([const N: usize] StepStart<N> { q, y, z });
+
+impl<const N: usize> StepStart<N> {
+    pub const ZERO: Self = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
+}
 
 /// The stages of a solved step: V, `rho L_q`, `rho L_z` and L, with 0 beyond the last stage.
 pub(super) struct Solved<const N: usize> {

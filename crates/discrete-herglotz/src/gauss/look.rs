@@ -38,7 +38,15 @@ pub(crate) struct Look {
     pub follows_a_jump: bool,
 }
 
+/// Products of two numbers that are smaller have lost digits.
+pub(crate) const UNDERFLOWN: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+
 impl Look {
+    /// Whether the misfit is one of numbers that have lost digits since they are too small, as where a force begins at nothing.
+    pub fn is_underflown(&self) -> bool {
+        self.misfit * self.size < UNDERFLOWN
+    }
+
     /// The jump of the values of L to the next step, beyond their round-off.
     pub fn jump_to(&self, next: &Look) -> f64 {
         let (before, after) = (self.ends[1], next.ends[0]);

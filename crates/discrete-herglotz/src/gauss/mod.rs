@@ -36,9 +36,10 @@ mod time_transformation;
 
 pub use clocked::ClockedStepper;
 pub use dense::DenseStep;
+pub(crate) use dense::StepStart;
 pub(crate) use integrator::facts;
 pub use integrator::{ClockedGauss, GaussCollocation};
-pub(crate) use look::{Look, SETS};
+pub(crate) use look::{Look, SETS, UNDERFLOWN};
 pub(crate) use stepper::FEW;
 pub use stepper::{GaussRoute, GaussStepper};
 

@@ -218,6 +218,29 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         StepStart { q: q.map(|q| q.value), y: y.map(|y| y.value), z: z.value }
     }
 
+    /// What the sums carry beyond the last digits of the state.
+    pub(crate) fn rests(&self) -> StepStart<N> {
+        let (q, y, z) = match &*self.route {
+            Route::Linear(run, _) => (&run.q, &run.v, run.z),
+            Route::Condensed(run) => (&run.q, &run.v, run.z),
+            Route::General(run) => (&run.q, &run.p, run.z),
+        };
+        StepStart { q: q.map(|q| q.rest), y: y.map(|y| y.rest), z: z.rest }
+    }
+
+    /// Goes on from the sums of a stepper of the same problem that has come to this start.
+    pub(crate) fn add_rests(&mut self, rests: &StepStart<N>) {
+        let (q, y, z) = match &mut *self.route {
+            Route::Linear(run, _) => (&mut run.q, &mut run.v, &mut run.z),
+            Route::Condensed(run) => (&mut run.q, &mut run.v, &mut run.z),
+            Route::General(run) => (&mut run.q, &mut run.p, &mut run.z),
+        };
+        for d in 0..N {
+            (q[d].rest, y[d].rest) = (rests.q[d], rests.y[d]);
+        }
+        z.rest = rests.z;
+    }
+
     /// With momenta for the velocities of the condensed routes.
     fn phase(&self, x: &StepStart<N>) -> PhasePoint<N> {
         let y = SVector::from(x.y);

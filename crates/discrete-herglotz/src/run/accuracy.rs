@@ -20,6 +20,10 @@ const HALTS: usize = 8;
 const LONG: usize = 512;
 const NARROWS: usize = 10;
 
+/// The times that equal steps are more than the motion asks for at its start, from which on steps that are divided are tried: each part costs
+/// some times as much as a step.
+const UNEVEN: usize = 32;
+
 /// The stages of the reference for other methods.
 const REFERENCE: usize = 12;
 
@@ -125,18 +129,28 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
     let mut stages = stages_along(pilots.request, pilots.wanted);
     pilots.watches_clock = const { L::HAS_CLOCK } && pilots.request.problem.structure.autonomous;
     pilots.watches_newton = stages > STAGES;
+    pilots.watches_uneven = true;
     let mut found = by_equal_steps(pilots, &gauss(stages), stages);
     pilots.watches_newton = false;
     if let Err(Ended::Elsewhere(Elsewhere::FewerStages)) = found {
         stages = STAGES;
         found = by_equal_steps(pilots, &gauss(stages), stages);
     }
-    pilots.watches_clock = false;
+    (pilots.watches_clock, pilots.watches_uneven) = (false, false);
+    if let Err(Ended::Elsewhere(Elsewhere::Divided)) = found {
+        match divided_steps(pilots) {
+            Ok(choice) => return Ok(choice),
+            Err(_) => found = by_equal_steps(pilots, &gauss(stages), stages),
+        }
+    }
     // Where a part of the motion asks for much shorter steps than the rest, those are divided; and they are refused for the first reason.
     if let Err(Ended::Refused(refused @ InputError::Accuracy { cause, .. })) = &found
         && !matches!(cause, Obstacle::RoundOff | Obstacle::Chaos { .. })
     {
-        return divided_steps(pilots).map_err(|_| *refused);
+        return divided_steps(pilots).map_err(|divided| match divided {
+            InputError::Accuracy { reached, .. } if reached.is_finite() => divided,
+            _ => *refused,
+        });
     }
     let Err(Ended::Elsewhere(Elsewhere::Clock)) = found else { return Ok(found?) };
     // Where the clock leads nowhere equal steps may.
@@ -229,8 +243,8 @@ pub(super) fn first_guess<L: Lagrangian<N>, const N: usize>(
     let Request { problem: Problem { lagrangian, start, t0, .. }, span, .. } = request;
     let h = lagrangian.hessian(*t0, start);
     // Of forces of position, and of those that turn the velocity as a magnetic field does.
-    let frequency = inverted(&h.vv).map_or(0.0, |inverse| {
-        larger(spectral_radius(*inverse * h.qq).sqrt(), spectral_radius(*inverse * (h.qv - h.qv.transpose())))
+    let [of_position, turning] = inverted(&h.vv).map_or([0.0; 2], |inverse| {
+        [spectral_radius(*inverse * h.qq).sqrt(), spectral_radius(*inverse * (h.qv - h.qv.transpose()))]
     });
     // The error of a step of x radians is about x^(2s+1) s!^4 / (2s)!^3.
     let s = stages as f64;
@@ -238,7 +252,9 @@ pub(super) fn first_guess<L: Lagrangian<N>, const N: usize>(
     let constant = 4.0 * logarithm(stages) - 3.0 * logarithm(2 * stages);
     let radians = ((goal.ln() - constant) / (2.0 * s + 1.0)).exp();
     // Beyond half a period sweeps do not contract.
-    let count = span.abs() * frequency / (0.5 * radians).min(s / 3.0).min(PI);
+    let radians = 0.5 * radians;
+    // Sweeps for the velocity contract by the angle that it turns.
+    let count = span.abs() * larger(of_position / radians.min(s / 3.0).min(PI), turning / radians.min(1.0));
     // What is stiff at its start need not be resolved, and what is free there may be anything later.
     if count.is_finite() { (count.ceil() as usize).clamp(1, 1 << 20) } else { 1 }
 }
@@ -275,6 +291,7 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         Compared::Times => Marks::Times,
     };
     let mut k = first_guess(pilots.request, stages, goal);
+    let first = k.max(LONG / UNEVEN);
     let mut marks = marks_of(k);
     let (mut best, mut strikes, mut narrows, mut halts) = (f64::INFINITY, 0, 0, (0, 0.0));
     let mut cause = Obstacle::Budget;
@@ -324,6 +341,9 @@ fn converge<L: Lagrangian<N>, const N: usize>(
             // What is narrow may need many halvings, what is singular has no end of them.
             let same = (part - halts.1).abs() <= 0.01 && k > LONG;
             (halts, cause) = ((if same { halts.0 + 1 } else { 1 }, part), obstacle);
+            if pilots.watches_uneven && k >= UNEVEN * first {
+                return Err(Ended::Elsewhere(Elsewhere::Divided));
+            }
             if halts.0 == HALTS {
                 break 'search;
             }

@@ -10,8 +10,9 @@ use std::sync::Arc;
 /// The stages of the parts.
 const STAGES: usize = 8;
 
-/// The most steps that are divided: what is fast is left to the parts.
-const MOST_STEPS: usize = 1 << 14;
+/// The fewest and the most steps that are divided: 2000 nodes, between which nothing wide may hide, and as many places between them at which their misfit
+/// is taken; what is fast is left to the parts.
+const STEPS: [usize; 2] = [256, 1 << 14];
 
 /// The largest misfit that parts may have, and the smallest that is beyond rounding.
 const MISFITS: [f64; 2] = [0.02, 1e-11];
@@ -26,7 +27,7 @@ pub(super) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
 ) -> Result<Choice<'p, L, N>, InputError> {
     let (wanted, t0, span) = (pilots.wanted, pilots.request.problem.t0, pilots.request.span);
     let finer = f64::powi(0.5, STAGES as i32);
-    let count = first_guess(pilots.request, STAGES, wanted).min(MOST_STEPS);
+    let count = first_guess(pilots.request, STAGES, wanted).clamp(STEPS[0], STEPS[1]);
     let marks = Marks::of(count);
     let mut most_misfit = (0.3 * wanted.sqrt()).min(MISFITS[0]);
     let (mut best, mut before, mut cause) = (f64::INFINITY, f64::NAN, Obstacle::Budget);
@@ -55,7 +56,8 @@ pub(super) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
             }
         };
         let error = larger(first.distance(&second), 0.5 * f64::EPSILON);
-        if error <= 0.25 * wanted {
+        // The finer of the two is nearer to the motion than they are to each other.
+        if error <= 0.5 * wanted {
             return Ok(Choice { integrator: Arc::new(integrator), count, h: span / count as f64, error: Some(error) });
         }
         let distances = first.distances(&second);

@@ -2,7 +2,7 @@
 
 use super::accuracy::Choice;
 use super::{Plan, Problem, Request, Shared, Wants};
-use crate::gauss::{Look, SETS};
+use crate::gauss::{Look, SETS, UNDERFLOWN};
 use crate::run::verified::refuted;
 use crate::switching::{DividedGauss, Reach, SwitchingStepper, has_switching_functions};
 use crate::{ClockedGauss, GaussCollocation, GaussRoute, GaussStepper, Halt, InputError, StepError, Stepper};
@@ -23,9 +23,6 @@ const AT_REST: f64 = 1e-13;
 
 /// The same of the values of L, whose polynomials follow twice the frequencies.
 const RESOLVED_VALUE: f64 = 0.2;
-
-/// Products of two numbers that are smaller have lost digits.
-const UNDERFLOWN: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
 /// The smallest number.
 const SMALLEST: f64 = f64::from_bits(1);
@@ -166,6 +163,8 @@ pub(super) enum Elsewhere {
     Clock,
     /// Steps of fewer stages, since these need Newton's method.
     FewerStages,
+    /// Steps that are divided where the motion is fast: equal ones are many times more than it asked for at its start.
+    Divided,
 }
 
 /// A misfit in units of a size; as it is where that is 0.
@@ -200,7 +199,7 @@ impl PilotLooks {
         self.of_momentum = larger(self.of_momentum, of_momentum);
         self.of_value = larger(self.of_value, of_value);
         // A NaN resolves nothing.
-        (look.misfit <= RESOLVED || of_momentum <= AT_REST * self.size || look.size < UNDERFLOWN)
+        (look.misfit <= RESOLVED || of_momentum <= AT_REST * self.size || look.is_underflown())
             && relative_to(of_value, self.kinetic) <= RESOLVED_VALUE
     }
 
@@ -242,12 +241,15 @@ pub(super) struct Pilots<'t, 'p, L, const N: usize> {
     pub watches_clock: bool,
     /// Whether they end where Newton's method is needed for many of the steps.
     pub watches_newton: bool,
+    /// Whether a search ends where it meets something that asks for many times more steps than the start.
+    pub watches_uneven: bool,
 }
 
 impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
     /// For a request, with the whole budget.
     pub fn new(request: &'t Request<'p, L, N>, wanted: f64) -> Self {
-        Pilots { request, left: BUDGET, reserve: RESERVE, wanted, watches_clock: false, watches_newton: false }
+        let (watches_clock, watches_newton, watches_uneven) = (false, false, false);
+        Pilots { request, left: BUDGET, reserve: RESERVE, wanted, watches_clock, watches_newton, watches_uneven }
     }
 
     /// Follows the motion by contact Gauss collocation, with a look between the nodes of each step: closely, at so many points of the
@@ -351,7 +353,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
                 if !seen.resolves(&look) {
                     return Some(PilotEnd::Unresolved { part });
                 }
-                let narrow = *narrow && look.size >= UNDERFLOWN && look.misfit > NARROW * look.expected + floor;
+                let narrow = *narrow && !look.is_underflown() && look.misfit > NARROW * look.expected + floor;
                 narrow.then_some(PilotEnd::Narrow { part })
             });
             (ending, spent(looks))

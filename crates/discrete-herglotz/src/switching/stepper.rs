@@ -2,6 +2,7 @@
 
 use super::corner::{Corner, corner};
 use super::surfaces::{SignChange, StepCurve, Surfaces, TimedState};
+use crate::gauss::StepStart;
 use crate::run::bracketed_root;
 use crate::run::saved::{Saved, load_option, save_option, saved};
 use crate::run::{first, step_error};
@@ -26,6 +27,12 @@ pub(crate) trait AsStepper<const N: usize> {
     fn stepper(&self) -> &(dyn Stepper<N> + '_);
     fn stepper_mut(&mut self) -> &mut (dyn Stepper<N> + '_);
 
+    /// What its sums carry beyond the last digits of the state, and the way back.
+    fn rests(&self) -> StepStart<N> {
+        StepStart::ZERO
+    }
+    fn add_rests(&mut self, _rests: &StepStart<N>) {}
+
     /// The largest misfit of its last step between the nodes, relative to the momenta; 0 where that is not known.
     fn misfit(&self) -> f64 {
         0.0
@@ -41,12 +48,15 @@ impl<const N: usize> AsStepper<N> for Box<dyn Stepper<N> + '_> {
     }
 }
 
-/// Momenta below this have lost digits in products: what does not fit there is rounding.
-const UNDERFLOWN: f64 = f64::MIN_POSITIVE / f64::EPSILON;
-
 impl<L: Lagrangian<N>, const N: usize> AsStepper<N> for GaussStepper<'_, L, N> {
+    fn rests(&self) -> StepStart<N> {
+        GaussStepper::rests(self)
+    }
+    fn add_rests(&mut self, rests: &StepStart<N>) {
+        GaussStepper::add_rests(self, rests);
+    }
     fn misfit(&self) -> f64 {
-        self.look(1).map_or(0.0, |look| if look.size < UNDERFLOWN { 0.0 } else { look.misfit })
+        self.look(1).map_or(0.0, |look| if look.is_underflown() { 0.0 } else { look.misfit })
     }
 
     fn stepper(&self) -> &(dyn Stepper<N> + '_) {
@@ -138,7 +148,7 @@ where
 {
     pub fn new(problem: &Problem<'a, L, N>, h: f64, reach: Reach, make: M) -> Result<Self, InputError> {
         let base = make(problem, h, false)?;
-        let here = TimedState { t: problem.t0, state: problem.state, v: problem.start.v };
+        let here = TimedState { t: problem.t0, state: problem.state, v: problem.start.v, rests: StepStart::ZERO };
         Ok(SwitchingStepper {
             problem: *problem,
             make,
@@ -192,14 +202,16 @@ where
     fn stepper_at(&self, at: &TimedState<N>, h: f64, is_part: bool) -> Result<S, StepError> {
         let start = VelocityPoint { q: at.state.q, v: at.v, z: at.state.z };
         let problem = Problem { t0: at.t, start, state: at.state, ..self.problem };
-        (self.make)(&problem, h, is_part).map_err(step_error)
+        let mut stepper = (self.make)(&problem, h, is_part).map_err(step_error)?;
+        stepper.add_rests(&at.rests);
+        Ok(stepper)
     }
 
     /// The state of a stepper with its velocity.
-    fn reached(&self, stepper: &dyn Stepper<N>, t: f64, guess: &TimedState<N>) -> Result<TimedState<N>, StepError> {
-        let state = stepper.state();
+    fn reached(&self, stepper: &S, t: f64, guess: &TimedState<N>) -> Result<TimedState<N>, StepError> {
+        let (state, rests) = (stepper.stepper().state(), stepper.rests());
         let v = legendre_inverse(self.problem.lagrangian, t, &state, &guess.v)?.v;
-        Ok(TimedState { t, state, v })
+        Ok(TimedState { t, state, v, rests })
     }
 
     /// One step of a length from a state.
@@ -208,7 +220,7 @@ where
         let taken = stepper.stepper_mut().advance(1).map_err(|halt| halt.cause);
         self.spent += stepper.stepper().evaluations();
         taken?;
-        let to = self.reached(stepper.stepper(), t, at)?;
+        let to = self.reached(&stepper, t, at)?;
         Ok((stepper, to))
     }
 
@@ -218,7 +230,7 @@ where
         let t = self.problem.t0 + (self.k + 1) as f64 * self.h;
         self.switched = false;
         if self.base.stepper_mut().advance(1).is_ok()
-            && let Ok(to) = self.reached(self.base.stepper(), t, &from)
+            && let Ok(to) = self.reached(&self.base, t, &from)
         {
             let curve = StepCurve { from, to, dense: self.base.stepper().dense() };
             let (lagrangian, surfaces) = (self.problem.lagrangian, &mut self.surfaces);
@@ -340,7 +352,7 @@ where
         };
         let state = PhasePoint { p, ..at.state };
         let v = legendre_inverse(lagrangian, at.t, &state, &at.v)?.v;
-        Ok(TimedState { state, v, ..at })
+        Ok(TimedState { state, v, rests: StepStart { y: [0.0; N], ..at.rests }, ..at })
     }
 
     /// The part that ends on a zero, to the spacing of time; no stepper where that is the start itself. `None` where the motion does not
@@ -468,7 +480,7 @@ where
     }
 }
 
-saved!([const N: usize] TimedState<N> { t, state, v });
+saved!([const N: usize] TimedState<N> { t, state, v, rests });
 
 impl<'a, L, S, M, const N: usize> SwitchingStepper<'a, L, S, M, N>
 where

@@ -1,6 +1,7 @@
 //! The switching functions of a Lagrangian along a step.
 
 use super::corner::{Corner, corner};
+use crate::gauss::StepStart;
 use crate::run::between;
 use crate::run::bracketed_root;
 use crate::{DenseStep, InputError};
@@ -41,7 +42,7 @@ pub fn jumps_between<const N: usize>(
 ) -> bool {
     let of = |(t, x): (f64, VelocityPoint<N>)| {
         let state = PhasePoint { q: x.q, p: lagrangian.gradient(t, &x).y, z: x.z };
-        TimedState { t, state, v: x.v }
+        TimedState { t, state, v: x.v, rests: StepStart::ZERO }
     };
     let curve = StepCurve { from: of(from), to: of(to), dense: None };
     let mut surfaces = Surfaces::at(lagrangian, from.0, &from.1);
@@ -75,6 +76,8 @@ pub(super) struct TimedState<const N: usize> {
     pub t: f64,
     pub state: PhasePoint<N>,
     pub v: SVector<f64, N>,
+    /// What the sums of the stepper carry beyond the last digits of the state.
+    pub rests: StepStart<N>,
 }
 
 impl<const N: usize> TimedState<N> {
