@@ -97,44 +97,77 @@ impl StageMap {
     }
 
     /// `y = start + M x`.
-    ///
-    /// Several registers at a time, even and odd columns apart: the sums that are under way keep the multipliers busy.
     #[inline(always)]
     pub fn apply<S: Simd>(&self, x: &Stages, s: usize, y: &mut Stages, start: impl Fn(usize) -> Lanes<S>) {
         let m = blocks::<S>(s);
         let mut r = 0;
         while const { 4 * S::F64_LANES <= MOST } && r + 4 <= m {
-            r = self.rows::<S, 4>(x, s, y, &start, r);
+            r = self.rows::<S, 4, 1>([x], s, [y], &|_, r| start(r), r);
         }
         while r + 2 <= m {
-            r = self.rows::<S, 2>(x, s, y, &start, r);
+            r = self.rows::<S, 2, 1>([x], s, [y], &|_, r| start(r), r);
         }
         if r < m {
-            self.rows::<S, 1>(x, s, y, &start, r);
+            self.rows::<S, 1, 1>([x], s, [y], &|_, r| start(r), r);
         }
     }
 
-    /// The same for K registers from the r-th on.
+    /// The same of N vectors, `y_d = start_d + M x_d`: two at a time, so that the matrix is loaded half as often. The same bits.
     #[inline(always)]
-    fn rows<S: Simd, const K: usize>(
+    pub fn apply_to_each<S: Simd, const N: usize>(
         &self,
-        x: &Stages,
+        x: &[Stages; N],
         s: usize,
-        y: &mut Stages,
-        start: &impl Fn(usize) -> Lanes<S>,
-        r: usize,
-    ) -> usize {
-        let (mut even, mut odd): ([_; K], _) = (from_fn(|i| start(r + i)), [Lanes::<S>::splat(0.0); K]);
-        for pair in 0..s.min(MOST).div_ceil(2) {
-            let (k, l) = (2 * pair, 2 * pair + 1);
-            let (a, b) = (Lanes::splat(x.0[k]), Lanes::splat(x.0[l]));
-            for i in 0..K {
-                even[i] = self.0[k].block(r + i).mul_add(a, even[i]);
-                odd[i] = self.0[l].block(r + i).mul_add(b, odd[i]);
+        y: &mut [Stages; N],
+        start: impl Fn(usize, usize) -> Lanes<S>,
+    ) {
+        let m = blocks::<S>(s);
+        for (i, (x, y)) in x.chunks(2).zip(y.chunks_mut(2)).enumerate() {
+            let start = |d: usize, r| start(2 * i + d, r);
+            match (x, y) {
+                ([a, b], [c, d]) => {
+                    let mut r = 0;
+                    while r + 2 <= m {
+                        r = self.rows::<S, 2, 2>([a, b], s, [c, d], &start, r);
+                    }
+                    if r < m {
+                        self.rows::<S, 1, 2>([a, b], s, [c, d], &start, r);
+                    }
+                }
+                ([a], [c]) => self.apply(a, s, c, |r| start(0, r)),
+                _ => {}
             }
         }
-        for i in 0..K {
-            y.set(r + i, even[i] + odd[i]);
+    }
+
+    /// The same of D vectors for K registers from the r-th on.
+    ///
+    /// Even and odd columns apart: the sums that are under way keep the multipliers busy.
+    #[inline(always)]
+    fn rows<S: Simd, const K: usize, const D: usize>(
+        &self,
+        x: [&Stages; D],
+        s: usize,
+        y: [&mut Stages; D],
+        start: &impl Fn(usize, usize) -> Lanes<S>,
+        r: usize,
+    ) -> usize {
+        let mut even: [[_; K]; D] = from_fn(|d| from_fn(|i| start(d, r + i)));
+        let mut odd = [[Lanes::<S>::splat(0.0); K]; D];
+        for pair in 0..s.min(MOST).div_ceil(2) {
+            let (k, l) = (2 * pair, 2 * pair + 1);
+            for d in 0..D {
+                let (a, b) = (Lanes::splat(x[d].0[k]), Lanes::splat(x[d].0[l]));
+                for i in 0..K {
+                    even[d][i] = self.0[k].block(r + i).mul_add(a, even[d][i]);
+                    odd[d][i] = self.0[l].block(r + i).mul_add(b, odd[d][i]);
+                }
+            }
+        }
+        for (y, (even, odd)) in y.into_iter().zip(even.iter().zip(&odd)) {
+            for i in 0..K {
+                y.set(r + i, even[i] + odd[i]);
+            }
         }
         r + K
     }
