@@ -33,10 +33,8 @@ impl<const D: usize> Lagrangian<D> for Kepler<D> {
 
     #[inline(always)]
     fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<D, T>) -> Option<Triple<D, T>> {
-        // The root and the quotient do not wait for each other.
-        let square = x.q.dot(&x.q);
-        let (distance, inverse) = (square.sqrt(), square.recip());
-        let pull = inverse * distance * (inverse * -self.mu);
+        let inverse = x.q.dot(&x.q).sqrt().recip();
+        let pull = inverse * inverse * inverse * -self.mu;
         Some(Triple { x: x.q * pull, y: x.v, z: T::from(self.gamma) })
     }
 

@@ -68,8 +68,7 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
             let (before, rho) = (self.falling.block::<S>(r), one - falling);
             seen.see(1, falling - before, rho);
             self.falling.set(r, falling);
-            // An excess that vanishes does so whatever it is divided by: the factor of the sweep before is there already.
-            let inverse = (one - before).recip();
+            let inverse = rho.recip();
             let excess =
                 SVector::<Lanes<S>, N>::from_fn(|d, _| self.l_v[d].block::<S>(r).mul_add(falling, pushed[d][k]));
             let mut weight = self.table.weights.block::<S>(r);
