@@ -15,7 +15,7 @@ use super::table::StageTable;
 use super::time_transformation::{Extension, TimeTransformation, Values};
 use crate::gauss::lanes::{Lanes, branched};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint};
+use contact_geom::{Derivatives, Hessian, Lagrangian, PhasePoint, Triple, VelocityPoint};
 use pulp::Simd;
 use std::array::from_fn;
 
@@ -43,7 +43,7 @@ const MOST_IN_LANES: usize = 8;
 #[repr(C)]
 pub(super) struct General<'a, L, P, const N: usize> {
     /// The `m` of the table.
-    m: StageMap,
+    pub(super) m: StageMap,
     /// The stages: velocities and `L_v`.
     pub(super) v: [Stages; N],
     pub(super) l_v: [Stages; N],
@@ -351,64 +351,6 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             moved: &mut self.moved,
             x: &mut self.x,
         })
-    }
-
-    /// New velocities, positions, actions and factors of the stages; returns the largest change, each in units of the
-    /// largest of its kind.
-    #[inline(always)]
-    fn sweep<S: Simd>(&mut self) -> f64 {
-        let s = self.table.s;
-        let m = blocks::<S>(s);
-        let zero = Lanes::<S>::splat(0.0);
-        let (before, mut impulses) = (self.falling, [Stages::ZERO; N]);
-        self.m.apply(&self.rate, s, &mut self.falling, |_| zero);
-        for d in 0..N {
-            let p = Lanes::<S>::splat(self.p[d].value);
-            self.m.apply(&self.force[d], s, &mut impulses[d], |_| p);
-        }
-        let one = Lanes::<S>::splat(1.0);
-        let (mut dv, mut sv, mut dr, mut sr) = (zero, zero, zero, one);
-        for r in 0..m {
-            let falling = self.falling.block::<S>(r);
-            dr = dr.max((falling - before.block(r)).abs());
-            let rho = one - falling;
-            let inverse = rho.recip();
-            sr = sr.max(rho.abs());
-            let excess = SVector::<Lanes<S>, N>::from_fn(|d, _| {
-                let l_v = self.l_v[d].block::<S>(r);
-                l_v.mul_add(falling, impulses[d].block::<S>(r) - l_v) * inverse
-            });
-            for i in 0..N {
-                let mut change = zero;
-                for j in 0..N {
-                    change = self.mass.inverse(i, j, r).mul_add(excess[j], change);
-                }
-                let v = self.v[i].block::<S>(r) + change;
-                dv = dv.max(change.abs());
-                sv = sv.max(v.abs());
-                self.v[i].set(r, v);
-            }
-        }
-        let (before, left) = (self.z_stages, self.x);
-        self.place::<S>();
-        let (mut dz, mut sz) = (zero, zero);
-        for r in 0..m {
-            let mut z = self.z_stages.block::<S>(r);
-            if self.follows {
-                for d in 0..N {
-                    let moved = self.x[d].block::<S>(r) - left[d].block(r);
-                    z = self.l_v[d].block::<S>(r).mul_add(moved, z);
-                }
-                self.z_stages.set(r, z);
-            }
-            dz = dz.max((z - before.block(r)).abs());
-            sz = sz.max(z.abs());
-        }
-        let relative = |change: f64, size: f64| if change > 0.0 { change / size } else { change };
-        let change = relative(dv.largest(), sv.largest()).max(dr.largest() / sr.largest());
-        let of_action = relative(dz.largest(), sz.largest());
-        // `f64::max` would hide a NaN.
-        if of_action > change || of_action.is_nan() { of_action } else { change }
     }
 
     /// The end of the step from its stages.

@@ -13,6 +13,7 @@ mod general;
 mod general_evaluation;
 mod general_saved;
 mod general_stages;
+mod general_sweep;
 pub(crate) mod instructions;
 mod integrator;
 pub(crate) mod lanes;

@@ -277,10 +277,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
                 // Where Newton's method is needed the tails follow each of its corrections.
                 (small, again) = (Some(weight), self.newton.is_some());
             }
-            for d in 0..N {
-                let base = &self.base[d];
-                self.left.head.b.apply(&self.rest[d], s, &mut self.x[d], |r| base.block::<S>(r));
-            }
+            let base = &self.base;
+            self.left.head.b.apply_to_each(&self.rest, s, &mut self.x, |d, r| base[d].block::<S>(r));
             if aside {
                 aside = false;
                 self.begin::<S>(small);

@@ -4,7 +4,7 @@ use super::{Plan, Problem};
 use crate::run::watch::{LEAST, rounding};
 use crate::{Doubt, InputError, Stepper, legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
+use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint, larger, largest};
 
 /// The difference from two halves, relative to the motion, from which on a step does not resolve it. Of the orders that there are
 /// a step then has an error of its own of a twentieth, or a fifteenth with order one.
@@ -46,7 +46,89 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         h: f64,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
         let start = VelocityPoint { q: from.q, v: *v, z: from.z };
-        let problem = Problem { t0: t, start, state: *from, ..*self.problem };
+        // A few steps of this length: no matrix of a linear motion is worth its price, not even a cheap one.
+        let structure = Structure { quadratic: false, ..self.problem.structure };
+        let problem = Problem { t0: t, start, state: *from, structure, ..*self.problem };
         self.make_stepper(&problem, if self.facts.by_clock { self.h } else { h }, false)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{GaussCollocation, Plan, Problem, Stepper, Steps, Until};
+    use contact_geom::nalgebra::SVector;
+    use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+
+    /// Oscillators with drag, of frequencies 1, 2 .. N: `v.v/2 - (k x_k)^2/2 - z/10`.
+    struct Oscillators;
+
+    impl<const N: usize> Lagrangian<N> for Oscillators {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+            (0..N).fold(-z * 0.1, |l, k| l + (v[k] * v[k] - q[k] * q[k] * ((k + 1) as f64).powi(2)) * 0.5)
+        }
+        fn structure(&self) -> Structure {
+            Structure {
+                autonomous: true,
+                separable: true,
+                quadratic: true,
+                z_affine: true,
+                constant_rate: true,
+                constant_mass: true,
+                ..Structure::default()
+            }
+        }
+    }
+
+    const H: f64 = 0.0625;
+
+    /// The plan of so many steps from `q = 1, v = 0`.
+    fn plan<'a, const N: usize>(
+        problem: &'a Problem<'a, Oscillators, N>,
+        stages: usize,
+        steps: usize,
+    ) -> Plan<'a, Oscillators, N> {
+        let run = problem.by(GaussCollocation { stages }).steps(Steps::Size(H));
+        run.plan(Until::Time(H * steps as f64)).unwrap()
+    }
+
+    fn problem<const N: usize>() -> Problem<'static, Oscillators, N> {
+        Problem::new(&Oscillators, 0.0, VelocityPoint::new([1.0; N], [0.0; N], 0.0)).unwrap()
+    }
+
+    /// Whether a stepper multiplies with a matrix: then it evaluates nothing.
+    fn by_one_matrix<const N: usize>(mut stepper: Box<dyn Stepper<N> + '_>) -> bool {
+        stepper.advance(1).unwrap();
+        stepper.evaluations() == 0
+    }
+
+    /// The matrix of a linear motion is made for many steps of one length, and not for one of another: not at any time at which a row or an event
+    /// is asked for.
+    #[test]
+    fn a_step_of_another_length_makes_no_matrix() {
+        let problem = problem::<2>();
+        let plan = plan(&problem, 8, 100);
+        assert!(by_one_matrix(plan.stepper().unwrap()));
+        for h in [0.3 * H, -0.5 * H] {
+            let mut part = plan.part((0.0, &problem.state), &problem.start.v, h).unwrap();
+            part.advance(1).unwrap();
+            assert!(part.evaluations() > 0);
+            // x = e^(-t/20) (cos w t + sin w t / (20 w)), w^2 = k^2 - 1/400; to round-off, of ten terms.
+            let (t, state) = (h, part.state());
+            for k in 0..2 {
+                let w = (((k + 1) * (k + 1)) as f64 - 0.0025f64).sqrt();
+                let exact = (-0.05 * t).exp() * ((w * t).cos() + 0.05 * (w * t).sin() / w);
+                assert!((state.q[k] - exact).abs() <= 10.0 * f64::EPSILON, "{h}: {:e}, {exact:e}", state.q[k]);
+            }
+        }
+    }
+
+    /// Nor for so few steps that it costs more than it spares: of 96 unknowns it is solved for as long as a thousand steps take, of half as many an eighth of that.
+    #[test]
+    fn a_few_steps_of_many_coordinates_make_no_matrix() {
+        let problem = problem::<6>();
+        for (steps, stages, expected) in [(500, 16, false), (1000, 16, true), (50, 8, false), (200, 8, true)] {
+            let plan = plan(&problem, stages, steps);
+            assert_eq!(by_one_matrix(plan.stepper().unwrap()), expected, "{steps} steps of {stages} stages");
+        }
     }
 }

@@ -10,7 +10,7 @@ use crate::run::verified::refuted;
 use crate::switching::{has_switching_functions, of_integrator};
 use crate::{Doubt, InputError, Status, StepError, Stepper, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Defect, Derivatives, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Defect, Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
 /// The steps that are tried, and probed, before a run.
 const FIRST_STEPS: usize = 64;
@@ -26,6 +26,22 @@ fn next_probe(taken: usize) -> usize {
 /// The next step, counted from 0, that is compared with two halves: each that ends at a power of two, and the last.
 fn halved_step(taken: usize, count: usize) -> usize {
     (taken + 1).checked_next_power_of_two().unwrap_or(count).min(count) - 1
+}
+
+/// The unknowns of a collocation step up to which the one matrix of a linear motion is never dear, and the part of their cube that is the number
+/// of steps from which on it is worth its price: it is solved for in twice the working precision.
+const MATRIX: (usize, usize) = (32, 1024);
+
+/// A problem for so many steps of an integrator: where they are too few for the matrix of a linear motion its stages are solved like those of others.
+pub(super) fn for_steps<'p, L, const N: usize>(
+    problem: &Problem<'p, L, N>,
+    integrator: &Facts,
+    steps: usize,
+) -> Problem<'p, L, N> {
+    let unknowns = integrator.collocation.unwrap_or(0) * N;
+    let worth_it = unknowns <= MATRIX.0 || unknowns.pow(3) / MATRIX.1 <= steps;
+    let structure = Structure { quadratic: problem.structure.quadratic && worth_it, ..problem.structure };
+    Problem { structure, ..*problem }
 }
 
 /// The earlier of two.
@@ -78,7 +94,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             let hypothesis = "a Lagrangian without kinks and jumps, since its steps are equal in the time of a clock";
             return Err(InputError::Hypothesis { hypothesis });
         }
-        let stepper = stepper_of(&integrator, switches, problem, h, Wants::default())?;
+        let stepper = stepper_of(&integrator, switches, &for_steps(problem, &facts, count), h, Wants::default())?;
         Ok(Plan {
             problem,
             t_end,
@@ -121,7 +137,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// # Errors
     /// Those of the method's start.
     pub fn stepper(&self) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-        self.make_stepper(self.problem, self.h, false)
+        self.make_stepper(&for_steps(self.problem, &self.facts, self.count), self.h, false)
     }
 
     /// A stepper at a start, by steps of h.
@@ -161,7 +177,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let by_clock = self.facts.by_clock;
         let h = (!by_clock).then_some(self.h);
         let count = (!by_clock || self.error.is_some()).then_some(self.count);
-        let mut stepper = self.make_stepper(self.problem, self.h, self.error.is_none())?;
+        let problem = for_steps(self.problem, &self.facts, self.count);
+        let mut stepper = self.make_stepper(&problem, self.h, self.error.is_none())?;
         if self.needs.saved && stepper.save().is_none() {
             return Err(InputError::Unsaved);
         }

@@ -1,0 +1,115 @@
+//! Sweeps of the general step.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+use super::general::General;
+use super::stages::{blocks, over_groups};
+use super::time_transformation::TimeTransformation;
+use crate::gauss::lanes::Lanes;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, Scalar};
+use pulp::Simd;
+
+/// The largest changes of a sweep, and the largest values: of velocities, of factors and of actions.
+struct Changes<S: Simd> {
+    change: [Lanes<S>; 3],
+    size: [Lanes<S>; 3],
+}
+
+impl<S: Simd> Changes<S> {
+    #[inline(always)]
+    fn see(&mut self, kind: usize, change: Lanes<S>, value: Lanes<S>) {
+        self.change[kind] = self.change[kind].max(change.abs());
+        self.size[kind] = self.size[kind].max(value.abs());
+    }
+}
+
+impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, P, N> {
+    /// New velocities, positions, actions and factors of the stages; returns the largest change, each in units of the
+    /// largest of its kind.
+    ///
+    /// What is found for some registers stays there until it is used: through memory it would be late. By loops, and not by closures, which may be
+    /// compiled by themselves and for no vector instructions.
+    #[inline(always)]
+    pub(super) fn sweep<S: Simd>(&mut self) -> f64 {
+        let (zero, one) = (Lanes::<S>::splat(0.0), Lanes::splat(1.0));
+        let mut seen = Changes { change: [zero; 3], size: [zero, one, zero] };
+        over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.push::<S, K>(r, &mut seen));
+        over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.move_stages::<S, K>(r, &mut seen));
+        let relative = |kind: usize| {
+            let change = seen.change[kind].largest();
+            if change > 0.0 { change / seen.size[kind].largest() } else { change }
+        };
+        let change = relative(0).max(relative(1));
+        let of_action = relative(2);
+        // `f64::max` would hide a NaN.
+        if of_action > change || of_action.is_nan() { of_action } else { change }
+    }
+
+    /// New factors and velocities of the stages in K registers from the r-th on.
+    #[inline(always)]
+    fn push<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S>) {
+        let (s, zero, one) = (self.table.s, Lanes::<S>::splat(0.0), Lanes::<S>::splat(1.0));
+        let (mut falling, mut pushed) = ([zero; K], [[zero; K]; N]);
+        for d in 0..N {
+            let mut p = [Lanes::splat(self.p[d].value); K];
+            for k in 0..K {
+                p[k] -= self.l_v[d].block(r + k);
+            }
+            if d == 0 {
+                [falling, pushed[0]] = self.m.rows([&self.rate, &self.force[0]], s, [[zero; K], p], r);
+            } else {
+                [pushed[d]] = self.m.rows([&self.force[d]], s, [p], r);
+            }
+        }
+        for k in 0..K {
+            let (r, falling) = (r + k, falling[k]);
+            let (before, rho) = (self.falling.block::<S>(r), one - falling);
+            seen.see(1, falling - before, rho);
+            self.falling.set(r, falling);
+            let inverse = rho.recip();
+            let excess =
+                SVector::<Lanes<S>, N>::from_fn(|d, _| self.l_v[d].block::<S>(r).mul_add(falling, pushed[d][k]));
+            let mut weight = self.table.weights.block::<S>(r);
+            if const { !P::PHYSICAL } {
+                weight *= self.extension.g.block(r);
+            }
+            for i in 0..N {
+                let mut change = zero;
+                for j in 0..N {
+                    change = (self.mass.inverse::<S>(i, j, r) * inverse).mul_add(excess[j], change);
+                }
+                let v = self.v[i].block::<S>(r) + change;
+                seen.see(0, change, v);
+                self.v[i].set(r, v);
+                self.moved[i].set(r, weight * v);
+            }
+        }
+    }
+
+    /// New positions and actions of the stages in K registers from the r-th on.
+    #[inline(always)]
+    fn move_stages<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S>) {
+        let s = self.table.s;
+        let mut z = [Lanes::<S>::splat(self.z.value); K];
+        for d in 0..N {
+            let mut x = [Lanes::<S>::splat(self.q[d].value); K];
+            if d == 0 {
+                [z, x] = self.m.rows([&self.l, &self.moved[0]], s, [z, x], r);
+            } else {
+                [x] = self.m.rows([&self.moved[d]], s, [x], r);
+            }
+            for k in 0..K {
+                if self.follows {
+                    z[k] = self.l_v[d].block::<S>(r + k).mul_add(x[k] - self.x[d].block(r + k), z[k]);
+                }
+                self.x[d].set(r + k, x[k]);
+            }
+        }
+        for k in 0..K {
+            seen.see(2, z[k] - self.z_stages.block(r + k), z[k]);
+            self.z_stages.set(r + k, z[k]);
+        }
+    }
+}
