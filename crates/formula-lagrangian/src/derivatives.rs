@@ -1,8 +1,66 @@
 //! Symbolic derivatives.
 
-use crate::{Graph, Id, Node, Operation};
+use crate::{Function, Graph, Id, Node, Operation};
+
+/// A part of a derivative by a node, with where it counts: `part` where `live` is 1, and 0 where that is 0, whatever `part` is there.
+///
+/// So a branch that is not taken leaves no trace, though a slope in it is no number: `part` is multiplied on as it is, and the
+/// choice is made last.
+#[derive(Clone, Copy)]
+struct Adjoint {
+    part: Id,
+    live: Id,
+}
+
+/// The choices within choices up to which each is written by itself; those further in by their `live`.
+const DEEP: usize = 8;
 
 impl Graph {
+    /// The value of an adjoint.
+    fn chosen(&mut self, adjoint: Adjoint) -> Id {
+        self.chosen_within(adjoint, DEEP)
+    }
+
+    fn chosen_within(&mut self, Adjoint { part, live }: Adjoint, deep: usize) -> Id {
+        let (zero, one) = (self.number(0.0), self.number(1.0));
+        match self.node(live) {
+            _ if live == one => part,
+            Node::Select([a, b, x, y]) if deep > 0 && (x == zero || y == zero) => {
+                let inner = self.chosen_within(Adjoint { part, live: if y == zero { x } else { y } }, deep - 1);
+                let pair = if y == zero { [inner, zero] } else { [zero, inner] };
+                self.select([a, b, pair[0], pair[1]])
+            }
+            _ => self.select([zero, live, part, zero]),
+        }
+    }
+
+    /// The sum of two adjoints.
+    fn sum(&mut self, first: Adjoint, second: Adjoint) -> Adjoint {
+        let (zero, one) = (self.number(0.0), self.number(1.0));
+        if first.live == second.live {
+            return Adjoint { part: self.add(first.part, second.part), live: first.live };
+        }
+        // The two branches of one choice.
+        if let (Node::Select([a, b, x, y]), Node::Select([c, d, z, w])) =
+            (self.node(first.live), self.node(second.live))
+            && (a, b) == (c, d)
+        {
+            if y == zero && z == zero && x == w {
+                return Adjoint { part: self.select([a, b, first.part, second.part]), live: x };
+            }
+            if x == zero && w == zero && y == z {
+                return Adjoint { part: self.select([a, b, second.part, first.part]), live: y };
+            }
+        }
+        let (left, right) = (self.chosen(first), self.chosen(second));
+        let live = if first.live == one || second.live == one {
+            one
+        } else {
+            self.binary(Operation::Max, first.live, second.live)
+        };
+        Adjoint { part: self.add(left, right), live }
+    }
+
     /// The partial derivatives of a node by others, all in one pass from the node back to what it is made of, so that they share
     /// their subexpressions with it and among themselves. `None` where the graph would get more than `limit` nodes.
     ///
@@ -17,9 +75,10 @@ impl Graph {
     /// ```
     pub fn gradient(&mut self, of: Id, by: &[Id], limit: usize) -> Option<Vec<Id>> {
         let leads = self.leads_to(of, by);
-        let mut adjoints: Vec<Option<Id>> = vec![None; of.index() + 1];
+        let mut adjoints: Vec<Option<Adjoint>> = vec![None; of.index() + 1];
         if let Some(last) = adjoints.last_mut() {
-            *last = Some(self.number(1.0));
+            let one = self.number(1.0);
+            *last = Some(Adjoint { part: one, live: one });
         }
         for i in (0..=of.index()).rev() {
             let (true, Some(adjoint)) = (leads[i], adjoints[i]) else { continue };
@@ -27,18 +86,22 @@ impl Graph {
                 return None;
             }
             let id = Id(i as u32);
-            let mut give = |graph: &mut Graph, operand: Id, part: Id| {
+            let mut give = |graph: &mut Graph, operand: Id, adjoint: Adjoint| {
                 if let Some(sum) = adjoints.get_mut(operand.index()).filter(|_| leads[operand.index()]) {
                     *sum = Some(match *sum {
-                        Some(sum) => graph.add(sum, part),
-                        None => part,
+                        Some(sum) => graph.sum(sum, adjoint),
+                        None => adjoint,
                     });
                 }
             };
             self.pass_back(id, adjoint, &leads, &mut give);
         }
         let zero = self.number(0.0);
-        Some(by.iter().map(|x| adjoints.get(x.index()).copied().flatten().unwrap_or(zero)).collect())
+        let value = |x: &Id| match adjoints.get(x.index()).copied().flatten() {
+            Some(adjoint) => self.chosen(adjoint),
+            None => zero,
+        };
+        Some(by.iter().map(value).collect())
     }
 
     /// Which nodes up to `of` depend on one of `by`.
@@ -52,9 +115,47 @@ impl Graph {
     }
 
     /// Gives each operand of a node its part of the derivative: the node's own, `adjoint`, times the slope.
-    fn pass_back(&mut self, id: Id, adjoint: Id, leads: &[bool], give: &mut impl FnMut(&mut Graph, Id, Id)) {
+    fn pass_back(&mut self, id: Id, of: Adjoint, leads: &[bool], give: &mut impl FnMut(&mut Graph, Id, Adjoint)) {
         let asked = |a: Id| leads.get(a.index()).copied().unwrap_or(false);
+        let Adjoint { part: adjoint, live } = of;
+        let mut choose = |graph: &mut Graph, [a, b, then, otherwise]: [Id; 4]| {
+            let zero = graph.number(0.0);
+            for (operand, choice) in [(then, [a, b, live, zero]), (otherwise, [a, b, zero, live])] {
+                let live = graph.select(choice);
+                if live != zero {
+                    give(graph, operand, Adjoint { part: adjoint, live });
+                }
+            }
+        };
         match self.node(id) {
+            Node::Select(all) => return choose(self, all),
+            // The second is taken where it is less, or where the first is.
+            Node::Binary(Operation::Min, a, b) => return choose(self, [b, a, b, a]),
+            Node::Binary(Operation::Max, a, b) => return choose(self, [a, b, b, a]),
+            _ => {}
+        }
+        let mut give = |graph: &mut Graph, operand: Id, part: Id| give(graph, operand, Adjoint { part, live });
+        match self.node(id) {
+            // Powers of roots and of lengths by themselves: they have derivatives where the root has none.
+            Node::Powi(a, n) if n > 2 && matches!(self.node(a), Node::Unary(Function::Sqrt, _)) => {
+                for square in self.node(a).operands() {
+                    let (below, factor) = (self.powi(a, n - 2), self.number(0.5 * f64::from(n)));
+                    let slope = self.mul(below, factor);
+                    let slope = if n < 4 { self.slope_of_squares(square, slope) } else { slope };
+                    let part = self.mul(adjoint, slope);
+                    give(self, square, part);
+                }
+            }
+            Node::Powi(a, n) if n > 2 && matches!(self.node(a), Node::Binary(Operation::Hypot, ..)) => {
+                let (below, factor, zero) = (self.powi(a, n - 2), self.number(f64::from(n)), self.number(0.0));
+                let slope = self.mul(below, factor);
+                let slope = if n < 4 { self.select([zero, a, slope, zero]) } else { slope };
+                let part = self.mul(adjoint, slope);
+                for x in self.node(a).operands() {
+                    let part = self.mul(part, x);
+                    give(self, x, part);
+                }
+            }
             Node::Unary(f, a) => {
                 let slope = f.slope(self, a, id);
                 let part = self.mul(adjoint, slope);
@@ -65,13 +166,6 @@ impl Graph {
                 let part = self.mul(adjoint, below);
                 let part = self.mul(part, factor);
                 give(self, a, part);
-            }
-            Node::Select([a, b, then, otherwise]) => {
-                let zero = self.number(0.0);
-                let first = self.select([a, b, adjoint, zero]);
-                give(self, then, first);
-                let second = self.select([a, b, zero, adjoint]);
-                give(self, otherwise, second);
             }
             Node::Binary(operation, a, b) => match operation {
                 Operation::Add => {
@@ -113,15 +207,6 @@ impl Graph {
                         give(self, b, steep);
                     }
                 }
-                Operation::Min | Operation::Max => {
-                    let zero = self.number(0.0);
-                    // The second is taken where it is less, or where the first is.
-                    let pair = if operation == Operation::Max { [a, b] } else { [b, a] };
-                    let first = self.select([pair[0], pair[1], zero, adjoint]);
-                    give(self, a, first);
-                    let second = self.select([pair[0], pair[1], adjoint, zero]);
-                    give(self, b, second);
-                }
                 Operation::Atan2 => {
                     let (y2, x2) = (self.mul(a, a), self.mul(b, b));
                     let square = self.add(y2, x2);
@@ -139,17 +224,54 @@ impl Graph {
                         give(self, x, part);
                     }
                 }
-                // The exponent is constant.
                 Operation::Power => {
-                    let one = self.number(1.0);
-                    let exponent = self.sub(b, one);
-                    let below = self.binary(Operation::Power, a, exponent);
-                    let part = self.mul(adjoint, below);
+                    let slope = self.slope_of_power(a, b);
+                    let part = self.mul(adjoint, slope);
                     let part = self.mul(part, b);
                     give(self, a, part);
                 }
+                // Chosen above.
+                Operation::Min | Operation::Max => {}
             },
             _ => {}
+        }
+    }
+
+    /// The slope of a power with an exponent between 1 and 2, where its base may be a sum of squares: a choice that says that the second
+    /// derivatives of the power vanish where the sum does. `|grad s|^2` is at most of the size of s, so that
+    /// `s^(b-2) (grad s)^2` goes to 0.
+    fn slope_of_squares(&mut self, base: Id, slope: Id) -> Id {
+        if !self.shape(base).flat {
+            return slope;
+        }
+        let zero = self.number(0.0);
+        self.select([zero, base, slope, zero])
+    }
+
+    /// `a^(b-1)`, which times b is the slope of `a^b` for a constant b.
+    fn slope_of_power(&mut self, a: Id, b: Id) -> Id {
+        let (zero, one) = (self.number(0.0), self.number(1.0));
+        let exponent = self.sub(b, one);
+        let slope = self.binary(Operation::Power, a, exponent);
+        let Some(x) = self.as_number(b) else {
+            // A power of 0 has no slope, not even at 0.
+            let size = self.unary(Function::Abs, b);
+            let slope = self.select([zero, size, slope, zero]);
+            if !self.shape(a).flat {
+                return slope;
+            }
+            let at_zero = self.select([one, b, zero, slope]);
+            return self.select([zero, a, slope, at_zero]);
+        };
+        match x {
+            _ if x > 1.0 && x < 2.0 => self.slope_of_squares(a, slope),
+            // The gradient vanishes with the squares. Its own derivatives do not exist there: nor do those of this 0, by any rule.
+            _ if x > 0.5 && x < 1.0 && self.shape(a).flat => {
+                let (inverse, two) = (self.recip(a), self.number(2.0));
+                let none = self.div(two, inverse);
+                self.select([zero, a, slope, none])
+            }
+            _ => slope,
         }
     }
 }

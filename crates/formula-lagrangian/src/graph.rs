@@ -22,6 +22,7 @@ use std::collections::HashMap;
 pub struct Graph {
     nodes: Vec<Node>,
     inputs: Vec<Inputs>,
+    shapes: Vec<Shape>,
     index: HashMap<Node, Id>,
 }
 
@@ -77,10 +78,53 @@ impl Graph {
             _ => Inputs::NONE,
         };
         let inputs = node.operands().fold(own, |all, a| all.and(self.inputs(a)));
+        let shape = self.shape_of(node);
         self.nodes.push(node);
         self.inputs.push(inputs);
+        self.shapes.push(shape);
         self.index.insert(node, id);
         id
+    }
+
+    /// What is known of the values of a node.
+    pub(crate) fn shape(&self, id: Id) -> Shape {
+        self.shapes.get(id.index()).copied().unwrap_or_default()
+    }
+
+    fn shape_of(&self, node: Node) -> Shape {
+        use Function::{Abs, Asinh, Atan, Cos, Cosh, Exp, ExpM1, Neg, Sin, Sinh, Tanh, Versine};
+        let shape = |id: Id| self.shape(id);
+        let positive = |id: Id| self.as_number(id).is_some_and(|x| x > 0.0 && x.is_finite());
+        let bounded = match node {
+            Node::Number(bits) => f64::from_bits(bits).is_finite(),
+            Node::Unary(Abs | Asinh | Atan | Cos | Cosh | Exp | ExpM1 | Neg | Sin | Sinh | Tanh | Versine, a) => {
+                shape(a).bounded
+            }
+            Node::Unary(..) => false,
+            Node::Binary(Operation::Add | Operation::Sub | Operation::Mul | Operation::Min | Operation::Max, a, b) => {
+                shape(a).bounded && shape(b).bounded
+            }
+            Node::Binary(Operation::Div, a, b) => shape(a).bounded && self.is_constant(b),
+            Node::Binary(..) => false,
+            Node::Powi(a, n) => n > 0 && shape(a).bounded,
+            Node::Select(all) => all.iter().all(|a| shape(*a).bounded),
+            _ => true,
+        };
+        let sum_of = |known: fn(Shape) -> bool, factor: &dyn Fn(Id) -> bool| match node {
+            Node::Binary(Operation::Mul, a, b) if a == b => bounded,
+            Node::Binary(Operation::Mul, a, b) => {
+                known(shape(a)) && (factor(b) || known(shape(b))) || known(shape(b)) && factor(a)
+            }
+            Node::Binary(Operation::Add, a, b) => known(shape(a)) && known(shape(b)),
+            Node::Binary(Operation::Div, a, b) => known(shape(a)) && factor(b),
+            Node::Powi(_, n) => bounded && n % 2 == 0,
+            Node::Unary(Versine, _) => bounded,
+            _ => false,
+        };
+        let squares = sum_of(|shape| shape.squares, &positive);
+        let parameter = |id: Id| self.is_constant(id) && self.as_number(id).is_none();
+        let flat = sum_of(|shape| shape.flat, &|id| positive(id) || parameter(id));
+        Shape { bounded, squares, flat }
     }
 
     /// A number.
@@ -129,6 +173,13 @@ impl Graph {
                 self.mul(b, c)
             }
             (Function::Recip, Node::Unary(Function::Recip, b)) => b,
+            (Function::Abs, _) if self.shape(a).squares => a,
+            // Roots of powers, which have derivatives where the root has none.
+            (Function::Sqrt, Node::Binary(Operation::Mul, b, c)) if b == c => self.unary(Function::Abs, b),
+            (Function::Sqrt, Node::Powi(b, n)) if n % 2 == 0 => {
+                let base = if n % 4 == 0 { b } else { self.unary(Function::Abs, b) };
+                self.powi(base, n / 2)
+            }
             // Even and odd functions.
             (Function::Cos | Function::Cosh | Function::Abs | Function::Versine, Node::Unary(Function::Neg, b)) => {
                 self.unary(function, b)
@@ -219,8 +270,26 @@ impl Graph {
         }
     }
 
+    /// The square of an absolute value or of a length, without a kink.
+    fn square_of(&mut self, a: Id) -> Option<Id> {
+        match self.node(a) {
+            Node::Unary(Function::Abs, b) => Some(self.mul(b, b)),
+            Node::Unary(Function::Sqrt, b) if self.shape(b).squares => Some(b),
+            Node::Binary(Operation::Hypot, b, c) => {
+                let (b, c) = (self.mul(b, b), self.mul(c, c));
+                Some(self.add(b, c))
+            }
+            _ => None,
+        }
+    }
+
     pub(crate) fn mul(&mut self, a: Id, b: Id) -> Id {
         let (a, b) = self.ordered(a, b);
+        if a == b
+            && let Some(square) = self.square_of(a)
+        {
+            return square;
+        }
         match (self.as_number(a), self.as_number(b)) {
             (Some(x), Some(y)) => return self.number(x * y),
             (None, Some(0.0)) => return b,
@@ -303,6 +372,11 @@ impl Graph {
             1 => a,
             2 => self.mul(a, a),
             -1 => self.recip(a),
+            _ if n % 2 == 0
+                && let Some(square) = self.square_of(a) =>
+            {
+                self.powi(square, n / 2)
+            }
             _ => match self.negated(a) {
                 Some(b) if n % 2 == 0 => self.powi(b, n),
                 Some(b) => {
@@ -379,6 +453,17 @@ impl Graph {
         }
         values
     }
+}
+
+/// What is known of the values of a node, as it is written.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Shape {
+    /// It and its derivatives are finite wherever its inputs are, but for overflow.
+    pub bounded: bool,
+    /// It is a sum of squares of bounded nodes, so not negative.
+    pub squares: bool,
+    /// The same but for factors that are parameters: its gradient is 0 where it is 0, at most of the size of its root beside it.
+    pub flat: bool,
 }
 
 /// Whether products with a number are exact.

@@ -54,6 +54,12 @@ macro_rules! arithmetic {
             fn chain(self, value: T, slope: T) -> Self {
                 $Dual { re: value, d: self.d.scaled(slope) }
             }
+
+            /// The same where the slope may be infinite at a finite value.
+            #[$inline]
+            fn chain_from_root(self, value: T, slope: T) -> Self {
+                $Dual { re: value, d: self.d.each(|x| x.along_slope(slope)) }
+            }
         }
 
         impl<T: Scalar, D: Module<T>> From<f64> for $Dual<T, D> {
@@ -222,14 +228,14 @@ macro_rules! arithmetic {
             #[$inline]
             fn sqrt(self) -> Self {
                 let r = self.re.sqrt();
-                self.chain(r, r.recip() * 0.5)
+                self.chain_from_root(r, r.slope_power(-1.0) * 0.5)
             }
             #[$inline]
             fn powi(self, n: i32) -> Self {
                 if n == 0 {
                     return Self::one();
                 }
-                let below = self.re.powi(n - 1);
+                let below = self.re.powi(n.saturating_sub(1));
                 self.chain(below * self.re, below * f64::from(n))
             }
             #[$inline]
@@ -238,7 +244,26 @@ macro_rules! arithmetic {
                 match a {
                     0.0 => Self::one(),
                     1.0 => self,
-                    _ => self.chain(self.re.powf(a), self.re.powf(a - 1.0) * a),
+                    // Infinite at 0 itself: no derivative is made up there.
+                    _ if a < 0.0 => self.chain(self.re.powf(a), self.re.powf(a - 1.0) * a),
+                    _ => self.chain_from_root(self.re.powf(a), self.re.slope_power(a - 1.0) * a),
+                }
+            }
+            #[$inline]
+            fn along_slope(self, slope: Self) -> Self {
+                let (x, s) = (self.re, slope.re);
+                $Dual { re: x.along_slope(s), d: self.d.join(slope.d, |dx, ds| dx.along_slope(s) + x.along_slope(ds)) }
+            }
+            #[$inline]
+            fn slope_power(self, a: f64) -> Self {
+                match a {
+                    0.0 => Self::one(),
+                    1.0 => self,
+                    -1.0 => {
+                        let r = self.re.slope_power(a);
+                        self.chain_from_root(r, -(r * r))
+                    }
+                    _ => self.chain_from_root(self.re.slope_power(a), self.re.slope_power(a - 1.0) * a),
                 }
             }
             #[$inline]

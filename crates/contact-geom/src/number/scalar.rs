@@ -76,12 +76,25 @@ pub trait Scalar:
     }
     /// `1 / x`.
     fn recip(self) -> Self;
-    /// The square root.
+    /// The square root. At 0 its slope is infinite; a differential of 0 stays 0.
     fn sqrt(self) -> Self;
     /// The power `x^n` for an integer `n`.
     fn powi(self, n: i32) -> Self;
-    /// The power `x^a` for a real `a`, `x > 0`.
+    /// The power `x^a` for a real `a`, `x > 0`; `x = 0` where `a` is not negative, with its derivatives from the right.
     fn powf(self, a: f64) -> Self;
+    /// A differential times the slope that it meets, where the slope may be infinite: of a root at 0. A differential of 0 stays 0 there,
+    /// as that of a constant does, and that of `(q.q)^1.5`; not a number where one of the two is none.
+    #[inline(always)]
+    fn along_slope(self, slope: Self) -> Self {
+        let (zero, infinite) = (Self::zero(), Self::from(f64::INFINITY));
+        let at_zero = Scalar::abs(slope).if_less(infinite, zero, zero);
+        zero.if_less(Scalar::abs(self), self * slope, at_zero)
+    }
+    /// The power `x^a` as a factor of the slope of another power: its own differentials are [`along_slope`](Self::along_slope).
+    #[inline(always)]
+    fn slope_power(self, a: f64) -> Self {
+        if a == -1.0 { self.recip() } else { self.powf(a) }
+    }
     /// `e^x`.
     fn exp(self) -> Self;
     /// `e^x - 1`, without cancellation near 0.
@@ -178,6 +191,10 @@ impl Scalar for f64 {
     #[inline]
     fn powf(self, a: f64) -> Self {
         f64::powf(self, a)
+    }
+    #[inline(always)]
+    fn along_slope(self, slope: Self) -> Self {
+        if self == 0.0 && slope.is_infinite() { 0.0 } else { self * slope }
     }
     #[inline]
     fn exp(self) -> Self {
@@ -290,5 +307,75 @@ mod tests {
             [Scalar::max(f64::INFINITY, 1.0), Scalar::min(f64::NEG_INFINITY, 1.0)],
             [f64::INFINITY, f64::NEG_INFINITY]
         );
+    }
+
+    /// `x^a` with its first and its second derivative at a point of `x >= 0`, from the right.
+    fn power_jet(x: f64, a: f64) -> [f64; 3] {
+        [x.powf(a), a * x.powf(a - 1.0), a * (a - 1.0) * x.powf(a - 2.0)]
+    }
+
+    fn close(found: [f64; 3], expected: [f64; 3]) -> bool {
+        let near = |a: f64, b: f64| a == b || (a - b).abs() <= 8.0 * f64::EPSILON * b.abs();
+        found.into_iter().zip(expected).all(|(a, b)| near(a, b))
+    }
+
+    #[test]
+    fn powers_have_their_one_sided_derivatives_at_0() {
+        for a in [0.25, 0.5, 0.75, 1.25, 1.5, 1.75, 2.5, 3.5, 7.3] {
+            for x in [0.0, 1e-12, 0.7] {
+                let found = jet(moving(x).powf(a));
+                assert!(close(found, power_jet(x, a)), "{x}^{a}: {found:?}");
+            }
+        }
+        assert_eq!(jet(moving(0.0).sqrt()), [0.0, f64::INFINITY, f64::NEG_INFINITY]);
+        for n in 1..6 {
+            let expected = match n {
+                1 => [0.0, 1.0, 0.0],
+                2 => [0.0, 0.0, 2.0],
+                _ => [0.0; 3],
+            };
+            assert_eq!(jet(moving(0.0).powi(n)), expected, "0^{n}");
+        }
+        assert!(moving(0.5).powi(i32::MIN).re.re.is_infinite());
+    }
+
+    /// `(q.q)^a` has a gradient of 0 at 0 for `a > 1/2`, and second derivatives of 0 for `a > 1`, infinite ones for less.
+    #[test]
+    fn powers_of_squares_have_their_derivatives_at_0() {
+        type Two<T> = Dual<T, SVector<T, 2>>;
+        let q = SVector::<Two<Two<f64>>, 2>::from_fn(|i, _| {
+            let inner = Dual { re: 0.0, d: SVector::<f64, 2>::ith(i, 1.0) };
+            Dual { re: inner, d: SVector::from_fn(|k, _| Dual::from(f64::from(i == k))) }
+        });
+        for a in [1.1, 1.5, 1.9, 2.0, 2.5] {
+            let y = q.dot(&q).powf(a);
+            let still = SVector::<f64, 2>::zeros();
+            assert_eq!((y.re.re, y.re.d), (0.0, still), "{a}");
+            assert!(y.d.iter().all(|row| row.re == 0.0 && row.d == still), "{a}: {y:?}");
+        }
+        let y = q.dot(&q).powf(0.75);
+        assert_eq!((y.re.d, y.d[0].d[0]), (SVector::<f64, 2>::zeros(), f64::INFINITY));
+        // Where the value is infinite, no derivative is made up.
+        assert!(q.dot(&q).powf(-0.5).re.d[0].is_nan() && q.dot(&q).sqrt().recip().re.d[0].is_nan());
+        // A constant has a derivative of 0, a number that is none has none.
+        assert_eq!(jet(SecondAlong::zero().sqrt()), [0.0; 3]);
+        assert_eq!(jet(SecondAlong::zero().powf(0.3)), [0.0; 3]);
+        let none = (moving(0.0) * moving(0.0) - 1.0).sqrt();
+        assert!(none.re.re.is_nan() && none.re.d[0].is_nan() && none.d[0].d[0].is_nan());
+        let none = (moving(0.0) * moving(0.0) - 1.0).powf(1.5);
+        assert!(none.re.re.is_nan() && none.re.d[0].is_nan());
+    }
+
+    #[test]
+    fn a_branch_that_is_not_taken_leaves_no_trace() {
+        let zero = SecondAlong::zero();
+        let branches = |x: SecondAlong| zero.if_less(x, x.powf(2.5) + x.sqrt() + x.ln() + x.recip(), zero);
+        for x in [-1.0, -0.0, 0.0] {
+            assert_eq!(jet(branches(moving(x))), [0.0; 3], "{x}");
+        }
+        let taken = zero.if_less(moving(1.0), (moving(1.0) - 2.0).sqrt(), zero);
+        assert!(taken.re.re.is_nan() && taken.re.d[0].is_nan() && taken.d[0].d[0].is_nan());
+        let compared = moving(f64::NAN).if_less(zero, zero, zero);
+        assert!(compared.re.re.is_nan() && compared.re.d[0].is_nan() && compared.d[0].d[0].is_nan());
     }
 }

@@ -380,6 +380,51 @@ mod tests {
         }
     }
 
+    /// Powers of numbers, and of their squares, with their slopes; as many as there are lanes at a time.
+    struct Powers<'a>(&'a [f64]);
+
+    /// The slopes of powers and of a choice by x.
+    fn slopes<T: Scalar>(x: T) -> [T; 5] {
+        let x = contact_geom::KernelDual { re: x, d: contact_geom::nalgebra::SVector::<T, 1>::new(T::one()) };
+        let zero = num_traits::Zero::zero();
+        let chosen = x.if_less(zero, zero, x.powf(2.5) + x.sqrt());
+        [Scalar::abs(x).powf(2.5), (x * x).powf(1.5), (x * x).powf(0.5), x.sqrt(), chosen].map(|y| y.d[0])
+    }
+
+    impl WithSimd for Powers<'_> {
+        type Output = Vec<[f64; 5]>;
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+            let mut out = Vec::new();
+            for x in self.0.chunks_exact(Lanes::<S>::COUNT) {
+                let found = slopes(Lanes::<S>(S::as_simd_f64s(x).0[0]));
+                out.extend((0..x.len()).map(|i| found.map(|y| y.lanes()[i])));
+            }
+            out
+        }
+    }
+
+    #[test]
+    fn slopes_of_powers_are_those_of_one_number() {
+        let x = [0.0, 1.0, -0.0, -2.0, 1e-9, f64::NAN, f64::INFINITY, 0.3];
+        let mut sets = vec![pulp::Scalar::new().vectorize(Powers(&x))];
+        #[cfg(target_arch = "x86_64")]
+        {
+            sets.extend(pulp::x86::V3::try_new().map(|set| Simd::vectorize(set, Powers(&x))));
+            sets.extend(pulp::x86::V4::try_new().map(|set| Simd::vectorize(set, Powers(&x))));
+        }
+        assert_eq!(slopes(0.0), [0.0, 0.0, 0.0, f64::INFINITY, f64::INFINITY]);
+        assert_eq!(slopes(-2.0)[4], 0.0);
+        for set in sets {
+            for (x, found) in x.iter().zip(set) {
+                let expected = slopes(*x);
+                let same = found.iter().zip(&expected).all(|(a, b)| a == b || (a.is_nan() && b.is_nan()));
+                assert!(same, "{x}: {found:?}, not {expected:?}");
+            }
+        }
+    }
+
     /// Asks for one value of the lanes of two numbers in turn, in all ways that there are.
     struct Ask(f64, f64);
 
