@@ -50,7 +50,7 @@ pub use solve::{CROSSOVER, ITERATION_LIMIT, Solver, last_correction};
 pub use splitting::{
     ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, RiccatiMap, Splitting, SplittingScheme, Strang,
 };
-pub use switching::jumps_between;
+pub use switching::{DividedGauss, jumps_between};
 pub use theory::{
     DiscreteLagrangian, DiscretePath, DiscreteRegularity, HamiltonianFlow, Transition, derived_jet, derived_second_jet,
     discrete_action, discrete_flow, discrete_flow_jacobian, discrete_momentum, discrete_regularity,

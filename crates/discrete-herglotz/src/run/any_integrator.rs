@@ -1,7 +1,10 @@
 //! The table of integrators.
 
 use super::{Facts, Integrator, Problem, Wants};
-use crate::{ClockedGauss, Composed, Gauss, GaussCollocation, InLanes, InputError, Method, SplittingScheme, Stepper};
+use crate::{
+    ClockedGauss, Composed, DividedGauss, Gauss, GaussCollocation, InLanes, InputError, Method, SplittingScheme,
+    Stepper,
+};
 use contact_geom::Lagrangian;
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
@@ -22,6 +25,8 @@ pub enum AnyIntegrator {
         /// The number of stages.
         stages: usize,
     },
+    /// [`DividedGauss`], by its name with the misfit: `divided_gauss_8_1e-5`.
+    Divided(DividedGauss),
     /// A splitting with exact rate, for `v.Mv/2 - V(t, q) + f(z)`.
     Splitting(SplittingScheme),
     /// A symmetric composition of a symmetric rule of order 2.
@@ -41,6 +46,7 @@ macro_rules! each {
                 let $integrator = ClockedGauss { stages };
                 $result
             }
+            AnyIntegrator::Divided($integrator) => $result,
             AnyIntegrator::Splitting($integrator) => $result,
             AnyIntegrator::Composition(rule, scheme) => {
                 let $integrator = Composed::new(rule, scheme);
@@ -51,7 +57,7 @@ macro_rules! each {
 }
 
 impl AnyIntegrator {
-    /// Every integrator by one name: quadrature rules, Gauss methods, splittings, the compositions of the symmetric midpoint rule, and
+    /// Every integrator by one name, but for those with a number of the user's own in it: quadrature rules, Gauss methods, splittings, the compositions of the symmetric midpoint rule, and
     /// Gauss methods by a clock.
     pub fn all() -> Vec<AnyIntegrator> {
         let discrete = Method::RULES.iter().copied().map(AnyIntegrator::Discrete);
@@ -67,7 +73,9 @@ impl AnyIntegrator {
     pub fn order(self) -> u32 {
         match self {
             AnyIntegrator::Discrete(method) => method.order(),
-            AnyIntegrator::Gauss { stages } | AnyIntegrator::Clocked { stages } => 2 * stages as u32,
+            AnyIntegrator::Gauss { stages }
+            | AnyIntegrator::Clocked { stages }
+            | AnyIntegrator::Divided(DividedGauss { stages, .. }) => 2 * stages as u32,
             AnyIntegrator::Splitting(scheme) | AnyIntegrator::Composition(_, scheme) => scheme.order(),
         }
     }
@@ -114,6 +122,7 @@ impl Display for AnyIntegrator {
             AnyIntegrator::Discrete(method) => f.pad(method.name()),
             AnyIntegrator::Gauss { stages } => f.pad(&format!("gauss_{stages}")),
             AnyIntegrator::Clocked { stages } => f.pad(&format!("clocked_gauss_{stages}")),
+            AnyIntegrator::Divided(divided) => f.pad(&divided.name()),
             AnyIntegrator::Splitting(scheme) => f.pad(scheme.name()),
             AnyIntegrator::Composition(method, scheme) => f.pad(&format!("{method}_by_{}", scheme.name())),
         }
@@ -133,7 +142,12 @@ impl FromStr for AnyIntegrator {
             let scheme = SplittingScheme::ALL.into_iter().find(|known| known.name() == scheme)?;
             Some(AnyIntegrator::Composition(rule.parse().ok()?, scheme))
         };
-        named.or_else(composed).ok_or_else(|| UnknownIntegrator { name: name.into() })
+        let divided = || {
+            let (stages, misfit) = name.strip_prefix("divided_gauss_")?.split_once('_')?;
+            let divided = DividedGauss { stages: stages.parse().ok()?, most_misfit: misfit.parse().ok()? };
+            Some(AnyIntegrator::Divided(divided))
+        };
+        named.or_else(composed).or_else(divided).ok_or_else(|| UnknownIntegrator { name: name.into() })
     }
 }
 

@@ -6,9 +6,22 @@ use crate::{Facts, GaussCollocation, InputError, Integrator, Problem, Stepper, W
 use contact_geom::Lagrangian;
 
 /// Contact Gauss collocation, each of whose steps is divided into parts where its curve does not solve Herglotz' equations between the nodes up to
-/// a misfit: halved until it does, and twice as long after each part that does. Each part is conformally contact, and so is the step.
+/// a misfit: halved until it does, and twice as long after each part that does. Each part is conformally contact, and so is the step. An accuracy is
+/// reached with such steps where a part of the motion, as a close encounter, asks for many times shorter steps than the rest.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::Kepler};
+/// use discrete_herglotz::{DividedGauss, Problem, Steps, Until};
+/// let (kepler, e) = (Kepler::<2> { gamma: 0.0, mu: 1.0 }, 0.9999);
+/// let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
+/// let problem = Problem::new(&kepler, 0.0, start)?;
+/// let divided = DividedGauss { stages: 8, most_misfit: 1e-6 };
+/// let outcome = problem.by(divided).steps(Steps::Count(64)).run(Until::Time(std::f64::consts::TAU))?;
+/// assert!((outcome.q[0] - 1.9999).abs() < 1e-9);
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct DividedGauss {
+pub struct DividedGauss {
     /// The number of stages.
     pub stages: usize,
     /// The largest misfit of a part, relative to its momenta.
@@ -16,8 +29,14 @@ pub(crate) struct DividedGauss {
 }
 
 impl DividedGauss {
+    /// The name in tables, from which it is read too.
+    pub(crate) fn name(&self) -> String {
+        let DividedGauss { stages, most_misfit } = self;
+        format!("divided_gauss_{stages}_{most_misfit:e}")
+    }
+
     /// A stepper, which also ends its steps on kinks and jumps.
-    pub fn run<'a, L: Lagrangian<N>, const N: usize>(
+    pub(crate) fn run<'a, L: Lagrangian<N>, const N: usize>(
         self,
         problem: &Problem<'a, L, N>,
         h: f64,
@@ -32,11 +51,16 @@ impl DividedGauss {
 impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for DividedGauss {
     fn facts(&self) -> Facts {
         let facts = facts(self.stages, false);
-        Facts { name: format!("divided_{}", facts.name).into(), divides: true, ..facts }
+        Facts { name: self.name().into(), divides: true, ..facts }
     }
 
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
-        Integrator::<'a, L, N>::check(&GaussCollocation { stages: self.stages }, lagrangian)
+        let DividedGauss { stages, most_misfit } = *self;
+        Integrator::<'a, L, N>::check(&GaussCollocation { stages }, lagrangian)?;
+        if most_misfit > 0.0 && most_misfit.is_finite() {
+            return Ok(());
+        }
+        Err(InputError::Hypothesis { hypothesis: "a positive and finite `most_misfit` of its parts" })
     }
 
     fn stepper(

@@ -10,7 +10,7 @@ mod divided;
 mod stepper;
 mod surfaces;
 
-pub(crate) use divided::DividedGauss;
+pub use divided::DividedGauss;
 pub(crate) use stepper::{Reach, SwitchingStepper, of_integrator};
 pub(crate) use surfaces::has_switching_functions;
 pub use surfaces::jumps_between;

@@ -34,7 +34,10 @@ fn factor(integrator: AnyIntegrator) -> f64 {
             scheme.substeps().map_or(f64::NAN, |g| g.iter().map(|g| rational(*g)).sum())
         }
         // Gauss methods have the Pade approximation of e^x, which at this x is e^x from two stages on; by a clock its steps differ.
-        AnyIntegrator::Gauss { .. } | AnyIntegrator::Clocked { .. } | AnyIntegrator::Splitting(_) => 2.0 * half,
+        AnyIntegrator::Gauss { .. }
+        | AnyIntegrator::Clocked { .. }
+        | AnyIntegrator::Divided(_)
+        | AnyIntegrator::Splitting(_) => 2.0 * half,
     }
 }
 
