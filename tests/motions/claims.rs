@@ -72,7 +72,9 @@ fn what_is_false_beyond_the_start_is_seen_where_the_motion_goes() {
         let start = VelocityPoint::new([draws.between(-1.0, 1.0)], [draws.between(1.5, 5.0)], 0.0);
         let problem = Problem::new(&bump, 0.0, start).unwrap();
         let integrator = integrators[(draws.next() * integrators.len() as f64) as usize];
-        if integrator.check::<1, _>(&bump).is_err() { continue }
+        if integrator.check::<1, _>(&bump).is_err() {
+            continue;
+        }
         let span = draws.between(15.0, 60.0);
         let run = if draws.next() < 0.4 {
             problem.by(integrator).accuracy(1e-9)
@@ -83,7 +85,9 @@ fn what_is_false_beyond_the_start_is_seen_where_the_motion_goes() {
         match run.run(Until::Time(span)) {
             Ok(end) => match end.status {
                 Status::FalseClaim { .. } => seen += 1,
-                Status::Completed if end.q[0] > 11.0 && end.suspicion.is_none() => silent.push((case, bump, integrator.to_string(), end.steps, end.q[0])),
+                Status::Completed if end.q[0] > 11.0 && end.suspicion.is_none() => {
+                    silent.push((case, bump, integrator.to_string(), end.steps, end.q[0]))
+                }
                 _ => other += 1,
             },
             Err(InputError::FalseClaim { .. }) => seen += 1,
@@ -91,6 +95,8 @@ fn what_is_false_beyond_the_start_is_seen_where_the_motion_goes() {
         }
     }
     println!("{seen} seen, {other} others, {} silent", silent.len());
-    for x in &silent { println!("{x:?}"); }
+    for x in &silent {
+        println!("{x:?}");
+    }
     assert!(silent.is_empty() && seen > 300);
 }

@@ -3,7 +3,7 @@
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Pendulum;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
-use discrete_herglotz::{AnyIntegrator, Problem, SplittingScheme, Status, Steps, Until};
+use discrete_herglotz::{AnyIntegrator, Problem, Rows, SplittingScheme, Status, Steps, Until};
 
 /// Systems of one coordinate that come to rest away from 0, with a drag.
 #[derive(Clone, Copy, Debug)]
@@ -74,8 +74,10 @@ fn draw(draws: &mut Draws) -> (Resting, VelocityPoint<1>) {
 #[test]
 fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
     let cases: u64 = std::env::var("RESTING").ok().and_then(|n| n.parse().ok()).unwrap_or(1000);
-    let integrators: Vec<_> =
-        AnyIntegrator::all().into_iter().filter(|i| i.check(&Resting::Hoop { square: 2.0, gamma: -1.0 }).is_ok()).collect();
+    let integrators: Vec<_> = AnyIntegrator::all()
+        .into_iter()
+        .filter(|i| i.check(&Resting::Hoop { square: 2.0, gamma: -1.0 }).is_ok())
+        .collect();
     let (mut flagged, mut done, mut other) = (Vec::new(), 0, std::collections::BTreeMap::<String, u32>::new());
     for case in 0..cases {
         let mut draws = Draws::of(case);
@@ -100,17 +102,35 @@ fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
             Ok(end) if end.status == Status::Completed => {
                 done += 1;
                 if let Some(suspicion) = end.suspicion {
-                    flagged.push((case, integrator.to_string(), by_accuracy, system, start.q[0], start.v[0], span, end.q[0], end.p[0], end.steps, suspicion));
+                    flagged.push((
+                        case,
+                        integrator.to_string(),
+                        by_accuracy,
+                        system,
+                        start.q[0],
+                        start.v[0],
+                        span,
+                        end.q[0],
+                        end.p[0],
+                        end.steps,
+                        suspicion,
+                    ));
                 }
             }
-            Ok(end) => *other.entry(format!("{} {}", integrator, end.status).chars().take(60).collect()).or_default() += 1,
+            Ok(end) => {
+                *other.entry(format!("{} {}", integrator, end.status).chars().take(60).collect()).or_default() += 1
+            }
             Err(error) => *other.entry(error.to_string().chars().take(60).collect()).or_default() += 1,
         }
     }
     println!("{done} of {cases} completed; others: {other:#?}");
-    for x in flagged.iter().take(30) { println!("{x:?}"); }
+    for x in flagged.iter().take(30) {
+        println!("{x:?}");
+    }
     let mut by = std::collections::BTreeMap::<String, u32>::new();
-    for x in &flagged { *by.entry(format!("{} {}", x.1, x.2)).or_default() += 1; }
+    for x in &flagged {
+        *by.entry(format!("{} {}", x.1, x.2)).or_default() += 1;
+    }
     println!("{by:?}");
     assert!(flagged.is_empty() && 10 * done > 8 * cases, "{} of {done} flagged", flagged.len());
 }
@@ -122,7 +142,11 @@ fn what_is_at_rest_ends_and_says_so() {
         let start = VelocityPoint::new([1.0], [0.5], 0.0);
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let begin = std::time::Instant::now();
-        let by_accuracy = problem.accuracy(1e-9).run(Until::Time(1e6)).unwrap();
+        let mut rows = Rows::at((0..=100).map(|k| 1e4 * f64::from(k))).unwrap();
+        let by_accuracy = problem.accuracy(1e-9).observe(&mut rows).run(Until::Time(1e6)).unwrap();
+        // Those that were reached.
+        let reached = (by_accuracy.t / 1e4).floor() as usize + 1;
+        assert!(rows.rows.len() == reached && reached < 10, "{gamma}: {} rows", rows.rows.len());
         println!("{gamma}: {by_accuracy:?} {:?}", begin.elapsed());
         let by_steps = problem.steps(Steps::Size(0.5)).run(Until::Time(1e6)).unwrap();
         let strang = problem.by(SplittingScheme::STRANG).steps(Steps::Size(0.1)).run(Until::Time(1e6)).unwrap();

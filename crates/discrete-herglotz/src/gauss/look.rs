@@ -23,11 +23,13 @@ pub(crate) struct Look {
     /// The largest misfit of the curve: of `p' = L_q + L_z p` and `z' = L`, over the length of the step, and of `p = L_v`; relative to
     /// the momenta and actions. Infinite where something is not finite.
     pub misfit: f64,
-    /// The same of momenta and forces alone, in the units of a momentum; and of the action alone, relative to it.
+    /// The same of momenta and forces alone, and of the action alone, in their own units.
     pub of_momenta: f64,
     pub of_action: f64,
     /// The momenta that it is relative to.
     pub size: f64,
+    /// The actions.
+    pub size_z: f64,
     /// The misfit that the last two coefficients of the step's polynomials let expect.
     pub expected: f64,
     /// The largest misfit of the values of L themselves, beyond their round-off: what jumps between two points and has no gradient at
@@ -295,14 +297,15 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
             return Look {
                 misfit: f64::INFINITY,
                 of_momenta: f64::INFINITY,
+                of_action: f64::INFINITY,
                 of_value: f64::INFINITY,
                 ..Look::default()
             };
         }
         let relative = |misfit: f64, size: f64| if misfit > 0.0 { misfit / size } else { 0.0 };
         let (size, size_z) = (size.largest(), size_z.largest());
-        let (of_momenta, of_action) = (misfit.largest(), relative(of_z.largest(), size_z));
-        let misfit = relative(of_momenta, size) + of_action;
+        let (of_momenta, of_action) = (misfit.largest(), of_z.largest());
+        let misfit = relative(of_momenta, size) + relative(of_action, size_z);
         let of_value = beyond_rounding(of_value.largest(), largest_l.largest());
         // The coefficients are the same for all points.
         if set > 0 {
@@ -320,6 +323,6 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
             expected += relative(tail(&curve.l) * h, size_z);
         }
         let ends = from_fn(|i| weighted(&g.ends[i], &curve.l) / curve.rates[i]);
-        Look { misfit, of_momenta, of_action, size, expected, of_value, kinetic: kinetic.largest(), ends }
+        Look { misfit, of_momenta, of_action, size, size_z, expected, of_value, kinetic: kinetic.largest(), ends }
     }
 }

@@ -214,7 +214,11 @@ fn chosen<'p, L: Lagrangian<N>, const N: usize>(
 }
 
 /// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.
-pub(super) fn first_guess<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, stages: usize, goal: f64) -> usize {
+pub(super) fn first_guess<L: Lagrangian<N>, const N: usize>(
+    request: &Request<'_, L, N>,
+    stages: usize,
+    goal: f64,
+) -> usize {
     let Request { problem: Problem { lagrangian, start, t0, .. }, span, .. } = request;
     let h = lagrangian.hessian(*t0, start);
     let frequency = inverted(&h.vv).map_or(0.0, |inverse| spectral_radius(*inverse * h.qq)).sqrt();

@@ -70,8 +70,11 @@ impl<const N: usize> ClaimMonitor<N> {
         }
         let here = [problem.state.q, problem.state.p];
         let reference = structure.autonomous || structure.z_free && structure.constant_mass;
-        let reference =
-            if reference { Some(Constants::at(&structure, problem.lagrangian, problem.t0, &problem.start)?) } else { None };
+        let reference = if reference {
+            Some(Constants::at(&structure, problem.lagrangian, problem.t0, &problem.start)?)
+        } else {
+            None
+        };
         Some(ClaimMonitor { structure, reference, low: here, high: here, last: here, guess: problem.start.v })
     }
 

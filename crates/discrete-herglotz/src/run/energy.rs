@@ -15,7 +15,7 @@ const LOOKS: usize = 32;
 /// The part of the kinetic energy by which the energy may be off: that of an oscillation by steps of half a radian, with the power of
 /// the order; and at the least this, by which a frequency is off too, so that the phase is lost in some ten periods.
 const STEP: f64 = 0.5;
-const LEAST: f64 = 0.02;
+const LEAST: f64 = 0.01;
 
 /// In so many steps from rest the energy of a step's error, with the order one, is as large as the kinetic energy over their number.
 const FIRST: f64 = 16.0;

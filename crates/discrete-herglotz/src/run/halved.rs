@@ -34,7 +34,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let apart = |a: &SVector<f64, N>, b: &SVector<f64, N>| largest((a - b).iter().copied());
         let relative = |apart: f64, size: f64| if apart == 0.0 { 0.0 } else { apart / size };
         // From rest, steps of order one are off by what they move over their number.
-        let moved = if self.facts.order == 1 { FIRST_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
+        let moved =
+            if self.facts.order == 1 { FIRST_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
         let width = larger(larger(size([&from.q, &to.q, &fine.q]), moved), rounding(&start.q, &start.v, self.h));
         let of_v = apart(&coarse_v, &fine_v);
         let of_v =

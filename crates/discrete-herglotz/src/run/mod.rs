@@ -251,7 +251,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         {
             let request = Request { t_end, span: t_end - problem.t0, integrator: self.integrator.clone(), ..*self };
             let mut plan = request.plan(length)?;
-            plan.rests = true;
+            plan.rests_until = Some(self.t_end);
             return Ok(plan);
         }
         if let Some(integrator) = &self.integrator {

@@ -53,8 +53,8 @@ pub struct Plan<'p, L, const N: usize> {
     pub(super) constant_rate: bool,
     /// Whether the error of given steps is estimated.
     pub(super) estimated: bool,
-    /// Whether it ends before the time that was requested, since the motion is at rest from there on.
-    pub(super) rests: bool,
+    /// The end that was requested, where it ends before since the motion is at rest from there on.
+    pub(super) rests_until: Option<f64>,
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
@@ -75,7 +75,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             constant_rate: stepper.has_constant_rate(),
             integrator,
             estimated: false,
-            rests: false,
+            rests_until: None,
         })
     }
 
@@ -150,7 +150,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         if self.needs.saved && stepper.save().is_none() {
             return Err(InputError::Unsaved);
         }
-        observers.prepare(&Course { t0: self.problem.t0, t_end: self.t_end, h, count })?;
+        let t_end = self.rests_until.unwrap_or(self.t_end);
+        observers.prepare(&Course { t0: self.problem.t0, t_end, h, count })?;
         // The logarithm of the product of the sigma_d; in single steps only where they differ.
         let (mut log_factor, single) = (0.0, self.needs.conformal_factor && !self.constant_rate);
         let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
@@ -185,7 +186,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             let next_seen_alone = if next_seen > taken + 1 { next_seen - 1 } else { next_seen };
             let next_energy = energy.as_ref().map_or(usize::MAX, |energy| energy.next(taken));
             let next_claims = claims.as_ref().map_or(usize::MAX, |claims| claims.next(taken));
-            let next = next_seen_alone.min(next_probe(taken)).min(next_look).min(next_energy).min(next_claims).min(most);
+            let next =
+                next_seen_alone.min(next_probe(taken)).min(next_look).min(next_energy).min(next_claims).min(most);
             let chunk = if single { 1 } else { next - taken };
             let alone = taken == halved || next_seen == taken + 1 || next_claims == taken + 1;
             let before = alone.then(|| (stepper.time(), stepper.state()));
@@ -223,19 +225,23 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             }
             if let Some(claims) = &mut claims
                 && (taken >= next_claims || over)
-                && let Some(Defect { claim, size }) = claims.look(self, &*stepper, before.as_ref().filter(|_| done == 1))
+                && let Some(Defect { claim, size }) =
+                    claims.look(self, &*stepper, before.as_ref().filter(|_| done == 1))
             {
                 status = Status::FalseClaim { step: taken, claim, size };
                 break;
             }
             if let Some(energy) = &mut energy
                 && (taken >= next_energy || over)
-                && let Some(misfit) =
-                    energy.look(self, (stepper.time(), &stepper.state()), (log_factor, taken))
+                && let Some(misfit) = energy.look(self, (stepper.time(), &stepper.state()), (log_factor, taken))
             {
                 suspicion = first(suspicion, Some(Suspicion { step: taken - 1, misfit }));
             }
-            let at_rest = if over { self.rests } else { probed && self.is_at_rest(stepper.time(), &stepper.state()) };
+            let at_rest = if over {
+                self.rests_until.is_some()
+            } else {
+                probed && self.is_at_rest(stepper.time(), &stepper.state())
+            };
             over |= at_rest;
             if taken >= next_seen || over {
                 let before = if done == 1 { before } else { None };
@@ -253,7 +259,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             }
         }
         let (mut t, mut state) = (stepper.time(), stepper.state());
-        let error_estimate = self.estimated.then(|| self.error.unwrap_or_else(|| self.distance_from_halves(taken, t, &state)));
+        let error_estimate =
+            self.estimated.then(|| self.error.unwrap_or_else(|| self.distance_from_halves(taken, t, &state)));
         if let Some(Stop { by, cause, at }) = stop {
             (t, state) = at.unwrap_or((t, state));
             status = match cause {

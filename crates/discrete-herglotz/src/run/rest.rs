@@ -34,7 +34,8 @@ impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
             return false;
         }
         let origin = VelocityPoint { q: SVector::zeros(), v: SVector::zeros(), z };
-        let (slope, h) = (problem.lagrangian.gradient(problem.t0, &origin), problem.lagrangian.hessian(problem.t0, &origin));
+        let (slope, h) =
+            (problem.lagrangian.gradient(problem.t0, &origin), problem.lagrangian.hessian(problem.t0, &origin));
         let still = slope.x.iter().chain(&slope.y).all(|e| *e == 0.0);
         // A momentum is steady where the action does not move it.
         let free = h.qz.iter().chain(&h.vz).all(|e| *e == 0.0);

@@ -88,28 +88,33 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         self.watch.first.or_else(|| {
             // A linear motion that is not resolved is so in every step, and none was looked at on the way.
             let sets = if let Route::Linear(..) = &*self.route { SETS } else { 1 };
-            let Look { misfit, of_momenta, of_action, .. } = self.look(sets)?;
+            let Look { misfit, of_momenta, of_action, size, size_z, .. } = self.look(sets)?;
             // A step of fewer stages is no polynomial between its nodes to speak of.
             let allowed = if self.products.s > FEW { UNRESOLVED } else { 1.0 };
             // A NaN is a misfit too.
-            if misfit <= allowed || of_action <= allowed && of_momenta <= self.rounding() {
+            if misfit <= allowed {
+                return None;
+            }
+            let [of_p, of_z] = self.rounding();
+            if of_momenta <= larger(allowed * size, of_p) && of_action <= larger(allowed * size_z, of_z) {
                 return None;
             }
             Some(Suspicion { step: self.k - 1, misfit: misfit / allowed })
         })
     }
 
-    /// What of a misfit of momenta in the last step is rounding: that of the forces there, which is all that is left of a motion at rest.
+    /// What of the misfits of momenta and of the action in the last step is rounding: that of the forces and of L there, which is all that is
+    /// left of a motion at rest.
     #[cold]
     #[inline(never)]
-    fn rounding(&self) -> f64 {
+    fn rounding(&self) -> [f64; 2] {
         let (t, state) = (self.time(), self.state());
-        let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return 0.0 };
-        let (_, g) = gradient_rounding(self.lagrangian, t, &x);
-        let of = |part: &SVector<f64, N>| largest(part.iter().copied());
-        let once = larger(of(&g.x) * self.products.h.abs(), of(&g.y));
-        // No bound where the derivatives have none.
-        if once.is_finite() { ROUNDINGS * once } else { 0.0 }
+        let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return [0.0; 2] };
+        let (l, g) = gradient_rounding(self.lagrangian, t, &x);
+        let (of, h) = (|part: &SVector<f64, N>| largest(part.iter().copied()), self.products.h.abs());
+        // No bound where the derivatives have none. What is below the normal numbers has lost its digits.
+        [larger(of(&g.x) * h, of(&g.y)), l * h]
+            .map(|once| if once.is_finite() { ROUNDINGS * once + f64::MIN_POSITIVE } else { 0.0 })
     }
 }
 
