@@ -111,7 +111,7 @@ impl<const N: usize> EnergyMonitor<N> {
         self.guess = x.v;
         let expected = self.start * log_factor.exp();
         let drift = (total - expected).abs();
-        let allowed = larger(LEAST, STEP.powf(self.order)) * larger(scale / (looks + 1.0), size);
+        let allowed = allowed(self.order) * larger(scale / (looks + 1.0), size);
         if drift <= allowed || !drift.is_finite() || !allowed.is_finite() {
             return None;
         }
@@ -120,6 +120,34 @@ impl<const N: usize> EnergyMonitor<N> {
         // Those of all steps may add up.
         (drift > (64.0 + taken as f64) * rounding).then(|| drift / larger(allowed, f64::MIN_POSITIVE))
     }
+}
+
+/// The part of a drift that is flagged in a run, from which on a look at its ends alone sees that it may be one: a drift that comes and goes
+/// is that small at an end by chance in one of some twenty members.
+const MAY: f64 = 0.05;
+
+/// Whether the energy of a run of a system that does not depend on time, with a constant `L_z`, may have drifted, by its two ends: an
+/// [`EnergyMonitor`] decides.
+pub(crate) fn may_drift<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    order: u32,
+    (t0, from): (f64, &PhasePoint<N>),
+    (t, to): (f64, &PhasePoint<N>),
+) -> bool {
+    let rest = SVector::zeros();
+    let Ok(x) = legendre_inverse(lagrangian, t0, from, &rest) else { return false };
+    let Ok(y) = legendre_inverse(lagrangian, t, to, &x.v) else { return false };
+    let sigma = (lagrangian.gradient(t0, &x).z * (t - t0)).exp();
+    let (Some(a), Some(b)) = (energies(lagrangian, t0, &x, from), energies(lagrangian, t, &y, to)) else {
+        return false;
+    };
+    let allowed = allowed(f64::from(order.max(1))) * larger(a.kinetic * sigma, b.kinetic);
+    (b.total - a.total * sigma).abs() > MAY * allowed
+}
+
+/// The drift, relative to the kinetic energy, that a method of an order may have.
+fn allowed(order: f64) -> f64 {
+    larger(LEAST, STEP.powf(order))
 }
 
 /// The energy at a state, with the kinetic one, `v.Wv/2`.

@@ -33,6 +33,7 @@ pub(crate) use checkpoint::digest;
 pub use checkpoint::{Checkpoint, CheckpointError, Interrupted};
 #[cfg(feature = "csv")]
 pub use csv_rows::CsvRows;
+pub(crate) use energy::may_drift;
 pub use events::{Crossing, Event, Events};
 pub(crate) use explain::DECOUPLED;
 pub use explain::Item;

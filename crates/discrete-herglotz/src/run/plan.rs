@@ -245,7 +245,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             over |= at_rest;
             if taken >= next_seen || over {
                 let before = if done == 1 { before } else { None };
-                let end = self.moment(&*stepper, before, (log_factor, suspicion, sums(&energy)), (taken, over));
+                let end =
+                    self.moment(&*stepper, before, (log_factor, suspicion, sums(&energy)), (taken, over && !at_rest));
                 stop = observers.step(&end).break_value();
                 // It ends within the step.
                 if let Some(Stop { at: Some((t, _)), .. }) = stop
