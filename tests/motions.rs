@@ -8,10 +8,13 @@
 
 mod motions {
     mod accuracy;
+    mod claims;
     mod coarse;
     mod many_coordinates;
     mod observed;
+    mod rest;
     mod round_off;
+    mod unresolved;
     mod watch;
 }
 

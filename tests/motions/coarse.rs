@@ -144,8 +144,8 @@ fn no_energy_is_lost_over_a_kink_in_silence() {
         }
     }
     assert!(lost.is_empty(), "{} lost, {kept} kept: {lost:?}", lost.len());
-    // Short steps are not marked.
-    assert!(kept > 50, "{kept}");
+    // Short steps are not marked, but where the energy is off by a hundredth of the kinetic one.
+    assert!(kept > 30, "{kept}");
 }
 
 /// A revolution of a thin orbit, whose passage of the centre is over in a step or two.

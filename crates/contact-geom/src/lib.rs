@@ -36,8 +36,9 @@ pub use dynamics::{
     Clock, DarbouxBracket, DarbouxField, Defect, Defects, Derivatives, Energy, HerglotzField, Hessian,
     InfinitesimalConformality, Lagrangian, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient,
     Regularity, Structure, Symmetry, ValueOnly, check_closed_derivatives, conformal_factor_along, derivative_along,
-    derived_gradient, derived_hessian, dissipation_defect, hamiltonian_vector_field, herglotz_field, herglotz_rates,
-    infinitesimal_conformality, jacobi_bracket, legendre, legendre_jacobian, lie_bracket, lie_derivative, regularity,
+    derived_gradient, derived_hessian, dissipation_defect, gradient_rounding, hamiltonian_vector_field, herglotz_field,
+    herglotz_rates, infinitesimal_conformality, jacobi_bracket, legendre, legendre_jacobian, lie_bracket,
+    lie_derivative, regularity,
 };
 pub use error::GeometryError;
 pub use forms::{

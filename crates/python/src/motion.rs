@@ -108,6 +108,7 @@ impl Motion {
         events: Vec<GivenEvent>,
         columns: Vec<String>,
         conformal_factor: bool,
+        estimate: bool,
     ) -> PyResult<Self> {
         let formula = system.inner.formula();
         let (q, rate, is_momentum, z) = start;
@@ -141,6 +142,7 @@ impl Motion {
             columns: all,
             events,
             conformal_factor,
+            estimate,
             ..runtime_herglotz::Motion::new(start, end, way)
         };
         Ok(Motion { system: system.inner.clone(), motion, conformal_factor })

@@ -83,6 +83,7 @@ pub struct Record {
     status: String,
     success: bool,
     suspicion: Option<String>,
+    error_estimate: Option<f64>,
     steps: usize,
     evaluations: u64,
     interrupted: Option<Py<PyAny>>,
@@ -153,6 +154,7 @@ fn record(py: Python<'_>, motion: &Motion, kept: Kept, outcome: Outcome) -> PyRe
         // A terminal event is what was asked for.
         success: matches!(outcome.status, Status::Completed | Status::Stopped { .. }) && kept.signals.raised.is_none(),
         suspicion: outcome.suspicion.map(|suspicion| suspicion.to_string()),
+        error_estimate: outcome.error_estimate,
         steps: outcome.steps,
         evaluations: outcome.evaluations,
         halted: kept.halted.map(|halted| halted.to_bytes()),

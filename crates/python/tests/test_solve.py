@@ -135,3 +135,15 @@ def test_every_name_of_the_catalogue_runs():
     for name in hz.catalogue():
         system = hz.solve(name, t=[1.0, 1.5]).system
         assert hz.solve(name, t=[1.0, 1.5]).success, system
+
+
+def test_the_error_of_given_steps_is_estimated():
+    end = 20.0
+    for integrator, step in [("strang", 0.1), ("gauss_2", 0.5), ("midpoint", 0.05)]:
+        sol = hz.solve(FORMULA, [1.0], [0.0], [0, end], integrator=integrator, step=step, estimate=True, **OSCILLATOR)
+        x, v = oscillator(end)
+        # The conjugate momentum is the velocity.
+        error = np.hypot(sol.q[-1, 0] - x, sol.p[-1, 0] - v) / np.hypot(x, v)
+        # Of an order p the distance from half steps is the part 1 - 2^-p of the error: three quarters at the least.
+        assert 0.7 * error < sol.error_estimate < 1.3 * error
+    assert hz.solve(FORMULA, [1.0], [0.0], [0, end], integrator="strang", step=0.1, **OSCILLATOR).error_estimate is None

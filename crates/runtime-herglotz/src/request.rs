@@ -116,6 +116,8 @@ pub struct Motion {
     pub action: bool,
     /// Whether the outcome has the conformal factor.
     pub conformal_factor: bool,
+    /// Whether the outcome has an estimate of its error: of given steps by a run with half of them, which costs twice as much.
+    pub estimate: bool,
     /// Whether every step is handed to [`Watch::node`](crate::Watch::node).
     pub nodes: bool,
     /// Whether it is refused where it could not be interrupted and [resumed](crate::System::resume).
@@ -134,6 +136,7 @@ impl Motion {
             events: Vec::new(),
             action: true,
             conformal_factor: false,
+            estimate: false,
             nodes: false,
             resumable: false,
         }

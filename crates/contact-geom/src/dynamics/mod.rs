@@ -8,6 +8,7 @@ mod hamiltonian;
 mod herglotz;
 mod lagrangian;
 pub(crate) mod probe;
+mod rounding;
 mod structure;
 
 pub use action::{OneParameterGroup, Symmetry};
@@ -24,4 +25,5 @@ pub use herglotz::{
 };
 pub use lagrangian::{Lagrangian, ValueOnly};
 pub use probe::check_closed_derivatives;
+pub use rounding::gradient_rounding;
 pub use structure::{Defect, Defects, Structure};

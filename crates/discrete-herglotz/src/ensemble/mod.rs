@@ -24,6 +24,7 @@ pub use sharded::{Merge, ShardedEnsemble};
 
 use crate::gauss::instructions::Instructions;
 use crate::gauss::lanes::{branched, forget_branches};
+use crate::run::may_drift;
 use crate::run::watch::size;
 use crate::run::{digest, rows};
 use crate::switching::has_switching_functions;
@@ -451,9 +452,14 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
             kernel.run(self.instructions, &mut lanes, action, wants);
         }
         if !branched() {
-            for (place, Lane { state, rows, doubtful, .. }) in places.into_iter().zip(lanes) {
+            let order = self.integrator.facts().order;
+            let structure = lagrangian.structure();
+            let dissipates = structure.autonomous && structure.has_constant_rate() && (structure.z_free || action);
+            for ((place, from), Lane { state, rows, doubtful, .. }) in places.into_iter().zip(&states).zip(lanes) {
                 if Triple::from(state).is_finite() {
                     let t = t0 + steps as f64 * h;
+                    let watched = self.watched && dissipates;
+                    let doubtful = doubtful || watched && may_drift(lagrangian, order, (t0, from), (t, &state));
                     let member = &mut members[place];
                     let mut suspicion = None;
                     if doubtful && self.watched {

@@ -23,8 +23,13 @@ pub(crate) struct Look {
     /// The largest misfit of the curve: of `p' = L_q + L_z p` and `z' = L`, over the length of the step, and of `p = L_v`; relative to
     /// the momenta and actions. Infinite where something is not finite.
     pub misfit: f64,
+    /// The same of momenta and forces alone, and of the action alone, in their own units.
+    pub of_momenta: f64,
+    pub of_action: f64,
     /// The momenta that it is relative to.
     pub size: f64,
+    /// The actions.
+    pub size_z: f64,
     /// The misfit that the last two coefficients of the step's polynomials let expect.
     pub expected: f64,
     /// The largest misfit of the values of L themselves, beyond their round-off: what jumps between two points and has no gradient at
@@ -57,7 +62,10 @@ impl Look {
     pub fn joined(self, next: Look) -> Look {
         Look {
             misfit: larger(self.misfit, next.misfit),
+            of_momenta: larger(self.of_momenta, next.of_momenta),
+            of_action: larger(self.of_action, next.of_action),
             size: larger(self.size, next.size),
+            size_z: larger(self.size_z, next.size_z),
             expected: larger(self.expected, next.expected),
             of_value: larger(self.of_value, next.of_value),
             kinetic: larger(self.kinetic, next.kinetic),
@@ -73,7 +81,13 @@ impl Look {
 
     /// Together with one at other points of the step.
     pub fn and(self, other: Look) -> Look {
-        Look { misfit: larger(self.misfit, other.misfit), of_value: larger(self.of_value, other.of_value), ..self }
+        Look {
+            misfit: larger(self.misfit, other.misfit),
+            of_momenta: larger(self.of_momenta, other.of_momenta),
+            of_action: larger(self.of_action, other.of_action),
+            of_value: larger(self.of_value, other.of_value),
+            ..self
+        }
     }
 }
 
@@ -311,15 +325,22 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
         }
         // The largest over lanes may hide a NaN; a NaN or an infinity times 0 is not 0.
         if all.sum() != 0.0 {
-            return Look { misfit: f64::INFINITY, of_value: f64::INFINITY, ..Look::default() };
+            return Look {
+                misfit: f64::INFINITY,
+                of_momenta: f64::INFINITY,
+                of_action: f64::INFINITY,
+                of_value: f64::INFINITY,
+                ..Look::default()
+            };
         }
         let relative = |misfit: f64, size: f64| if misfit > 0.0 { misfit / size } else { 0.0 };
         let (size, size_z) = (size.largest(), size_z.largest());
-        let misfit = relative(misfit.largest(), size) + relative(of_z.largest(), size_z);
+        let (of_momenta, of_action) = (misfit.largest(), of_z.largest());
+        let misfit = relative(of_momenta, size) + relative(of_action, size_z);
         let of_value = beyond_rounding(of_value.largest(), largest_l.largest());
         // The coefficients are the same for all points.
         if set > 0 {
-            return Look { misfit, of_value, ..Look::default() };
+            return Look { misfit, of_momenta, of_action, of_value, ..Look::default() };
         }
         let fastest = largest(v.iter().flat_map(|v| v.0));
         let g = Coefficients::of(s);
@@ -333,6 +354,17 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
             expected += relative(tail(&curve.l) * h, size_z);
         }
         let ends = from_fn(|i| weighted(&g.ends[i], &curve.l) / curve.rates[i]);
-        Look { misfit, size, expected, of_value, kinetic: kinetic.largest(), ends, follows_a_jump: false }
+        Look {
+            misfit,
+            of_momenta,
+            of_action,
+            size,
+            size_z,
+            expected,
+            of_value,
+            kinetic: kinetic.largest(),
+            ends,
+            follows_a_jump: false,
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! Checkpoints: a run that is interrupted goes on as if it had not been.
 
+use super::energy::EnergySums;
 use super::saved::{Saved, load_option, save_option, word};
 use super::{Moment, Needs, Observer, Stop};
 use crate::{InputError, Suspicion};
@@ -10,7 +11,7 @@ use thiserror::Error;
 
 /// What a file of a checkpoint begins with, and the version of what follows.
 const MAGIC: u64 = u64::from_le_bytes(*b"herglotz");
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 /// Why a file is no checkpoint.
 #[derive(Debug, Error)]
@@ -42,6 +43,7 @@ pub struct Interrupted {
     pub(super) taken: usize,
     pub(super) log_factor: f64,
     pub(super) suspicion: Option<Suspicion>,
+    pub(super) energy: EnergySums,
     /// The stepper's own.
     pub(super) words: Vec<u64>,
 }
@@ -78,7 +80,9 @@ impl Interrupted {
         Saved::load(&mut taken, &mut from)?;
         Saved::load(&mut log_factor, &mut from)?;
         let suspicion = load_option(&mut from, || Suspicion { step: 0, misfit: 0.0 })?;
-        Some(Interrupted { fingerprint, taken, log_factor, suspicion, words: from.to_vec() })
+        let mut energy = EnergySums::default();
+        Saved::load(&mut energy, &mut from)?;
+        Some(Interrupted { fingerprint, taken, log_factor, suspicion, energy, words: from.to_vec() })
     }
 
     /// As bytes, with their digest, for [`from_bytes`](Self::from_bytes): the contents of a checkpoint's file.
@@ -87,6 +91,7 @@ impl Interrupted {
         self.taken.save(&mut body);
         self.log_factor.save(&mut body);
         save_option(self.suspicion.as_ref(), &mut body);
+        self.energy.save(&mut body);
         body.extend_from_slice(&self.words);
         let sum = digest(&body);
         let words = [MAGIC, VERSION].into_iter().chain(body).chain([sum]);

@@ -10,6 +10,9 @@ use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint, larger, lar
 /// a step then has an error of its own of a twentieth, or a fifteenth with order one.
 const APART: f64 = 0.05;
 
+/// The steps from rest in which a method of order one is off by as much as it moves.
+const FIRST_STEPS: f64 = 16.0;
+
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// The misfit of some steps; above one where they do not resolve the motion. `None` where there is nothing to compare with.
     pub(super) fn against_halves(&self, Doubt { steps, t, from, to, .. }: &Doubt<N>) -> Option<f64> {
@@ -30,7 +33,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let size = |x: [&SVector<f64, N>; 3]| largest(x.into_iter().flat_map(|x| x.iter().copied()));
         let apart = |a: &SVector<f64, N>, b: &SVector<f64, N>| largest((a - b).iter().copied());
         let relative = |apart: f64, size: f64| if apart == 0.0 { 0.0 } else { apart / size };
-        let width = larger(size([&from.q, &to.q, &fine.q]), rounding(&start.q, &start.v, self.h));
+        // From rest, steps of order one are off by what they move over their number.
+        let moved =
+            if self.facts.order == 1 { FIRST_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
+        let width = larger(larger(size([&from.q, &to.q, &fine.q]), moved), rounding(&start.q, &start.v, self.h));
         let of_v = apart(&coarse_v, &fine_v);
         let of_v =
             if of_v * self.h.abs() > LEAST * width { relative(of_v, size([&v, &coarse_v, &fine_v])) } else { 0.0 };

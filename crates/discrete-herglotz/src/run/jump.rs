@@ -1,7 +1,7 @@
 //! Steps in doubt: whether what turned the velocity is narrower than they are.
 
 use super::{Plan, Problem};
-use crate::run::watch::{rounding, size};
+use crate::run::watch::{ROUNDED, rounding, size};
 use crate::{Doubt, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, herglotz_rates, larger, largest};
@@ -47,7 +47,9 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
             *acceleration = if exact_drag { rates.y - x.v * drag } else { rates.y };
         }
         let jump = largest(accelerations.windows(3).map(|a| size(&(a[2] - a[1] * 2.0 + a[0]))));
-        let rounded = jump * self.h * self.h <= rounding(&first.q, &first.v, self.h);
+        // Forces are rounded at the size of the motion where it starts, and where it is.
+        let floor = larger(rounding(&first.q, &first.v, self.h), ROUNDED * size(&to.q));
+        let rounded = jump * self.h * self.h <= floor;
         Some(if rounded { 0.0 } else { jump * self.h.abs() / (JUMP * speed) })
     }
 }

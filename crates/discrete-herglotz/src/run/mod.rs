@@ -3,9 +3,12 @@
 mod accuracy;
 mod any_integrator;
 mod checkpoint;
+mod claims;
 #[cfg(feature = "csv")]
 mod csv_rows;
 mod divided;
+mod energy;
+mod estimate;
 mod events;
 mod explain;
 mod halved;
@@ -19,6 +22,7 @@ mod plan;
 mod problem;
 mod progress;
 mod quotient;
+mod rest;
 pub(crate) mod rows;
 pub(crate) mod saved;
 mod stepper;
@@ -30,6 +34,7 @@ pub(crate) use checkpoint::digest;
 pub use checkpoint::{Checkpoint, CheckpointError, Interrupted};
 #[cfg(feature = "csv")]
 pub use csv_rows::CsvRows;
+pub(crate) use energy::may_drift;
 pub(crate) use events::bracketed_root;
 pub use events::{Crossing, Event, Events};
 pub(crate) use explain::DECOUPLED;
@@ -131,13 +136,22 @@ pub struct Run<'p, 'o, L, const N: usize> {
     integrator: Option<Shared<'p, L, N>>,
     length: Option<Length<'p, L, N>>,
     needs: Needs,
+    estimated: bool,
     observers: Vec<Box<dyn Observer<N> + 'o>>,
     from: Option<Interrupted>,
 }
 
 impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     fn of(problem: &'p Problem<'p, L, N>) -> Self {
-        Run { problem, integrator: None, length: None, needs: Needs::ACTION, observers: Vec::new(), from: None }
+        Run {
+            problem,
+            integrator: None,
+            length: None,
+            needs: Needs::ACTION,
+            estimated: false,
+            observers: Vec::new(),
+            from: None,
+        }
     }
 
     /// The same by this integrator.
@@ -177,6 +191,12 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
         Run { needs: Needs { conformal_factor: true, ..self.needs }, ..self }
     }
 
+    /// With an estimate of its error in the outcome: of given steps by a run with twice as many of half their length, which costs
+    /// twice as much as the run; of steps for an accuracy what the trial runs have found.
+    pub fn with_error_estimate(self) -> Self {
+        Run { estimated: true, ..self }
+    }
+
     /// Goes on with the run where it was interrupted, to the last bit: problem, integrator, steps, end and requests must be the same. The
     /// observers see what follows, its start included.
     pub fn resume(self, interrupted: Interrupted) -> Self {
@@ -209,7 +229,10 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
                 });
             }
         };
-        Request { problem, t_end, span, integrator: self.integrator.clone(), needs }.plan(length)
+        let request = Request { problem, t_end, span, integrator: self.integrator.clone(), needs };
+        let mut plan = request.plan(length)?;
+        plan.estimated = self.estimated;
+        Ok(plan)
     }
 
     /// Runs it.
@@ -226,6 +249,15 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         let Request { problem, span, .. } = *self;
         if !(span != 0.0 && span.is_finite()) {
             return Err(InputError::Span { span });
+        }
+        // Beyond its rest no error relative to the motion can be told.
+        if let Length::For(..) = length
+            && let Some(t_end) = self.time_of_rest()
+        {
+            let request = Request { t_end, span: t_end - problem.t0, integrator: self.integrator.clone(), ..*self };
+            let mut plan = request.plan(length)?;
+            plan.rests_until = Some(self.t_end);
+            return Ok(plan);
         }
         if let Some(integrator) = &self.integrator {
             integrator.check(problem.lagrangian)?;

@@ -1,5 +1,6 @@
 //! What looks at a run while it goes on.
 
+use super::energy::EnergySums;
 use super::{Interrupted, Motion};
 use crate::gauss::DenseStep;
 use crate::{InputError, StepError, Stepper, Suspicion};
@@ -121,6 +122,7 @@ pub struct Moment<'r, const N: usize> {
     /// Whether the run ends here.
     pub last: bool,
     pub(super) suspicion: Option<Suspicion>,
+    pub(super) energy: EnergySums,
     pub(super) before: Option<(f64, PhasePoint<N>)>,
     pub(super) motion: &'r dyn Motion<N>,
     pub(super) stepper: &'r dyn Stepper<N>,
@@ -146,8 +148,8 @@ impl<'r, const N: usize> Moment<'r, N> {
     /// The run as it would go on from here, for [`Run::resume`](super::Run::resume); `None` where its stepper cannot be saved.
     pub fn interrupted(&self) -> Option<Interrupted> {
         let (fingerprint, words) = (self.motion.fingerprint(), self.stepper.save()?);
-        let (taken, suspicion) = (self.k, self.suspicion);
-        Some(Interrupted { fingerprint, taken, log_factor: self.log_factor.unwrap_or(0.0), suspicion, words })
+        let (taken, suspicion, energy) = (self.k, self.suspicion, self.energy);
+        Some(Interrupted { fingerprint, taken, log_factor: self.log_factor.unwrap_or(0.0), suspicion, energy, words })
     }
 
     /// The moment at a time of the last step: see [`LastStep::at`].

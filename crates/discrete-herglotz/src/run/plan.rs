@@ -2,6 +2,9 @@
 
 use super::accuracy::Choice;
 use super::checkpoint::digest;
+use super::claims::ClaimMonitor;
+use super::energy::{EnergyMonitor, EnergySums};
+use super::rest::REST;
 use super::{
     Course, Facts, Interrupted, Item, Moment, Motion, Needs, Observer, Outcome, Problem, Request, Shared, Stop, Wants,
 };
@@ -81,6 +84,10 @@ pub struct Plan<'p, L, const N: usize> {
     pub(super) constant_rate: bool,
     /// Whether the Lagrangian states switching functions.
     pub(super) switches: bool,
+    /// Whether the error of given steps is estimated.
+    pub(super) estimated: bool,
+    /// The end that was requested, where it ends before since the motion is at rest from there on.
+    pub(super) rests_until: Option<f64>,
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
@@ -107,6 +114,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             constant_rate: stepper.has_constant_rate(),
             switches,
             integrator,
+            estimated: false,
+            rests_until: None,
         })
     }
 
@@ -182,25 +191,32 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         if self.needs.saved && stepper.save().is_none() {
             return Err(InputError::Unsaved);
         }
-        observers.prepare(&Course { t0: self.problem.t0, t_end: self.t_end, h, count })?;
+        let t_end = self.rests_until.unwrap_or(self.t_end);
+        observers.prepare(&Course { t0: self.problem.t0, t_end, h, count })?;
         // The logarithm of the product of the sigma_d; in single steps only where they differ.
         let (mut log_factor, single) = (0.0, self.needs.conformal_factor && !self.constant_rate);
         let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
+        let (mut energy, mut claims) = (EnergyMonitor::of(self), ClaimMonitor::of(self));
         if let Some(from) = from {
             if from.fingerprint != self.fingerprint() || !stepper.restore(&from.words) {
                 return Err(InputError::AnotherRun);
             }
             (taken, log_factor, suspicion) = (from.taken, from.log_factor, from.suspicion);
+            energy.iter_mut().for_each(|energy| energy.sums = from.energy);
         }
         // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes, and are compared
         // with halves in doubt alone.
         let doubts = self.error.is_none() && !by_clock;
+        // Those of other methods than Gauss' were compared with a reference that was looked at.
+        let judged = self.error.is_some() && self.facts.collocation.is_none();
+        let seen_by = |stepper: &dyn Stepper<N>| if judged { None } else { stepper.suspicion() };
         let halves = doubts && !self.many_stages();
         let most = if by_clock { usize::MAX } else { self.count };
         let ended = |taken: usize, t: f64| taken == most || by_clock && self.is_over(t);
         // A run may be resumed at its end.
         let mut over = ended(taken, stepper.time());
-        let start = self.moment(&*stepper, None, (log_factor, suspicion), (taken, over));
+        let sums = |energy: &Option<EnergyMonitor<N>>| energy.as_ref().map(|energy| energy.sums).unwrap_or_default();
+        let start = self.moment(&*stepper, None, (log_factor, suspicion, sums(&energy)), (taken, over));
         let mut stop = observers.start(&start).break_value();
         while !over && stop.is_none() {
             // One mark is enough.
@@ -209,9 +225,13 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             let next_look = if taken == halved { taken + 1 } else { halved };
             // The step that is seen is taken by itself, so that observers can look into it.
             let next_seen_alone = if next_seen > taken + 1 { next_seen - 1 } else { next_seen };
-            let next = next_seen_alone.min(next_probe(taken)).min(next_look).min(most);
+            let next_energy = energy.as_ref().map_or(usize::MAX, |energy| energy.next(taken));
+            let next_claims = claims.as_ref().map_or(usize::MAX, |claims| claims.next(taken));
+            let next =
+                next_seen_alone.min(next_probe(taken)).min(next_look).min(next_energy).min(next_claims).min(most);
             let chunk = if single { 1 } else { next - taken };
-            let before = (taken == halved || next_seen == taken + 1).then(|| (stepper.time(), stepper.state()));
+            let alone = taken == halved || next_seen == taken + 1 || next_claims == taken + 1;
+            let before = alone.then(|| (stepper.time(), stepper.state()));
             let (done, cause) = match stepper.advance_until(chunk, self.t_end) {
                 Ok(done) => (done, None),
                 Err(halt) => (halt.taken, Some(halt.cause)),
@@ -242,11 +262,32 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
                 }
                 let doubt = stepper.doubt().filter(|_| doubts && suspicion.is_none());
                 suspicion = first(suspicion, doubt.and_then(|doubt| self.settled(&doubt)));
-                suspicion = first(suspicion, stepper.suspicion());
+                suspicion = first(suspicion, seen_by(&*stepper));
             }
+            if let Some(claims) = &mut claims
+                && (taken >= next_claims || over)
+                && let Some(Defect { claim, size }) =
+                    claims.look(self, &*stepper, before.as_ref().filter(|_| done == 1))
+            {
+                status = Status::FalseClaim { step: taken, claim, size };
+                break;
+            }
+            if let Some(energy) = &mut energy
+                && (taken >= next_energy || over)
+                && let Some(misfit) = energy.look(self, (stepper.time(), &stepper.state()), (log_factor, taken))
+            {
+                suspicion = first(suspicion, Some(Suspicion { step: taken - 1, misfit }));
+            }
+            let at_rest = if over {
+                self.rests_until.is_some()
+            } else {
+                probed && self.is_at_rest(stepper.time(), &stepper.state())
+            };
+            over |= at_rest;
             if taken >= next_seen || over {
                 let before = if done == 1 { before } else { None };
-                let end = self.moment(&*stepper, before, (log_factor, suspicion), (taken, over));
+                let end =
+                    self.moment(&*stepper, before, (log_factor, suspicion, sums(&energy)), (taken, over && !at_rest));
                 stop = observers.step(&end).break_value();
                 // It ends within the step.
                 if let Some(Stop { at: Some((t, _)), .. }) = stop
@@ -255,8 +296,13 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
                     log_factor = there;
                 }
             }
+            if at_rest {
+                stop = stop.or(Some(Stop::here(REST)));
+            }
         }
         let (mut t, mut state) = (stepper.time(), stepper.state());
+        let error_estimate =
+            self.estimated.then(|| self.error.unwrap_or_else(|| self.distance_from_halves(taken, t, &state)));
         if let Some(Stop { by, cause, at }) = stop {
             (t, state) = at.unwrap_or((t, state));
             status = match cause {
@@ -267,7 +313,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let Needs { action, conformal_factor, .. } = self.needs;
         Ok(Outcome {
             status,
-            suspicion: first(suspicion, stepper.suspicion()),
+            suspicion: first(suspicion, seen_by(&*stepper)),
             steps: taken,
             t,
             q: state.q,
@@ -275,6 +321,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             v: self.velocity(t, &state).ok(),
             z: action.then_some(state.z),
             log_factor: conformal_factor.then_some(log_factor),
+            error_estimate,
             evaluations: stepper.evaluations(),
             z_or_start: state.z,
         })
@@ -285,12 +332,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         &'r self,
         stepper: &'r dyn Stepper<N>,
         before: Option<(f64, PhasePoint<N>)>,
-        (log_factor, suspicion): (f64, Option<Suspicion>),
+        (log_factor, suspicion, energy): (f64, Option<Suspicion>, EnergySums),
         (k, last): (usize, bool),
     ) -> Moment<'r, N> {
         let log_factor = self.needs.conformal_factor.then_some(log_factor);
         let (t, state, sigma) = (stepper.time(), stepper.state(), stepper.sigma());
-        Moment { k, t, state, sigma, log_factor, last, suspicion, before, motion: self, stepper }
+        Moment { k, t, state, sigma, log_factor, last, suspicion, energy, before, motion: self, stepper }
     }
 
     /// The first claim that is false at the state of a stepper.

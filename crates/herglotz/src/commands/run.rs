@@ -330,14 +330,18 @@ impl Run {
                 "step_size": plan.step_size,
                 "steps": steps,
                 "evaluations": evaluations,
-                "estimated_error": plan.error,
+                "estimated_error": plan.error.or(outcome.error_estimate.filter(|e| e.is_finite())),
                 "rows": rows,
                 "events": events,
                 "end": end,
             }))?;
         } else {
             let Plan { integrator, step_size, .. } = plan;
-            let error = plan.error.map(|error| format!(", estimated error {error:.1e}")).unwrap_or_default();
+            let error = plan
+                .error
+                .or(outcome.error_estimate)
+                .map(|error| format!(", estimated error {error:.1e}"))
+                .unwrap_or_default();
             let mut lines = vec![format!(
                 "{status}: {steps} {} of {} by {}{error}",
                 if *steps == 1 { "step" } else { "steps" },

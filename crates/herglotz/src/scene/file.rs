@@ -79,6 +79,9 @@ pub(crate) struct WantTable {
     /// Whether the conformal factor of the whole motion is in the summary.
     #[serde(default)]
     pub conformal_factor: bool,
+    /// Whether the error of given steps is estimated, by a second run with steps of half their length.
+    #[serde(default)]
+    pub estimate: bool,
 }
 
 /// When there is a row, by one of `every`, `at` and `every_step`, and what is in it.

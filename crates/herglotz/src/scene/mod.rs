@@ -40,6 +40,7 @@ pub struct Scene {
     way: Way,
     rows: RowTimes,
     conformal_factor: bool,
+    estimate: bool,
     text: String,
     places: Places,
 }
@@ -131,6 +132,7 @@ impl Scene {
             end,
             way,
             conformal_factor: file.want.conformal_factor,
+            estimate: file.want.estimate,
             text: text.to_owned(),
             places: Places {
                 lagrangian,
@@ -152,6 +154,7 @@ impl Scene {
             columns: self.columns.iter().map(|(_, column)| column.clone()).collect(),
             events: self.events.iter().map(|(_, event)| event.clone()).collect(),
             conformal_factor: self.conformal_factor,
+            estimate: self.estimate,
             ..self.bare_motion()
         }
     }

@@ -82,6 +82,7 @@ class Solution:
     status: str
     success: bool
     suspicion: str | None
+    error_estimate: float | None
     steps: int
     evaluations: int
     @property
@@ -211,6 +212,7 @@ def solve(
     events: Expression | Event | Sequence[Expression | Event] | Mapping[str, Expression | Event] = (),
     observe: Mapping[str, Expression] | None = None,
     conformal_factor: bool = False,
+    estimate: bool = False,
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Solution: ...

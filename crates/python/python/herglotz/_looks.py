@@ -128,7 +128,7 @@ def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters):
     start = (q0, v0, False, z0) if p0 is None else (q0, p0, True, z0)
     if t is None:
         raise ValueError("`t` is not given: the end of the motion")
-    return _core.Motion(L, start, t, None, way, [], [], False)
+    return _core.Motion(L, start, t, None, way, [], [], False, False)
 
 
 def check(

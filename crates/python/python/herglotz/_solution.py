@@ -72,6 +72,8 @@ class Solution:
         How the run ended; ``success`` says whether as it was asked to.
     suspicion : str or None
         The first step that was seen not to resolve the motion.
+    error_estimate : float or None
+        The error of (q, p) at the end, relative to its size, where `estimate` was asked for; infinite where half steps fail.
     steps, evaluations : int
         The steps taken, and the evaluations of forces or gradients.
     t_end : float
@@ -84,6 +86,7 @@ class Solution:
         self.t, self.q, self.v, self.p, self.z = record.t, record.q, record.v, record.p, record.z
         self.energy, self.log_factor = record.energy, record.log_factor
         self.status, self.success, self.suspicion = record.status, record.success, record.suspicion
+        self.error_estimate = record.error_estimate
         self.steps, self.evaluations = record.steps, record.evaluations
         self._end, self._halted = record.end, record.halted
         self._observed = observed
@@ -173,11 +176,11 @@ class Solution:
         times = np.atleast_1d(np.asarray(t, dtype=float))
         if len(times) == 0 or times[0] != at:
             times = np.concatenate([[at], times])
-        _, _, every, way, events, columns, conformal_factor = self._request
+        _, _, every, way, events, columns, conformal_factor, estimate = self._request
         if way[3] is not None:
             # So many steps were of another span.
             way = (None, way[1], self.plan.step, None)
-        request = (q, p, True, z), times, every, way, events, columns, conformal_factor
+        request = (q, p, True, z), times, every, way, events, columns, conformal_factor, estimate
         return run(self.system, request, self._event_names, self._observed)
 
     @property

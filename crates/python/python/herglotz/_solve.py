@@ -21,6 +21,7 @@ def solve(
     events=(),
     observe=None,
     conformal_factor=False,
+    estimate=False,
     coordinates=None,
     parameters=None,
 ):
@@ -55,6 +56,9 @@ def solve(
         Expressions by name: columns beside the state, ``sol["name"]``.
     conformal_factor : bool
         Whether `Solution.log_factor` is computed.
+    estimate : bool
+        Whether `Solution.error_estimate` is computed: of given steps by a second run with steps of half their length,
+        which costs twice as much as the first.
     coordinates, parameters
         As of `system`.
 
@@ -83,6 +87,7 @@ def solve(
         events_of(events, L) if events else [],
         [expression(column, L) for column in observe.values()] if observe else [],
         conformal_factor,
+        estimate,
     )
     event_names = tuple(events) if isinstance(events, dict) else len(request[4])
     return run(L, request, event_names, tuple(observe) if observe else ())

@@ -17,7 +17,8 @@ fn of<'p, 'o, const N: usize>(
         Way::Steps { by, steps } => problem.by(by).steps(steps),
     };
     let run = if motion.action { run } else { run.without_action() };
-    if motion.conformal_factor { run.with_conformal_factor() } else { run }
+    let run = if motion.conformal_factor { run.with_conformal_factor() } else { run };
+    if motion.estimate { run.with_error_estimate() } else { run }
 }
 
 pub(super) fn plan<const N: usize>(system: &Sized<N>, motion: &Motion) -> Result<Plan, RuntimeError> {
@@ -60,6 +61,7 @@ pub(super) fn run<const N: usize>(
         v: outcome.v.map(|v| coordinates(&v, n).to_vec()),
         z: outcome.z,
         log_factor: outcome.log_factor,
+        error_estimate: outcome.error_estimate,
         evaluations: outcome.evaluations,
     })
 }

@@ -6,14 +6,17 @@ use crate::gauss::look::{Compare, Curve, Look, SETS};
 use crate::gauss::time_transformation::Physical;
 use crate::run::saved::saved;
 use crate::run::watch::{misfit, sharper};
-use crate::{Doubt, Suspicion};
-use contact_geom::Lagrangian;
+use crate::{Doubt, Stepper, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, gradient_rounding, larger, largest};
 use pulp::{Simd, WithSimd};
 
 /// The misfit between the nodes from which a step of at least three stages does not resolve the motion: of harmonics it then has an
 /// error of its own of 0.01 to 0.1.
 const UNRESOLVED: f64 = 0.1;
+
+/// The roundings of a force or momentum that a misfit may hold: sixteen stages, with the weights of an interpolation between them.
+const ROUNDINGS: f64 = 256.0;
 
 /// The mean velocities of the last steps, in sequence, the last position, and the states after the last two steps.
 pub(super) struct Sequence<const N: usize> {
@@ -85,12 +88,33 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         self.watch.first.or_else(|| {
             // A linear motion that is not resolved is so in every step, and none was looked at on the way.
             let sets = if let Route::Linear(..) = &*self.route { SETS } else { 1 };
-            let Look { misfit, .. } = self.look(sets)?;
+            let Look { misfit, of_momenta, of_action, size, size_z, .. } = self.look(sets)?;
             // A step of fewer stages is no polynomial between its nodes to speak of.
-            let misfit = if self.products.s > FEW { misfit / UNRESOLVED } else { misfit };
+            let allowed = if self.products.s > FEW { UNRESOLVED } else { 1.0 };
             // A NaN is a misfit too.
-            if misfit <= 1.0 { None } else { Some(Suspicion { step: self.k - 1, misfit }) }
+            if misfit <= allowed {
+                return None;
+            }
+            let [of_p, of_z] = self.rounding();
+            if of_momenta <= larger(allowed * size, of_p) && of_action <= larger(allowed * size_z, of_z) {
+                return None;
+            }
+            Some(Suspicion { step: self.k - 1, misfit: misfit / allowed })
         })
+    }
+
+    /// What of the misfits of momenta and of the action in the last step is rounding: that of the forces and of L there, which is all that is
+    /// left of a motion at rest.
+    #[cold]
+    #[inline(never)]
+    fn rounding(&self) -> [f64; 2] {
+        let (t, state) = (self.time(), self.state());
+        let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return [0.0; 2] };
+        let (l, g) = gradient_rounding(self.lagrangian, t, &x);
+        let (of, h) = (|part: &SVector<f64, N>| largest(part.iter().copied()), self.products.h.abs());
+        // No bound where the derivatives have none. What is below the normal numbers has lost its digits.
+        [larger(of(&g.x) * h, of(&g.y)), l * h]
+            .map(|once| if once.is_finite() { ROUNDINGS * once + f64::MIN_POSITIVE } else { 0.0 })
     }
 }
 

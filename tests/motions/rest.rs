@@ -1,0 +1,199 @@
+//! Motions that come to rest: no step of theirs is flagged, wherever they rest.
+
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::Pendulum;
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+use discrete_herglotz::{AnyIntegrator, Problem, Rows, SplittingScheme, Status, Steps, Until};
+
+/// Systems of one coordinate that come to rest away from 0, with a drag.
+#[derive(Clone, Copy, Debug)]
+enum Resting {
+    /// A pendulum with a constant torque, of less than its weight.
+    Torque { torque: f64, gamma: f64 },
+    /// Two wells.
+    Duffing { beta: f64, gamma: f64 },
+    /// A bead on a hoop that turns, beside its lowest place.
+    Hoop { square: f64, gamma: f64 },
+}
+
+impl Lagrangian<1> for Resting {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        let (x, kinetic) = (q[0], v[0] * v[0] * 0.5);
+        match *self {
+            Resting::Torque { torque, gamma } => kinetic + x.cos() + x * torque + z * gamma,
+            Resting::Duffing { beta, gamma } => kinetic + x * x * 0.5 - x * x * x * x * (0.25 * beta) + z * gamma,
+            Resting::Hoop { square, gamma } => kinetic + x.sin() * x.sin() * (0.5 * square) + x.cos() + z * gamma,
+        }
+    }
+    fn structure(&self) -> Structure {
+        Structure {
+            autonomous: true,
+            z_affine: true,
+            constant_rate: true,
+            separable: true,
+            constant_mass: true,
+            ..Structure::default()
+        }
+    }
+}
+
+/// Numbers between 0 and 1, the same in each run of the test.
+pub struct Draws(u64);
+
+impl Draws {
+    /// Those of a case.
+    pub fn of(case: u64) -> Self {
+        let mut draws = Draws(case.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        draws.next();
+        draws
+    }
+
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + self.next() * (high - low)
+    }
+}
+
+fn draw(draws: &mut Draws) -> (Resting, VelocityPoint<1>) {
+    let gamma = -f64::exp(draws.between(f64::ln(0.05), f64::ln(3.0)));
+    let system = match (draws.next() * 3.0) as u32 {
+        0 => Resting::Torque { torque: draws.between(0.05, 0.9), gamma },
+        1 => Resting::Duffing { beta: f64::exp(draws.between(-2.0, 2.0)), gamma },
+        _ => Resting::Hoop { square: draws.between(1.2, 4.0), gamma },
+    };
+    // Half of them beside the equilibrium at or near 0.
+    let size = if draws.next() < 0.5 { 1.0 } else { f64::powf(10.0, -draws.between(0.0, 8.0)) };
+    (system, VelocityPoint::new([size * draws.between(-1.5, 1.5)], [size * draws.between(-1.0, 1.0)], 0.0))
+}
+
+#[test]
+fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
+    let cases: u64 = std::env::var("RESTING").ok().and_then(|n| n.parse().ok()).unwrap_or(1000);
+    let integrators: Vec<_> = AnyIntegrator::all()
+        .into_iter()
+        .filter(|i| i.check(&Resting::Hoop { square: 2.0, gamma: -1.0 }).is_ok())
+        .collect();
+    let (mut flagged, mut done, mut other) = (Vec::new(), 0, std::collections::BTreeMap::<String, u32>::new());
+    for case in 0..cases {
+        let mut draws = Draws::of(case);
+        let (system, start) = draw(&mut draws);
+        let (Resting::Torque { gamma, .. } | Resting::Duffing { gamma, .. } | Resting::Hoop { gamma, .. }) = system;
+        let integrator = integrators[(draws.next() * integrators.len() as f64) as usize];
+        // Until e^(gamma t/2) is between 1e-3 and 1e-40; where the drag is above critical it takes longer.
+        let span = draws.between(14.0, 180.0) / gamma.abs().min(2.0 / gamma.abs());
+        let problem = Problem::new(&system, 0.0, start).unwrap();
+        let by_accuracy = draws.next() < 0.25;
+        let run = if by_accuracy {
+            problem.by(integrator).accuracy(1e-9)
+        } else {
+            let parts = match integrator {
+                AnyIntegrator::Gauss { stages } => 0.1 * stages as f64,
+                _ if integrator.order() == 1 => 0.02,
+                _ => 0.1,
+            };
+            problem.by(integrator).steps(Steps::Size(parts * draws.between(0.2, 1.0)))
+        };
+        match run.run(Until::Time(span)) {
+            Ok(end) if end.status == Status::Completed => {
+                done += 1;
+                if let Some(suspicion) = end.suspicion {
+                    flagged.push((
+                        case,
+                        integrator.to_string(),
+                        by_accuracy,
+                        system,
+                        start.q[0],
+                        start.v[0],
+                        span,
+                        end.q[0],
+                        end.p[0],
+                        end.steps,
+                        suspicion,
+                    ));
+                }
+            }
+            Ok(end) => {
+                *other.entry(format!("{} {}", integrator, end.status).chars().take(60).collect()).or_default() += 1
+            }
+            Err(error) => *other.entry(error.to_string().chars().take(60).collect()).or_default() += 1,
+        }
+    }
+    println!("{done} of {cases} completed; others: {other:#?}");
+    for x in flagged.iter().take(30) {
+        println!("{x:?}");
+    }
+    let mut by = std::collections::BTreeMap::<String, u32>::new();
+    for x in &flagged {
+        *by.entry(format!("{} {}", x.1, x.2)).or_default() += 1;
+    }
+    println!("{by:?}");
+    assert!(flagged.is_empty() && 10 * done > 8 * cases, "{} of {done} flagged", flagged.len());
+}
+
+/// A damped pendulum down to the smallest numbers.
+#[test]
+fn what_is_at_rest_ends_and_says_so() {
+    for (system, gamma) in [-0.05, -0.1, -1.0].map(|gamma| (Pendulum { gamma }, gamma)) {
+        let start = VelocityPoint::new([1.0], [0.5], 0.0);
+        let problem = Problem::new(&system, 0.0, start).unwrap();
+        let begin = std::time::Instant::now();
+        let mut rows = Rows::at((0..=100).map(|k| 1e4 * f64::from(k))).unwrap();
+        let by_accuracy = problem.accuracy(1e-9).observe(&mut rows).run(Until::Time(1e6)).unwrap();
+        // Those that were reached.
+        let reached = (by_accuracy.t / 1e4).floor() as usize + 1;
+        assert!(rows.rows.len() == reached && reached < 10, "{gamma}: {} rows", rows.rows.len());
+        println!("{gamma}: {by_accuracy:?} {:?}", begin.elapsed());
+        let by_steps = problem.steps(Steps::Size(0.5)).run(Until::Time(1e6)).unwrap();
+        let strang = problem.by(SplittingScheme::STRANG).steps(Steps::Size(0.1)).run(Until::Time(1e6)).unwrap();
+        for end in [by_accuracy, by_steps, strang] {
+            assert!(matches!(end.status, Status::Stopped { by: "rest", t, .. } if t < 1e5), "{gamma}: {end:?}");
+            assert!(end.q[0].abs() < 1e-279 && end.p[0].abs() < 1e-279, "{gamma}: {end:?}");
+            assert_eq!(end.suspicion, None);
+            // Where z' = cos q - 1 + gamma z vanishes.
+            assert!(end.z.unwrap().abs() < 1e-13, "{gamma}: {end:?}");
+        }
+    }
+}
+
+/// `v^2/2 + q^2/2 + gamma z` from the stable direction of its hill: the motion comes as close as numbers can, and leaves.
+struct Hill;
+
+impl Lagrangian<1> for Hill {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        (v[0] * v[0] + q[0] * q[0]) * 0.5 - z * 1.5
+    }
+    fn structure(&self) -> Structure {
+        Structure { autonomous: true, z_affine: true, separable: true, constant_mass: true, ..Structure::default() }
+    }
+}
+
+/// A pendulum that is pushed after a long time.
+struct Pushed;
+
+impl Lagrangian<1> for Pushed {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        let s = t - 4000.0;
+        v[0] * v[0] * 0.5 + q[0].cos() + (-(s * s)).exp() * q[0] - z
+    }
+    fn structure(&self) -> Structure {
+        Structure { z_affine: true, constant_rate: true, separable: true, constant_mass: true, ..Structure::default() }
+    }
+}
+
+#[test]
+fn what_will_move_again_does_not_end() {
+    // q = e^(-2t) + 1e-300 e^(t/2), both far below the numbers that are at rest in between.
+    let start = VelocityPoint::new([1e-200], [-2e-200], 0.0);
+    let problem = Problem::new(&Hill, 0.0, start).unwrap();
+    let end = problem.by(SplittingScheme::YOSHIDA_4).steps(Steps::Size(0.05)).run(Until::Time(1000.0)).unwrap();
+    assert!(!matches!(end.status, Status::Stopped { .. }), "{end:?}");
+    let problem = Problem::new(&Pushed, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let end = problem.steps(Steps::Size(0.25)).run(Until::Time(4003.0)).unwrap();
+    assert_eq!(end.status, Status::Completed);
+    assert!(end.q[0].abs() > 0.1, "{end:?}");
+}
