@@ -50,6 +50,51 @@ impl Lagrangian<1> for Explosive {
     }
 }
 
+/// A Lagrangian that jumps where its velocity passes 1/2, and one whose switching function has another sign whenever it is asked for.
+enum Switching {
+    Fast,
+    Restless(std::cell::Cell<bool>),
+}
+
+impl Lagrangian<1> for Switching {
+    const HAS_SWITCHING_FUNCTIONS: bool = true;
+
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        v[0] * v[0] * 0.5 + q[0] - v[0].if_less(T::from(0.5), T::zero(), T::from(5.0))
+    }
+    fn switching_functions(&self, _t: f64, x: &VelocityPoint<1>, values: &mut Vec<f64>) {
+        values.push(match self {
+            Switching::Fast => x.v[0] - 0.5,
+            Switching::Restless(positive) => {
+                positive.set(!positive.get());
+                if positive.get() { 1.0 } else { -1.0 }
+            }
+        });
+    }
+}
+
+impl Switching {
+    fn fails(self) -> StepError {
+        let problem = Problem::new(&self, 0.0, VelocityPoint::new([0.0], [0.0], 0.0)).unwrap();
+        match problem.steps(Steps::Size(0.3)).run(Until::Steps(3)).unwrap().status {
+            Status::Failed { cause, .. } => cause,
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+/// Switching functions that are not stated.
+struct Unstated;
+
+impl Lagrangian<1> for Unstated {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        v[0] * v[0] * 0.5 - q[0].abs()
+    }
+    fn switching_functions(&self, _t: f64, x: &VelocityPoint<1>, values: &mut Vec<f64>) {
+        values.push(x.q[0]);
+    }
+}
+
 /// No W.
 struct Massless;
 
@@ -220,6 +265,10 @@ fn input_errors() {
             Strang::new(CoupledInZ::default(), 0.1, 0.0, &pendulum_at(0.5)).err().unwrap()
         }, ["separable", "claim it", "another method"];
         InputError::FalseClaim { .. } => Problem::new(&Liar, 0.0, start).err().unwrap(), ["quadratic", "is not", "size"];
+        InputError::SwitchingUnstated => {
+            let problem = Problem::new(&Unstated, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+            problem.steps(Steps::Size(0.1)).plan(Until::Steps(3)).err().unwrap()
+        }, ["switching_functions", "HAS_SWITCHING_FUNCTIONS: bool = true"];
         InputError::Hypothesis { .. } => {
             let rule = |h| Midpoint::new(pendulum, h);
             Composition::new(rule, &SplittingScheme::BLANES_MOAN_6, 0.1, 0.0, pendulum_at(0.5)).err().unwrap()
@@ -326,6 +375,10 @@ fn step_errors() {
                 other => panic!("{other:?}"),
             }
         }, ["the function of an event", "not finite at t = 0.2", "defined along the motion"];
+        StepError::Switching { .. } => {
+            Switching::Restless(std::cell::Cell::new(false)).fails()
+        }, ["without end", "smooth the kink"];
+        StepError::JumpAlong { .. } => Switching::Fast.fails(), ["depends on the velocity", "smooth the jump"];
         StepError::NonFinite => {
             let ld = Rectangle::new(Kepler::<2>::default(), 0.1).unwrap();
             let centre = PhasePoint::new([0.0, 0.0], [0.0, 1.0], 0.0);

@@ -2,7 +2,7 @@
 
 use crate::names::Names;
 use crate::parser::{MOST_NODES, Parser};
-use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id};
+use crate::{Expression, FormulaError, FormulaLagrangian, Graph, Id, Node};
 
 /// A Lagrangian `L(t, q, v, z)` that is known when the program runs: an expression of coordinates, velocities, z, t and parameters, all
 /// with names of the user's.
@@ -126,6 +126,16 @@ impl Formula {
     /// The parameters with their values, in their order.
     pub fn parameters(&self) -> impl Iterator<Item = (&str, f64)> {
         self.names.parameters.iter().map(String::as_str).zip(self.values.iter().copied())
+    }
+
+    /// The parameters on which the expression depends, in their order.
+    pub fn used_parameters(&self) -> impl Iterator<Item = &str> {
+        let needed = self.graph.needed(self.root);
+        let is_used = move |i: usize| {
+            let mut nodes = needed.iter().enumerate().filter(|(_, needed)| **needed).map(|(id, _)| Id(id as u32));
+            nodes.any(|id| self.graph.node(id) == Node::Parameter(i as u32))
+        };
+        self.names.parameters.iter().enumerate().filter(move |(i, _)| is_used(*i)).map(|(_, name)| name.as_str())
     }
 
     /// Gives a parameter another value.

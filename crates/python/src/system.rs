@@ -61,6 +61,12 @@ impl System {
         Ok(all)
     }
 
+    /// The parameters on which the Lagrangian depends.
+    #[getter]
+    fn used_parameters(&self) -> Vec<String> {
+        self.inner.formula().used_parameters().map(str::to_owned).collect()
+    }
+
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
         let (this, py) = (slf.get(), slf.py());
         Ok((slf.get_type(), (this.lagrangian.clone(), this.given_coordinates.clone(), this.parameters(py)?)))

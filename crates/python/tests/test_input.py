@@ -39,7 +39,7 @@ BAD = [
     (dict(parameters={"gamma": "low"}), r"parameters\[\"gamma\"\]"),
     (dict(coordinates=["t"]), '"t" has a meaning'),
     (dict(L="x'^2/2 + cos(y)"), r"line 1, column 14.*\n.*\n +\^"),
-    (dict(L="x'"), "linear in x'"),
+    (dict(L="x' + gamma*z"), "linear in x'"),
     (dict(L="pendulun"), "pendulum|unknown name"),
     (dict(L="x'^2/2 + 1/x", q0=[0.0]), "not finite at the start"),
     (dict(events="y"), 'event "y": line 1, column 1'),
@@ -62,3 +62,37 @@ def test_a_bad_argument_is_named(change, message):
 def test_what_is_no_lagrangian():
     with pytest.raises(TypeError, match="where a function, a formula"):
         hz.solve(3.0, [1.0], [0.0], 1.0)
+
+
+def test_parameters_that_do_not_exist_are_refused():
+    def drag(t, q, v, z, gamma=-0.1):
+        return v @ v / 2 - q @ q / 2 + gamma * z
+
+    import sympy
+
+    x, xdot, z, gamma = sympy.symbols("x xdot z gamma")
+    expression = xdot**2 / 2 - x**2 / 2 + gamma * z
+    cases = [
+        (drag, dict(q0=[1.0], v0=[0.0]), {"gama": -5.0}),
+        (FORMULA, dict(q0=[1.0], v0=[0.0], coordinates=["x"]), {"gamma": -0.1, "gama": -5.0}),
+        ("pendulum", {}, {"gama": -5.0}),
+        (expression, dict(q0=[1.0], v0=[0.0], coordinates=[x]), {"gamma": -0.1, "gama": -5.0}),
+    ]
+    for L, start, parameters in cases:
+        with pytest.raises(ValueError, match="'gama' is not in the Lagrangian.*did you mean 'gamma'"):
+            hz.solve(L, t=1.0, parameters=parameters, **start)
+    with pytest.raises(ValueError, match="'gama'"):
+        hz.ensemble(drag, np.ones((3, 1)), np.zeros((3, 1)), 1.0, parameters={"gama": [-1.0, -2.0, -3.0]})
+    # One that an event or a column alone has is no mistake.
+    sol = hz.solve(FORMULA, [1.0], [0.0], 9.0, coordinates=["x"], parameters={"gamma": -0.1, "level": 0.5}, events="x - level")
+    assert len(sol.events[0].t) > 1
+
+
+def test_a_solution_keeps_no_array_of_the_callers():
+    q, v, t = np.array([1.0]), np.array([0.0]), np.array([0.0, 5.0, 10.0])
+    sol = hz.solve(FORMULA, q, v, t, coordinates=["x"], parameters={"gamma": -0.1})
+    before = sol(5.0).q[0]
+    again = hz.solve(FORMULA, q, v, t, coordinates=["x"], parameters={"gamma": -0.1})
+    q[0], v[0], t[:] = 2.0, 3.0, 7.0
+    assert again(5.0).q[0] == before
+    assert again.plan.steps == sol.plan.steps

@@ -7,7 +7,7 @@ import numpy as np
 from . import _core
 from ._solution import crossings
 from ._solve import events_of, system_and_start
-from ._system import expression
+from ._system import check_parameters, expression
 
 
 def ensemble(
@@ -70,6 +70,9 @@ def ensemble(
     if (v0 is None) == (p0 is None):
         raise ValueError("give `v0` or `p0`, one of them")
     given = events_of(events, system) if events else []
+    columns = [expression(column, system) for column in observe.values()] if observe else []
+    if parameters:
+        check_parameters(system, parameters, L, [*(event[0] for event in given), *columns])
     record = _core.run_ensemble(
         system,
         (q0, v0, False, z0) if p0 is None else (q0, p0, True, z0),
@@ -78,7 +81,7 @@ def ensemble(
         list(varied),
         list(varied.values()),
         given,
-        [expression(column, system) for column in observe.values()] if observe else [],
+        columns,
         threads,
     )
     event_names = tuple(events) if isinstance(events, dict) else len(given)

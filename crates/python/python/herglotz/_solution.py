@@ -173,7 +173,7 @@ class Solution:
             t = asked[asked > at] if asked[-1] > start else asked[asked < at]
             if len(t) == 0:
                 raise ValueError("the motion has reached its end: give `t`, a later one")
-        times = np.atleast_1d(np.asarray(t, dtype=float))
+        times = np.array(t, dtype=float, ndmin=1)
         if len(times) == 0 or times[0] != at:
             times = np.concatenate([[at], times])
         _, _, every, way, events, columns, conformal_factor, estimate = self._request

@@ -2,7 +2,7 @@
 
 from . import _core
 from ._solution import Interrupted, Solution
-from ._system import expression, system
+from ._system import check_parameters, copied, expression, system
 
 
 def solve(
@@ -73,6 +73,7 @@ def solve(
     Interrupted
         A `KeyboardInterrupt` with the solution up to there.
     """
+    given = L
     if type(L) is not _core.System or parameters is not None or q0 is None:
         L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters)
     if t is None:
@@ -80,8 +81,8 @@ def solve(
     if (v0 is None) == (p0 is None):
         raise ValueError("give `v0` or `p0`, one of them")
     request = (
-        (q0, v0, False, z0) if p0 is None else (q0, p0, True, z0),
-        t,
+        (copied(q0), copied(v0), False, z0) if p0 is None else (copied(q0), copied(p0), True, z0),
+        copied(t),
         every,
         (accuracy, integrator, step, steps),
         events_of(events, L) if events else [],
@@ -89,6 +90,8 @@ def solve(
         conformal_factor,
         estimate,
     )
+    if parameters:
+        check_parameters(L, parameters, given, [*(event[0] for event in request[4]), *request[5]])
     event_names = tuple(events) if isinstance(events, dict) else len(request[4])
     return run(L, request, event_names, tuple(observe) if observe else ())
 

@@ -1,7 +1,11 @@
 """Systems of what a user may call a Lagrangian."""
 
+import difflib
 import functools
+import re
 from types import FunctionType
+
+import numpy as np
 
 from . import _core, _trace
 
@@ -61,6 +65,29 @@ def expression(of, system):
             of, (names, _core.velocity_names(system.given_coordinates)[1], list(system.parameters))
         )
     raise ValueError(f"{of!r} is no expression: give a text, or a function of (t, q, v, z)")
+
+
+def check_parameters(system, given, L, expressions):
+    """Refuses parameters that neither the Lagrangian nor an expression beside it has: most are misspelt."""
+    known = system.used_parameters
+    for name in given:
+        if name in known or any(re.search(rf"\b{re.escape(str(name))}\b", text) for text in expressions):
+            continue
+        own = getattr(L, "__code__", None)
+        own = own.co_varnames[: own.co_argcount + own.co_kwonlyargcount][4:] if own is not None else ()
+        if name in own:
+            continue
+        names = sorted({*known, *own})
+        near = difflib.get_close_matches(str(name), names, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(map(repr, names)) or 'none'}"
+        raise ValueError(f"the parameter {name!r} is not in the Lagrangian, nor in an event or a column: {hint}")
+
+
+def copied(x):
+    """An array or a list of the caller's as it is now: what they change later changes no solution."""
+    if isinstance(x, np.ndarray):
+        return x.copy()
+    return [copied(part) for part in x] if isinstance(x, list) else x
 
 
 def names(coordinates, n):
