@@ -11,6 +11,7 @@ use crate::{Attack, Exceptions};
 
 pub const EXCEPTIONS: Exceptions = &[
     ("Lagrangian::closed_*", "the implementor's, and nothing by default"),
+    ("Lagrangian::switching_functions", "the implementor's, and none by default"),
     ("Lagrangian::structure", "the implementor's, and takes no number"),
     ("OneParameterGroup::act", "the implementor's; that of Symmetry is attacked with what calls it"),
     ("SystemVisitor::*", "the implementor's"),

@@ -33,6 +33,7 @@ pub const ATTACKS: &[Attack] = &[
             "Run::steps",
             "Run::without_action",
             "Run::with_conformal_factor",
+            "Run::with_error_estimate",
             "Run::plan",
             "Run::run",
             "Plan::step_size",
@@ -145,7 +146,7 @@ fn runs(report: &mut Report) {
         }
     }
     let problem = tame();
-    let in_seven = |until| seven(&problem, None).with_conformal_factor().run(until).map(numbers);
+    let in_seven = |until| seven(&problem, None).with_conformal_factor().with_error_estimate().run(until).map(numbers);
     let by_steps = |steps| problem.steps(steps).run(Until::Time(0.5)).map(numbers);
     for span in HOSTILE {
         let refused = span == 0.0 || !span.is_finite();

@@ -7,12 +7,15 @@ use contact_geom::statements::ActionSquared;
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField};
 use contact_geom::{
     Clock, Derivatives, Dual, Lagrangian, Regularity, Statement, Structure, ValueOnly, VelocityPoint,
-    check_closed_derivatives, derived_gradient, derived_hessian, herglotz_field, herglotz_rates, legendre,
-    legendre_jacobian, legendre_polynomials, regularity, statements,
+    check_closed_derivatives, derived_gradient, derived_hessian, gradient_rounding, herglotz_field, herglotz_rates,
+    legendre, legendre_jacobian, legendre_polynomials, regularity, statements,
 };
 
 pub const ATTACKS: &[Attack] = &[
-    Attack { on: &["legendre", "legendre_jacobian", "herglotz_field", "herglotz_rates"], run: herglotz },
+    Attack {
+        on: &["legendre", "legendre_jacobian", "herglotz_field", "herglotz_rates", "gradient_rounding"],
+        run: herglotz,
+    },
     Attack { on: &["legendre_polynomials"], run: polynomials },
     Attack { on: &["regularity", "Regularity::of", "Regularity::condition"], run: regularities },
     Attack {
@@ -59,6 +62,10 @@ fn herglotz(report: &mut Report) {
         report.formula(&(t, x), herglotz_field(&Everything, t, &at));
         report.formula(&(t, x), herglotz_rates(&Everything, t, &at));
         report.formula(&(t, x), herglotz_field(&ValueOnly(Everything), t, &at));
+        let (of_value, of_gradient) = gradient_rounding(&Everything, t, &at);
+        // Sizes, or no numbers: never a number below 0.
+        let entries = (0..5).map(|i| of_gradient.component(i)).chain([of_value]);
+        report.check(entries.into_iter().all(|e| !(e < 0.0)), || format!("{t}, {x:?}: {of_value}, {of_gradient:?}"));
     }
 }
 

@@ -45,6 +45,8 @@ pub const ATTACKS: &[Attack] = &[
             "Scalar::sqrt",
             "Scalar::powi",
             "Scalar::powf",
+            "Scalar::along_slope",
+            "Scalar::slope_power",
             "Scalar::exp",
             "Scalar::exp_m1",
             "Scalar::ln",
@@ -194,7 +196,9 @@ fn functions(report: &mut Report) {
         ("atan", |x| x.atan()),
     ];
     // Elsewhere than where they are defined they are not numbers.
-    let partly: [(&str, Function); 7] = [
+    let partly: [(&str, Function); 9] = [
+        ("along_slope", |x| x.along_slope(x.recip())),
+        ("slope_power", |x| x.slope_power(-1.0) + x.slope_power(0.5)),
         ("recip", |x| x.recip()),
         ("sqrt", |x| x.sqrt()),
         ("powf", |x| x.powf(1.5)),
