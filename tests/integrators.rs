@@ -14,6 +14,7 @@ mod accuracy;
 mod clocked;
 mod conformal_steppers;
 mod dense_output;
+mod events;
 mod every_run;
 mod gauss;
 mod gauss_catalogue;

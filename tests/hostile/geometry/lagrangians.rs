@@ -64,7 +64,7 @@ fn herglotz(report: &mut Report) {
         report.formula(&(t, x), herglotz_field(&ValueOnly(Everything), t, &at));
         let (of_value, of_gradient) = gradient_rounding(&Everything, t, &at);
         // Sizes, or no numbers: never a number below 0.
-        let entries = (0..5).map(|i| of_gradient.component(i)).chain([of_value]);
+        let entries = (0..3).map(|i| of_gradient.component(i)).chain([of_value]);
         report.check(entries.into_iter().all(|e| !(e < 0.0)), || format!("{t}, {x:?}: {of_value}, {of_gradient:?}"));
     }
 }

@@ -1,0 +1,232 @@
+//! Events of runs that join: each change of sign is counted once, in exactly one of the runs.
+
+use contact_geom::nalgebra::SVector;
+use contact_geom::systems::{HarmonicOscillator, UniformField};
+use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint};
+use discrete_herglotz::{
+    AnyIntegrator, Checkpoint, Crossing, Event, Events, Interrupted, Method, Moment, Problem, Start, Status, Steps,
+    Stop, Until,
+};
+use proptest::prelude::*;
+use std::f64::consts::PI;
+use std::ops::ControlFlow;
+
+/// An oscillation of frequency one about a place.
+struct About(f64);
+
+impl Lagrangian<1> for About {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        let x = q[0] - self.0;
+        (v[0] * v[0] - x * x) * 0.5
+    }
+}
+
+/// A damped oscillation under a force that depends on the time.
+struct Driven {
+    force: f64,
+    frequency: f64,
+}
+
+impl Lagrangian<1> for Driven {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        (v[0] * v[0] - q[0] * q[0]) * 0.5 + (t * self.frequency).cos() * q[0] * self.force - z * 0.02
+    }
+}
+
+/// A run from a start to a time, with the crossings of events and where it ends.
+fn run_to<'f, L: Lagrangian<1>>(
+    system: &L,
+    (t0, start): (f64, impl Into<Start<1>>),
+    (by, steps): (AnyIntegrator, Steps),
+    to: f64,
+    events: impl IntoIterator<Item = Event<'f, 1>>,
+) -> (discrete_herglotz::Outcome<1>, Vec<Crossing<1>>) {
+    let mut events = Events::new(events);
+    let problem = Problem::new(system, t0, start).unwrap();
+    let outcome = problem.by(by).steps(steps).observe(&mut events).run(Until::Time(to)).unwrap();
+    (outcome, events.crossings)
+}
+
+/// A loop that goes on from the first crossing comes to the next one, wherever the surface, by the time that goes on or begins anew,
+/// forward and back; with a function that jumps as with a smooth one.
+#[test]
+fn a_run_from_a_crossing_goes_on_to_the_next() {
+    let integrators = [
+        AnyIntegrator::Gauss { stages: 4 },
+        AnyIntegrator::Gauss { stages: 16 },
+        AnyIntegrator::Discrete(Method::Midpoint),
+        AnyIntegrator::Discrete(Method::LeftMidpoint),
+    ];
+    for by in integrators {
+        for (place, h, way) in [(0.0, 0.1, 1.0), (0.0, 1e-3, 1.0), (0.0, 0.1, -1.0), (1.0, 0.05, 1.0), (1e6, 0.1, 1.0)]
+        {
+            for (anew, jump, terminal) in
+                [(false, false, false), (true, false, true), (false, true, false), (true, true, true)]
+            {
+                // At a place with a size a jump is not told from the rounding of its argument.
+                if jump && place != 0.0 {
+                    continue;
+                }
+                let system = About(place);
+                let (mut t, mut start) = (0.0, Start::from(VelocityPoint::new([place + 1.0], [0.0], 0.0)));
+                for k in 0..12 {
+                    let event = Event::new(|_, x: &PhasePoint<1>| {
+                        let g = x.q[0] - place;
+                        if jump { if g > 0.0 { 1.0 } else { -1.0 } } else { g }
+                    });
+                    let event = if terminal { event.terminal() } else { event };
+                    let (_, found) = run_to(&system, (t, start), (by, Steps::Size(h)), t + 4.0 * way, [event]);
+                    let name = format!("{by} about {place} by {h}, anew {anew}, jump {jump}: the {k}th from {t}");
+                    assert_eq!(found.len(), 1, "{name}: {found:?}");
+                    // Half a period, a quarter at first: to the error of midpoint steps of a tenth, 1e-3 of it, and the rounding of 1e6.
+                    let passed = (found[0].t - t).abs();
+                    let expected = if k == 0 { 0.5 * PI } else { PI };
+                    assert!((passed - expected).abs() <= 5e-3, "{name}: after {passed}");
+                    (t, start) = (if anew { 0.0 } else { found[0].t }, found[0].state.into());
+                }
+            }
+        }
+    }
+}
+
+/// A throw from below the floor by a rounding: it falls through it at twice the speed over the acceleration, in long steps and short ones.
+#[test]
+fn a_start_within_rounding_goes_by_its_rate() {
+    let ball = UniformField { field: [-9.81], gamma: 0.0 };
+    for below in [-2e-16, 0.0, 2e-16, -1e-17] {
+        for (count, h) in [(1, 20.0), (20, 1.0), (2000, 0.01)] {
+            let floor = || Event::new(|_, x: &PhasePoint<1>| x.q[0]);
+            let start = VelocityPoint::new([below], [3.5], 0.0);
+            let way = (AnyIntegrator::Gauss { stages: 8 }, Steps::Count(count));
+            for event in [floor().terminal(), floor().falling().terminal()] {
+                let (ended, found) = run_to(&ball, (0.0, start), way, 20.0, [event]);
+                let name = format!("{below} by {h}: {ended:?}");
+                assert!(matches!(ended.status, Status::Stopped { by: "an event", .. }) && found.len() == 1, "{name}");
+                // The quotient has two roundings, and the step is one of 20.
+                assert!((ended.t - 7.0 / 9.81).abs() <= 8.0 * f64::EPSILON * 20.0, "{name}");
+            }
+        }
+    }
+    // From rest on the floor it falls, and does not come through it.
+    let rest = VelocityPoint::new([0.0], [0.0], 0.0);
+    let way = (AnyIntegrator::Gauss { stages: 8 }, Steps::Count(20));
+    let (ended, found) = run_to(&ball, (0.0, rest), way, 2.0, [Event::new(|_, x: &PhasePoint<1>| x.q[0])]);
+    assert_eq!((ended.status, found), (Status::Completed, vec![]));
+    // What is off the surface by more than rounding comes through it.
+    let off = VelocityPoint::new([-1e-12], [3.5], 0.0);
+    let (_, found) = run_to(&ball, (0.0, off), way, 0.5, [Event::new(|_, x: &PhasePoint<1>| x.q[0])]);
+    assert_eq!(found.len(), 1);
+}
+
+/// An event exactly where one run ends and the next begins is the first one's; also where an observer ends it and it is resumed.
+#[test]
+fn a_seam_on_a_surface_belongs_to_the_run_that_ends() {
+    let system = HarmonicOscillator { gamma: 0.0 };
+    let start = VelocityPoint::new([1.0], [0.0], 0.0);
+    let way = (AnyIntegrator::Gauss { stages: 8 }, Steps::Count(8));
+    let at_one = || Event::new(|t, _: &PhasePoint<1>| t - 1.0);
+    let (ended, found) = run_to(&system, (0.0, start), way, 1.0, [at_one(), at_one().rising(), at_one().falling()]);
+    assert_eq!(found.iter().map(|c| (c.event, c.t)).collect::<Vec<_>>(), [(0, 1.0), (1, 1.0)]);
+    assert_eq!(run_to(&system, (1.0, &ended), way, 2.0, [at_one()]).1, []);
+    // It touches its surface at the seam.
+    let touches = || Event::new(|t, _: &PhasePoint<1>| (t - 1.0).powi(2));
+    assert_eq!(run_to(&system, (0.0, start), way, 1.0, [touches()]).1, []);
+    assert_eq!(run_to(&system, (1.0, &ended), way, 2.0, [touches()]).1, []);
+
+    let path = std::env::temp_dir().join(format!("seam_on_a_surface_{}", std::process::id()));
+    let problem = Problem::new(&system, 0.0, start).unwrap();
+    let run = || problem.by(way.0).steps(Steps::Count(16));
+    let mut saved = Checkpoint::every(8, &path).unwrap();
+    let mut enough = |at: &Moment<'_, 1>| {
+        if at.k == 8 { ControlFlow::Break(Stop::here("a test")) } else { ControlFlow::Continue(()) }
+    };
+    let (mut first, mut second) = (Events::new([at_one()]), Events::new([at_one()]));
+    let cut = run().observe(&mut first).observe(&mut saved).observe(&mut enough).run(Until::Time(2.0)).unwrap();
+    let resumed = run().observe(&mut second).resume(Interrupted::read(&path).unwrap()).run(Until::Time(2.0)).unwrap();
+    std::fs::remove_file(path).unwrap();
+    assert_eq!((cut.t, resumed.status), (1.0, Status::Completed));
+    assert_eq!((first.crossings.len(), second.crossings.len()), (1, 0));
+}
+
+/// Events of one instant are told in the order of their index, those after the terminal one too; what lies behind is not told.
+#[test]
+fn all_events_of_an_instant_are_told() {
+    let system = HarmonicOscillator { gamma: 0.0 };
+    let start = VelocityPoint::new([1.0], [0.0], 0.0);
+    for (stages, steps) in [(4, 7), (8, 3), (16, 1)] {
+        let all = || {
+            [
+                Event::new(|_, x: &PhasePoint<1>| x.q[0].sin()),
+                Event::new(|_, x: &PhasePoint<1>| x.q[0]).terminal(),
+                Event::new(|_, x: &PhasePoint<1>| -3.0 * x.q[0]),
+                Event::new(|_, x: &PhasePoint<1>| x.q[0] + 1e-3),
+                Event::new(|_, x: &PhasePoint<1>| x.q[0] * (2.0 + x.p[0])).terminal(),
+            ]
+        };
+        let way = (AnyIntegrator::Gauss { stages }, Steps::Count(steps));
+        let (ended, found) = run_to(&system, (0.0, start), way, 3.0, all());
+        assert_eq!(found.iter().map(|c| c.event).collect::<Vec<_>>(), [0, 1, 2, 4], "{stages}");
+        assert_eq!(ended.t, found[1].t);
+        // The next run has the rest alone, and then those of the next instant.
+        let (_, found) = run_to(&system, (ended.t, &ended), way, ended.t + 3.5, all());
+        assert_eq!(found.iter().map(|c| c.event).collect::<Vec<_>>(), [3, 3, 0, 1, 2, 4], "{stages}: {found:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// A run that is chopped anywhere, and at its crossings, has the crossings of the whole one.
+    #[test]
+    fn chopped_runs_have_the_crossings_of_the_whole(
+        (force, frequency) in (0.0..2.0, 0.1..3.0),
+        (x, v) in (-2.0..2.0, -2.0..2.0),
+        (begin, span) in (prop_oneof![Just(0.0), -100.0..100.0], 5.0..20.0),
+        back in any::<bool>(),
+        mut cuts in prop::collection::vec(0.0..1.0, 0..6),
+        own in prop::collection::vec(any::<bool>(), 40),
+        stages in 6usize..12,
+    ) {
+        let system = Driven { force, frequency };
+        let way = (AnyIntegrator::Gauss { stages }, Steps::Size(0.05));
+        let all = || [
+            Event::new(|_, x: &PhasePoint<1>| x.q[0]),
+            Event::new(|_, x: &PhasePoint<1>| x.p[0]),
+            Event::new(|_, x: &PhasePoint<1>| x.q[0] - 0.5).rising(),
+            Event::new(|_, x: &PhasePoint<1>| 2.0 * x.q[0]).falling(),
+        ];
+        let rate = |c: &Crossing<1>| match c.event {
+            1 => force * (frequency * c.t).cos() - c.state.q[0] - 0.02 * c.state.p[0],
+            _ => c.state.p[0],
+        };
+        let start = VelocityPoint::new([x], [v], 0.0);
+        let end: f64 = if back { begin - span } else { begin + span };
+        let (_, whole) = run_to(&system, (begin, start), way, end, all());
+        // What nearly touches its surface has no time to round-off.
+        prop_assume!(whole.iter().all(|c| rate(c).abs() > 0.05));
+        for cut in &mut cuts {
+            *cut = begin + *cut * (end - begin);
+        }
+        cuts.extend(whole.iter().zip(&own).filter(|(_, own)| **own).map(|(c, _)| c.t));
+        cuts.push(end);
+        cuts.sort_by(|a: &f64, b| if back { b.total_cmp(a) } else { a.total_cmp(b) });
+        cuts.dedup();
+        let (mut t, mut from, mut chopped) = (begin, Start::from(start), Vec::new());
+        for cut in cuts {
+            // What is shorter than the rounding of ten steps is none.
+            if (cut - t).abs() < 1e-10 {
+                continue;
+            }
+            let (ended, found) = run_to(&system, (t, from), way, cut, all());
+            chopped.extend(found);
+            (t, from) = (ended.t, (&ended).into());
+        }
+        let names = |found: &[Crossing<1>]| found.iter().map(|c| c.event).collect::<Vec<_>>();
+        prop_assert_eq!(names(&whole), names(&chopped), "{:?} and {:?}", whole, chopped);
+        for (a, b) in whole.iter().zip(&chopped) {
+            // 400 steps of a motion of size 5, over the rate, and the rounding of the time.
+            let bound = f64::EPSILON * (400.0 * 5.0 / rate(a).abs() + 16.0 * a.t.abs());
+            prop_assert!((a.t - b.t).abs() <= bound, "{} and {}, not {}", a.t, b.t, bound);
+        }
+    }
+}
