@@ -85,7 +85,7 @@ fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
         let (Resting::Torque { gamma, .. } | Resting::Duffing { gamma, .. } | Resting::Hoop { gamma, .. }) = system;
         let integrator = integrators[(draws.next() * integrators.len() as f64) as usize];
         // Until e^(gamma t/2) is between 1e-3 and 1e-40; where the drag is above critical it takes longer.
-        let span = draws.between(14.0, 180.0) / gamma.abs().min(2.0 / gamma.abs());
+        let span = draws.between(14.0, 180.0) / -contact_geom::larger(-gamma.abs(), -2.0 / gamma.abs());
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let by_accuracy = draws.next() < 0.25;
         let run = if by_accuracy {

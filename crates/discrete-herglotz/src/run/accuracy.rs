@@ -424,7 +424,9 @@ fn beside_nodes<L: Lagrangian<N>, const N: usize>(
         return Ok(None);
     }
     Ok(match pilots.gauss(stages, k + 1, &Marks::of(k + 1), false, false)? {
-        PilotEnd::Followed(track) => Some(track.distance_at_end(fine)).filter(|distance| !(*distance <= goal)),
+        PilotEnd::Followed(track) => {
+            Some(track.distance_at_end(fine)).filter(|distance| distance.is_nan() || *distance > goal)
+        }
         PilotEnd::Exhausted => None,
         _ => Some(f64::INFINITY),
     })

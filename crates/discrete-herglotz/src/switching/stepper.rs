@@ -181,8 +181,11 @@ where
 
     /// Whether a step is to be divided.
     fn is_too_long(&self, step: &S) -> bool {
-        // A NaN is too.
-        self.most_misfit < f64::INFINITY && !(step.misfit() <= self.most_misfit)
+        if self.most_misfit == f64::INFINITY {
+            return false;
+        }
+        let misfit = step.misfit();
+        misfit.is_nan() || misfit > self.most_misfit
     }
 
     /// The steppers of the last step: of its parts where it had some, else that of all steps.
