@@ -215,3 +215,19 @@ fn random_kinks_and_jumps() {
     println!("{solved} solved, {refused} refused, at worst {worst:e}");
     assert!(solved > 700 && refused <= solved / 100, "{refused} of {solved} refused");
 }
+
+/// A jump that is written as a smooth function, so narrow that no gradient sees it: the motion is right beyond it, or refused.
+#[test]
+fn a_jump_in_disguise_is_not_crossed() {
+    for (height, beyond) in [(0.15, 0.4_f64.sqrt()), (0.0015, 0.994_f64.sqrt())] {
+        let text = format!("x'^2/2 - {height}*tanh((x - 0.7)*1e10)");
+        let lagrangian = Formula::parse(&text, &["x"], &[]).unwrap().lagrangian::<1>().unwrap();
+        let problem = Problem::new(&lagrangian, 0.0, VelocityPoint::new([0.0], [1.0], 0.0)).unwrap();
+        for wanted in [1e-4, 1e-6, 1e-9] {
+            if let Ok(found) = problem.accuracy(wanted).run(Until::Time(10.0)) {
+                let off = (found.q[0] - 0.7 - 9.3 * beyond).abs();
+                assert!(off <= 10.0 * wanted, "{text} to {wanted:e}: {off:e} in {} steps", found.steps);
+            }
+        }
+    }
+}

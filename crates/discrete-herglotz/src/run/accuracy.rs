@@ -129,7 +129,9 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
     let mut stages = stages_along(pilots.request, pilots.wanted);
     pilots.watches_clock = const { L::HAS_CLOCK } && pilots.request.problem.structure.autonomous;
     pilots.watches_newton = stages > STAGES;
-    pilots.watches_uneven = true;
+    // Parts that end where a kink is hidden would agree on a wrong motion: only where all kinks are known are steps divided.
+    let divides = const { L::PROVED || L::HAS_SWITCHING_FUNCTIONS };
+    pilots.watches_uneven = divides;
     let mut found = by_equal_steps(pilots, &gauss(stages), stages);
     pilots.watches_newton = false;
     if let Err(Ended::Elsewhere(Elsewhere::FewerStages)) = found {
@@ -145,6 +147,7 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
     }
     // Where a part of the motion asks for much shorter steps than the rest, those are divided; and they are refused for the first reason.
     if let Err(Ended::Refused(refused @ InputError::Accuracy { cause, .. })) = &found
+        && divides
         && !matches!(cause, Obstacle::RoundOff | Obstacle::Chaos { .. })
     {
         return divided_steps(pilots).map_err(|divided| match divided {

@@ -56,7 +56,11 @@ impl<L: Lagrangian<N>, const N: usize> AsStepper<N> for GaussStepper<'_, L, N> {
         GaussStepper::add_rests(self, rests);
     }
     fn misfit(&self) -> f64 {
-        self.look(1).map_or(0.0, |look| if look.is_underflown() { 0.0 } else { look.misfit })
+        self.look(1).map_or(0.0, |look| {
+            // A jump that has no gradient at either side is seen in the values of L alone.
+            let of_value = if look.kinetic > 0.0 { look.of_value / look.kinetic } else { 0.0 };
+            if look.is_underflown() { of_value } else { larger(look.misfit, of_value) }
+        })
     }
 
     fn stepper(&self) -> &(dyn Stepper<N> + '_) {
