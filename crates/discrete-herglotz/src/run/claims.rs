@@ -69,7 +69,8 @@ impl<const N: usize> ClaimMonitor<N> {
             return None;
         }
         let here = [problem.state.q, problem.state.p];
-        let reference = structure.autonomous || structure.z_free && structure.constant_mass;
+        // What is quadratic may have coefficients that depend on time.
+        let reference = structure.autonomous || structure.z_free && structure.constant_mass && !structure.quadratic;
         let reference = if reference {
             Some(Constants::at(&structure, problem.lagrangian, problem.t0, &problem.start)?)
         } else {

@@ -372,7 +372,8 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
         let (found, cause) = self.in_step(&mut step, way);
         let mut end: Option<Crossing<N>> = None;
         for crossing in found {
-            if end.is_some_and(|end| !self.together(&end, &crossing, way)) {
+            // The event that ends the run has no other crossing at its own instant.
+            if end.is_some_and(|end| end.event == crossing.event || !self.together(&end, &crossing, way)) {
                 continue;
             }
             self.crossings.push(crossing);

@@ -36,7 +36,8 @@ fn pilot_runs_cost_little() {
         assert_eq!(count, run.steps);
         // Looks count twice their points, of which there are at least 2000 beside those of the steps.
         let (spent, looks) = (spent as f64, 2.5 * 2.0 * 2000.0);
-        let most = 8.0 * run.evaluations as f64 + looks;
+        // A run of 0.6 k steps is the shortest that those with k, k + 1 and 2k steps may end in, and a first one may have been in vain.
+        let most = 10.0 * run.evaluations as f64 + looks;
         assert!(spent <= most, "{span}, {wanted:e}: {spent} evaluations for {}", run.evaluations);
     }
 }
