@@ -60,4 +60,11 @@ fn nothing_is_allocated() {
         stepper.advance(1).unwrap();
         assert_eq!(allocations(|| stepper.advance(10).unwrap()), 0, "{stages} stages");
     }
+    // Nor by steps that are searched for a kink and meet none.
+    let kinked = Formula::parse("x'^2/2 - x^2/2 - max(x - 100, 0)", &["x"], &[]).unwrap().lagrangian::<1>().unwrap();
+    let problem = Problem::new(&kinked, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let plan = problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(1e-1)).plan(Until::Time(10.0)).unwrap();
+    let mut stepper = plan.stepper().unwrap();
+    stepper.advance(1).unwrap();
+    assert_eq!(allocations(|| stepper.advance(10).unwrap()), 0, "beside a kink");
 }

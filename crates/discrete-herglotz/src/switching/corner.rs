@@ -80,11 +80,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
             if size <= f64::EPSILON * largest(v.iter().copied())
                 || (size >= before && size <= 1e-10 * largest(v.iter().copied()))
             {
-                break;
+                return Ok((v, p.dot(&v) - self.value(&v)));
             }
             before = size;
         }
-        Ok((v, p.dot(&v) - self.value(&v)))
+        Err(StepError::NotConverged { residual: before, iterations: ITERATIONS as u32 })
     }
 }
 
@@ -207,7 +207,8 @@ fn conditions<L: Lagrangian<N>, const N: usize>(
         }
         before = size;
     }
-    Ok(None)
+    // Neither a root nor a turn was found: that is no reflection.
+    Err(StepError::NotConverged { residual: before, iterations: ITERATIONS as u32 })
 }
 
 /// Whether L or its momenta jump across a surface that depends on the velocity or on z alone.
