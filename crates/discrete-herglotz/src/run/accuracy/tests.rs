@@ -6,7 +6,7 @@ use crate::run::{Needs, Problem, Request, Shared, Until};
 use crate::{AnyIntegrator, GaussCollocation, Stepper, Wants};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Duffing, Kepler, OneCoordinate, Pendulum, QuadraticInZ};
-use contact_geom::{Lagrangian, Scalar, VelocityPoint};
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -114,6 +114,21 @@ impl Lagrangian<1> for Unstated {
         match self {
             Unstated::Stiffer(k) => kinetic - T::zero().if_less(q[0], potential, potential * *k),
             Unstated::Begins(at) => kinetic - potential + T::from(*at).if_less(t, q[0], T::zero()),
+        }
+    }
+
+    /// Its accelerations alone are iterated, with the stages that long motions take.
+    fn structure(&self) -> Structure {
+        let autonomous = matches!(self, Unstated::Stiffer(_));
+        let (separable, constant_mass) = (true, true);
+        Structure {
+            autonomous,
+            z_free: true,
+            z_affine: true,
+            constant_rate: true,
+            separable,
+            constant_mass,
+            ..Structure::default()
         }
     }
 }
