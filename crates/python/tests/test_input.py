@@ -41,7 +41,7 @@ BAD = [
     (dict(L="x'^2/2 + cos(y)"), r"line 1, column 14.*\n.*\n +\^"),
     (dict(L="x' + gamma*z"), "linear in x'"),
     (dict(L="pendulun"), "pendulum|unknown name"),
-    (dict(L="x'^2/2 + 1/x", q0=[0.0]), "not finite at the start"),
+    (dict(L="x'^2/2 + 1/x", q0=[0.0], parameters={}), "not finite at the start"),
     (dict(events="y"), 'event "y": line 1, column 1'),
     (dict(events=[hz.Event("x", direction="up")]), '"up"'),
     (dict(events=[3]), "3 is no expression"),
