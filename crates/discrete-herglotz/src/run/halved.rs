@@ -1,8 +1,9 @@
 //! Steps against twice as many of half their length: whether given steps resolve the motion at all.
 
 use super::{Plan, Problem};
+use crate::run::step_error;
 use crate::run::watch::{LEAST, rounding};
-use crate::{Doubt, InputError, Stepper, legendre_inverse};
+use crate::{Doubt, StepError, Stepper, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint, larger, largest};
 
@@ -23,11 +24,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         if self.facts.by_clock {
             return None;
         }
-        let mut fine = self.part((*t, from), &v, 0.5 * self.h).ok()?;
-        if fine.advance_until(2 * steps, end).is_err() {
+        let Ok(fine) = self.advanced((*t, from), &v, 0.5 * self.h, (2 * steps, end)) else {
             // What shorter steps do not get over a longer one should not.
             return Some(f64::INFINITY);
-        }
+        };
         let fine = fine.state();
         let (coarse_v, fine_v) = (at_end(to)?, at_end(&fine)?);
         let size = |x: [&SVector<f64, N>; 3]| largest(x.into_iter().flat_map(|x| x.iter().copied()));
@@ -43,19 +43,29 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         Some(larger(relative(apart(&to.q, &fine.q), width), of_v) / APART)
     }
 
-    /// A stepper by steps of another length, from a state with its velocity; by a clock, of the same length in its time: they are cut
-    /// where they pass the time that they are to reach.
-    pub(super) fn part(
+    /// A stepper after steps of another length, from a state with its velocity, so many or until a time; by a clock, steps of the
+    /// same length in its time: they are cut where they pass the time that they are to reach.
+    ///
+    /// A few steps of a linear motion are worth no matrix, not even a cheap one, unless their stages cannot be solved for without it:
+    /// the sweeps lose with an ill-conditioned mass matrix what they gain.
+    pub(super) fn advanced(
         &self,
         (t, from): (f64, &PhasePoint<N>),
         v: &SVector<f64, N>,
         h: f64,
-    ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-        let start = VelocityPoint { q: from.q, v: *v, z: from.z };
-        // A few steps of this length: no matrix of a linear motion is worth its price, not even a cheap one.
-        let structure = Structure { quadratic: false, ..self.problem.structure };
-        let problem = Problem { t0: t, start, state: *from, structure, ..*self.problem };
-        self.make_stepper(&problem, if self.facts.by_clock { self.h } else { h }, false)
+        (steps, t_end): (usize, f64),
+    ) -> Result<Box<dyn Stepper<N> + 'p>, StepError> {
+        let linear = self.problem.structure.quadratic;
+        let by = |quadratic: bool| {
+            let start = VelocityPoint { q: from.q, v: *v, z: from.z };
+            let structure = Structure { quadratic, ..self.problem.structure };
+            let problem = Problem { t0: t, start, state: *from, structure, ..*self.problem };
+            let h = if self.facts.by_clock { self.h } else { h };
+            let mut stepper = self.make_stepper(&problem, h, false).map_err(step_error)?;
+            stepper.advance_until(steps, t_end).map_err(|halt| halt.cause)?;
+            Ok(stepper)
+        };
+        by(false).or_else(|cause| if linear { by(true) } else { Err(cause) })
     }
 }
 
@@ -115,8 +125,7 @@ mod tests {
         let plan = plan(&problem, 8, 100);
         assert!(by_one_matrix(plan.stepper().unwrap()));
         for h in [0.3 * H, -0.5 * H] {
-            let mut part = plan.part((0.0, &problem.state), &problem.start.v, h).unwrap();
-            part.advance(1).unwrap();
+            let part = plan.advanced((0.0, &problem.state), &problem.start.v, h, (1, h)).unwrap();
             assert!(part.evaluations() > 0);
             // x = e^(-t/20) (cos w t + sin w t / (20 w)), w^2 = k^2 - 1/400; to round-off, of ten terms.
             let (t, state) = (h, part.state());
@@ -135,6 +144,40 @@ mod tests {
         for (steps, stages, expected) in [(500, 16, false), (1000, 16, true), (50, 8, false), (200, 8, true)] {
             let plan = plan(&problem, stages, steps);
             assert_eq!(by_one_matrix(plan.stepper().unwrap()), expected, "{steps} steps of {stages} stages");
+        }
+    }
+
+    /// An oscillator in two coordinates that are nearly one: the mass matrix, and that of the spring, have the condition 1e10.
+    struct NearlyOne;
+
+    impl Lagrangian<2> for NearlyOne {
+        fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+            let turned = |x: &SVector<T, 2>| {
+                let (sin, cos) = 0.6f64.sin_cos();
+                SVector::from([x[0] * cos + x[1] * sin, (x[1] * cos - x[0] * sin) * 1e-5])
+            };
+            Oscillators.value(t, &turned(q), &turned(v), z) + turned(q)[1] * turned(q)[1] * 1.5
+        }
+        fn structure(&self) -> Structure {
+            Lagrangian::<2>::structure(&Oscillators)
+        }
+    }
+
+    /// Without the matrix the stages of such a motion are not solved for: its steps are compared, and looked into, by one.
+    #[test]
+    fn an_ill_conditioned_mass_matrix_is_no_flaw_of_the_steps() {
+        let start = VelocityPoint::new([1.0, -0.4], [0.3, 0.8], 0.0);
+        let problem = Problem::new(&NearlyOne, 0.0, start).unwrap();
+        for stages in [1, 2] {
+            let run = problem.by(GaussCollocation { stages }).steps(Steps::Count(64));
+            assert_eq!(run.run(Until::Time(4.0)).unwrap().suspicion, None, "{stages} stages");
+            let plan = problem.by(GaussCollocation { stages }).steps(Steps::Count(64)).plan(Until::Time(4.0)).unwrap();
+            let part = plan.advanced((0.0, &problem.state), &start.v, 0.03, (1, 0.03)).unwrap();
+            // By the whole step's matrix: to rounding through the inverse of the mass matrix.
+            let mut whole = problem.by(GaussCollocation { stages }).steps(Steps::Count(1));
+            whole = whole.without_action();
+            let whole = whole.run(Until::Time(0.03)).unwrap();
+            assert!((part.state().q - whole.q).norm() <= 1e10 * 8.0 * f64::EPSILON);
         }
     }
 }

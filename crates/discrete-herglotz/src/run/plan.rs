@@ -401,8 +401,7 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
 
     fn inside(&self, (t0, from): &(f64, PhasePoint<N>), t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
         let v = self.velocity(*t0, from)?;
-        let mut run = self.part((*t0, from), &v, t - t0).map_err(step_error)?;
-        run.advance_until(1, t).map_err(|halt| halt.cause)?;
+        let run = self.advanced((*t0, from), &v, t - t0, (1, t))?;
         Ok((run.state(), run.sigma()))
     }
 }
