@@ -57,8 +57,7 @@ impl Lagrangian<1> for Bump {
 fn what_is_false_beyond_the_start_is_seen_where_the_motion_goes() {
     let (mut silent, mut seen, mut other) = (Vec::new(), 0, 0);
     let integrators: Vec<_> = AnyIntegrator::all();
-    let cases: u64 = std::env::var("CLAIMS").ok().and_then(|n| n.parse().ok()).unwrap_or(500);
-    for case in 0..cases {
+    for case in 0..500 {
         let mut draws = Draws::of(case);
         let of = [Bumped::Drag, Bumped::Mass, Bumped::Force][(draws.next() * 3.0) as usize];
         let bump = Bump {
@@ -94,9 +93,5 @@ fn what_is_false_beyond_the_start_is_seen_where_the_motion_goes() {
             Err(_) => other += 1,
         }
     }
-    println!("{seen} seen, {other} others, {} silent", silent.len());
-    for x in &silent {
-        println!("{x:?}");
-    }
-    assert!(silent.is_empty() && seen > 300);
+    assert!(silent.is_empty() && seen > 300, "{seen} seen, {other} others; silent: {silent:#?}");
 }

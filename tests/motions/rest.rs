@@ -2,7 +2,7 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Pendulum;
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, larger};
 use discrete_herglotz::{AnyIntegrator, Problem, Rows, SplittingScheme, Status, Steps, Until};
 
 /// Systems of one coordinate that come to rest away from 0, with a drag.
@@ -14,6 +14,8 @@ enum Resting {
     Duffing { beta: f64, gamma: f64 },
     /// A bead on a hoop that turns, beside its lowest place.
     Hoop { square: f64, gamma: f64 },
+    /// A Morse potential.
+    Morse { gamma: f64 },
 }
 
 impl Lagrangian<1> for Resting {
@@ -21,6 +23,10 @@ impl Lagrangian<1> for Resting {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         let (x, kinetic) = (q[0], v[0] * v[0] * 0.5);
         match *self {
+            Resting::Morse { gamma } => {
+                let stretched = -((-x).exp()) + 1.0;
+                kinetic - stretched * stretched + z * gamma
+            }
             Resting::Torque { torque, gamma } => kinetic + x.cos() + x * torque + z * gamma,
             Resting::Duffing { beta, gamma } => kinetic + x * x * 0.5 - x * x * x * x * (0.25 * beta) + z * gamma,
             Resting::Hoop { square, gamma } => kinetic + x.sin() * x.sin() * (0.5 * square) + x.cos() + z * gamma,
@@ -73,19 +79,22 @@ fn draw(draws: &mut Draws) -> (Resting, VelocityPoint<1>) {
 
 #[test]
 fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
-    let cases: u64 = std::env::var("RESTING").ok().and_then(|n| n.parse().ok()).unwrap_or(1000);
+    let cases = 1000;
     let integrators: Vec<_> = AnyIntegrator::all()
         .into_iter()
         .filter(|i| i.check(&Resting::Hoop { square: 2.0, gamma: -1.0 }).is_ok())
         .collect();
-    let (mut flagged, mut done, mut other) = (Vec::new(), 0, std::collections::BTreeMap::<String, u32>::new());
+    let (mut flagged, mut done) = (Vec::new(), 0);
     for case in 0..cases {
         let mut draws = Draws::of(case);
         let (system, start) = draw(&mut draws);
-        let (Resting::Torque { gamma, .. } | Resting::Duffing { gamma, .. } | Resting::Hoop { gamma, .. }) = system;
+        let (Resting::Torque { gamma, .. }
+        | Resting::Duffing { gamma, .. }
+        | Resting::Hoop { gamma, .. }
+        | Resting::Morse { gamma }) = system;
         let integrator = integrators[(draws.next() * integrators.len() as f64) as usize];
         // Until e^(gamma t/2) is between 1e-3 and 1e-40; where the drag is above critical it takes longer.
-        let span = draws.between(14.0, 180.0) / -contact_geom::larger(-gamma.abs(), -2.0 / gamma.abs());
+        let span = draws.between(14.0, 180.0) / -larger(-gamma.abs(), -2.0 / gamma.abs());
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let by_accuracy = draws.next() < 0.25;
         let run = if by_accuracy {
@@ -101,38 +110,48 @@ fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
         match run.run(Until::Time(span)) {
             Ok(end) if end.status == Status::Completed => {
                 done += 1;
-                if let Some(suspicion) = end.suspicion {
-                    flagged.push((
-                        case,
-                        integrator.to_string(),
-                        by_accuracy,
-                        system,
-                        start.q[0],
-                        start.v[0],
-                        span,
-                        end.q[0],
-                        end.p[0],
-                        end.steps,
-                        suspicion,
-                    ));
+                if end.suspicion.is_some() {
+                    flagged.push(format!("{case}: {system:?} from {start:?} by {integrator}: {end:?}"));
                 }
             }
-            Ok(end) => {
-                *other.entry(format!("{} {}", integrator, end.status).chars().take(60).collect()).or_default() += 1
-            }
-            Err(error) => *other.entry(error.to_string().chars().take(60).collect()).or_default() += 1,
+            // Accuracies that methods of low order do not reach, and steps that cannot be taken.
+            Ok(_) | Err(_) => {}
         }
     }
-    println!("{done} of {cases} completed; others: {other:#?}");
-    for x in flagged.iter().take(30) {
-        println!("{x:?}");
+    assert!(flagged.is_empty() && 10 * done > 8 * cases, "{} of {done} flagged: {flagged:#?}", flagged.len());
+}
+
+/// Beside its equilibrium at 0 the force of a Morse potential, `2 (1 - e^-x) e^-x`, is rounded like 1: the motion decays to that rounding, which no
+/// step resolves and no accuracy relative to the motion can reach.
+#[test]
+fn a_motion_that_is_left_with_the_rounding_of_its_forces_is_right() {
+    let integrators = ["gauss_8", "gauss_11", "strang", "yoshida_6", "blanes_moan_6", "midpoint_by_kahan_li_8"];
+    let (mut wrong, mut drawn) = (Vec::new(), Draws::of(1));
+    for case in 0..150 {
+        let gamma = -f64::exp(drawn.between(f64::ln(0.05), f64::ln(3.0)));
+        let system = Resting::Morse { gamma };
+        let start = VelocityPoint::new([drawn.between(-0.5, 1.0)], [drawn.between(-1.0, 1.0)], 0.0);
+        // Until its oscillation, or what is slower beyond the critical drag, is between 1e-9 and 1e-43 of the start.
+        let span = drawn.between(20.0, 100.0) / -larger(0.5 * gamma, 2.0 / gamma);
+        let problem = Problem::new(&system, 0.0, start).unwrap();
+        let integrator: AnyIntegrator = integrators[case % integrators.len()].parse().unwrap();
+        let wanted = f64::powf(10.0, -drawn.between(4.0, 9.0));
+        let (run, what) = match case % 3 {
+            0 => (problem.accuracy(wanted), format!("accuracy {wanted:e}")),
+            // By the order that there is.
+            1 if integrator.order() > 2 => {
+                (problem.by(integrator).accuracy(wanted), format!("{integrator}, accuracy {wanted:e}"))
+            }
+            _ => (problem.by(integrator).steps(Steps::Size(0.1)), format!("{integrator}, h = 0.1")),
+        };
+        let end = run.run(Until::Time(span));
+        let right = matches!(&end, Ok(end) if end.status == Status::Completed && end.suspicion.is_none());
+        // Some hundred roundings of the force, added up.
+        if !(right && end.as_ref().is_ok_and(|end| end.q[0].abs() < 1e-8)) {
+            wrong.push(format!("{case}: {system:?} from {start:?} to {span} by {what}: {end:?}"));
+        }
     }
-    let mut by = std::collections::BTreeMap::<String, u32>::new();
-    for x in &flagged {
-        *by.entry(format!("{} {}", x.1, x.2)).or_default() += 1;
-    }
-    println!("{by:?}");
-    assert!(flagged.is_empty() && 10 * done > 8 * cases, "{} of {done} flagged", flagged.len());
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 /// A damped pendulum down to the smallest numbers.
@@ -141,13 +160,11 @@ fn what_is_at_rest_ends_and_says_so() {
     for (system, gamma) in [-0.05, -0.1, -1.0].map(|gamma| (Pendulum { gamma }, gamma)) {
         let start = VelocityPoint::new([1.0], [0.5], 0.0);
         let problem = Problem::new(&system, 0.0, start).unwrap();
-        let begin = std::time::Instant::now();
         let mut rows = Rows::at((0..=100).map(|k| 1e4 * f64::from(k))).unwrap();
         let by_accuracy = problem.accuracy(1e-9).observe(&mut rows).run(Until::Time(1e6)).unwrap();
         // Those that were reached.
         let reached = (by_accuracy.t / 1e4).floor() as usize + 1;
         assert!(rows.rows.len() == reached && reached < 10, "{gamma}: {} rows", rows.rows.len());
-        println!("{gamma}: {by_accuracy:?} {:?}", begin.elapsed());
         let by_steps = problem.steps(Steps::Size(0.5)).run(Until::Time(1e6)).unwrap();
         let strang = problem.by(SplittingScheme::STRANG).steps(Steps::Size(0.1)).run(Until::Time(1e6)).unwrap();
         for end in [by_accuracy, by_steps, strang] {

@@ -326,7 +326,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
                     }
                     return outcome;
                 }
-                AfterSweep::Slow { .. } if self.holds::<S>() => return self.finish::<S>(),
+                AfterSweep::Slow { .. } if self.holds::<S>(t) => return self.finish::<S>(),
                 refused => return refused,
             }
         }

@@ -3,13 +3,13 @@
 use super::coefficients::MOST;
 use super::dense::Solved;
 use super::general::General;
-use super::resolution::{FORETOLD, of_sigma};
+use super::resolution::{FORETOLD, ROUNDINGS, of_sigma};
 use super::stages::{Stages, blocks};
 use super::time_transformation::TimeTransformation;
 use crate::gauss::lanes::Lanes;
 use crate::rules::step_equations::{inverted, kept_mass_matrix};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, VelocityPoint, larger};
+use contact_geom::{Lagrangian, VelocityPoint, gradient_rounding, larger};
 use pulp::Simd;
 use std::array::from_fn;
 
@@ -39,25 +39,29 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
     }
 
     /// Whether the stages satisfy their equations to round-off, though the velocities still change: where W is ill conditioned
-    /// they are determined no better.
+    /// they are determined no better, nor where forces that cancel beside an equilibrium are rounded like the terms that cancel.
     #[cold]
     #[inline(never)]
-    pub(super) fn holds<S: Simd>(&self) -> bool {
-        let s = self.table.s;
+    pub(super) fn holds<S: Simd>(&self, t: f64) -> bool {
+        let (s, i) = (self.table.s, self.table.s / 2);
+        let (q, v) = (SVector::from_fn(|d, _| self.x[d].0[i]), SVector::from_fn(|d, _| self.v[d].0[i]));
+        let x = VelocityPoint { q, v, z: self.z_stages.0[i] };
+        let (_, once) = gradient_rounding(self.lagrangian, t + self.table.times.0[i], &x);
         // `start + M rates` against what it should be, in units of its terms.
-        let holds = |start: f64, rates: &Stages, sums: &dyn Fn(usize) -> f64| {
+        let holds = |start: f64, rates: &Stages, rounding: f64, sums: &dyn Fn(usize) -> f64| {
             let mut sum = Stages::ZERO;
             self.table.m.apply(rates, s, &mut sum, |_| Lanes::<S>::splat(0.0));
             (0..s).all(|i| {
                 let terms = (0..s).fold(start.abs(), |m, j| m + (self.table.m.0[j].0[i] * rates.0[j]).abs());
                 let off = start + sum.0[i] - sums(i);
-                off.abs() <= 8.0 * f64::EPSILON * larger(terms, sums(i).abs())
+                off.abs() <= larger(8.0 * f64::EPSILON * larger(terms, sums(i).abs()), ROUNDINGS * rounding)
             })
         };
         let rho = self.falling.map(|falling| 1.0 - falling);
-        holds(1.0, &self.rate.map(|rate| -rate), &|i| rho.0[i])
-            && holds(self.z.value, &self.l, &|i| self.z_stages.0[i])
-            && (0..N).all(|d| holds(self.p[d].value, &self.force[d], &|i| rho.0[i] * self.l_v[d].0[i]))
+        let of_momentum = |d: usize| once.x[d] * self.table.h.abs() + once.y[d];
+        holds(1.0, &self.rate.map(|rate| -rate), 0.0, &|i| rho.0[i])
+            && holds(self.z.value, &self.l, 0.0, &|i| self.z_stages.0[i])
+            && (0..N).all(|d| holds(self.p[d].value, &self.force[d], of_momentum(d), &|i| rho.0[i] * self.l_v[d].0[i]))
     }
 
     /// Inverts W at the stages, one by one, on the heap; `false` where it is singular.

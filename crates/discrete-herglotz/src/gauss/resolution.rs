@@ -22,6 +22,10 @@ pub(crate) const MOVED: f64 = 1e-8;
 /// foretold to a tenth is resolved.
 pub(super) const FORETOLD: f64 = 0.1;
 
+/// The roundings of a force or momentum that a misfit, or what an iteration leaves, may hold: sixteen stages, with the weights of an
+/// interpolation between them.
+pub(super) const ROUNDINGS: f64 = 256.0;
+
 /// The misfit of a conformal factor: `ln sigma_d` against the integral of `L_z`; above one where the step does not resolve it.
 pub(crate) fn of_sigma(sigma: f64, integral: f64) -> f64 {
     (sigma.ln() - integral).abs() / SIGMA

@@ -8,7 +8,7 @@ use super::condensed::{Condensed, Preconditioned};
 use super::instructions::Instructions;
 use super::pair::{Registers, over_registers};
 use super::position_newton::{At, PositionNewton, curvature};
-use super::resolution::{FORETOLD, Tail};
+use super::resolution::{FORETOLD, ROUNDINGS, Tail};
 use super::simplified::SlopeNewton;
 use super::stage_values::StageValues;
 use super::stages::{Stages, blocks};
@@ -17,7 +17,7 @@ use crate::StepError;
 use crate::gauss::lanes::{Lanes, branched};
 use crate::run::saved::{Saved, load_option, save_option, saved};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Lagrangian, VelocityPoint, largest};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, gradient_rounding, largest};
 use pulp::Simd;
 use std::sync::Arc;
 
@@ -300,6 +300,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             match sweeps.judge(change, size) {
                 AfterSweep::Going if tails && change > NEAR * size => (due, self.far) = (true, true),
                 AfterSweep::Going => (again, due) = (again || due, false),
+                AfterSweep::Slow { .. } if self.is_rounding(t, change) => break AfterSweep::Done,
                 done => break done,
             }
             if const { N == 1 } && self.newton.is_none() {
@@ -354,6 +355,19 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             self.rest[d].set(r, rest);
             self.a[d].set(r, a[d]);
         }
+    }
+
+    /// Whether a change of the accelerations is one of the rounding of forces: those that cancel beside an equilibrium are rounded like the terms
+    /// that cancel.
+    #[cold]
+    #[inline(never)]
+    fn is_rounding(&self, t: f64, change: f64) -> bool {
+        let i = self.table.s / 2;
+        let q = SVector::from_fn(|d, _| self.x[d].0[i]);
+        let x = VelocityPoint { q, v: SVector::zeros(), z: 0.0 };
+        let (_, once) = gradient_rounding(self.lagrangian, t + self.table.times.0[i], &x);
+        let of_acceleration = self.inverse_mass.as_ref().map_or(once.x, |inverse| inverse.abs() * once.x);
+        change <= ROUNDINGS * largest(of_acceleration.iter().copied())
     }
 
     /// Corrects a sweep by Newton's method. Returns the change, and whether the positions have not moved but for their round-off.

@@ -411,7 +411,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
                 Route::Condensed(condensed) => condensed.misfit,
                 Route::General(general) => general.misfit,
             };
-            if misfit > 1.0 {
+            if misfit > 1.0 && !run.is_at_rest(t + h) {
                 run.watch.note(run.k, misfit);
             }
             if run.sequence.is_some() {

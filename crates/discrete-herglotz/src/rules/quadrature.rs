@@ -7,9 +7,12 @@ use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
     Border, Derivatives, DiscreteJet, DiscretePoint, Dual, GeometryError, Lagrangian, Module, PhasePoint, Regularity,
-    Scalar, SecondDiscreteJet, Triple, VelocityPoint,
+    Scalar, SecondDiscreteJet, Triple, VelocityPoint, gradient_rounding,
 };
 use std::marker::PhantomData;
+
+/// The roundings of L's terms that a residual may hold: of a few nodes, and a few units each.
+const ROUNDINGS: f64 = 64.0;
 
 /// A node of a quadrature rule on `Q x Q x R^2`: L is taken at the time `t + a h`, the position `(1 - a) q0 + a q1`, the
 /// velocity `(q1 - q0)/h` and the action `(1 - b) z0 + b z1`.
@@ -251,7 +254,11 @@ impl<L, R: Rule> Quadrature<L, R> {
     {
         let (resolution, impulse) = ((largest(&from.q) / h).abs(), largest(&from.p) * h.abs());
         let start = NewtonStart { u: *guess, z: from.z, resolution, impulse };
-        let root = newton(start, solver, |u, z1| Ok(self.linearise::<N, ADJOINT>(t, h, from, u, z1)))?;
+        let rounding = |u: &SVector<f64, N>, z1: f64| {
+            let x = VelocityPoint { q: from.q + u * (0.5 * h), v: *u, z: z1 };
+            rounding_of_residual(&self.lagrangian, (t + 0.5 * h, h), &x, &from.p)
+        };
+        let root = newton(start, solver, rounding, |u, z1| Ok(self.linearise::<N, ADJOINT>(t, h, from, u, z1)))?;
         let (u, mut force) = (root.u, SVector::<f64, N>::zeros());
         let (mut value, mut slope_0, mut slope_1) = (0.0, 0.0, 0.0);
         for node in R::NODES {
@@ -299,6 +306,21 @@ impl<L, R: Rule> Quadrature<L, R> {
     {
         self.step::<N, false>(t, self.h, from, guess, solver)?.checked()
     }
+}
+
+/// What rounding within L may leave of the residual of a step of h, and of its action, at a point in its middle: forces that cancel beside an
+/// equilibrium are rounded like the terms that cancel, and so is the potential, of which they are the differential.
+#[cold]
+#[inline(never)]
+fn rounding_of_residual<L: Lagrangian<N>, const N: usize>(
+    lagrangian: &L,
+    (t, h): (f64, f64),
+    x: &VelocityPoint<N>,
+    p: &SVector<f64, N>,
+) -> [f64; 2] {
+    let (of_value, once) = gradient_rounding(lagrangian, t, x);
+    let of_action = of_value + largest(&once.x) * largest(&x.q);
+    [h.abs() * (largest(&once.x) + largest(p) * once.z) + largest(&once.y), h.abs() * of_action].map(|e| ROUNDINGS * e)
 }
 
 /// The node, or its mirror image for the adjoint rule.

@@ -1,6 +1,7 @@
 //! What is provably dissipated along a motion: the energy of an autonomous system.
 
 use super::Plan;
+use super::noise::Noise;
 use super::saved::saved;
 use crate::legendre_inverse;
 use contact_geom::nalgebra::SVector;
@@ -117,6 +118,7 @@ impl<const N: usize> EnergyMonitor<N> {
         }
         let rounding = rounding_of(problem.lagrangian, t, &x, state)
             + rounding_of(problem.lagrangian, problem.t0, &problem.start, &problem.state) * log_factor.exp();
+        let rounding = rounding + Noise::at(problem.lagrangian, t, &x).energy;
         // Those of all steps may add up.
         (drift > (64.0 + taken as f64) * rounding).then(|| drift / larger(allowed, f64::MIN_POSITIVE))
     }

@@ -15,6 +15,7 @@ mod halved;
 mod integrator;
 mod jump;
 mod momentum;
+mod noise;
 mod observer;
 mod outcome;
 mod pilot;

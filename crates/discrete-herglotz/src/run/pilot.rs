@@ -1,6 +1,7 @@
 //! Pilot runs: a motion followed with some number of steps, seen at a few common times, and looked at between its steps.
 
 use super::accuracy::Choice;
+use super::noise::{DECAYED, all_together};
 use super::{Plan, Problem, Request, Shared, Wants};
 use crate::gauss::{Look, SETS, UNDERFLOWN};
 use crate::run::verified::refuted;
@@ -20,6 +21,9 @@ const RESOLVED: f64 = 0.05;
 
 /// The misfit in units of the largest momentum that is round-off: some hundred units for the sums that forces are made of.
 const AT_REST: f64 = 1e-13;
+
+/// The roundings of a force that a misfit may hold.
+const ROUNDINGS: f64 = 64.0;
 
 /// The same of the values of L, whose polynomials follow twice the frequencies.
 const RESOLVED_VALUE: f64 = 0.2;
@@ -88,6 +92,8 @@ impl Marks {
 #[derive(Clone, Debug)]
 pub(super) struct Track<const N: usize> {
     states: Vec<[SVector<f64, N>; 2]>,
+    /// What the rounding of forces may have moved them by, where they have decayed as far as that; else 0.
+    noise: Vec<f64>,
     /// The largest misfit that was seen between the nodes of its steps.
     pub misfit: f64,
     /// What it has cost without the looks, in evaluations of L at one stage.
@@ -105,9 +111,12 @@ fn norm<const N: usize>(x: &[SVector<f64, N>; 2]) -> f64 {
     size * x.iter().map(|x| (x / size).norm_squared()).sum::<f64>().sqrt()
 }
 
-/// The distance of a state from another, relative to the size of that, or to one that is given where it is larger.
-fn relative<const N: usize>(a: &[SVector<f64, N>; 2], b: &[SVector<f64, N>; 2], least: f64) -> f64 {
+/// The distance of a state from another beyond the noise, relative to the size of that, or to one that is given where it is larger.
+fn relative<const N: usize>(a: &[SVector<f64, N>; 2], b: &[SVector<f64, N>; 2], noise: f64, least: f64) -> f64 {
     let (apart, size) = (norm(&[a[0] - b[0], a[1] - b[1]]), larger(norm(b), least));
+    if apart <= noise {
+        return 0.0;
+    }
     // Numbers are known to no less than half of the smallest one.
     if apart == 0.0 && size == 0.0 { 0.0 } else { larger(apart, SMALLEST) / size }
 }
@@ -117,13 +126,14 @@ impl<const N: usize> Track<N> {
     /// where that is larger. Not a number where a state is not.
     pub fn distances(&self, of: &Self) -> Vec<f64> {
         let last = of.states.last().map_or(0.0, norm);
-        self.states.iter().zip(&of.states).map(|(a, b)| relative(a, b, last)).collect()
+        let states = self.states.iter().zip(&of.states).zip(&of.noise);
+        states.map(|((a, b), noise)| relative(a, b, *noise, last)).collect()
     }
 
     /// The same of the last states alone, of runs that need not have other marks in common.
     pub fn distance_at_end(&self, of: &Self) -> f64 {
         match (self.states.last(), of.states.last()) {
-            (Some(a), Some(b)) => relative(a, b, 0.0),
+            (Some(a), Some(b)) => relative(a, b, of.noise.last().copied().unwrap_or(0.0), 0.0),
             _ => f64::NAN,
         }
     }
@@ -334,7 +344,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
     ) -> Result<PilotEnd<N>, InputError> {
         let PilotCourse { count, marks, points, narrow, price } = course;
         let Problem { lagrangian, start, .. } = *self.request.problem;
-        let floor = larger(0.1 * self.wanted, 1e-11);
+        let (floor, h) = (larger(0.1 * self.wanted, 1e-11), (self.request.span / *count as f64).abs());
         let Self { watches_clock, watches_newton, .. } = *self;
         let (mut looks, mut cost, mut seen, mut uneven) = (0, 0, PilotLooks::default(), Uneven::default());
         let ending = self.follow(run, *count, marks, stride, |run, part| {
@@ -353,7 +363,10 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
                 if !seen.resolves(&look) {
                     return Some(PilotEnd::Unresolved { part });
                 }
-                let narrow = *narrow && !look.is_underflown() && look.misfit > NARROW * look.expected + floor;
+                let narrow = *narrow
+                    && !look.is_underflown()
+                    && look.misfit > NARROW * look.expected + floor
+                    && look.of_momenta > ROUNDINGS * self.request.noise(run.time(), &run.state()).force * h;
                 narrow.then_some(PilotEnd::Narrow { part })
             });
             (ending, spent(looks))
@@ -398,8 +411,11 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
         stride: usize,
         mut look: impl FnMut(&R, f64) -> (Option<PilotEnd<N>>, u64),
     ) -> PilotEnd<N> {
-        let &Request { problem: &Problem { t0, .. }, span, .. } = self.request;
-        let (mut states, mut taken, mut spent) = (Vec::with_capacity(PARTS), 0, 0);
+        let &Request { problem, span, .. } = self.request;
+        let t0 = problem.t0;
+        let (mut states, mut noise, mut taken, mut spent) =
+            (Vec::with_capacity(PARTS), Vec::with_capacity(PARTS), 0, 0);
+        let mut reach = norm(&[problem.state.q, problem.state.p]);
         let mut ending = None;
         while ending.is_none()
             && let Some((steps, time)) = marks.stop(states.len(), count, t0, span)
@@ -415,7 +431,13 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
             ending = cause.map(|cause| PilotEnd::Halted { part, cause }).or(seen);
             if taken == steps || (run.time() - time) * span >= 0.0 {
                 let x = run.state();
-                states.push([x.q, x.p]);
+                let state = [x.q, x.p];
+                let size = norm(&state);
+                reach = larger(reach, size);
+                let decayed = size < DECAYED * reach;
+                let of_all = || all_together(taken) * self.request.noise(run.time(), &x).displacement;
+                noise.push(if decayed { of_all() } else { 0.0 });
+                states.push(state);
             }
             // A run whose end is in sight may go on.
             if spent > self.left && spent as f64 > part * self.reserve as f64 {
@@ -424,7 +446,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
         }
         self.left = self.left.saturating_sub(spent);
         self.reserve = self.reserve.saturating_sub(spent);
-        ending.unwrap_or(PilotEnd::Followed(Track { states, misfit: 0.0, cost: spent, tau: span }))
+        ending.unwrap_or(PilotEnd::Followed(Track { states, noise, misfit: 0.0, cost: spent, tau: span }))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Newton's method for the implicit part of a step.
 
 use crate::{Solver, StepError};
+use contact_geom::larger;
 use contact_geom::nalgebra::{SMatrix, SVector};
 
 /// The iterations that a step may take.
@@ -65,12 +66,14 @@ pub fn last_correction(now: f64, before: f64, tolerance: f64) -> bool {
 ///
 /// Stopping rule, the first that holds: the next corrections of `u` and `z`, predicted from the last two, are below their
 /// round-off; the residual and the defect of `z` are below the round-off of their own terms; the corrections stagnate, that of
-/// `u` below what moves the position. An iterate outside the domain (a value that is not finite) is drawn back half-way, which counts
+/// `u` below what moves the position, or the residual and that of `z` below what `rounding` says
+/// that the terms within L may leave of the two. An iterate outside the domain (a value that is not finite) is drawn back half-way, which counts
 /// as an iteration; after [`ITERATION_LIMIT`] the step fails.
 #[inline(always)]
 pub(crate) fn newton<const N: usize>(
     start: NewtonStart<N>,
     solver: &mut Solver<N>,
+    rounding: impl Fn(&SVector<f64, N>, f64) -> [f64; 2],
     mut linearise: impl FnMut(&SVector<f64, N>, f64) -> Result<Linearised<N>, StepError>,
 ) -> Result<Root<N>, StepError> {
     let NewtonStart { mut u, mut z, resolution, impulse } = start;
@@ -111,7 +114,11 @@ pub(crate) fn newton<const N: usize>(
         // of the digits tell that from what a potential's own cancellation leaves.
         let settled =
             z_size <= round_off * action || (z_size >= 0.5 * last_z_size && z_size <= f64::EPSILON.sqrt() * action);
-        let stagnant = size >= 0.5 * last_size && size <= round_off * (resolution + u_size) && settled;
+        let rounded = |u: &SVector<f64, N>| {
+            let [of_residual, of_z] = rounding(u, z);
+            residual_size <= of_residual && z_size <= larger(of_z, round_off * action)
+        };
+        let stagnant = size >= 0.5 * last_size && (settled && size <= round_off * (resolution + u_size) || rounded(&u));
         if predicted || exact || stagnant {
             return Ok(Root { u, z, iterations });
         }
@@ -128,16 +135,21 @@ mod tests {
     #[test]
     fn an_exact_guess_of_u_does_not_end_the_search_for_z() {
         let start = NewtonStart { u: SVector::from([1.0]), z: 1.5, resolution: 1.0, impulse: 1.0 };
-        let root = newton(start, &mut Solver::default(), |u: &SVector<f64, 1>, z| {
-            Ok(Linearised {
-                residual: SVector::from([u[0] - 1.0]),
-                jacobian: SMatrix::identity(),
-                // No bound on the round-off of the residual, so that the corrections decide.
-                size: 0.0,
-                z_change: (2.0 - z * z) / (2.0 * z),
-                z_slope: SVector::zeros(),
-            })
-        });
+        let root = newton(
+            start,
+            &mut Solver::default(),
+            |_, _| [0.0; 2],
+            |u: &SVector<f64, 1>, z| {
+                Ok(Linearised {
+                    residual: SVector::from([u[0] - 1.0]),
+                    jacobian: SMatrix::identity(),
+                    // No bound on the round-off of the residual, so that the corrections decide.
+                    size: 0.0,
+                    z_change: (2.0 - z * z) / (2.0 * z),
+                    z_slope: SVector::zeros(),
+                })
+            },
+        );
         let z = root.unwrap().z;
         assert!((z - 2.0f64.sqrt()).abs() <= 2.0 * f64::EPSILON, "{z}");
     }

@@ -80,16 +80,21 @@ pub trait DiscreteLagrangian<const N: usize> {
         let point = |u: &SVector<f64, N>| DiscretePoint { q0: from.q, q1: from.q + u * h, z0: from.z };
         let start =
             NewtonStart { u: *guess, z: 0.0, resolution: from.q.amax() / h.abs(), impulse: from.p.amax() * h.abs() };
-        let root = newton(start, solver, |u, _| {
-            let jet = self.second_jet(t, &point(u))?;
-            Ok(Linearised {
-                residual: jet.first.d1 + from.p * jet.first.sigma(),
-                jacobian: (jet.d12 + from.p * jet.d2z.transpose()) * h,
-                size: jet.first.d1.amax() + from.p.amax() * (1.0 + jet.first.dz.abs()),
-                z_change: 0.0,
-                z_slope: SVector::zeros(),
-            })
-        })?;
+        let root = newton(
+            start,
+            solver,
+            |_, _| [0.0; 2],
+            |u, _| {
+                let jet = self.second_jet(t, &point(u))?;
+                Ok(Linearised {
+                    residual: jet.first.d1 + from.p * jet.first.sigma(),
+                    jacobian: (jet.d12 + from.p * jet.d2z.transpose()) * h,
+                    size: jet.first.d1.amax() + from.p.amax() * (1.0 + jet.first.dz.abs()),
+                    z_change: 0.0,
+                    z_slope: SVector::zeros(),
+                })
+            },
+        )?;
         let x = point(&root.u);
         let jet = self.jet(t, &x)?;
         let end = PhasePoint { q: x.q1, p: jet.d2, z: from.z + jet.value };
@@ -113,19 +118,24 @@ pub trait DiscreteLagrangian<const N: usize> {
         let point = |u: &SVector<f64, N>, z0: f64| DiscretePoint { q0: from.q - u * h, q1: from.q, z0 };
         let start =
             NewtonStart { u: *guess, z: from.z, resolution: from.q.amax() / h.abs(), impulse: from.p.amax() * h.abs() };
-        let root = newton(start, solver, |u, z0| {
-            let jet = self.second_jet(t, &point(u, z0))?;
-            let defect = z0 + jet.first.value - from.z;
-            // z0 moves by -(defect + D1 . dq0) / sigma, and dq0 = -h du.
-            let (z_change, z_slope) = (-defect / jet.first.sigma(), jet.first.d1 * (h / jet.first.sigma()));
-            Ok(Linearised {
-                residual: jet.first.d2 - from.p + jet.d2z * z_change,
-                jacobian: jet.d12.transpose() * -h + jet.d2z * z_slope.transpose(),
-                size: jet.first.d2.amax() + from.p.amax() + jet.d2z.amax() * (z0.abs() + jet.first.value.abs()),
-                z_change,
-                z_slope,
-            })
-        })?;
+        let root = newton(
+            start,
+            solver,
+            |_, _| [0.0; 2],
+            |u, z0| {
+                let jet = self.second_jet(t, &point(u, z0))?;
+                let defect = z0 + jet.first.value - from.z;
+                // z0 moves by -(defect + D1 . dq0) / sigma, and dq0 = -h du.
+                let (z_change, z_slope) = (-defect / jet.first.sigma(), jet.first.d1 * (h / jet.first.sigma()));
+                Ok(Linearised {
+                    residual: jet.first.d2 - from.p + jet.d2z * z_change,
+                    jacobian: jet.d12.transpose() * -h + jet.d2z * z_slope.transpose(),
+                    size: jet.first.d2.amax() + from.p.amax() + jet.d2z.amax() * (z0.abs() + jet.first.value.abs()),
+                    z_change,
+                    z_slope,
+                })
+            },
+        )?;
         let x = point(&root.u, root.z);
         let jet = self.jet(t, &x)?;
         let sigma = jet.sigma();

@@ -3,20 +3,18 @@
 use super::{GaussStepper, Route};
 use crate::gauss::dense::StepStart;
 use crate::gauss::look::{Compare, Curve, Look, SETS};
+use crate::gauss::resolution::ROUNDINGS;
 use crate::gauss::time_transformation::Physical;
 use crate::run::saved::saved;
-use crate::run::watch::{misfit, sharper};
+use crate::run::watch::{misfit, sharper, size};
 use crate::{Doubt, Stepper, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, gradient_rounding, larger, largest};
+use contact_geom::{Derivatives, Lagrangian, gradient_rounding, larger, largest};
 use pulp::{Simd, WithSimd};
 
 /// The misfit between the nodes from which a step of at least three stages does not resolve the motion: of harmonics it then has an
 /// error of its own of 0.01 to 0.1.
 const UNRESOLVED: f64 = 0.1;
-
-/// The roundings of a force or momentum that a misfit may hold: sixteen stages, with the weights of an interpolation between them.
-const ROUNDINGS: f64 = 256.0;
 
 /// The mean velocities of the last steps, in sequence, the last position, and the states after the last two steps.
 pub(super) struct Sequence<const N: usize> {
@@ -101,6 +99,17 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
             }
             Some(Suspicion { step: self.k - 1, misfit: misfit / allowed })
         })
+    }
+
+    /// Whether the step that ends at a time has only the rounding of its forces left, and moves by no more than that.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn is_at_rest(&self, t: f64) -> bool {
+        let state = self.state();
+        let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return false };
+        let (force, rounding) = (self.lagrangian.gradient(t, &x), gradient_rounding(self.lagrangian, t, &x).1);
+        size(&x.v) * self.products.h.abs() <= self.watch.floor
+            && size(&(force.x + state.p * force.z)) <= ROUNDINGS * size(&rounding.x)
     }
 
     /// What of the misfits of momenta and of the action in the last step is rounding: that of the forces and of L there, which is all that is
