@@ -8,11 +8,11 @@ use std::time::{Duration, Instant};
 /// The errors that are asked of the reference, until one is had.
 const REFERENCES: [f64; 5] = [1e-13, 1e-12, 1e-10, 1e-8, 1e-6];
 
-/// No integrator is tried with shorter steps after a run that took so long.
-const LONGEST: Duration = Duration::from_millis(500);
+/// What all runs may take together; each integrator has the same part of it, and one run at the least.
+const BUDGET: Duration = Duration::from_secs(2);
 
-/// A run is repeated for so long, and so often, for the least time.
-const REPEATED: Duration = Duration::from_millis(10);
+/// A run is repeated for such a part of that, and so often, for the least time.
+const REPEATED: u32 = 16;
 const REPETITIONS: usize = 5;
 
 /// The halvings of the step of an integrator.
@@ -69,8 +69,8 @@ fn apart(a: &Outcome, b: &Outcome) -> f64 {
 
 impl System {
     /// Runs a motion by all integrators that apply, with steps from long to short, and measures time and error of each. Of `motion` the start
-    /// and the end are taken. `progress` is told the part that is done; `false` ends it there. Steps are halved until round-off, or until a
-    /// run takes half a second.
+    /// and the end are taken. `progress` is told the part that is done; `false` ends it there. Steps are halved until round-off, or as
+    /// long as the runs of an integrator take no more than its part of two seconds.
     ///
     /// # Errors
     /// Those of the reference, which is by contact Gauss collocation with 16 stages.
@@ -99,6 +99,7 @@ impl System {
             ended: false,
         };
         let all = AnyIntegrator::all();
+        let share = BUDGET / all.len().max(1) as u32;
         for (i, by) in all.iter().copied().enumerate() {
             if !progress(i as f64 / all.len() as f64) {
                 comparison.ended = true;
@@ -110,7 +111,7 @@ impl System {
             }
             // So long that the reference would need as many evaluations.
             let first = count.div_ceil(8).max(1);
-            work_of(by, (first, span), &run, &reference, &mut comparison);
+            work_of(by, (first, span), share, &run, &reference, &mut comparison);
         }
         progress(1.0);
         Ok(comparison)
@@ -121,11 +122,12 @@ impl System {
 fn work_of(
     by: AnyIntegrator,
     (first, span): (usize, f64),
+    share: Duration,
     run: &dyn Fn(AnyIntegrator, usize) -> Result<Outcome, RuntimeError>,
     reference: &Outcome,
     to: &mut Comparison,
 ) {
-    let (mut least, mut worse) = (f64::INFINITY, 0);
+    let (mut least, mut worse, start) = (f64::INFINITY, 0, Instant::now());
     for halving in 0..HALVINGS {
         let Some(count) = first.checked_shl(halving) else { break };
         let begin = Instant::now();
@@ -136,7 +138,7 @@ fn work_of(
             let error = largest([apart(&outcome, reference), to.reference_error]);
             let mut spent = seconds;
             for _ in 1..REPETITIONS {
-                if spent > REPEATED {
+                if spent > share / REPEATED {
                     break;
                 }
                 let begin = Instant::now();
@@ -162,7 +164,8 @@ fn work_of(
                 break;
             }
         }
-        if seconds > LONGEST {
+        // The next one takes twice as long.
+        if start.elapsed() + 2 * seconds > share {
             break;
         }
     }
