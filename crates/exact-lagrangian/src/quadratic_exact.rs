@@ -42,9 +42,11 @@ pub struct QuadraticExact<const N: usize> {
     /// `e^(gamma h)`, and that minus one.
     sigma: f64,
     sigma_m1: f64,
-    /// The displacement `q1 - q0` and the velocity `v1`.
+    /// The displacement `q1 - q0` and the velocity `v1`; of a coordinate that does not stay, `q1` itself.
     displacement: Affine<N>,
     velocity: Affine<N>,
+    /// Which coordinates stay so near where they are that `dq1/dq0` has its digits from `dq1/dq0 - 1`.
+    stays: [bool; N],
     /// The inverse of `dq1/dv0`.
     inverse: SMatrix<f64, N, N>,
     /// G: its quadratic part in q and v (`qv` counted twice), its linear part and its constant.
@@ -93,7 +95,8 @@ impl<const N: usize> QuadraticExact<N> {
             |i: usize, j: usize, scale: f64| SMatrix::<f64, N, N>::from_fn(|k, l| e[(i * N + k, j * N + l)] * scale);
         let column = |i: usize, scale: f64| SVector::<f64, N>::from_fn(|k, _| e[(i * N + k, n)] * scale);
         let mut displacement = Affine { q: block(0, 0, 1.0), v: block(0, 1, unit), one: column(0, 1.0) };
-        (0..N).for_each(|i| displacement.q[(i, i)] = d[i]);
+        let stays = std::array::from_fn(|i| d[i].abs() < evolution::FAR);
+        (0..N).filter(|i| stays[*i]).for_each(|i| displacement.q[(i, i)] = d[i]);
         let velocity = Affine { q: block(1, 0, 1.0 / unit), v: block(1, 1, 1.0), one: column(1, 1.0 / unit) };
         let Regularity { smallest, largest } = singular_values(&block(0, 1, 1.0));
         // What the rounding of h and of the doublings does to dq1/dw0, whose change with h is dw1/dw0; and what that of K and
@@ -126,6 +129,7 @@ impl<const N: usize> QuadraticExact<N> {
             sigma_m1: (gamma * h).exp_m1(),
             displacement,
             velocity,
+            stays,
             inverse,
             qq: form(0, 0, 1.0),
             qv: form(0, 1, 2.0 * unit),
@@ -140,10 +144,15 @@ impl<const N: usize> QuadraticExact<N> {
     pub fn motion<T: Scalar>(&self, start: &VelocityPoint<N, T>) -> VelocityPoint<N, T> {
         let (q, v) = (&start.q, &start.v);
         VelocityPoint {
-            q: q + self.displacement.at(q, v),
+            q: self.staying(q) + self.displacement.at(q, v),
             v: self.velocity.at(q, v),
             z: start.z * self.sigma + self.form(q, v),
         }
+    }
+
+    /// The positions that stay, 0 for the others: beside `q0`, a `q1` that has decayed would be lost.
+    fn staying<T: Scalar>(&self, q: &SVector<T, N>) -> SVector<T, N> {
+        SVector::from_fn(|i, _| if self.stays[i] { q[i] } else { T::zero() })
     }
 
     /// Whether nothing is left of the positions in the action: drag has brought all of it below the smallest number, and
@@ -180,7 +189,7 @@ impl<const N: usize> DiscreteLagrangian<N> for QuadraticExact<N> {
         }
         let still = SVector::from_element(T::zero());
         // The displacement first: it may have few digits, and no more may be lost.
-        let by_velocity = (x.q1 - x.q0) - self.displacement.at(&x.q0, &still);
+        let by_velocity = (x.q1 - self.staying(&x.q0)) - self.displacement.at(&x.q0, &still);
         let v0 = times(&self.inverse, &by_velocity);
         let value = x.z0 * self.sigma_m1 + self.form(&x.q0, &v0);
         // A position that is not finite makes the value so, but for one that the form does not contain.

@@ -51,6 +51,19 @@ def test_contact_maps_are_contact():
     assert np.allclose(found.image, np.concatenate([*map(np.ravel, step(*map(np.array, at)))]), rtol=1e-14)
 
 
+def test_a_factor_of_nothing_is_not_contact():
+    # All of these pull dz - p dq back to 0: to a point, to a Legendrian curve, onto the momenta at one place.
+    for map in (
+        lambda q, p, z: (0 * q, 0 * p, 0 * z),
+        lambda q, p, z: (q, np.cos(q), np.sum(np.sin(q))),
+        lambda q, p, z: (0 * q, p, 0 * z),
+    ):
+        found = hz.is_contact(map, ([1.0], [0.3], 0.2))
+        assert not found and found.sigma == 0.0 and "sigma is 0" in str(found)
+    # A factor may be small.
+    assert hz.is_contact(lambda q, p, z: (q, 1e-200 * p, 1e-200 * z), ([1.0], [0.3], 0.2))
+
+
 def test_maps_and_points_are_checked():
     identity = lambda q, p, z: (q, p, z)
     for at in ([1.0], ([1.0], [1.0, 2.0], 0.0), ([1.0], [np.nan], 0.0), ([], [], 0.0)):

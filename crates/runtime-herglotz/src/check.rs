@@ -66,9 +66,15 @@ impl Check {
         contact_geom::largest(self.places.iter().map(|place| place.contact_defect))
     }
 
-    /// Whether every step that was looked at is contact, to [`CONTACT`].
+    /// Whether every step that was looked at is contact, to [`CONTACT`]: with a factor that is a number other than 0, since what a factor 0
+    /// pulls back is no contact form.
     pub fn is_contact(&self) -> bool {
-        self.contact_defect() <= CONTACT
+        self.contact_defect() <= CONTACT && !self.loses_the_form()
+    }
+
+    /// Whether the conformal factor of a step is 0 or not finite, as where drag within one step is beyond all numbers.
+    pub fn loses_the_form(&self) -> bool {
+        self.places.iter().any(|place| place.sigma == 0.0 || !place.sigma.is_finite())
     }
 
     /// The largest departure of a momentum from its prediction, in units of the largest momentum of any symmetry: one that vanishes has no
@@ -78,5 +84,29 @@ impl Check {
         let size = contact_geom::largest(all().map(|m| m.predicted));
         let apart = contact_geom::largest(all().map(|m| m.momentum - m.predicted));
         if size > 0.0 { apart / size } else { apart }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_factor_that_is_none_is_not_contact() {
+        let check = |sigma: f64| {
+            let place = Place {
+                t: 0.0,
+                sigma,
+                log_factor: 0.0,
+                contact_defect: 0.0,
+                herglotz_defect: 0.0,
+                momenta: Vec::new(),
+            };
+            Check { integrator: String::new(), step_size: 1.0, places: vec![place], statements: Vec::new() }
+        };
+        assert!([1.0, -2.0, 1e-300, f64::from_bits(1)].into_iter().all(|sigma| check(sigma).is_contact()));
+        for none in [0.0, -0.0, f64::NAN, f64::INFINITY] {
+            assert!(!check(none).is_contact() && check(none).loses_the_form(), "{none}");
+        }
     }
 }

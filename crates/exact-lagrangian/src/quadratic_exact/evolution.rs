@@ -6,6 +6,9 @@ use discrete_herglotz::{InputError, StepError};
 /// The terms of the series, whose k-th is below `1/k!`: the last is far below the rounding of the first.
 const TERMS: i32 = 24;
 
+/// How far from one a diagonal element of E has its digits from itself, and not from `E - 1`.
+pub(super) const FAR: f64 = 0.5;
+
 /// The matrix `E = e^A`, its diagonal less one, and the form `G = int_0^1 e^(r (1 - s)) e^(A s)^T S e^(A s) ds`.
 pub(super) struct Evolution {
     pub e: DMatrix<f64>,
@@ -61,7 +64,7 @@ impl Evolution {
             let cross: f64 = (0..n).filter(|k| *k != i).map(|k| self.e[(i, k)] * self.e[(k, i)]).sum();
             let d = self.d[i] * (2.0 + self.d[i]) + cross;
             // Near one E has its digits from E - 1; far from it, where it may decay to nothing, from itself.
-            if d.abs() < 0.5 {
+            if d.abs() < FAR {
                 (self.d[i], square[(i, i)]) = (d, 1.0 + d);
             } else {
                 self.d[i] = square[(i, i)] - 1.0;

@@ -177,13 +177,22 @@ fn it_is_the_flow_of_gyroscopic_and_many_body_systems() {
 fn fast_oscillations_and_strong_drags_keep_their_digits_over_long_steps() {
     let start = VelocityPoint::new([0.3], [1.7], -0.4);
     let (mut oscillator, mut strong) = (Units::default(), Units::default());
-    for (gamma, h) in [-0.1, 0.0, 0.05].into_iter().flat_map(|gamma| [4.0, 20.0, 50.0].map(|h| (gamma, h))) {
+    let weak = [-0.1, 0.0, 0.05].into_iter().flat_map(|gamma| [4.0, 20.0, 50.0].map(|h| (gamma, h)));
+    // What is left of these is far below the rounding of the start.
+    let decayed = [-1.0, -0.4].into_iter().flat_map(|gamma| [90.0, 300.0, 1000.0].map(|h| (gamma, h)));
+    for (gamma, h) in weak.chain(decayed) {
         let system = HarmonicOscillator { gamma };
         let end = system.solution(h, &start);
-        let Ok(found) = QuadraticExact::new(&system, h).map(|ld| ld.motion(&start)) else { unreachable!() };
-        let size = end.q[0].hypot(end.v[0]);
+        let Ok(ld) = QuadraticExact::new(&system, h) else { unreachable!() };
+        let (found, size) = (ld.motion(&start), end.q[0].hypot(end.v[0]));
         let error = (found.q - end.q).largest().larger((found.v - end.v).largest()) / size;
         oscillator.motion = oscillator.motion.larger(error / (EPS * (1.0 + h)));
+        // Between positions it is the same motion, as far as the action is above the smallest number.
+        if gamma * h >= -300.0 {
+            let Ok(jet) = ld.jet(0.0, &DiscretePoint { q0: start.q, q1: end.q, z0: start.z }) else { unreachable!() };
+            let off = (jet.d2 - end.v).largest() / size;
+            oscillator.momenta = oscillator.momenta.larger(off / (EPS * (1.0 + h)));
+        }
     }
     for (gamma, h) in [-40.0, -1e3, -1e6].into_iter().flat_map(|gamma| [0.1, 0.8, 10.0].map(|h| (gamma, h))) {
         let system = FreeParticle { gamma };
@@ -198,7 +207,7 @@ fn fast_oscillations_and_strong_drags_keep_their_digits_over_long_steps() {
         strong.value = strong.value.larger(decayed[0].larger(decayed[1]) / (EPS * (1.0 + (gamma * h).abs())));
     }
     // In units of the rounded phase, and of the size of the slow motion that is left.
-    oscillator.assert_below(8.0, 0.0, 0.0, "phase");
+    oscillator.assert_below(8.0, 0.0, 8.0, "phase");
     strong.assert_below(16.0, 8.0, 0.0, "strong drag");
 }
 

@@ -81,7 +81,11 @@ fn in_words(check: &runtime_herglotz::Check, momenta: &[String]) -> String {
     for stated in &check.statements {
         statements.push(vec![stated.statement.to_string(), stated.method.clone(), size(stated.residual)]);
     }
-    let verdict = if check.is_contact() { "contact" } else { "not contact" };
+    let verdict = match (check.is_contact(), check.loses_the_form()) {
+        (true, _) => "contact",
+        (false, true) => "not contact, since sigma_d is 0 or not finite at a step",
+        (false, false) => "not contact",
+    };
     let (defect, runtime_herglotz::Check { integrator, step_size, .. }) = (check.contact_defect(), check);
     let mut parts = vec![
         format!(

@@ -61,6 +61,8 @@ class Contact(NamedTuple):
     def __str__(self):
         if self.is_contact:
             return f"contact: F*(dz - p dq) = sigma (dz - p dq), sigma = {self.sigma!r}, to {self.defect:.1e}"
+        if self.sigma == 0.0:
+            return "not contact: sigma is 0, F*(dz - p dq) has lost the form"
         return f"not contact: F*(dz - p dq) departs from {self.sigma!r} (dz - p dq) by {self.defect:.1e} of its size"
 
 
@@ -83,6 +85,7 @@ def is_contact(map, at, *, tolerance=1e-9):
     -------
     Contact
         True or false, the conformal factor sigma, and the largest component of F*eta - sigma eta, relative to F*eta.
+        A map with sigma = 0 is not contact.
     """
     try:
         q, p, z = at
@@ -93,8 +96,9 @@ def is_contact(map, at, *, tolerance=1e-9):
         raise ValueError("`at` has a q without coordinates")
     components = _trace.components_of(map, n)
     sigma, defect, image, jacobian = _core.conformality(components, (q, p, z))
-    # Not a number is no contact map.
-    return Contact(bool(defect <= tolerance), sigma, defect, image, jacobian)
+    # Not a number is no contact map, and neither is a factor 0: what it pulls back is no contact form.
+    is_so = defect <= tolerance and sigma != 0.0 and np.isfinite(sigma)
+    return Contact(bool(is_so), sigma, defect, image, jacobian)
 
 
 class Place(NamedTuple):
