@@ -89,6 +89,11 @@ pub enum AssemblyError {
         "the system has general local terms; splittings and `AssembledMidpoint` take potentials only: use `AssembledGauss`"
     )]
     NotSeparable,
+    /// What needs the action is asked of a state without it.
+    #[error(
+        "the Lagrangian depends on the action z, which the state does not have; start the motion with one, as `z: Some(0.0)`"
+    )]
+    NoAction,
     /// The matrix `L_vv` is singular at the start.
     #[error("the matrix L_vv is singular at the start: the Lagrangian is not regular; give each unknown a mass")]
     SingularMass,

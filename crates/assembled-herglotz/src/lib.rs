@@ -12,7 +12,7 @@
 //! let n = 1000;
 //! let chain = fput_chain(n, FputBond { alpha: 0.0, beta: 1.0 }, -0.01)?;
 //! let q: Vec<f64> = (1..=n).map(|i| (std::f64::consts::PI * i as f64 / (n + 1) as f64).sin()).collect();
-//! let start = State { t: 0.0, q: &q, v: &vec![0.0; n], z: 0.0 };
+//! let start = State { t: 0.0, q: &q, v: &vec![0.0; n], z: Some(0.0) };
 //! let mut motion = AssembledSplitting::new(&chain, &SplittingScheme::BLANES_MOAN_6, 1.0, start)?;
 //! assert!(motion.advance(100).is_ok());
 //! println!("{:?}", motion.state().q[500]);

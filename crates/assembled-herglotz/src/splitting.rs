@@ -113,7 +113,7 @@ impl SubstepTable {
 }
 
 impl<'a> AssembledSplitting<'a> {
-    /// From a state, without the action.
+    /// From a state; with the action z where the state has one, which costs the energies at each stage.
     ///
     /// # Errors
     /// [`AssemblyError::Input`] with [`InputError::Step`] unless h is finite and not 0 (negative goes back);
@@ -151,9 +151,9 @@ impl<'a> AssembledSplitting<'a> {
             rests: Rests::default(),
             end_rests: Rests::default(),
             inverse_masses,
-            z: start.z,
-            action: false,
-            energies: Vec::new(),
+            z: start.z.unwrap_or(0.0),
+            action: start.z.is_some(),
+            energies: vec![[0.0; 2]; if start.z.is_some() { blocks::count(n) } else { 0 }],
         };
         let mut force = vec![0.0; BLOCK.min(n)];
         for block in 0..blocks::count(n) {
@@ -168,13 +168,6 @@ impl<'a> AssembledSplitting<'a> {
             }
         }
         Ok(splitting)
-    }
-
-    /// With the action z, which costs the energies at each stage.
-    pub fn with_action(mut self) -> Self {
-        self.action = true;
-        self.energies = vec![[0.0; 2]; blocks::count(self.system.unknowns())];
-        self
     }
 
     /// With compensated sums (Kahan's): what the last digits of positions and velocities leave out is carried from stage to stage. For few unknowns
@@ -246,7 +239,7 @@ impl<'a> AssembledSplitting<'a> {
                 z = act(z, &stage, &self.energies);
             }
         }
-        State { t, q: &self.next[1..=n], v: &self.end, z }
+        State { t, q: &self.next[1..=n], v: &self.end, z: self.action.then_some(z) }
     }
 
     /// `sigma_d` of the last step, `e^(gamma h)`, or the exponential of the integral of gamma over it; before the first one, of that.

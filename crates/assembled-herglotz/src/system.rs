@@ -155,13 +155,15 @@ impl AssembledSystem {
     /// depend on time.
     ///
     /// # Errors
-    /// [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state.
+    /// [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state; [`AssemblyError::NoAction`] of one without the action, where L
+    /// depends on it.
     pub fn energy(&self, state: State) -> Result<f64, AssemblyError> {
         state.check(self)?;
+        let z = self.action(state)?;
         let between = |x: &[f64]| [&[0.0], x, &[0.0]].concat();
         let (q, v) = (between(state.q), between(state.v));
         let mut first = First::zeros(self.unknowns);
-        self.first(Place { t: state.t, q: &q, v: &v, z: state.z }, true, &mut first);
+        self.first(Place { t: state.t, q: &q, v: &v, z }, true, &mut first);
         let twice_kinetic: f64 = first.v.iter().zip(state.v).map(|(p, v)| p * v).sum();
         Ok(twice_kinetic - first.l)
     }
@@ -210,6 +212,12 @@ impl AssembledSystem {
         }
     }
 
+    /// The action of a state, or any number where L does not depend on it.
+    pub(crate) fn action(&self, state: State) -> Result<f64, AssemblyError> {
+        let free = self.locals.is_empty() && self.rate(state.t) == 0.0;
+        state.z.or(free.then_some(0.0)).ok_or(AssemblyError::NoAction)
+    }
+
     /// Checks that there are no general terms.
     pub(crate) fn check_separable(&self) -> Result<(), AssemblyError> {
         if self.locals.is_empty() { Ok(()) } else { Err(AssemblyError::NotSeparable) }
@@ -256,8 +264,9 @@ pub struct State<'a> {
     pub q: &'a [f64],
     /// The velocities.
     pub v: &'a [f64],
-    /// The action; that of the start where it is not followed.
-    pub z: f64,
+    /// The action. A start without it is that of a motion whose action is not computed, which saves the energies at each stage; its states
+    /// have none either.
+    pub z: Option<f64>,
 }
 
 impl State<'_> {
@@ -266,6 +275,6 @@ impl State<'_> {
         system.check_vector("q", self.q)?;
         system.check_vector("v", self.v)?;
         AssembledSystem::check_number("t", self.t)?;
-        AssembledSystem::check_number("z", self.z)
+        self.z.map_or(Ok(()), |z| AssembledSystem::check_number("z", z))
     }
 }

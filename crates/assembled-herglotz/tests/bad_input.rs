@@ -55,7 +55,7 @@ fn elements() {
 #[test]
 fn starts_and_steps() {
     let (q, v) = (vec![0.1; 20], vec![0.0; 20]);
-    let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let start = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     let system = chain();
     for h in [0.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(refused(&system, h, start), AssemblyError::Input(InputError::Step { .. })));
@@ -70,7 +70,7 @@ fn starts_and_steps() {
         AssemblyError::NonFinite { what: "t", .. }
     ));
     assert!(matches!(
-        refused(&system, 0.1, State { z: f64::NAN, ..start }),
+        refused(&system, 0.1, State { z: Some(f64::NAN), ..start }),
         AssemblyError::NonFinite { what: "z", .. }
     ));
     let drag = refused(&chain().with_drag(f64::NAN), 0.1, start);
@@ -98,7 +98,7 @@ fn starts_and_steps() {
 fn too_little_memory() {
     let system = lattice([30, 30], SineGordon { omega_squared: 1.0 }, 1.0, 0.0).unwrap();
     let zeros = vec![0.0; 900];
-    let start = State { t: 0.0, q: &zeros, v: &zeros, z: 0.0 };
+    let start = State { t: 0.0, q: &zeros, v: &zeros, z: Some(0.0) };
     let Some(AssemblyError::Memory { needed, limit: 1000 }) =
         AssembledMidpoint::new(&system, 0.1, start, Some(1000)).err()
     else {
@@ -117,7 +117,7 @@ fn motions_that_end() {
     let unbound = fput_chain(20, FputBond { alpha: 0.0, beta: -1.0 }, 0.0).unwrap();
     let q: Vec<f64> = (0..20).map(|i| if i % 2 == 0 { 3.0 } else { -3.0 }).collect();
     let v = vec![0.0; 20];
-    let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let start = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     let mut explicit = AssembledSplitting::new(&unbound, &SplittingScheme::STRANG, 0.1, start).unwrap();
     let halt = explicit.advance(1000).unwrap_err();
     assert_eq!((halt.cause, halt.taken), (StepError::NonFinite, 0));

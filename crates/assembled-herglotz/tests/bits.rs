@@ -12,16 +12,15 @@ fn run(system: &AssembledSystem, threads: usize, parts: &[usize]) -> Vec<u64> {
     let n = system.unknowns();
     let q: Vec<f64> = (0..n).map(|i| (0.01 * i as f64).sin()).collect();
     let v: Vec<f64> = (0..n).map(|i| (0.03 * i as f64).cos()).collect();
-    let start = State { t: 0.0, q: &q, v: &v, z: 0.5 };
+    let start = State { t: 0.0, q: &q, v: &v, z: Some(0.5) };
     pool.install(|| {
-        let mut motion =
-            AssembledSplitting::new(system, &SplittingScheme::BLANES_MOAN_4, 0.1, start).unwrap().with_action();
+        let mut motion = AssembledSplitting::new(system, &SplittingScheme::BLANES_MOAN_4, 0.1, start).unwrap();
         for steps in parts {
             motion.advance(*steps).unwrap();
             motion.state();
         }
         let end = motion.state();
-        end.q.iter().chain(end.v).chain([&end.z]).map(|x| x.to_bits()).collect()
+        end.q.iter().chain(end.v).chain(&end.z).map(|x| x.to_bits()).collect()
     })
 }
 

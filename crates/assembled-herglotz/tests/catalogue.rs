@@ -34,7 +34,7 @@ fn a_membrane() {
         assert_eq!(system.unknowns(), (k - 1) * (k - 1));
         let mode = |x: &[f64; 2]| (pi * x[0]).sin() * (pi * x[1]).sin();
         let q: Vec<f64> = nodes.iter().zip(&held).filter(|(_, held)| !**held).map(|(x, _)| mode(x)).collect();
-        let start = State { t: 0.0, q: &q, v: &vec![0.0; q.len()], z: 0.0 };
+        let start = State { t: 0.0, q: &q, v: &vec![0.0; q.len()], z: Some(0.0) };
         let mut motion = AssembledSplitting::new(&system, &SplittingScheme::BLANES_MOAN_6, t / 60.0, start).unwrap();
         motion.advance(60).unwrap();
         let end = motion.state().q.to_vec();
@@ -60,7 +60,7 @@ fn a_membrane_with_consistent_masses() {
             consistent_membrane(Mesh { nodes: &nodes, triangles: &triangles, held: &held }, 1.0, gamma).unwrap();
         let mode = |x: &[f64; 2]| (pi * x[0]).sin() * (pi * x[1]).sin();
         let q: Vec<f64> = nodes.iter().zip(&held).filter(|(_, held)| !**held).map(|(x, _)| mode(x)).collect();
-        let start = State { t: 0.0, q: &q, v: &vec![0.0; q.len()], z: 0.0 };
+        let start = State { t: 0.0, q: &q, v: &vec![0.0; q.len()], z: Some(0.0) };
         let mut motion = AssembledGauss::new(&system, 2, t / 30.0, start, None).unwrap();
         motion.advance(30).unwrap();
         // The rate is constant: sigma_d is the diagonal Padé approximation of the exponential, with an error of (gamma h)^5/720 = 4e-15.
@@ -87,7 +87,7 @@ fn bad_meshes() {
     // A free node of no triangle.
     let lone = membrane(Mesh { nodes: &nodes, triangles: &[[0, 1, 3]], held: &[false; 9] }, 1.0, 0.0).unwrap();
     let zeros = [0.0; 9];
-    let start = State { t: 0.0, q: &zeros, v: &zeros, z: 0.0 };
+    let start = State { t: 0.0, q: &zeros, v: &zeros, z: Some(0.0) };
     let none = AssembledSplitting::new(&lone, &SplittingScheme::STRANG, 0.1, start).err();
     assert_eq!(none, Some(AssemblyError::Mass { unknown: 2, mass: 0.0 }));
 }
@@ -100,7 +100,7 @@ fn a_cloth_falls() {
     let system = cloth([6, 5], 3.0, g, gamma).unwrap();
     let q: Vec<f64> = (0..30).flat_map(|i| [f64::from(i % 6), f64::from(i / 6), 0.0]).collect();
     let v = vec![0.0; 90];
-    let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let start = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     let fallen = -g * ((gamma * t).exp() - 1.0 - gamma * t) / (gamma * gamma);
     let mut explicit = AssembledSplitting::new(&system, &SplittingScheme::BLANES_MOAN_6, 0.1, start).unwrap();
     explicit.advance(20).unwrap();
@@ -123,7 +123,7 @@ fn a_cloth_falls() {
 fn jupiter_comes_back() {
     let system = OuterSolarSystem::system(2, 0.0).unwrap();
     let (q, v) = (OuterSolarSystem::positions(2), OuterSolarSystem::velocities(2));
-    let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let start = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     let mut motion = AssembledSplitting::new(&system, &SplittingScheme::BLANES_MOAN_6, 43.326, start).unwrap();
     motion.advance(100).unwrap();
     let end = motion.state().q;

@@ -84,7 +84,7 @@ fn start() -> VelocityPoint<N> {
 fn general_terms_are_those_of_the_whole() {
     let (system, x) = (large(), start());
     let p = Whole.gradient(0.7, &x).y;
-    let from = State { t: 0.7, q: x.q.as_slice(), v: x.v.as_slice(), z: x.z };
+    let from = State { t: 0.7, q: x.q.as_slice(), v: x.v.as_slice(), z: Some(x.z) };
     for (stages, h) in [(1, H), (2, H), (1, -H), (2, -H)] {
         let mut a = AssembledGauss::new(&system, stages, h, from, None).unwrap();
         let gauss = Gauss::new(Whole, stages, h).unwrap();
@@ -98,13 +98,17 @@ fn general_terms_are_those_of_the_whole() {
             let (dq, dp) = (a.q()[i] - expected.q[i], a.p()[i] - expected.p[i]);
             assert!(dq.abs() <= tolerance && dp.abs() <= tolerance, "{stages} stages, {i}: {dq:e}, {dp:e}");
         }
-        assert!((a.z() - expected.z).abs() <= N as f64 * tolerance, "z differs by {:e}", a.z() - expected.z);
+        assert!(
+            (a.z().unwrap() - expected.z).abs() <= N as f64 * tolerance,
+            "z differs by {:e}",
+            a.z().unwrap() - expected.z
+        );
         // The velocity of a state belongs to its momentum.
         let (momenta, state) = (a.p().to_vec(), a.state().unwrap());
         let end = VelocityPoint {
             q: SVector::from_column_slice(state.q),
             v: SVector::from_column_slice(state.v),
-            z: state.z,
+            z: state.z.unwrap(),
         };
         let off = Whole.gradient(state.t, &end).y - SVector::<f64, N>::from_column_slice(&momenta);
         assert!(off.amax() <= 100.0 * f64::EPSILON, "p - L_v = {:e}", off.amax());
@@ -127,9 +131,9 @@ fn one_stage_is_the_midpoint_rule() {
     let n = 50;
     let chain = fput_chain(n, FputBond { alpha: 0.3, beta: 1.0 }, -0.1).unwrap();
     let (q, v) = motion_of(n);
-    let from = State { t: 0.0, q: &q, v: &v, z: 0.2 };
-    let mut a = AssembledGauss::new(&chain, 1, H, from, None).unwrap().with_action();
-    let mut b = AssembledMidpoint::new(&chain, H, from, None).unwrap().with_action();
+    let from = State { t: 0.0, q: &q, v: &v, z: Some(0.2) };
+    let mut a = AssembledGauss::new(&chain, 1, H, from, None).unwrap();
+    let mut b = AssembledMidpoint::new(&chain, H, from, None).unwrap();
     assert_eq!((a.advance(STEPS), b.advance(STEPS)), (Ok(()), Ok(())));
     // One rounding of the product gamma h, and of each of the quotients.
     assert!((a.sigma() - b.sigma()).abs() <= 8.0 * f64::EPSILON);
@@ -137,7 +141,7 @@ fn one_stage_is_the_midpoint_rule() {
     // As in small_systems.rs: Newton's method ends within the rounding of q/h.
     let tolerance = 200.0 * f64::EPSILON * STEPS as f64 / H;
     assert!(distance(a.q, b.q) <= tolerance && distance(a.v, b.v) <= tolerance, "{:e}", distance(a.v, b.v));
-    assert!((a.z - b.z).abs() <= n as f64 * tolerance, "{:e}", a.z - b.z);
+    assert!((a.z.unwrap() - b.z.unwrap()).abs() <= n as f64 * tolerance, "{:e}", a.z.unwrap() - b.z.unwrap());
 }
 
 /// Two stages have order 4 on a nonlinear chain: the slope of the error, to 0.15.
@@ -146,18 +150,17 @@ fn two_stages_have_order_four() {
     let n = 50;
     let chain = fput_chain(n, FputBond { alpha: 0.3, beta: 1.0 }, -0.1).unwrap();
     let (q, v) = motion_of(n);
-    let from = State { t: 0.0, q: &q, v: &v, z: 0.2 };
-    let mut exact = AssembledSplitting::new(&chain, &SplittingScheme::SOFRONIOU_SPALETTA_10, 4.0 / 256.0, from)
-        .unwrap()
-        .with_action();
+    let from = State { t: 0.0, q: &q, v: &v, z: Some(0.2) };
+    let mut exact =
+        AssembledSplitting::new(&chain, &SplittingScheme::SOFRONIOU_SPALETTA_10, 4.0 / 256.0, from).unwrap();
     exact.advance(256).unwrap();
     let end = exact.state();
-    let exact = [end.q, end.v, &[end.z]].concat();
+    let exact = [end.q, end.v, &[end.z.unwrap()]].concat();
     let error = |steps: usize| {
-        let mut motion = AssembledGauss::new(&chain, 2, 4.0 / steps as f64, from, None).unwrap().with_action();
+        let mut motion = AssembledGauss::new(&chain, 2, 4.0 / steps as f64, from, None).unwrap();
         motion.advance(steps).unwrap();
         let end = motion.state().unwrap();
-        distance(&[end.q, end.v, &[end.z]].concat(), &exact)
+        distance(&[end.q, end.v, &[end.z.unwrap()]].concat(), &exact)
     };
     let points = [48, 64, 96, 128].map(|steps| ((4.0 / steps as f64).ln(), error(steps).ln()));
     let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / points.len() as f64;
@@ -173,7 +176,7 @@ fn two_stages_have_order_four() {
 #[test]
 fn bad_input() {
     let x = start();
-    let from = State { t: 0.0, q: x.q.as_slice(), v: x.v.as_slice(), z: x.z };
+    let from = State { t: 0.0, q: x.q.as_slice(), v: x.v.as_slice(), z: Some(x.z) };
     let refused =
         |system: &AssembledSystem, stages, h, memory| AssembledGauss::new(system, stages, h, from, memory).err();
     let system = large();
@@ -234,10 +237,10 @@ impl LocalLagrangian<1> for Inverse {
 fn a_step_that_fails_keeps_the_state() {
     let strong = large().with_drag(-60.0);
     let x = start();
-    let from = State { t: 0.0, q: x.q.as_slice(), v: x.v.as_slice(), z: x.z };
+    let from = State { t: 0.0, q: x.q.as_slice(), v: x.v.as_slice(), z: Some(x.z) };
     let mut motion = AssembledGauss::new(&strong, 1, H, from, None).unwrap();
     let halt = motion.advance(3).unwrap_err();
     assert_eq!(halt.taken, 0);
     assert!(!matches!(halt.cause, StepError::Singular { .. }), "{halt}");
-    assert_eq!((motion.q(), motion.time(), motion.z()), (x.q.as_slice(), 0.0, x.z));
+    assert_eq!((motion.q(), motion.time(), motion.z()), (x.q.as_slice(), 0.0, Some(x.z)));
 }

@@ -53,9 +53,8 @@ fn steps() {
     let n = 3000;
     let chain = fput_chain(n, FputBond { alpha: 0.1, beta: 1.0 }, -0.01).unwrap();
     let (q, v) = (vec![0.5; n], vec![0.1; n]);
-    let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
-    let mut explicit =
-        AssembledSplitting::new(&chain, &SplittingScheme::BLANES_MOAN_6, 0.1, start).unwrap().with_action();
+    let start = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
+    let mut explicit = AssembledSplitting::new(&chain, &SplittingScheme::BLANES_MOAN_6, 0.1, start).unwrap();
     explicit.state();
     let found = allocations(|| {
         explicit.advance(300).unwrap();
@@ -65,7 +64,7 @@ fn steps() {
     // With compensated sums, and with elements that are in no run.
     let planets = OuterSolarSystem::system(5, -1e-8).unwrap();
     let (at, moving) = (OuterSolarSystem::positions(5), OuterSolarSystem::velocities(5));
-    let begin = State { t: 0.0, q: &at, v: &moving, z: 0.0 };
+    let begin = State { t: 0.0, q: &at, v: &moving, z: Some(0.0) };
     let mut bodies =
         AssembledSplitting::new(&planets, &SplittingScheme::BLANES_MOAN_6, 100.0, begin).unwrap().compensated();
     let found = allocations(|| {
@@ -92,7 +91,7 @@ fn memory_of_a_chain() {
     MOST.with(|most| most.set(before));
     let (q, v) = (vec![0.5; n], vec![0.1; n]);
     let chain = fput_chain(n, FputBond { alpha: 0.1, beta: 1.0 }, -0.01).unwrap();
-    let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let start = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     let mut motion = AssembledSplitting::new(&chain, &SplittingScheme::BLANES_MOAN_6, 0.1, start).unwrap();
     motion.advance(2).unwrap();
     motion.state();
@@ -109,7 +108,7 @@ fn memory_of_gauss() {
     let system = lattice([side, side], SineGordon { omega_squared: 1.0 }, 1.0, -0.01).unwrap();
     let q: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).sin()).collect();
     let v = vec![0.0; n];
-    let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let start = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     let Some(AssemblyError::Memory { needed, limit: 1 }) = AssembledGauss::new(&system, 2, 0.05, start, Some(1)).err()
     else {
         panic!("a byte is not enough");

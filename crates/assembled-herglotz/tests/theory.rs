@@ -4,7 +4,11 @@
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{FputBond, KleinGordon, OuterSolarSystem, SineGordon, fput_chain, lattice};
-use assembled_herglotz::{AssembledMidpoint, AssembledSplitting, AssembledSystem, State};
+use assembled_herglotz::{
+    AssembledGauss, AssembledMidpoint, AssembledSplitting, AssembledSystem, AssemblyError, LocalLagrangian, State,
+};
+use contact_geom::Scalar;
+use contact_geom::nalgebra::SVector;
 use discrete_herglotz::SplittingScheme;
 
 /// A motion without symmetry.
@@ -15,17 +19,17 @@ fn start(n: usize) -> (Vec<f64>, Vec<f64>) {
 
 /// Positions and velocities after a time.
 fn explicit(system: &AssembledSystem, scheme: &SplittingScheme, start: State, time: f64, steps: usize) -> Vec<f64> {
-    let mut motion = AssembledSplitting::new(system, scheme, time / steps as f64, start).unwrap().with_action();
+    let mut motion = AssembledSplitting::new(system, scheme, time / steps as f64, start).unwrap();
     motion.advance(steps).unwrap();
     let end = motion.state();
-    [end.q, end.v, &[end.z]].concat()
+    [end.q, end.v, &[end.z.unwrap()]].concat()
 }
 
 fn implicit(system: &AssembledSystem, start: State, time: f64, steps: usize) -> Vec<f64> {
-    let mut motion = AssembledMidpoint::new(system, time / steps as f64, start, None).unwrap().with_action();
+    let mut motion = AssembledMidpoint::new(system, time / steps as f64, start, None).unwrap();
     motion.advance(steps).unwrap();
     let end = motion.state();
-    [end.q, end.v, &[end.z]].concat()
+    [end.q, end.v, &[end.z.unwrap()]].concat()
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
@@ -48,7 +52,7 @@ fn orders() {
     let n = 50;
     let chain = fput_chain(n, FputBond { alpha: 0.3, beta: 1.0 }, -0.1).unwrap();
     let (q, v) = start(n);
-    let from = State { t: 0.0, q: &q, v: &v, z: 0.2 };
+    let from = State { t: 0.0, q: &q, v: &v, z: Some(0.2) };
     let exact = explicit(&chain, &SplittingScheme::SOFRONIOU_SPALETTA_10, from, 4.0, 256);
     let check = |name: &str, order: f64, steps: [usize; 4], run: &dyn Fn(usize) -> Vec<f64>| {
         let points = steps.map(|k| (4.0 / k as f64, distance(&run(k), &exact)));
@@ -76,7 +80,7 @@ fn momenta_decay_with_the_conformal_factor() {
     let system = lattice(size, free, 2.0, -0.3).unwrap();
     let (q, v) = start(n);
     let v: Vec<f64> = v.iter().map(|v| v + 0.5).collect();
-    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let from = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     let (h, steps) = (0.1, 50);
     let before: f64 = v.iter().sum();
     // The forces are opposite to the last bit; each unknown rounds about four times a stage, at random.
@@ -103,10 +107,10 @@ fn energy_decays() {
     let system = lattice([16, 16], SineGordon { omega_squared: 1.0 }, 1.0, -0.05).unwrap();
     let n = system.unknowns();
     let (q, v) = start(n);
-    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let from = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     let before = system.energy(from).unwrap();
     let defect = |h: f64| {
-        let mut motion = AssembledSplitting::new(&system, &SplittingScheme::STRANG, h, from).unwrap().with_action();
+        let mut motion = AssembledSplitting::new(&system, &SplittingScheme::STRANG, h, from).unwrap();
         let mut worst = 0.0f64;
         for _ in 0..10 {
             motion.advance((4.0 / h).round() as usize).unwrap();
@@ -122,13 +126,64 @@ fn energy_decays() {
     assert!((coarse / fine).log2() > 1.8, "order of the energy's error: {coarse:e}, {fine:e}");
 }
 
+/// A drag of one unknown, as a general term.
+struct Drag;
+
+impl LocalLagrangian<1> for Drag {
+    #[inline(always)]
+    fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, _v: &SVector<T, 1>, z: T, _c: &[T; 0]) -> T {
+        z * -0.1
+    }
+}
+
+/// A motion whose start has no action has none either: the energy is refused where L depends on it, and is the same where it does not.
+#[test]
+fn no_energy_without_the_action() {
+    let (q, v) = start(50);
+    let from = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
+    for gamma in [-0.1, 0.0] {
+        let chain = fput_chain(50, FputBond { alpha: 0.3, beta: 1.0 }, gamma).unwrap();
+        let energy = |state: State| {
+            assert_eq!(state.z, None);
+            chain.energy(state)
+        };
+        let without = State { z: None, ..from };
+        let mut splitting = AssembledSplitting::new(&chain, &SplittingScheme::STRANG, 0.05, without).unwrap();
+        let mut midpoint = AssembledMidpoint::new(&chain, 0.05, without, None).unwrap();
+        let mut gauss = AssembledGauss::new(&chain, 2, 0.05, without, None).unwrap();
+        splitting.advance(20).unwrap();
+        midpoint.advance(20).unwrap();
+        gauss.advance(20).unwrap();
+        let energies = [splitting.state(), midpoint.state(), gauss.state().unwrap()].map(energy);
+        let mut with = AssembledSplitting::new(&chain, &SplittingScheme::STRANG, 0.05, from).unwrap();
+        with.advance(20).unwrap();
+        let with = with.state();
+        assert_eq!((with.q, with.z.is_some()), (splitting.state().q, true));
+        let expected = chain.energy(with).unwrap();
+        for found in energies {
+            if gamma == 0.0 {
+                // The errors of steps of a twentieth, of second order, of waves of frequencies up to 4.
+                assert!((found.unwrap() / expected - 1.0).abs() < 0.01, "{found:?}, {expected}");
+            } else {
+                assert_eq!(found, Err(AssemblyError::NoAction));
+            }
+        }
+    }
+    // A general term may depend on z.
+    let general =
+        fput_chain(50, FputBond { alpha: 0.0, beta: 1.0 }, 0.0).and_then(|s| s.with_term(Drag, [[3]])).unwrap();
+    let refused = AssembledGauss::new(&general, 2, 0.05, State { z: None, ..from }, None).err();
+    assert_eq!(refused, Some(AssemblyError::NoAction));
+    assert!(AssembledGauss::new(&general, 2, 0.05, from, None).is_ok());
+}
+
 /// With drag the outer solar system has the same error as without: nothing is proportional to the drag.
 ///
 /// In the time `tau = int e^(gamma t) dt` an orbit with drag is not one without, so each is compared with its own fine run.
 #[test]
 fn outer_solar_system() {
     let (q, v) = (OuterSolarSystem::positions(6), OuterSolarSystem::velocities(6));
-    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    let from = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     let error = |gamma: f64, steps: usize| {
         let system = OuterSolarSystem::system(6, gamma).unwrap();
         let exact = explicit(&system, &SplittingScheme::SOFRONIOU_SPALETTA_10, from, 20_000.0, 400);

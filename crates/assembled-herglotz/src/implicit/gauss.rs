@@ -28,7 +28,7 @@ use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError};
 /// use assembled_herglotz::{AssembledGauss, State};
 /// let chain = fput_chain(100, FputBond { alpha: 0.0, beta: 1.0 }, -0.01)?;
 /// let q: Vec<f64> = (1..=100).map(|i| (0.03 * i as f64).sin()).collect();
-/// let start = State { t: 0.0, q: &q, v: &[0.0; 100], z: 0.0 };
+/// let start = State { t: 0.0, q: &q, v: &[0.0; 100], z: Some(0.0) };
 /// let mut motion = AssembledGauss::new(&chain, 2, 0.1, start, None)?;
 /// assert!(motion.advance(100).is_ok());
 /// println!("{:?}", motion.q()[50]);
@@ -70,13 +70,15 @@ pub struct AssembledGauss<'a> {
 }
 
 impl<'a> AssembledGauss<'a> {
-    /// From a state, with 1 or 2 stages. The matrix, its factors and the workspace are refused where they may need more than `memory` bytes; with
+    /// From a state, with 1 or 2 stages; with the action z where the state has one, which costs the energies once a step unless there are general
+    /// terms. The matrix, its factors and the workspace are refused where they may need more than `memory` bytes; with
     /// `None` more than the system has available (Linux' `MemAvailable`; elsewhere there is no limit then).
     ///
     /// # Errors
     /// [`InputError::Stages`], [`InputError::Step`]; [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state and the masses;
     /// [`AssemblyError::Mass`] where an unknown has no mass, be it of its own or in a general term; [`AssemblyError::SingularMass`];
-    /// [`AssemblyError::Undefined`] where a derivative of L is not finite at the start; [`AssemblyError::Memory`] with the estimate.
+    /// [`AssemblyError::NoAction`] of general terms from a state without the action; [`AssemblyError::Undefined`] where a derivative of L is not
+    /// finite at the start; [`AssemblyError::Memory`] with the estimate.
     pub fn new(
         system: &'a AssembledSystem,
         stages: usize,
@@ -92,6 +94,10 @@ impl<'a> AssembledGauss<'a> {
         }
         start.check(system)?;
         let general = !system.locals.is_empty();
+        if general && start.z.is_none() {
+            return Err(AssemblyError::NoAction);
+        }
+        let z = start.z.unwrap_or(0.0);
         system.check_masses(general)?;
         AssembledSystem::check_number("gamma", system.rate(start.t))?;
         let (n, limit) = (system.unknowns(), limit(memory));
@@ -102,7 +108,7 @@ impl<'a> AssembledGauss<'a> {
         let between = |x: &[f64]| [&[0.0], x, &[0.0]].concat();
         let (q, place_v) = (between(start.q), between(start.v));
         let mut first = First::zeros(n);
-        system.first(Place { t: start.t, q: &q, v: &place_v, z: start.z }, true, &mut first);
+        system.first(Place { t: start.t, q: &q, v: &place_v, z }, true, &mut first);
         let defined = |unknown: usize| first.q[unknown].is_finite() && first.v[unknown].is_finite();
         if let Some(unknown) = (0..n).find(|i| !defined(*i)) {
             return Err(AssemblyError::Undefined { unknown });
@@ -121,11 +127,11 @@ impl<'a> AssembledGauss<'a> {
             taken: 0,
             factorisations: 0,
             iterations: 0,
-            action: false,
+            action: start.z.is_some(),
             place_q: q.clone(),
             q,
             p: first.v.clone(),
-            z: start.z,
+            z,
             sigma: 1.0,
             next: v.clone(),
             v,
@@ -141,11 +147,6 @@ impl<'a> AssembledGauss<'a> {
             gauss.check_regular(limit)?;
         }
         Ok(gauss)
-    }
-
-    /// With the action z also where L has no general terms; it costs the energies once a step there.
-    pub fn with_action(self) -> Self {
-        AssembledGauss { action: true, ..self }
     }
 
     /// Takes steps.
@@ -175,9 +176,9 @@ impl<'a> AssembledGauss<'a> {
         &self.p
     }
 
-    /// The action; that of the start where it is not followed.
-    pub fn z(&self) -> f64 {
-        self.z
+    /// The action, where the start has one.
+    pub fn z(&self) -> Option<f64> {
+        self.action.then_some(self.z)
     }
 
     /// `sigma_d` of the last step; 1 before the first.
@@ -213,7 +214,7 @@ impl<'a> AssembledGauss<'a> {
                 found?;
             }
         }
-        Ok(State { t: self.time(), q: &self.q[1..=n], v: &self.end, z: self.z })
+        Ok(State { t: self.time(), q: &self.q[1..=n], v: &self.end, z: self.z() })
     }
 
     /// Solves `L_v = p` for the velocity, from that of the last state, into `end`.
@@ -323,7 +324,7 @@ impl<'a> AssembledGauss<'a> {
         for (q, v) in self.q.iter_mut().skip(1).zip(self.next.chunks_exact(s)) {
             *q += v.iter().zip(b).map(|(v, b)| b * v).sum::<f64>();
         }
-        if self.action || self.border.is_some() {
+        if self.action {
             self.z += action;
         }
         self.sigma = 1.0 / rho;

@@ -50,7 +50,7 @@ pub(super) enum Linear {
 }
 
 impl<'a> AssembledMidpoint<'a> {
-    /// From a state, without the action. Factors and workspace of more than `memory` bytes are refused; with `None` of more than the system
+    /// From a state; with the action z where the state has one, which costs the energies once a step. Factors and workspace of more than `memory` bytes are refused; with `None` of more than the system
     /// has available (Linux' `MemAvailable`; elsewhere there is no limit then).
     ///
     /// # Errors
@@ -75,7 +75,7 @@ impl<'a> AssembledMidpoint<'a> {
     /// use assembled_herglotz::{AssembledMidpoint, State};
     /// let (planets, q, v) =
     ///     (OuterSolarSystem::system(5, -1e-6)?, OuterSolarSystem::positions(5), OuterSolarSystem::velocities(5));
-    /// let start = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    /// let start = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     /// let mut motion = AssembledMidpoint::matrix_free(&planets, 10.0, start)?; // days
     /// assert!(motion.advance(10).is_ok());
     /// # Ok::<(), assembled_herglotz::AssemblyError>(())
@@ -121,8 +121,8 @@ impl<'a> AssembledMidpoint<'a> {
             middle: q.clone(),
             q,
             v: start.v.to_vec(),
-            z: start.z,
-            action: false,
+            z: start.z.unwrap_or(0.0),
+            action: start.z.is_some(),
             u: start.v.to_vec(),
             before: zeros.clone(),
             residual: zeros.clone(),
@@ -133,11 +133,6 @@ impl<'a> AssembledMidpoint<'a> {
             Some(unknown) => Err(AssemblyError::Undefined { unknown }),
             None => Ok(midpoint),
         }
-    }
-
-    /// With the action z, which costs the energies once a step.
-    pub fn with_action(self) -> Self {
-        AssembledMidpoint { action: true, ..self }
     }
 
     /// Takes steps.
@@ -155,7 +150,12 @@ impl<'a> AssembledMidpoint<'a> {
     /// The state.
     pub fn state(&self) -> State<'_> {
         let n = self.system.unknowns();
-        State { t: self.t0 + self.taken as f64 * self.h, q: &self.q[1..=n], v: &self.v, z: self.z }
+        State {
+            t: self.t0 + self.taken as f64 * self.h,
+            q: &self.q[1..=n],
+            v: &self.v,
+            z: self.action.then_some(self.z),
+        }
     }
 
     /// `sigma_d` of the last step; before the first one, of that.

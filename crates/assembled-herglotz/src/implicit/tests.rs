@@ -59,7 +59,7 @@ fn the_assembled_matrix_is_that_of_the_whole() {
         .and_then(|s| s.with_potential(Triple, TRIPLES))
         .unwrap();
     let q: [f64; N] = std::array::from_fn(|i| (1.3 * i as f64).sin());
-    let start = State { t: 0.4, q: &q, v: &[0.0; N], z: 0.0 };
+    let start = State { t: 0.4, q: &q, v: &[0.0; N], z: Some(0.0) };
     let mut midpoint = AssembledMidpoint::new(&system, H, start, None).unwrap();
     midpoint.factorise(start.t).unwrap();
     let x = VelocityPoint { q: SVector::from(q), v: SVector::zeros(), z: 0.0 };

@@ -53,7 +53,8 @@ fn p4(report: &mut Report) -> Result<(), Failure> {
     let n = 1000;
     let system = chain(n)?;
     let (q, v) = start(n);
-    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    // Without the action, whose energies are a part of the time.
+    let from = State { t: 0.0, q: &q, v: &v, z: None };
     let reference = {
         let scheme = SplittingScheme::SOFRONIOU_SPALETTA_10;
         let mut motion = AssembledSplitting::new(&system, &scheme, 0.25, from).map_err(refused)?;
@@ -139,7 +140,8 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
     let sizes: &[usize] = if report.quick { &[1000, 10_000, 100_000] } else { &[1000, 10_000, 100_000, 1_000_000] };
     for &n in sizes {
         let (q, v) = start(n);
-        let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+        // Without the action, whose energies are a part of the time.
+        let from = State { t: 0.0, q: &q, v: &v, z: None };
         for scheme in [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_4, SplittingScheme::BLANES_MOAN_6] {
             let (seconds, bytes) = peak(|| {
                 let system = chain(n)?;
@@ -173,7 +175,8 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
 fn copy(report: &mut Report, n: usize) -> Result<(), Failure> {
     let system = chain(n)?;
     let (q, v) = start(n);
-    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    // Without the action, whose energies are a part of the time.
+    let from = State { t: 0.0, q: &q, v: &v, z: None };
     let mut motion = AssembledSplitting::new(&system, &SplittingScheme::STRANG, 0.1, from).map_err(refused)?;
     let (mut a, mut b) = (q.clone(), v.clone());
     const STAGES: usize = 20;
@@ -197,7 +200,8 @@ fn factorisation(report: &mut Report, n: usize) -> Result<(), Failure> {
     let system = chain(n)?;
     let (q, v) = start(n);
     let h = 0.1;
-    let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+    // Without the action, whose energies are a part of the time.
+    let from = State { t: 0.0, q: &q, v: &v, z: None };
     let mut motion = AssembledMidpoint::new(&system, h, from, None).map_err(refused)?;
     // M + (h^2/4) V_qq at the start.
     let place = |i: usize| if i == 0 || i > n { 0.0 } else { q[i - 1] };

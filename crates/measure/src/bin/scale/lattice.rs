@@ -21,7 +21,8 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         // A kink in each row, at rest.
         let q: Vec<f64> = (0..n).map(|i| 4.0 * (0.5 * ((i % side) as f64 - 0.5 * side as f64)).exp().atan()).collect();
         let v = vec![0.0; n];
-        let from = State { t: 0.0, q: &q, v: &v, z: 0.0 };
+        // Without the action, whose energies are a part of the time.
+        let from = State { t: 0.0, q: &q, v: &v, z: None };
         let site = SineGordon { omega_squared: 1.0 };
         let (seconds, bytes) = peak(|| {
             let system = lattice([side, side], site, 4.0, -0.01).map_err(refused)?;
