@@ -173,6 +173,108 @@ fn all_events_of_an_instant_are_told() {
     }
 }
 
+/// A fall towards the place where the potential ends: `v^2/2 - x^(5/2)` for x >= 0.
+struct EndsAtZero;
+
+impl Lagrangian<1> for EndsAtZero {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        v[0] * v[0] * 0.5 - q[0].sqrt().powi(5)
+    }
+}
+
+/// `v^2/2 - log(x)`-like: nothing of the motion is defined beyond the centre.
+struct Well;
+
+impl Lagrangian<1> for Well {
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        v[0] * v[0] * 0.5 + q[0].recip() - z * 0.1
+    }
+}
+
+/// A terminal event before the place where the motion, or L, has its end: by accuracy it is found with the energy of the start, however far
+/// the run was to go, and whatever the integrator.
+#[test]
+fn a_run_for_an_accuracy_may_end_in_an_event_before_its_domain_does() {
+    let floor = |at: f64| Event::new(move |_, x: &PhasePoint<1>| x.q[0] - at).terminal();
+    for (to, at) in [(10.0, 1e-3), (1e3, 1e-3), (10.0, 1e-6), (10.0, 0.5)] {
+        for v in [-1.0, 0.0, 0.5] {
+            let problem = Problem::new(&EndsAtZero, 0.0, VelocityPoint::new([1.0], [v], 0.0)).unwrap();
+            for by in [None, Some(AnyIntegrator::Gauss { stages: 8 }), Some(AnyIntegrator::Gauss { stages: 16 })] {
+                let mut events = Events::new([floor(at)]);
+                let run = by.map_or_else(|| problem.accuracy(1e-9), |by| problem.by(by).accuracy(1e-9));
+                let name = format!("to {to}, at {at}, v = {v}, {by:?}");
+                let ended =
+                    run.observe(&mut events).run(Until::Time(to)).unwrap_or_else(|error| panic!("{name}: {error}"));
+                assert!(matches!(ended.status, Status::Stopped { by: "an event", .. }), "{name}: {ended:?}");
+                assert_eq!((events.crossings.len(), ended.suspicion), (1, None), "{name}: {ended:?}");
+                // Of the position to the rounding of a step of size one, of the momentum to the accuracy.
+                let expected = -(v * v + 2.0 - 2.0 * at.powf(2.5)).sqrt();
+                assert!((ended.q[0] - at).abs() <= 8.0 * f64::EPSILON, "{name}: {ended:?}");
+                assert!((ended.p[0] - expected).abs() <= 1e-9 * expected.abs(), "{name}: {ended:?}, {expected}");
+            }
+        }
+    }
+    // With a dissipation, towards a pole: against a finer run to the same place.
+    let problem = Problem::new(&Well, 0.0, VelocityPoint::new([1.0], [0.1], 0.0)).unwrap();
+    let [coarse, fine] = [1e-6, 1e-10].map(|wanted| {
+        let mut events = Events::new([floor(0.01)]);
+        problem.accuracy(wanted).observe(&mut events).run(Until::Time(50.0)).unwrap()
+    });
+    assert!(matches!(coarse.status, Status::Stopped { by: "an event", .. }), "{coarse:?}");
+    assert!((coarse.p[0] - fine.p[0]).abs() <= 1e-6 * fine.p[0].abs(), "{coarse:?}, {fine:?}");
+    // Without the event the motion has no end that is reached.
+    assert!(problem.accuracy(1e-6).run(Until::Time(50.0)).is_err());
+    // An event that is not met refuses nothing, and changes nothing.
+    let oscillator = HarmonicOscillator { gamma: 0.0 };
+    let problem = Problem::new(&oscillator, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
+    let mut events = Events::new([floor(2.0)]);
+    let with = problem.accuracy(1e-9).observe(&mut events).run(Until::Time(30.0)).unwrap();
+    assert_eq!((with.q, with.status), (problem.accuracy(1e-9).run(Until::Time(30.0)).unwrap().q, Status::Completed));
+}
+
+/// Given steps too: the step that cannot be taken as a whole is taken as far as the event. What observers see is as of any other step.
+#[test]
+fn a_step_that_cannot_be_taken_may_end_in_an_event() {
+    let problem = Problem::new(&EndsAtZero, 0.0, VelocityPoint::new([1.0], [-1.0], 0.0)).unwrap();
+    let times: Vec<f64> = (0..64).map(|k| 0.01 * f64::from(k)).collect();
+    for count in [20, 30, 50] {
+        let mut events = Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0] - 1e-3).terminal()]);
+        let mut rows = discrete_herglotz::Rows::at(times.iter().copied()).unwrap();
+        let run = problem.by(AnyIntegrator::Gauss { stages: 8 }).steps(Steps::Count(count));
+        let ended = run.observe(&mut rows).observe(&mut events).run(Until::Time(3.0)).unwrap();
+        assert!(matches!(ended.status, Status::Stopped { by: "an event", .. }), "{count}: {ended:?}");
+        assert!((ended.q[0] - 1e-3).abs() <= 8.0 * f64::EPSILON, "{count}: {ended:?}");
+        let until = rows.rows.iter().filter(|row| row.t <= ended.t).count();
+        assert_eq!(until, times.iter().filter(|t| **t <= ended.t).count(), "{count}: {ended:?}");
+    }
+}
+
+/// A function that is not defined beyond its surface: the change of sign before counts, whether it ends the run or not.
+#[test]
+fn a_crossing_before_the_function_ends_is_found() {
+    let ball = UniformField { field: [-9.81], gamma: 0.0 };
+    let root = || Event::new(|_, x: &PhasePoint<1>| x.q[0].sqrt() - 0.5);
+    let start = VelocityPoint::new([3.0], [0.0], 0.0);
+    let expected = f64::sqrt(2.0 * 2.75 / 9.81);
+    for count in [1, 3, 40] {
+        let way = (AnyIntegrator::Gauss { stages: 8 }, Steps::Count(count));
+        for (event, status) in [(root().terminal(), "an event"), (root().falling(), "")] {
+            let (ended, found) = run_to(&ball, (0.0, start), way, 5.0, [event]);
+            assert_eq!(found.len(), 1, "{count}: {ended:?}");
+            // Of a time of size one some roundings, and of a step of 5.
+            assert!((found[0].t - expected).abs() <= 4.0 * 5.0 * f64::EPSILON, "{count}: {found:?}, {expected}");
+            match ended.status {
+                Status::Stopped { by, .. } => assert_eq!(by, status),
+                other => assert!(status.is_empty() && matches!(other, Status::Failed { .. }), "{other:?}"),
+            }
+        }
+    }
+    let problem = Problem::new(&ball, 0.0, start).unwrap();
+    let mut events = Events::new([root().terminal()]);
+    let ended = problem.accuracy(1e-9).observe(&mut events).run(Until::Time(5.0)).unwrap();
+    assert!((ended.t - expected).abs() <= 1e-9 && (ended.q[0] - 0.25).abs() <= 1e-9, "{ended:?}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 

@@ -2,7 +2,7 @@
 
 use super::divided::divided_steps;
 use super::pilot::{Elsewhere, Marks, PilotEnd, Pilots, Track};
-use super::{MOST_STEPS, Problem, Request, Shared};
+use super::{MOST_STEPS, Problem, Request, Shared, Terminal};
 use crate::gauss::MOST;
 use crate::rules::step_equations::inverted;
 use crate::{ClockedGauss, GaussCollocation, InputError, Obstacle};
@@ -49,6 +49,8 @@ pub(super) struct Choice<'p, L, const N: usize> {
     pub h: f64,
     /// The error that the pilot runs found, or predict; `None` where the steps are given.
     pub error: Option<f64>,
+    /// The steps after which an observer is to end the run, where they go on beyond.
+    pub ended: Option<usize>,
 }
 
 impl<L, const N: usize> Clone for Choice<'_, L, N> {
@@ -93,14 +95,23 @@ fn stages_along<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, w
 /// solve Herglotz' equations up to a misfit that falls from the one to the other as it does where the motion is smooth. The search ends
 /// a run at the first step that does not resolve the motion, so that runs that are far too coarse cost nothing. The error of the
 /// integrator's own runs is then their distance from the reference.
+///
+/// Where `terminal` ends the run, all these end there.
 pub(super) fn choose<'p, L: Lagrangian<N>, const N: usize>(
     request: &Request<'p, L, N>,
     wanted: f64,
+    terminal: Option<Terminal<'_, N>>,
 ) -> Result<Choice<'p, L, N>, InputError> {
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
-    choose_with(&mut Pilots::new(request, wanted))
+    let Some(t_end) = terminal.and_then(|terminal| request.time_of_end(terminal)) else {
+        return choose_with(&mut Pilots::new(request, wanted));
+    };
+    // What lies beyond the end is not followed.
+    let span = t_end - request.problem.t0;
+    let part = Request { t_end, span, integrator: request.integrator.clone(), ..*request };
+    Ok(choose_with(&mut Pilots::new(&part, wanted))?.going_on(request.span / span))
 }
 
 /// The same with a budget.
@@ -232,9 +243,9 @@ fn chosen<'p, L: Lagrangian<N>, const N: usize>(
     if let Marks::Times = found.marks {
         // The last step is about half of the others, so that no rounding adds one.
         let count = (found.truth.tau / h + 0.5).ceil().max(1.0);
-        return Choice { integrator, count: count as usize, h: found.truth.tau / (count - 0.5), error };
+        return Choice { integrator, count: count as usize, h: found.truth.tau / (count - 0.5), error, ended: None };
     }
-    Choice { integrator, count, h, error }
+    Choice { integrator, count, h, error, ended: None }
 }
 
 /// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.

@@ -58,7 +58,8 @@ pub(super) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
         let error = larger(first.distance(&second), 0.5 * f64::EPSILON);
         // The finer of the two is nearer to the motion than they are to each other.
         if error <= 0.5 * wanted {
-            return Ok(Choice { integrator: Arc::new(integrator), count, h: span / count as f64, error: Some(error) });
+            let (h, error) = (span / count as f64, Some(error));
+            return Ok(Choice { integrator: Arc::new(integrator), count, h, error, ended: None });
         }
         let distances = first.distances(&second);
         cause = obstacle(&distances, f64::log2(before / error), wanted, t0, span);

@@ -1,8 +1,9 @@
 //! Events: where functions of the state change sign along a run.
 
-use super::{Course, LastStep, Moment, Motion, Observer, Stop};
+use super::{Course, LastStep, Moment, Motion, Observer, Stop, Terminal};
 use crate::{InputError, StepError};
 use contact_geom::PhasePoint;
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 
 /// A time is told to so many of its roundings, and a state to so many of its own: those of the sums of a step, of the iteration that
@@ -22,7 +23,8 @@ type Function<'f, const N: usize> = Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 
 
 /// A function `g(t, state)` whose changes of sign are to be found: a section of Poincare, a collision, a turning point.
 pub struct Event<'f, const N: usize> {
-    function: Function<'f, N>,
+    /// Trial runs call it as well.
+    function: RefCell<Function<'f, N>>,
     direction: Direction,
     terminal: bool,
 }
@@ -30,7 +32,7 @@ pub struct Event<'f, const N: usize> {
 impl<'f, const N: usize> Event<'f, N> {
     /// All changes of sign of a function, which do not end the run.
     pub fn new(function: impl FnMut(f64, &PhasePoint<N>) -> f64 + 'f) -> Self {
-        Event { function: Box::new(function), direction: Direction::Both, terminal: false }
+        Event { function: RefCell::new(Box::new(function)), direction: Direction::Both, terminal: false }
     }
 
     /// Those from negative to positive alone, in the sense of the run.
@@ -48,8 +50,18 @@ impl<'f, const N: usize> Event<'f, N> {
         Event { terminal: true, ..self }
     }
 
+    /// The same for a trial run.
+    fn borrowed(&self) -> Event<'_, N> {
+        let function = |t: f64, x: &PhasePoint<N>| self.function.try_borrow_mut().map_or(f64::NAN, |mut f| f(t, x));
+        Event { function: RefCell::new(Box::new(function)), direction: self.direction, terminal: self.terminal }
+    }
+
+    fn value(&mut self, t: f64, state: &PhasePoint<N>) -> f64 {
+        self.function.get_mut()(t, state)
+    }
+
     fn at(&mut self, t: f64, state: &PhasePoint<N>) -> Result<f64, StepError> {
-        let value = (self.function)(t, state);
+        let value = self.value(t, state);
         if value.is_finite() { Ok(value) } else { Err(StepError::Event { t }) }
     }
 
@@ -224,11 +236,11 @@ impl<const N: usize> Event<'_, N> {
         found: &mut Vec<Crossing<N>>,
     ) -> Result<(), StepError> {
         let ((start, end), parts) = (step.ends(), sketch.len() + 1);
-        let value = self.at(end.0, &end.1)?;
+        let value = self.value(end.0, &end.1);
         let (mut quiet, mut size) = (value * seen.sign > 0.0, seen.value.abs());
         for (k, x) in (1..parts).zip(sketch) {
             // A sketch may leave the domain of the function where the motion does not.
-            let there = (self.function)(step.time(k as f64 / parts as f64), x);
+            let there = self.value(step.time(k as f64 / parts as f64), x);
             quiet &= there * seen.sign > 0.0;
             size = size.max(there.abs());
         }
@@ -241,7 +253,7 @@ impl<const N: usize> Event<'_, N> {
         for k in 1..=parts {
             let tau = k as f64 / parts as f64;
             let (t, state) = if k == parts { end } else { (step.time(tau), step.at(step.time(tau))?) };
-            let value = self.at(t, &state)?;
+            let value = self.value(t, &state);
             let mut from = (k - 1) as f64 / parts as f64;
             if let Some(Left { t, value: there }) = seen.left {
                 let fraction = (t - start.0) / (end.0 - start.0);
@@ -251,6 +263,14 @@ impl<const N: usize> Event<'_, N> {
                 }
                 (from, seen.value, seen.left) = (fraction, there, None);
             }
+            if !value.is_finite() {
+                found.extend(self.before_its_domain_ends(step, [from, tau], seen)?.map(|(t, state)| Crossing {
+                    t,
+                    event: index,
+                    state,
+                }));
+                return Err(StepError::Event { t });
+            }
             let side = if k == parts { left.map_or(value, |left| left.value) } else { value };
             if let Some((t, state)) = self.between(step, [from, tau], seen, [value, side], (t, &state))? {
                 found.push(Crossing { t, event: index, state });
@@ -258,6 +278,33 @@ impl<const N: usize> Event<'_, N> {
         }
         seen.left = left;
         Ok(())
+    }
+
+    /// The change of sign that counts between the point last seen and one where the function is not defined, if there is one.
+    fn before_its_domain_ends(
+        &mut self,
+        step: &LastStep<'_, N>,
+        [mut from, mut to]: [f64; 2],
+        seen: &mut LastSign<N>,
+    ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
+        loop {
+            let tau = 0.5 * (from + to);
+            if tau <= from || tau >= to {
+                return Ok(None);
+            }
+            let (t, state) = (step.time(tau), step.at(step.time(tau))?);
+            let value = self.value(t, &state);
+            if !value.is_finite() {
+                to = tau;
+                continue;
+            }
+            let changes = value * seen.sign < 0.0;
+            let found = self.between(step, [from, tau], seen, [value, value], (t, &state))?;
+            if changes {
+                return Ok(found);
+            }
+            from = tau;
+        }
     }
 
     /// The change of sign between the point last seen and the next one, where the function has a value and a side, if there is one that
@@ -319,7 +366,7 @@ impl<const N: usize> Event<'_, N> {
     fn after(&mut self, motion: &dyn Motion<N>, (t, state): (f64, &PhasePoint<N>), ahead: f64) -> Option<Left> {
         let there = t + ahead;
         let (x, _) = motion.inside(&(t, *state), there).ok()?;
-        let value = (self.function)(there, &x);
+        let value = self.value(there, &x);
         value.is_finite().then_some(Left { t: there, value })
     }
 
@@ -327,7 +374,7 @@ impl<const N: usize> Event<'_, N> {
     fn rounding(&mut self, t: f64, state: &PhasePoint<N>, g: f64) -> f64 {
         let [q, p, z] = [state.q.amax(), state.p.amax(), state.z.abs()].map(|size| ROUNDINGS * size);
         let mut change =
-            |x: PhasePoint<N>| Some(((self.function)(t, &x) - g).abs()).filter(|d| d.is_finite()).unwrap_or(0.0);
+            |x: PhasePoint<N>| Some((self.value(t, &x) - g).abs()).filter(|d| d.is_finite()).unwrap_or(0.0);
         let mut sum = change(PhasePoint { z: state.z + z, ..*state });
         for i in 0..N {
             let mut aside = *state;
@@ -388,6 +435,11 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
             Some(cause) => ControlFlow::Break(Stop::failed(cause)),
             None => ControlFlow::Continue(()),
         }
+    }
+
+    fn terminal(&self) -> Option<Terminal<'_, N>> {
+        let events: Vec<_> = self.events.iter().filter(|event| event.terminal).map(Event::borrowed).collect();
+        (!events.is_empty()).then(|| Box::new(Events::new(events)) as Terminal<'_, N>)
     }
 }
 

@@ -7,6 +7,7 @@ mod claims;
 #[cfg(feature = "csv")]
 mod csv_rows;
 mod divided;
+mod ended;
 mod energy;
 mod estimate;
 mod events;
@@ -43,7 +44,7 @@ pub use explain::Item;
 pub use integrator::{Facts, Integrator, Wants};
 pub(crate) use jump::between;
 pub use momentum::{MomentumDecay, MomentumRow};
-pub use observer::{Course, LastStep, Moment, Needs, Observer, Stop};
+pub use observer::{Course, LastStep, Moment, Needs, Observer, Stop, Terminal};
 pub use outcome::Outcome;
 pub use plan::Plan;
 pub(crate) use plan::{first, step_error};
@@ -88,7 +89,8 @@ pub enum Until {
 type Shared<'p, L, const N: usize> = Arc<dyn Integrator<'p, L, N> + 'p>;
 
 /// How a step is chosen for an accuracy: in a program that asks for none it is not compiled.
-type Choose<'p, L, const N: usize> = fn(&Request<'p, L, N>, f64) -> Result<Choice<'p, L, N>, InputError>;
+type Choose<'p, L, const N: usize> =
+    for<'e> fn(&Request<'p, L, N>, f64, Option<Terminal<'e, N>>) -> Result<Choice<'p, L, N>, InputError>;
 
 /// How long the steps of a run are to be.
 enum Length<'p, L, const N: usize> {
@@ -170,6 +172,8 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// a small multiple of the run; what is narrower than the distance of their nodes, about the step divided by four times the stages, may
     /// go unseen.
     ///
+    /// Where an observer's event ends the run, the trial runs end there too.
+    ///
     /// Where no integrator is named, it is contact Gauss collocation: with 8 stages, with 16 where it is to take many steps whose
     /// accelerations alone are iterated, and by the clock that the Lagrangian states where that takes much fewer steps.
     pub fn accuracy(self, wanted: f64) -> Self {
@@ -210,7 +214,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// [`InputError`]: a span or step that is 0 or not finite, no steps or no integrator, a false or a missing claim of structure, an
     /// integrator whose hypothesis the Lagrangian does not meet, an accuracy that it does not reach.
     pub fn plan(&self, until: Until) -> Result<Plan<'p, L, N>, InputError> {
-        let needs = self.observers.iter().fold(self.needs, |needs, observer| needs.and(observer.needs()));
+        let needs = self.needs.and(self.observers.needs());
         let problem = self.problem;
         let (t0, Some(length)) = (problem.t0, self.length) else { return Err(InputError::NoSteps) };
         let (t_end, span, length) = match (until, length) {
@@ -231,7 +235,8 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
             }
         };
         let request = Request { problem, t_end, span, integrator: self.integrator.clone(), needs };
-        let mut plan = request.plan(length)?;
+        let terminal = if let Length::For(..) = length { self.observers.terminal() } else { None };
+        let mut plan = request.plan(length, terminal)?;
         plan.estimated = self.estimated;
         Ok(plan)
     }
@@ -246,7 +251,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
-    fn plan(&self, length: Length<'p, L, N>) -> Result<Plan<'p, L, N>, InputError> {
+    fn plan(&self, length: Length<'p, L, N>, terminal: Option<Terminal<'_, N>>) -> Result<Plan<'p, L, N>, InputError> {
         let Request { problem, span, .. } = *self;
         if !(span != 0.0 && span.is_finite()) {
             return Err(InputError::Span { span });
@@ -256,7 +261,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
             && let Some(t_end) = self.time_of_rest()
         {
             let request = Request { t_end, span: t_end - problem.t0, integrator: self.integrator.clone(), ..*self };
-            let mut plan = request.plan(length)?;
+            let mut plan = request.plan(length, terminal)?;
             plan.rests_until = Some(self.t_end);
             return Ok(plan);
         }
@@ -275,7 +280,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         let times = if let Length::For(..) = length { 4 } else { 16 };
         verified_over(problem.lagrangian, problem.t0, span, &problem.start, times)?;
         let choice = match length {
-            Length::For(wanted, choose) => choose(self, wanted)?,
+            Length::For(wanted, choose) => choose(self, wanted, terminal)?,
             Length::Given(steps) => self.given(steps)?,
             Length::Exactly(count, h) => Choice { h, ..self.given(Steps::Count(count))? },
         };
@@ -293,7 +298,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         let Some(integrator) = self.integrator.clone() else { return Err(InputError::NoIntegrator) };
         let rate = if integrator.facts().by_clock { Some(self.clock_rate()?) } else { None };
         let span = self.span;
-        let of = |count: usize, integrator| Choice { integrator, count, h: span / count as f64, error: None };
+        let of =
+            |count: usize, integrator| Choice { integrator, count, h: span / count as f64, error: None, ended: None };
         match (steps, rate) {
             (Steps::Count(0), _) => Err(NO_STEP),
             (Steps::Count(_), Some(_)) => Err(InputError::Hypothesis { hypothesis: SIZED }),

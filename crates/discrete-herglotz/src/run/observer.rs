@@ -82,6 +82,21 @@ pub trait Observer<const N: usize> {
 
     /// Sees the end of a step that it has asked for, or another observer, or of the last one; `Break` ends the run.
     fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>>;
+
+    /// What ends trial runs where this one ends its run, and does nothing else; `None`, the default, where it ends none. What lies beyond is
+    /// then no reason to refuse an accuracy.
+    fn terminal(&self) -> Option<Terminal<'_, N>> {
+        None
+    }
+}
+
+/// An observer that only ends runs: see [`Observer::terminal`].
+pub type Terminal<'o, const N: usize> = Box<dyn Observer<N> + 'o>;
+
+/// Those of several observers as one.
+fn all_terminal<'o, const N: usize>(of: impl IntoIterator<Item = Option<Terminal<'o, N>>>) -> Option<Terminal<'o, N>> {
+    let all: Vec<_> = of.into_iter().flatten().collect();
+    (!all.is_empty()).then(|| Box::new(all) as Terminal<'o, N>)
 }
 
 /// The end of a run by one of its observers.
@@ -126,6 +141,8 @@ pub struct Moment<'r, const N: usize> {
     pub(super) before: Option<(f64, PhasePoint<N>)>,
     pub(super) motion: &'r dyn Motion<N>,
     pub(super) stepper: &'r dyn Stepper<N>,
+    /// Whether the step that leads here is a part of one that cannot be taken as a whole.
+    pub(super) in_failed_step: bool,
 }
 
 impl<'r, const N: usize> Moment<'r, N> {
@@ -145,8 +162,12 @@ impl<'r, const N: usize> Moment<'r, N> {
         self.motion.velocity(t, state)
     }
 
-    /// The run as it would go on from here, for [`Run::resume`](super::Run::resume); `None` where its stepper cannot be saved.
+    /// The run as it would go on from here, for [`Run::resume`](super::Run::resume); `None` where its stepper cannot be saved, or the run
+    /// cannot go on.
     pub fn interrupted(&self) -> Option<Interrupted> {
+        if self.in_failed_step {
+            return None;
+        }
         let (fingerprint, words) = (self.motion.fingerprint(), self.stepper.save()?);
         let (taken, suspicion, energy) = (self.k, self.suspicion, self.energy);
         Some(Interrupted { fingerprint, taken, log_factor: self.log_factor.unwrap_or(0.0), suspicion, energy, words })
@@ -275,6 +296,9 @@ macro_rules! one_after_the_other {
                 $(self.$field.step(at)?;)+
                 ControlFlow::Continue(())
             }
+            fn terminal(&self) -> Option<Terminal<'_, N>> {
+                all_terminal([$(self.$field.terminal()),+])
+            }
         }
     };
 }
@@ -298,6 +322,9 @@ impl<const N: usize, O: Observer<N>> Observer<N> for Vec<O> {
     fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
         self.iter_mut().try_for_each(|observer| observer.step(at))
     }
+    fn terminal(&self) -> Option<Terminal<'_, N>> {
+        all_terminal(self.iter().map(Observer::terminal))
+    }
 }
 
 /// An observer that someone else keeps.
@@ -319,6 +346,9 @@ impl<const N: usize, O: Observer<N>> Observer<N> for Borrowed<'_, O> {
     fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
         self.0.step(at)
     }
+    fn terminal(&self) -> Option<Terminal<'_, N>> {
+        self.0.terminal()
+    }
 }
 
 impl<const N: usize> Observer<N> for Box<dyn Observer<N> + '_> {
@@ -336,5 +366,8 @@ impl<const N: usize> Observer<N> for Box<dyn Observer<N> + '_> {
     }
     fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
         (**self).step(at)
+    }
+    fn terminal(&self) -> Option<Terminal<'_, N>> {
+        (**self).terminal()
     }
 }

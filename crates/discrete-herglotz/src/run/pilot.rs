@@ -390,7 +390,8 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
         count: usize,
         marks: &Marks,
     ) -> Result<PilotEnd<N>, InputError> {
-        let choice = Choice { integrator: integrator.clone(), count, h: self.step(count, marks), error: None };
+        let choice =
+            Choice { integrator: integrator.clone(), count, h: self.step(count, marks), error: None, ended: None };
         let stepper = Plan::new(&self.request.bare(), &choice).and_then(|plan| plan.stepper());
         let mut stepper = match stepper {
             Ok(stepper) => stepper,

@@ -3,6 +3,7 @@
 use super::accuracy::Choice;
 use super::checkpoint::digest;
 use super::claims::ClaimMonitor;
+use super::ended::Before;
 use super::energy::{EnergyMonitor, EnergySums};
 use super::rest::REST;
 use super::{
@@ -47,6 +48,9 @@ pub(super) fn for_steps<'p, L, const N: usize>(
     Problem { structure, ..*problem }
 }
 
+/// The steps by which a run may pass the end that trial runs have met: the errors of both.
+const PASSED: usize = 2;
+
 /// The earlier of two.
 pub(crate) fn first(a: Option<Suspicion>, b: Option<Suspicion>) -> Option<Suspicion> {
     a.into_iter().chain(b).min_by_key(|s| s.step)
@@ -74,6 +78,8 @@ pub struct Plan<'p, L, const N: usize> {
     /// Negative where the run goes back.
     pub(super) h: f64,
     pub(super) count: usize,
+    /// The steps after which an observer is to end the run.
+    ended: Option<usize>,
     error: Option<f64>,
     integrator: Shared<'p, L, N>,
     pub(super) facts: Facts,
@@ -94,7 +100,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// Finds the route of a request.
     pub(super) fn new(request: &Request<'p, L, N>, choice: &Choice<'p, L, N>) -> Result<Self, InputError> {
         let Request { problem, t_end, needs, .. } = *request;
-        let Choice { integrator, count, h, error } = choice.clone();
+        let Choice { integrator, count, h, error, ended } = choice.clone();
         let switches = has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?;
         let facts = integrator.facts();
         if switches && facts.by_clock {
@@ -107,6 +113,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             t_end,
             h,
             count,
+            ended,
             error,
             facts,
             needs,
@@ -124,9 +131,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         self.h
     }
 
-    /// The number of steps; by a clock with steps of a given size, as many as its rate at the start lets expect.
+    /// The number of steps; by a clock with steps of a given size, as many as its rate at the start lets expect. Where trial runs have met
+    /// an event that ends the run, as many as there are until then.
     pub fn count(&self) -> usize {
-        self.count
+        self.ended.map_or(self.count, |ended| self.count.min(ended.saturating_add(1)))
     }
 
     /// What is known of the integrator, where none was named the one that was chosen.
@@ -185,14 +193,15 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     ) -> Result<Outcome<N>, InputError> {
         let by_clock = self.facts.by_clock;
         let h = (!by_clock).then_some(self.h);
-        let count = (!by_clock || self.error.is_some()).then_some(self.count);
+        let count = (!by_clock || self.error.is_some()).then_some(self.count());
         let problem = for_steps(self.problem, &self.facts, self.count);
         let mut stepper = self.make_stepper(&problem, self.h, self.error.is_none())?;
         if self.needs.saved && stepper.save().is_none() {
             return Err(InputError::Unsaved);
         }
         let t_end = self.rests_until.unwrap_or(self.t_end);
-        observers.prepare(&Course { t0: self.problem.t0, t_end, h, count })?;
+        let course = Course { t0: self.problem.t0, t_end, h, count };
+        observers.prepare(&course)?;
         // The logarithm of the product of the sigma_d; in single steps only where they differ.
         let (mut log_factor, single) = (0.0, self.needs.conformal_factor && !self.constant_rate);
         let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
@@ -249,6 +258,13 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
                 log_factor += done as f64 * stepper.sigma().ln();
             }
             if let Some(cause) = cause {
+                let noted = (log_factor, suspicion, sums(&energy));
+                if let Some((end, there)) =
+                    self.end_within_a_step(observers, Before { stepper: &*stepper, course, noted, taken })
+                {
+                    (taken, log_factor, stop) = (taken + 1, there.unwrap_or(log_factor), Some(end));
+                    break;
+                }
                 status = Status::Failed { step: taken, t: stepper.time(), cause };
                 break;
             }
@@ -277,6 +293,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
                 && let Some(misfit) = energy.look(self, (stepper.time(), &stepper.state()), (log_factor, taken))
             {
                 suspicion = first(suspicion, Some(Suspicion { step: taken - 1, misfit }));
+            }
+            // Trial runs have seen nothing of what follows.
+            if self.ended.is_some_and(|ended| taken > ended + PASSED) {
+                suspicion = first(suspicion, Some(Suspicion { step: taken - 1, misfit: f64::INFINITY }));
             }
             let at_rest = if over {
                 self.rests_until.is_some()
@@ -328,7 +348,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     }
 
     /// What observers see after some steps.
-    fn moment<'r>(
+    pub(super) fn moment<'r>(
         &'r self,
         stepper: &'r dyn Stepper<N>,
         before: Option<(f64, PhasePoint<N>)>,
@@ -337,7 +357,31 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     ) -> Moment<'r, N> {
         let log_factor = self.needs.conformal_factor.then_some(log_factor);
         let (t, state, sigma) = (stepper.time(), stepper.state(), stepper.sigma());
-        Moment { k, t, state, sigma, log_factor, last, suspicion, energy, before, motion: self, stepper }
+        let motion = self;
+        Moment {
+            k,
+            t,
+            state,
+            sigma,
+            log_factor,
+            last,
+            suspicion,
+            energy,
+            before,
+            motion,
+            stepper,
+            in_failed_step: false,
+        }
+    }
+
+    /// A stepper after one step from a time and a state to another time.
+    pub(super) fn step_to(
+        &self,
+        (t0, from): &(f64, PhasePoint<N>),
+        t: f64,
+    ) -> Result<Box<dyn Stepper<N> + 'p>, StepError> {
+        let v = self.velocity(*t0, from)?;
+        self.advanced((*t0, from), &v, t - t0, (1, t))
     }
 
     /// The first claim that is false at the state of a stepper.
@@ -400,8 +444,7 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
     }
 
     fn inside(&self, (t0, from): &(f64, PhasePoint<N>), t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
-        let v = self.velocity(*t0, from)?;
-        let run = self.advanced((*t0, from), &v, t - t0, (1, t))?;
+        let run = self.step_to(&(*t0, *from), t)?;
         Ok((run.state(), run.sigma()))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::recorder::{Crossings, rows};
 use crate::{Column, Crossing, When};
-use discrete_herglotz::{Course, InputError, Moment, Needs, Observer, Row, Rows, Stop};
+use discrete_herglotz::{Course, InputError, Moment, Needs, Observer, Row, Rows, Stop, Terminal};
 use std::ops::ControlFlow;
 
 /// What was recorded of a member.
@@ -47,6 +47,10 @@ impl<'r, const N: usize> Observed<'r, N> {
 }
 
 impl<const N: usize> Observer<N> for Observed<'_, N> {
+    fn terminal(&self) -> Option<Terminal<'_, N>> {
+        self.crossings.as_ref().and_then(Crossings::terminal)
+    }
+
     fn needs(&self) -> Needs {
         let of = |rows: &Option<Rows<'_, N>>| rows.as_ref().map(Observer::needs).unwrap_or_default();
         let of_events = self.crossings.as_ref().map(Crossings::needs).unwrap_or_default();

@@ -5,7 +5,7 @@ use crate::{Column, Crossing, Direction, Motion, RuntimeError, Watch, When};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{
-    Course, Event, Events, InputError, Moment, Needs, Observer, Row, Rows, Stop, legendre_inverse,
+    Course, Event, Events, InputError, Moment, Needs, Observer, Row, Rows, Stop, Terminal, legendre_inverse,
 };
 use formula_lagrangian::{Expression, FormulaLagrangian};
 use std::cell::Cell;
@@ -188,6 +188,11 @@ impl<'r, const N: usize> Crossings<'r, N> {
         self.events.start(at)
     }
 
+    /// What ends trial runs at the terminal events.
+    pub fn terminal(&self) -> Option<Terminal<'_, N>> {
+        self.events.terminal()
+    }
+
     /// Hands on what is found in a step; `Break` at a terminal event.
     pub fn step(
         &mut self,
@@ -219,6 +224,10 @@ fn of<'r, const N: usize>(lagrangian: &'r FormulaLagrangian<N>, event: &'r crate
 }
 
 impl<const N: usize> Observer<N> for Recorder<'_, N> {
+    fn terminal(&self) -> Option<Terminal<'_, N>> {
+        self.crossings.as_ref().and_then(Crossings::terminal)
+    }
+
     fn needs(&self) -> Needs {
         self.needs
     }
