@@ -6,10 +6,12 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
-    CoupledPlane, DoublePendulum, Duffing, FreeParticle, HarmonicOscillator, Pendulum, QuadraticInZ, Relativistic,
-    System,
+    CoupledPlane, DoublePendulum, Duffing, FreeParticle, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ,
+    Relativistic, System,
 };
-use contact_geom::{DiscretePoint, GeometryError, Lagrangian, Largest, Scalar, VelocityPoint, largest, legendre};
+use contact_geom::{
+    DiscretePoint, GeometryError, Lagrangian, Largest, PhasePoint, Scalar, VelocityPoint, largest, legendre,
+};
 use discrete_herglotz::{BoundaryPath, CriticalPath, End, PathStatus, continuation};
 use discrete_herglotz::{
     DiscreteLagrangian, DiscretePath, Discretised, Gauss, InputError, Method, Midpoint, StepError, discrete_action,
@@ -508,4 +510,83 @@ proptest! {
         run(CoupledPlane::default(), &u, steps, z0);
         run(DoublePendulum::default(), &u.iter().map(|u| 0.5 * u).collect::<Vec<_>>(), steps, z0);
     }
+}
+
+/// An oscillator from 0 to 1 in half a period: there is no motion, and what is found has the amplitude that the error of the steps gives it, 155 to
+/// 2e7 here. The steps move it by about its own range, of order one however short they are, which no pivot shows. Away from the conjugate point
+/// the estimate is the error.
+#[test]
+fn conjugate_ends_are_flagged() {
+    for method in Method::ALL {
+        for gamma in [0.0, -0.1] {
+            let omega = (1.0 - 0.25 * gamma * gamma as f64).sqrt();
+            for steps in [20, 50, 100, 1000, 5000] {
+                let path = |span: f64| {
+                    let start = PhasePoint::new([0.0], [1.0], 0.0);
+                    let oscillator = HarmonicOscillator { gamma };
+                    let ld = method.discretise(oscillator, span / steps as f64, 0.0, &start).unwrap();
+                    let path = BoundaryPath::new(ld, steps, [at([0.0]), at([1.0])]).unwrap().search();
+                    assert!(path.is_found() && path.regularity > 0.0 && path.regularity <= 1.0, "{}", path.status);
+                    path
+                };
+                let conjugate = path(PI / omega);
+                let what = format!("{method}, gamma = {gamma}, {steps} steps: {:?}", conjugate.error_estimate);
+                assert!(conjugate.suspicion.is_some_and(|s| s.misfit > 1.0 && s.step < steps), "{what}");
+                assert!(conjugate.error_estimate.is_some_and(|e| e > 0.9), "{what}");
+                for span in [1.5, 2.8, 3.6] {
+                    let found = path(span);
+                    assert_eq!(found.suspicion, None, "{method}, gamma = {gamma}, {steps} steps, span {span}");
+                    if *method != Method::Midpoint || gamma != 0.0 {
+                        continue;
+                    }
+                    let exact = |k: usize| (span * k as f64 / steps as f64).sin() / span.sin();
+                    let off = largest((0..=steps).map(|k| (found.points[k][0] - exact(k)).abs()));
+                    // The points reach the turning point to within the square of half a step.
+                    let range = if span > PI { 1.0 / span.sin().abs() + 1.0 } else { largest((0..=steps).map(exact)) };
+                    let estimate = found.error_estimate.unwrap();
+                    // To first order, with third differences at the ends of the path that are those of the points within: a fifth of it. Beyond 1e-9
+                    // of the range the rounding of 5000 positions in third differences of momenta is below that.
+                    assert!(
+                        (estimate * range / off - 1.0).abs() < 0.2 || estimate < 1e-9,
+                        "{span}, {steps}: {estimate:e}, {off:e}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Kepler's problem from (1, 0) to (0, 1) in the time 8, by several paths: where the energy of the steps, which is conserved, jumps, the steps have
+/// passed the centre without resolving it, and the path is flagged; where it is steady the path is not.
+#[test]
+fn paths_that_jump_a_centre_are_flagged() {
+    let ends = [at([1.0, 0.0]), at([0.0, 1.0])];
+    let (mut jumped, mut steady) = (0, 0);
+    for steps in [40, 60, 80, 100, 150] {
+        let h = 8.0 / steps as f64;
+        let ld = Midpoint::new(Kepler::<2> { mu: 1.0, gamma: 0.0 }, h).unwrap();
+        let problem = BoundaryPath::new(&ld, steps, ends).unwrap();
+        let mut known: Vec<CriticalPath<2>> = Vec::new();
+        for _ in 0..4 {
+            let away = problem.clone().avoiding(&known.iter().collect::<Vec<_>>(), 1.0).unwrap();
+            let path = away.search();
+            if !path.is_found() {
+                continue;
+            }
+            let energy = |p: &[SVector<f64, 2>]| 0.5 * ((p[1] - p[0]) / h).norm_squared() - 2.0 / (p[0] + p[1]).norm();
+            let energies: Vec<f64> = path.points.windows(2).map(energy).collect();
+            let mean = energies.iter().sum::<f64>() / energies.len() as f64;
+            let spread = largest(energies.iter().map(|e| (e - mean).abs()));
+            let what = format!("{steps} steps: {spread:e}, {:?}, {:?}", path.suspicion, path.error_estimate);
+            if spread > 0.5 {
+                assert!(path.suspicion.is_some(), "{what}");
+                jumped += 1;
+            } else if spread < 0.02 {
+                assert_eq!(path.suspicion, None, "{what}");
+                steady += 1;
+            }
+            known.push(path);
+        }
+    }
+    assert!(jumped >= 2 && steady >= 5, "{jumped}, {steady}");
 }

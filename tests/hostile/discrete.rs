@@ -36,6 +36,8 @@ pub const EXCEPTIONS: Exceptions = &[
     ("AnyIntegrator::order", "takes no number; that of any number of stages is in the attack on check"),
     ("DiscreteLagrangian::is_explicit", "takes no number"),
     ("DiscreteLagrangian::constant_rate", "takes no number"),
+    ("DiscreteLagrangian::order", "takes no number"),
+    ("EnergyDrift::first", "takes no number"),
     ("Rule::is_symmetric", "takes no number"),
     ("ActionFlow::*", "the implementor's; that of Riccati is attacked with what calls it"),
     ("Observer::*", "the implementor's; what a run makes of odd ones is in the attack on Run::observe"),

@@ -30,6 +30,7 @@ mod kernels;
 mod lanes;
 mod local;
 mod memory;
+mod monitor;
 mod pass;
 mod splitting;
 mod system;

@@ -7,7 +7,7 @@ use crate::splitting::Stage;
 use crate::system::{AssembledSystem, Masses};
 
 /// The number of unknowns from which a pass is shared among threads.
-const SHARED: usize = 1 << 17;
+pub(crate) const SHARED: usize = 1 << 17;
 
 /// The blocks that a thread takes at a time.
 const TOGETHER: usize = 16;
@@ -167,7 +167,7 @@ fn exact_sum(a: f64, b: f64) -> (f64, f64) {
 }
 
 /// The sum of squares, in eight partial sums so that the compiler may use vector registers.
-fn sum_of_squares(v: &[f64]) -> f64 {
+pub(crate) fn sum_of_squares(v: &[f64]) -> f64 {
     let (chunks, rest) = v.as_chunks::<8>();
     let mut sums = [0.0; 8];
     for chunk in chunks {

@@ -5,9 +5,10 @@ use crate::aligned::Aligned;
 use crate::blocks::{self, BLOCK};
 use crate::drag::{Drag, Drift};
 use crate::kernels::Weight;
+use crate::monitor::{EnergyMonitor, Reached, StepFacts};
 use crate::pass::{InverseMasses, Pass, Passed};
 use crate::system::{AssembledSystem, Masses, State};
-use discrete_herglotz::{Halt, InputError, SplittingScheme, StepError};
+use discrete_herglotz::{Halt, InputError, SplittingScheme, StepError, Suspicion};
 
 /// The steps between two looks whether all numbers are finite.
 const LOOK: usize = 256;
@@ -45,6 +46,7 @@ pub struct AssembledSplitting<'a> {
     action: bool,
     /// What each block adds to the action: its potential energy, twice its kinetic energy. Empty without the action.
     energies: Vec<[f64; 2]>,
+    monitor: EnergyMonitor,
 }
 
 /// What the last digits of positions and velocities leave out.
@@ -138,6 +140,12 @@ impl<'a> AssembledSplitting<'a> {
             Masses::Same(m) => InverseMasses::Same(1.0 / m),
             Masses::Each(masses) => InverseMasses::Each(masses.iter().map(|m| 1.0 / m).collect()),
         };
+        // That of the flow: splittings have no other.
+        let log_sigma = system.rate(start.t) * h;
+        let facts = StepFacts { h, log_sigma, order: scheme.order() };
+        let monitor = EnergyMonitor::new(system, start, facts, |bounded| {
+            system.energies((start.t, &q, start.v, start.z.unwrap_or(0.0)), bounded)
+        });
         let splitting = AssembledSplitting {
             system,
             table: SubstepTable::new(scheme, &system.drag, h, start.t),
@@ -154,6 +162,7 @@ impl<'a> AssembledSplitting<'a> {
             z: start.z.unwrap_or(0.0),
             action: start.z.is_some(),
             energies: vec![[0.0; 2]; if start.z.is_some() { blocks::count(n) } else { 0 }],
+            monitor,
         };
         let mut force = vec![0.0; BLOCK.min(n)];
         for block in 0..blocks::count(n) {
@@ -190,6 +199,9 @@ impl<'a> AssembledSplitting<'a> {
             let some = LOOK.min(steps - taken);
             for _ in 0..some {
                 self.step();
+                if self.monitor.is_due(self.taken) {
+                    self.look();
+                }
             }
             // A number that is none makes the sum one.
             if !(self.v.iter().sum::<f64>() + self.z).is_finite() {
@@ -218,8 +230,36 @@ impl<'a> AssembledSplitting<'a> {
         self.taken += 1;
     }
 
+    /// Looks at the energy.
+    #[cold]
+    fn look(&mut self) {
+        let (t, z) = self.complete();
+        let log_factor = self.system.rate(t) * (t - self.t0);
+        let reached = Reached { t, log_factor, taken: self.taken };
+        let AssembledSplitting { system, next, end, monitor, .. } = self;
+        monitor.look(system, reached, |t, bounded| system.energies((t, next, end, z), bounded));
+    }
+
+    /// The first step at which the steps were seen not to resolve the motion, where they were: by the energy, which is multiplied by the
+    /// conformal factor where L does not depend on time, and without the action at least does not grow by drag. It is looked at after 4, 16, 64 and 256
+    /// steps, every 1024, and here: what follows such a step may be wrong. Nothing is seen without the action where gamma is positive, and of
+    /// systems that depend on time.
+    pub fn suspicion(&mut self) -> Option<Suspicion> {
+        if self.monitor.wants(self.taken) {
+            self.look();
+        }
+        self.monitor.suspicion()
+    }
+
     /// The state after the steps taken.
     pub fn state(&mut self) -> State<'_> {
+        let (t, z) = self.complete();
+        let n = self.system.unknowns();
+        State { t, q: &self.next[1..=n], v: &self.end, z: self.action.then_some(z) }
+    }
+
+    /// Completes the last step, in `next` and `end`; the time and the action.
+    fn complete(&mut self) -> (f64, f64) {
         let n = self.system.unknowns();
         let t = self.t0 + self.taken as f64 * self.h;
         self.end.copy_from_slice(&self.v);
@@ -239,7 +279,7 @@ impl<'a> AssembledSplitting<'a> {
                 z = act(z, &stage, &self.energies);
             }
         }
-        State { t, q: &self.next[1..=n], v: &self.end, z: self.action.then_some(z) }
+        (t, z)
     }
 
     /// `sigma_d` of the last step, `e^(gamma h)`, or the exponential of the integral of gamma over it; before the first one, of that.

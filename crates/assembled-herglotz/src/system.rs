@@ -5,7 +5,10 @@ use crate::drag::Drag;
 use crate::elements::{ElementData, Elements};
 use crate::kernels::{Kind, PotentialList, Weight};
 use crate::local::{First, LocalKind, LocalList, Place};
+use crate::monitor::Energies;
+use crate::pass::{SHARED, sum_of_squares};
 use crate::{AssemblyError, LocalLagrangian, Potential};
+use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 
 /// The most unknowns that a system can have: places are counted in 32 bits, with a fixed one at each end.
 const MOST: usize = u32::MAX as usize - 2;
@@ -194,14 +197,31 @@ impl AssembledSystem {
 
     /// The potential energy, of positions between fixed places.
     pub(crate) fn potential(&self, t: f64, q: &[f64]) -> f64 {
+        (0..blocks::count(self.unknowns)).map(|block| self.potential_of(block, t, q)).sum()
+    }
+
+    /// That of the elements which begin in a block.
+    fn potential_of(&self, block: usize, t: f64, q: &[f64]) -> f64 {
         let blocks = blocks::count(self.unknowns);
-        let mut sum = 0.0;
-        for block in 0..blocks {
-            for list in &self.potentials {
-                sum += list.energy(block, blocks, t, q);
-            }
-        }
-        sum
+        self.potentials.iter().map(|list| list.energy(block, blocks, t, q)).sum()
+    }
+
+    /// The energies of a system without general terms, at positions between fixed places: `E_L`, or `T + V` where that is asked for. Shared among
+    /// threads where passes are, so that the last bits depend on their number.
+    pub(crate) fn energies(&self, (t, q, v, z): (f64, &[f64], &[f64], f64), bounded: bool) -> Energies {
+        let kinetic = 0.5
+            * match &self.masses {
+                Masses::Same(m) => m * sum_of_squares(v),
+                Masses::Each(masses) => masses.iter().zip(v).map(|(m, v)| m * v * v).sum(),
+            };
+        let potential = if self.unknowns < SHARED || rayon::current_num_threads() == 1 {
+            self.potential(t, q)
+        } else {
+            (0..blocks::count(self.unknowns)).into_par_iter().map(|block| self.potential_of(block, t, q)).sum()
+        };
+        let of_drag = if bounded { 0.0 } else { -self.rate(t) * z };
+        let (total, terms) = (kinetic + potential + of_drag, potential.abs() + of_drag.abs());
+        Energies { total, kinetic, terms }
     }
 
     /// The mass of an unknown.

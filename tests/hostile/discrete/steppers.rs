@@ -7,8 +7,8 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, QuadraticInZ};
 use contact_geom::{DiscretePoint, PhasePoint, Triple};
 use discrete_herglotz::{
-    ActionFlow, ActionMap, ActionSplitting, Composition, DiscreteLagrangian, Flow, Gauss, GaussRoute, InputError,
-    Midpoint, Riccati, Splitting, SplittingScheme, Stepper,
+    ActionFlow, ActionMap, ActionSplitting, Composition, DiscreteLagrangian, EnergyDrift, EnergyLook, Flow, Gauss,
+    GaussRoute, InputError, Midpoint, Riccati, Splitting, SplittingScheme, Stepper,
 };
 
 pub const ATTACKS: &[Attack] = &[
@@ -77,7 +77,27 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: steppers,
     },
+    Attack { on: &["EnergyDrift::new", "EnergyDrift::misfit"], run: drifts },
 ];
+
+/// An energy that is no number is no drift, and what is one is above one.
+fn drifts(report: &mut Report) {
+    let tame = EnergyLook { total: 1.0, kinetic: 0.5, terms: 0.5, log_factor: 0.0, taken: 0 };
+    for value in HOSTILE {
+        let wild = [
+            EnergyLook { total: value, ..tame },
+            EnergyLook { kinetic: value, ..tame },
+            EnergyLook { terms: value, ..tame },
+        ];
+        for (start, wild) in wild.iter().flat_map(|w| [(tame, *w), (*w, tame), (*w, *w)]) {
+            for log_factor in [0.0, -1.0, value] {
+                let mut drift = EnergyDrift::new(2, &start);
+                let found = drift.misfit(&EnergyLook { log_factor, taken: 100, ..wild }, |_| 0.0);
+                report.check(found.is_none_or(|misfit| misfit > 1.0), || format!("{start:?}, {wild:?}: {found:?}"));
+            }
+        }
+    }
+}
 
 /// A door that makes a stepper: it refuses a start that is not finite, and its states are finite.
 fn drive<S: Stepper<1>>(report: &mut Report, input: &(impl Numbers + std::fmt::Debug), made: Result<S, InputError>) {

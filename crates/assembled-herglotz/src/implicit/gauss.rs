@@ -8,8 +8,9 @@ use super::stages::{Assembly, MOST, Table};
 use crate::AssemblyError;
 use crate::local::{First, Place};
 use crate::memory::limit;
+use crate::monitor::{Energies, EnergyMonitor, Reached, StepFacts};
 use crate::system::{AssembledSystem, State};
-use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError};
+use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError, Suspicion};
 
 /// Contact Gauss collocation with one or two stages, of order 2 or 4, for systems of any size and any local terms: the stage equations of
 /// [`Gauss`](discrete_herglotz::Gauss),
@@ -67,6 +68,8 @@ pub struct AssembledGauss<'a> {
     place_v: Vec<f64>,
     /// The velocity of a state that is asked for.
     end: Vec<f64>,
+    log_factor: f64,
+    monitor: EnergyMonitor,
 }
 
 impl<'a> AssembledGauss<'a> {
@@ -115,9 +118,20 @@ impl<'a> AssembledGauss<'a> {
         }
         let v: Vec<f64> = start.v.iter().flat_map(|v| std::iter::repeat_n(*v, stages)).collect();
         let zeros = vec![0.0; len];
+        let table = Table::new(stages, h);
+        let rho = table.factors([first.z; MOST]);
+        let end = table.b.iter().zip(rho).take(stages).fold(1.0, |end, (b, rho)| end - b * rho * first.z);
+        let facts = StepFacts { h, log_sigma: -end.ln(), order: 2 * stages as u32 };
+        let monitor = EnergyMonitor::new(system, start, facts, |bounded| {
+            if general {
+                energies(&first, (start.v, &first.v), z)
+            } else {
+                system.energies((start.t, &q, start.v, z), bounded)
+            }
+        });
         let mut gauss = AssembledGauss {
             system,
-            table: Table::new(stages, h),
+            table,
             assembly,
             factors,
             border: general.then(|| Border::new(len)),
@@ -142,6 +156,8 @@ impl<'a> AssembledGauss<'a> {
             stages: vec![first; stages],
             place_v,
             end: start.v.to_vec(),
+            log_factor: 0.0,
+            monitor,
         };
         if general {
             gauss.check_regular(limit)?;
@@ -157,8 +173,39 @@ impl<'a> AssembledGauss<'a> {
     pub fn advance(&mut self, steps: usize) -> Result<(), Halt> {
         for taken in 0..steps {
             self.step().map_err(|cause| Halt { taken, cause })?;
+            if self.monitor.is_due(self.taken) {
+                self.look();
+            }
         }
         Ok(())
+    }
+
+    /// Looks at the energy. With general terms that takes the velocity; where none is found, nothing is seen.
+    #[cold]
+    fn look(&mut self) {
+        let Ok(State { t, .. }) = self.state() else { return };
+        let (n, z) = (self.system.unknowns(), self.z);
+        let reached = Reached { t, log_factor: self.log_factor, taken: self.taken };
+        let AssembledGauss { system, q, p, end, place_v, stages, border, monitor, .. } = self;
+        place_v[1..=n].copy_from_slice(end);
+        monitor.look(system, reached, |t, bounded| match stages.first_mut() {
+            Some(first) if border.is_some() => {
+                system.first(Place { t, q, v: place_v, z }, true, first);
+                energies(first, (end, p), z)
+            }
+            _ => system.energies((t, q, end, z), bounded),
+        });
+    }
+
+    /// The first step at which the steps were seen not to resolve the motion, where they were: by the energy, which is multiplied by the
+    /// conformal factor where L does not depend on time, and without the action at least does not grow by drag. It is looked at after 4, 16, 64 and 256
+    /// steps, every 1024, and here: what follows such a step may be wrong. Nothing is seen without the action where gamma is positive, and of
+    /// systems that depend on time; without general terms the conformal factor of a step is compared with the exponential as well.
+    pub fn suspicion(&mut self) -> Option<Suspicion> {
+        if self.monitor.wants(self.taken) {
+            self.look();
+        }
+        self.monitor.suspicion()
     }
 
     /// The time.
@@ -328,6 +375,7 @@ impl<'a> AssembledGauss<'a> {
             self.z += action;
         }
         self.sigma = 1.0 / rho;
+        self.log_factor -= rho.ln();
         std::mem::swap(&mut self.v, &mut self.next);
         self.taken += 1;
         Ok(())
@@ -456,4 +504,11 @@ impl<'a> AssembledGauss<'a> {
             None => Ok(()),
         }
     }
+}
+
+/// The energies of a Lagrangian with its first derivatives, of a velocity and its momentum. The kinetic energy is that of a form of degree two.
+fn energies(first: &First, (v, p): (&[f64], &[f64]), z: f64) -> Energies {
+    let twice_kinetic: f64 = p.iter().zip(v).map(|(p, v)| p * v).sum();
+    let terms = first.l.abs() + (first.z * z).abs();
+    Energies { total: twice_kinetic - first.l, kinetic: 0.5 * twice_kinetic.abs(), terms }
 }

@@ -7,8 +7,9 @@ use super::sparse::Sparse;
 use crate::AssemblyError;
 use crate::blocks::BLOCK;
 use crate::kernels::Weight;
+use crate::monitor::{EnergyMonitor, Reached, StepFacts};
 use crate::system::{AssembledSystem, State};
-use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError};
+use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError, Suspicion};
 
 /// The symmetric midpoint rule on `L = sum m_i v_i^2/2 - V(t, q) + gamma z`: the discrete Herglotz equations of
 /// [`Midpoint`](discrete_herglotz::Midpoint), for systems of any size.
@@ -39,6 +40,7 @@ pub struct AssembledMidpoint<'a> {
     middle: Vec<f64>,
     residual: Vec<f64>,
     change: Vec<f64>,
+    monitor: EnergyMonitor,
 }
 
 /// How a correction is solved for.
@@ -109,6 +111,10 @@ impl<'a> AssembledMidpoint<'a> {
         let mut q = vec![0.0; n + 2];
         q[1..=n].copy_from_slice(start.q);
         let zeros = vec![0.0; n];
+        let log_sigma = ((1.0 + half) / (1.0 - half)).ln();
+        let monitor = EnergyMonitor::new(system, start, StepFacts { h, log_sigma, order: 2 }, |bounded| {
+            system.energies((start.t, &q, start.v, start.z.unwrap_or(0.0)), bounded)
+        });
         let mut midpoint = AssembledMidpoint {
             system,
             linear,
@@ -127,6 +133,7 @@ impl<'a> AssembledMidpoint<'a> {
             before: zeros.clone(),
             residual: zeros.clone(),
             change: zeros,
+            monitor,
         };
         midpoint.forces(start.t);
         match midpoint.residual.iter().position(|f| !f.is_finite()) {
@@ -143,8 +150,32 @@ impl<'a> AssembledMidpoint<'a> {
     pub fn advance(&mut self, steps: usize) -> Result<(), Halt> {
         for taken in 0..steps {
             self.step().map_err(|cause| Halt { taken, cause })?;
+            if self.monitor.is_due(self.taken) {
+                self.look();
+            }
         }
         Ok(())
+    }
+
+    /// Looks at the energy.
+    #[cold]
+    fn look(&mut self) {
+        let State { t, z, .. } = self.state();
+        let log_factor = self.taken as f64 * self.sigma().ln();
+        let (reached, z) = (Reached { t, log_factor, taken: self.taken }, z.unwrap_or(0.0));
+        let AssembledMidpoint { system, q, v, monitor, .. } = self;
+        monitor.look(system, reached, |t, bounded| system.energies((t, q, v, z), bounded));
+    }
+
+    /// The first step at which the steps were seen not to resolve the motion, where they were: by the energy, which is multiplied by the
+    /// conformal factor where L does not depend on time, and without the action at least does not grow by drag. It is looked at after 4, 16, 64 and 256
+    /// steps, every 1024, and here: what follows such a step may be wrong. Nothing is seen without the action where gamma is positive, and of
+    /// systems that depend on time; the conformal factor of a step is compared with the exponential as well.
+    pub fn suspicion(&mut self) -> Option<Suspicion> {
+        if self.monitor.wants(self.taken) {
+            self.look();
+        }
+        self.monitor.suspicion()
     }
 
     /// The state.

@@ -1,13 +1,15 @@
 //! A path that was found, and how the search for it ended.
 
+use super::judge::Judgement;
 use super::sweep::{Measured, Nodes};
-use crate::{DiscretePath, StepError};
+use crate::{DiscretePath, StepError, Suspicion};
 use contact_geom::nalgebra::SVector;
 
 /// How the search for a critical path ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PathStatus {
-    /// The path satisfies the discrete Herglotz equations to round-off.
+    /// The path satisfies the discrete Herglotz equations to round-off; whether it is near a motion its
+    /// [suspicion](CriticalPath::suspicion) tells.
     Found,
     /// The iterations were used up.
     NotConverged,
@@ -74,6 +76,17 @@ pub struct CriticalPath<const N: usize> {
     pub relative_residual: f64,
     /// `ln(sigma_1 ... sigma_N)`, the logarithm of the conformal factor of the whole path; not a number unless all are positive.
     pub log_factor: f64,
+    /// The smallest pivot of the last block of the linearised equations, relative to its size before the elimination: the reciprocal of it is how
+    /// much the last unknown position is magnified. 0 where a pivot vanishes or nothing was measured.
+    pub regularity: f64,
+    /// By how much what the steps leave out moves the path, to first order and in units of its range: by the inverse of the last Jacobian, so that it
+    /// is of order one where the ends are conjugate to within the error of the steps. Of found paths, by a discrete Lagrangian of
+    /// [order](crate::DiscreteLagrangian::order) one or two.
+    pub error_estimate: Option<f64>,
+    /// The first step that cannot have resolved the motion, as of a run of the same discrete Lagrangian; or else the one where the error
+    /// estimate is largest, if that is above a quarter. The path may then be far from every motion: it may have crossed a centre of force
+    /// without meeting it, or its ends be conjugate. Of found paths only.
+    pub suspicion: Option<Suspicion>,
     /// The corrections that were made, from all starts.
     pub iterations: u32,
 }
@@ -106,6 +119,9 @@ impl<const N: usize> CriticalPath<N> {
             residual: f64::INFINITY,
             relative_residual: f64::INFINITY,
             log_factor: f64::NAN,
+            regularity: 0.0,
+            error_estimate: None,
+            suspicion: None,
             iterations,
         }
     }
@@ -115,7 +131,12 @@ impl<const N: usize> CriticalPath<N> {
             residual: measured.residual,
             relative_residual: measured.relative,
             log_factor: measured.log_factor,
+            regularity: measured.regularity,
             ..self
         }
+    }
+
+    pub(super) fn judged(self, Judgement { suspicion, error_estimate }: Judgement) -> Self {
+        CriticalPath { suspicion, error_estimate, ..self }
     }
 }

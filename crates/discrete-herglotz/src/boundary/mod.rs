@@ -7,6 +7,7 @@ mod deflation;
 mod elimination;
 mod end;
 mod index;
+mod judge;
 mod newton;
 mod problem;
 mod sweep;

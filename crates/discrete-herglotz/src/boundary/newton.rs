@@ -2,6 +2,7 @@
 
 use super::critical_path::{CriticalPath, PathStatus};
 use super::deflation::Deflation;
+use super::judge::{Judgement, judge};
 use super::sweep::{Equations, Measured, Nodes, Sweep};
 use crate::{DiscreteLagrangian, last_correction};
 use contact_geom::nalgebra::SVector;
@@ -103,7 +104,12 @@ pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
                 Some((step, sigma)) => PathStatus::SigmaVanished { step, sigma },
                 None => PathStatus::Found,
             };
-            return CriticalPath::ended(status, x, iterations).measured(&at);
+            let judgement = if status == PathStatus::Found {
+                judge(of, &mut sweep, &mut x, &mut trial.q)
+            } else {
+                Judgement::default()
+            };
+            return CriticalPath::ended(status, x, iterations).measured(&at).judged(judgement);
         }
         before = if part == 1.0 { size } else { f64::INFINITY };
     }

@@ -182,7 +182,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
     }
 
     pub(super) fn equations(&self) -> Equations<'_, D, N> {
-        Equations { ld: &self.ld, conditions: &self.conditions, t0: self.t0, steps: self.steps }
+        Equations { ld: &self.ld, conditions: &self.conditions, t0: self.t0, steps: self.steps, load: &[] }
     }
 
     /// The path from which the search starts: not a known one, from which nothing leads away.
@@ -255,9 +255,10 @@ impl<D: DiscreteLagrangian<N>, const N: usize> BoundaryPath<D, N> {
 /// Refuses a path whose search needs more memory than there is: what is available, where the system tells, and what the allocator
 /// gives.
 fn check_memory<const N: usize>(steps: usize, periodic: bool) -> Result<(), InputError> {
-    // Positions of the path, of the correction, of the trial, of the best so far and of the start; actions; the eliminated blocks.
+    // Positions of the path, of the correction, of the trial, of the best so far and of the start; momenta and loads of the path that is judged;
+    // actions; the eliminated blocks.
     let blocks = if periodic { 2 } else { 1 };
-    let reals = 5 * N + 3 + N + blocks * N * N;
+    let reals = 7 * N + 3 + N + blocks * N * N;
     let bytes = reals.saturating_mul(size_of::<f64>());
     // Not worth a question to the system.
     if steps <= (1 << 26) / bytes {

@@ -68,6 +68,8 @@ pub(super) struct Equations<'a, D, const N: usize> {
     pub conditions: &'a Conditions<N>,
     pub t0: f64,
     pub steps: usize,
+    /// What is added to the equation of the point at the start of each step; of none beyond its length.
+    pub load: &'a [SVector<f64, N>],
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
@@ -96,7 +98,10 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
     ) -> Result<SecondDiscreteJet<N>, Undefined> {
         let t = self.t0 + k as f64 * self.ld.step_size();
         let jet = self.ld.second_jet(t, &DiscretePoint { q0: *q0, q1: *q1, z0 });
-        let jet = jet.map_err(|cause| Undefined { step: k, cause })?;
+        let mut jet = jet.map_err(|cause| Undefined { step: k, cause })?;
+        if let Some(load) = self.load.get(k) {
+            jet.first.d1 += load;
+        }
         let second = jet.d11.sum() + jet.d12.sum() + jet.d22.sum() + jet.d1z.sum() + jet.d2z.sum() + jet.dzz;
         let first = jet.first.value + jet.first.d1.sum() + jet.first.d2.sum() + jet.first.dz;
         // A multiple by zero is zero unless an entry is infinite or not a number, or a sum overflows.
@@ -252,6 +257,15 @@ impl<const N: usize> Sweep<N> {
         {
             return Ok(measured);
         }
+        self.with_exchanges(of, x)
+    }
+
+    /// The same, with rows of neighbouring points exchanged where that is more accurate, and with the load of the equations.
+    pub fn with_exchanges<D: DiscreteLagrangian<N>>(
+        &mut self,
+        of: &Equations<'_, D, N>,
+        x: &mut Nodes<N>,
+    ) -> Result<Measured<N>, Undefined> {
         // What a periodic path has more is compiled out of the others.
         if of.conditions.is_periodic() { self.forward_of::<D, true>(of, x) } else { self.forward_of::<D, false>(of, x) }
     }

@@ -226,6 +226,10 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Discretised<L, 
         each!(self, ld => ld.misfit(velocities, to, sigma))
     }
 
+    fn order(&self) -> Option<u32> {
+        each!(self, ld => DiscreteLagrangian::<N>::order(ld))
+    }
+
     fn is_explicit(&self) -> bool {
         each!(self, ld => DiscreteLagrangian::<N>::is_explicit(ld))
     }

@@ -367,6 +367,10 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         factor_misfit(sigma).or_else(|| misfit(velocities, &to.q, self.h, 0.0))
     }
 
+    fn order(&self) -> Option<u32> {
+        Some(R::ORDER)
+    }
+
     // A part of the second jet, which shares what it computes.
     #[inline(always)]
     fn jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<DiscreteJet<N>, StepError> {

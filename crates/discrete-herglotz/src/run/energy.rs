@@ -21,21 +21,86 @@ const LEAST: f64 = 0.01;
 /// In so many steps from rest the energy of a step's error, with the order one, is as large as the kinetic energy over their number.
 const FIRST: f64 = 16.0;
 
-/// Watches the energy `H = p.v - L` of an autonomous system along a run. The motion has `dH/dt = L_z H`, so that `H / sigma` is constant,
+/// The drift of the energy of an autonomous system along a run. The motion has `dH/dt = L_z H`, so that `H / sigma` is constant,
 /// with the conformal factor sigma; what it drifts by is compared with the kinetic energy, the mean of the looks so far and that of
 /// the last one, in the same units.
 ///
 /// Where the drag is strong in a step H is a small difference of L and `L_z z`, whose errors are of their own size times the drag.
-pub(super) struct EnergyMonitor<const N: usize> {
+///
+/// A [`Run`](crate::Run) looks at it by itself. This is for programs that take the steps of systems of their own:
+///
+/// ```
+/// use discrete_herglotz::{EnergyDrift, EnergyLook};
+/// let look = |total: f64, taken: usize| EnergyLook { total, kinetic: 0.5, terms: 0.5, log_factor: 0.0, taken };
+/// let mut drift = EnergyDrift::new(2, &look(1.0, 0));
+/// assert_eq!(drift.misfit(&look(1.001, 100), |_| 0.0), None);
+/// assert!(drift.misfit(&look(2.0, 200), |_| 0.0).is_some_and(|misfit| misfit > 1.0));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnergyDrift {
     start: f64,
+    order: f64,
+    pub(super) sums: EnergySums,
+}
+
+/// An energy after some steps of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnergyLook {
+    /// The energy `H`.
+    pub total: f64,
+    /// The kinetic energy, which a drift is compared with.
+    pub kinetic: f64,
+    /// The size of the terms `L` and `L_z z`.
+    pub terms: f64,
+    /// The logarithm of the conformal factor since the start.
+    pub log_factor: f64,
+    /// The steps taken.
+    pub taken: usize,
+}
+
+impl EnergyDrift {
+    /// Of a run by a method of an order, from its start.
+    pub fn new(order: u32, start: &EnergyLook) -> Self {
+        let sums = EnergySums { scale: start.kinetic, looks: 1.0, ..EnergySums::default() };
+        EnergyDrift { start: start.total, order: f64::from(order.max(1)), sums }
+    }
+
+    /// The number of steps before which a look tells nothing.
+    pub fn first(&self) -> usize {
+        FIRST.powf(1.0 / self.order).ceil() as usize
+    }
+
+    /// Looks: the drift, in units of the largest that steps have which resolve their motion, where that is above one. What
+    /// rounding may have changed of the energies is asked for by the conformal factor since the start, and only where it matters.
+    pub fn misfit(&mut self, at: &EnergyLook, rounding: impl FnOnce(f64) -> f64) -> Option<f64> {
+        let EnergyLook { total, kinetic, terms, log_factor, taken } = *at;
+        if taken < self.first() {
+            return None;
+        }
+        let EnergySums { scale, looks, log_factor: before, taken: taken_before } = self.sums;
+        let grown = log_factor - before;
+        let in_a_step = (grown / (taken as f64 - taken_before)).abs();
+        let size = kinetic + in_a_step * terms;
+        let scale = scale * grown.exp() + size;
+        self.sums = EnergySums { scale, looks: looks + 1.0, log_factor, taken: taken as f64 };
+        let drift = (total - self.start * log_factor.exp()).abs();
+        let allowed = allowed(self.order) * larger(scale / (looks + 1.0), size);
+        if drift <= allowed || !drift.is_finite() || !allowed.is_finite() {
+            return None;
+        }
+        // The roundings of all steps may add up.
+        let rounding = (64.0 + taken as f64) * rounding(log_factor.exp());
+        (drift > rounding).then(|| drift / larger(allowed, f64::MIN_POSITIVE))
+    }
+}
+
+/// Watches the [drift](EnergyDrift) of the energy `H = p.v - L` along a run.
+pub(super) struct EnergyMonitor<const N: usize> {
     /// `L_z`, where the logarithm of sigma is this times the time, and the run does not count it.
     rate: Option<f64>,
-    order: f64,
-    /// The looks that are due.
-    first: usize,
     every: usize,
     guess: SVector<f64, N>,
-    pub sums: EnergySums,
+    pub drift: EnergyDrift,
 }
 
 /// What the looks so far add up to.
@@ -68,25 +133,23 @@ impl<const N: usize> EnergyMonitor<N> {
         if plan.error().is_some() || !structure.autonomous || !known || !(structure.z_free || plan.needs.action) {
             return None;
         }
-        let Energies { total, kinetic, .. } = energies(problem.lagrangian, problem.t0, &problem.start, &problem.state)?;
+        let Energies { total, kinetic, terms } =
+            energies(problem.lagrangian, problem.t0, &problem.start, &problem.state)?;
         let counted = plan.constant_rate || plan.needs.conformal_factor;
         let rate = (!counted).then(|| problem.lagrangian.gradient(problem.t0, &problem.start).z);
-        let order = f64::from(plan.facts.order.max(1));
+        let start = EnergyLook { total, kinetic, terms, log_factor: 0.0, taken: 0 };
         Some(EnergyMonitor {
-            start: total,
             rate,
-            order,
-            first: FIRST.powf(1.0 / order).ceil() as usize,
             every: APART.max(plan.count.div_ceil(LOOKS)),
             guess: problem.start.v,
-            sums: EnergySums { scale: kinetic, looks: 1.0, ..EnergySums::default() },
+            drift: EnergyDrift::new(plan.facts.order, &start),
         })
     }
 
     /// The number of steps after which it looks next.
     pub fn next(&self, taken: usize) -> usize {
         let doubled = (taken + 1).checked_next_power_of_two().unwrap_or(usize::MAX);
-        doubled.min((taken / self.every + 1) * self.every).max(self.first)
+        doubled.min((taken / self.every + 1) * self.every).max(self.drift.first())
     }
 
     /// Looks at a state: its drift, in units of the largest that steps have which resolve their motion, where that is above one.
@@ -97,30 +160,19 @@ impl<const N: usize> EnergyMonitor<N> {
         (log_factor, taken): (f64, usize),
     ) -> Option<f64> {
         let problem = plan.problem;
-        if taken < self.first {
+        if taken < self.drift.first() {
             return None;
         }
         let x = legendre_inverse(problem.lagrangian, t, state, &self.guess).ok()?;
-        let Energies { total, kinetic, terms, .. } = energies(problem.lagrangian, t, &x, state)?;
+        let Energies { total, kinetic, terms } = energies(problem.lagrangian, t, &x, state)?;
         let log_factor = self.rate.map_or(log_factor, |rate| rate * (t - problem.t0));
-        let EnergySums { scale, looks, log_factor: before, taken: taken_before } = self.sums;
-        let grown = log_factor - before;
-        let in_a_step = (grown / (taken as f64 - taken_before)).abs();
-        let size = kinetic + in_a_step * terms;
-        let scale = scale * grown.exp() + size;
-        self.sums = EnergySums { scale, looks: looks + 1.0, log_factor, taken: taken as f64 };
         self.guess = x.v;
-        let expected = self.start * log_factor.exp();
-        let drift = (total - expected).abs();
-        let allowed = allowed(self.order) * larger(scale / (looks + 1.0), size);
-        if drift <= allowed || !drift.is_finite() || !allowed.is_finite() {
-            return None;
-        }
-        let rounding = rounding_of(problem.lagrangian, t, &x, state)
-            + rounding_of(problem.lagrangian, problem.t0, &problem.start, &problem.state) * log_factor.exp();
-        let rounding = rounding + Noise::at(problem.lagrangian, t, &x).energy;
-        // Those of all steps may add up.
-        (drift > (64.0 + taken as f64) * rounding).then(|| drift / larger(allowed, f64::MIN_POSITIVE))
+        let start = (problem.t0, &problem.start, &problem.state);
+        self.drift.misfit(&EnergyLook { total, kinetic, terms, log_factor, taken }, |sigma| {
+            rounding_of(problem.lagrangian, t, &x, state)
+                + rounding_of(problem.lagrangian, start.0, start.1, start.2) * sigma
+                + Noise::at(problem.lagrangian, t, &x).energy
+        })
     }
 }
 

@@ -37,6 +37,7 @@ pub use checkpoint::{Checkpoint, CheckpointError, Interrupted};
 #[cfg(feature = "csv")]
 pub use csv_rows::CsvRows;
 pub(crate) use energy::may_drift;
+pub use energy::{EnergyDrift, EnergyLook};
 pub(crate) use events::bracketed_root;
 pub use events::{Crossing, Event, Events};
 pub(crate) use explain::DECOUPLED;

@@ -211,7 +211,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
                 return Err(InputError::AnotherRun);
             }
             (taken, log_factor, suspicion) = (from.taken, from.log_factor, from.suspicion);
-            energy.iter_mut().for_each(|energy| energy.sums = from.energy);
+            energy.iter_mut().for_each(|energy| energy.drift.sums = from.energy);
         }
         // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes, and are compared
         // with halves in doubt alone.
@@ -224,7 +224,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let ended = |taken: usize, t: f64| taken == most || by_clock && self.is_over(t);
         // A run may be resumed at its end.
         let mut over = ended(taken, stepper.time());
-        let sums = |energy: &Option<EnergyMonitor<N>>| energy.as_ref().map(|energy| energy.sums).unwrap_or_default();
+        let sums =
+            |energy: &Option<EnergyMonitor<N>>| energy.as_ref().map(|energy| energy.drift.sums).unwrap_or_default();
         let start = self.moment(&*stepper, None, (log_factor, suspicion, sums(&energy)), (taken, over));
         let mut stop = observers.start(&start).break_value();
         while !over && stop.is_none() {

@@ -91,6 +91,10 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> DiscreteLagrangian<N> for 
         misfit(velocities, &to.q, self.h, 0.0)
     }
 
+    fn order(&self) -> Option<u32> {
+        Some(2)
+    }
+
     /// Explicit; the guess and the solver are not needed.
     #[inline(always)]
     fn forward(

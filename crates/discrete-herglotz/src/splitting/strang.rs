@@ -100,6 +100,10 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
         misfit(velocities, &to.q, self.h, 0.0)
     }
 
+    fn order(&self) -> Option<u32> {
+        Some(2)
+    }
+
     fn is_explicit(&self) -> bool {
         true
     }

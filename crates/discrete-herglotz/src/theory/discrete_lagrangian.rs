@@ -37,6 +37,11 @@ pub trait DiscreteLagrangian<const N: usize> {
         None
     }
 
+    /// The order of its flow, where that is known. By default it is not.
+    fn order(&self) -> Option<u32> {
+        None
+    }
+
     /// Whether its steps solve no equation. By default they do.
     fn is_explicit(&self) -> bool {
         false
@@ -157,6 +162,9 @@ impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
     #[inline(always)]
     fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
         (**self).misfit(velocities, to, sigma)
+    }
+    fn order(&self) -> Option<u32> {
+        (**self).order()
     }
     fn is_explicit(&self) -> bool {
         (**self).is_explicit()
