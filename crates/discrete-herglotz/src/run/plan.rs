@@ -131,9 +131,14 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         self.h
     }
 
-    /// The number of steps; by a clock with steps of a given size, as many as its rate at the start lets expect. Where trial runs have met
-    /// an event that ends the run, as many as there are until then.
+    /// The number of steps; by a clock with steps of a given size, as many as its rate at the start lets expect. An
+    /// observer may end the run before.
     pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The number of steps that are to be expected: where trial runs have met an event that ends the run, those until then.
+    fn expected(&self) -> usize {
         self.ended.map_or(self.count, |ended| self.count.min(ended.saturating_add(1)))
     }
 
@@ -193,7 +198,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     ) -> Result<Outcome<N>, InputError> {
         let by_clock = self.facts.by_clock;
         let h = (!by_clock).then_some(self.h);
-        let count = (!by_clock || self.error.is_some()).then_some(self.count());
+        let count = (!by_clock || self.error.is_some()).then_some(self.expected());
         let problem = for_steps(self.problem, &self.facts, self.count);
         let mut stepper = self.make_stepper(&problem, self.h, self.error.is_none())?;
         if self.needs.saved && stepper.save().is_none() {
