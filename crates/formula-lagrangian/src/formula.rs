@@ -97,8 +97,7 @@ impl Formula {
         FormulaLagrangian::within(self)
     }
 
-    /// Another expression over the same names, such as a function whose zeros are events. It may have the momenta `p_x` (`p_q[0]` of an
-    /// array) and the energy `energy`, `E_L = v.L_v - L`, too, unless a coordinate or a parameter has the name.
+    /// Another expression over the same names, such as a function whose zeros are events.
     ///
     /// # Errors
     /// [`FormulaError::Parse`], [`FormulaError::TooLarge`].
@@ -106,8 +105,7 @@ impl Formula {
         Expression::parse(self, text, false)
     }
 
-    /// The same of a column: the value may be given a name, as in `E = x'^2/2 + x^2/2`, one that is not taken; and it may have the conformal
-    /// factor since the start, `sigma`, and its logarithm `log_factor`, which are [told](Expression::with_log_factor) beside the state.
+    /// The same where the value may be given a name, as in `E = x'^2/2 + x^2/2`: one that is not taken.
     ///
     /// # Errors
     /// Those of [`expression`](Self::expression).
@@ -132,7 +130,12 @@ impl Formula {
 
     /// The parameters on which the expression depends, in their order.
     pub fn used_parameters(&self) -> impl Iterator<Item = &str> {
-        used_parameters(&self.names, &self.graph, self.root)
+        let needed = self.graph.needed(self.root);
+        let is_used = move |i: usize| {
+            let mut nodes = needed.iter().enumerate().filter(|(_, needed)| **needed).map(|(id, _)| Id(id as u32));
+            nodes.any(|id| self.graph.node(id) == Node::Parameter(i as u32))
+        };
+        self.names.parameters.iter().enumerate().filter(move |(i, _)| is_used(*i)).map(|(_, name)| name.as_str())
     }
 
     /// Gives a parameter another value.
@@ -161,14 +164,4 @@ pub(crate) fn index(names: &Names, parameter: &str, value: f64) -> Result<usize,
         return Err(FormulaError::ParameterValue { name: parameter.to_owned(), value });
     }
     Ok(i)
-}
-
-/// The parameters on which a node depends, in their order.
-pub(crate) fn used_parameters<'a>(names: &'a Names, graph: &'a Graph, root: Id) -> impl Iterator<Item = &'a str> {
-    let needed = graph.needed(root);
-    let is_used = move |i: usize| {
-        let mut nodes = needed.iter().enumerate().filter(|(_, needed)| **needed).map(|(id, _)| Id(id as u32));
-        nodes.any(|id| graph.node(id) == Node::Parameter(i as u32))
-    };
-    names.parameters.iter().enumerate().filter(move |(i, _)| is_used(*i)).map(|(_, name)| name.as_str())
 }

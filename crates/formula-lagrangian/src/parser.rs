@@ -35,21 +35,6 @@ pub(crate) struct Parser<'a> {
     brackets: usize,
     /// Whether the value may have any name that is free, in place of `L`.
     named: bool,
-    /// What a motion has beside its state, where the text is of an expression along one.
-    of_motion: Option<OfMotion>,
-    /// The nodes that there may be.
-    limit: usize,
-}
-
-/// What a motion of a Lagrangian has beside its state, as nodes: the names that expressions along it may use.
-#[derive(Clone, Debug)]
-pub(crate) struct OfMotion {
-    /// `energy`: `E_L = v.L_v - L`.
-    pub energy: Id,
-    /// `p_x`, or `p_q[0]`: `L_v`.
-    pub momenta: Vec<Id>,
-    /// `sigma`, the conformal factor since the start; `None` where a state alone is known.
-    pub sigma: Option<Id>,
 }
 
 type Parsed<T> = Result<T, ParseError>;
@@ -58,37 +43,13 @@ impl<'a> Parser<'a> {
     /// The node of a text over a graph: definitions, one a line, and at the end the value, with `L =` before it or without; with any name
     /// where it is `named`.
     pub fn parse(text: &'a str, names: &'a Names, graph: &'a mut Graph, named: bool) -> Parsed<Id> {
-        Self::parse_along(text, names, graph, named, None)
-    }
-
-    /// The same along a motion.
-    pub fn parse_along(
-        text: &'a str,
-        names: &'a Names,
-        graph: &'a mut Graph,
-        named: bool,
-        of_motion: Option<OfMotion>,
-    ) -> Parsed<Id> {
         if text.len() > LONGEST_TEXT {
             let message = format!("the text has {} bytes, where {LONGEST_TEXT} are possible", text.len());
             return Err(ParseError::at(text, (0, 0), message));
         }
         let words = words(text)?;
-        let limit = graph.len() + MOST_NODES;
-        let mut parser = Parser {
-            text,
-            words,
-            at: 0,
-            names,
-            graph,
-            locals: Vec::new(),
-            depth: 0,
-            read: 0,
-            brackets: 0,
-            named,
-            of_motion,
-            limit,
-        };
+        let mut parser =
+            Parser { text, words, at: 0, names, graph, locals: Vec::new(), depth: 0, read: 0, brackets: 0, named };
         parser.program()
     }
 
@@ -164,7 +125,7 @@ impl<'a> Parser<'a> {
         let word = self.word(0);
         self.at = (self.at + 1).min(self.words.len());
         self.read += 1;
-        if self.read > MOST_WORDS || self.graph.len() > self.limit {
+        if self.read > MOST_WORDS || self.graph.len() > MOST_NODES {
             let message = format!("the formula has more than {MOST_NODES} parts, its sums written out");
             return Err(self.error(word, message));
         }
@@ -295,9 +256,6 @@ impl<'a> Parser<'a> {
             return Ok(self.graph.parameter(i as u32));
         }
         let all = Block { name: name.to_owned(), first: 0, count: Some(self.names.dimension) };
-        if let Some(value) = self.of_motion(name, word)? {
-            return Ok(value);
-        }
         match name {
             "t" => Ok(self.graph.time()),
             "z" => Ok(self.graph.action()),
@@ -311,26 +269,6 @@ impl<'a> Parser<'a> {
             _ if is_reserved(name) => Err(self.error(word, format!("`{name}` is a function: write `{name}(...)`"))),
             _ => Err(self.unknown(name, word, "name")),
         }
-    }
-
-    /// A value of the motion that is no part of its state.
-    fn of_motion(&mut self, name: &str, word: Word<'a>) -> Parsed<Option<Id>> {
-        let Some(OfMotion { energy, sigma, .. }) = self.of_motion else { return Ok(None) };
-        match (name, sigma) {
-            ("energy", _) => return Ok(Some(energy)),
-            ("sigma", Some(sigma)) => return Ok(Some(sigma)),
-            ("sigma" | "log_factor", None) => {
-                let message = format!("`{name}` is a sum along the motion, which is known in columns alone");
-                return Err(self.error(word, message));
-            }
-            _ => {}
-        }
-        let names = self.names;
-        let Some(block) = name.strip_prefix("p_").and_then(|of| names.blocks.iter().find(|b| b.name == of)) else {
-            return Ok(None);
-        };
-        let i = if block.count.is_some() { self.index(block)? } else { block.first as u32 };
-        Ok(self.of_motion.as_ref().and_then(|of| of.momenta.get(i as usize)).copied())
     }
 
     /// Whether a name has a value, so that a bracket after it is a forgotten product.

@@ -72,14 +72,6 @@ impl Directory {
         self.0.join(name)
     }
 
-    /// Writes a file that is there as a whole, or as it was before, whenever the program is killed.
-    pub fn replace(&self, name: &str, text: &str) -> Result<(), Failure> {
-        let path = self.file(name);
-        let part = path.with_extension("part");
-        let write = || std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, &path));
-        write().map_err(Failure::of_file(&path))
-    }
-
     /// Writes a file.
     pub fn write(&self, name: &str, text: &str) -> Result<PathBuf, Failure> {
         let path = self.file(name);
@@ -137,7 +129,7 @@ impl Table {
     }
 
     /// Writes all to the file, and tells its length.
-    pub fn flush(&mut self) -> Result<u64, Failure> {
+    pub fn finish(mut self) -> Result<u64, Failure> {
         let flushed = self.out.flush().and_then(|()| std::fs::metadata(&self.path));
         Ok(flushed.map_err(Failure::of_file(&self.path))?.len())
     }

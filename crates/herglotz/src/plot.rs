@@ -2,9 +2,8 @@
 
 use contact_figure::{Axis, Curve, Line, Panel, draw, draw_grid};
 use herglotz::Scene;
-use runtime_herglotz::{AnyIntegrator, Column, Comparison, Work, velocity_name};
-use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::TAU;
+use runtime_herglotz::{Column, Comparison, Work, velocity_name};
+use std::collections::BTreeSet;
 
 /// The most points of a curve: more are not seen.
 const POINTS: usize = 2000;
@@ -15,10 +14,10 @@ const MANY: usize = 500;
 /// The panels beside each other.
 const IN_A_ROW: usize = 3;
 
-/// The most integrators of a family that are drawn.
-const OF_A_FAMILY: usize = 3;
+/// The most integrators of a comparison that are drawn.
+const CURVES: usize = 12;
 
-/// How much slower than the best one of its family an integrator may be for an error to be drawn.
+/// How much slower than the best one an integrator may be for an error to be drawn.
 const NEAR: f64 = 3.0;
 
 /// The longest label of an axis, in characters.
@@ -61,8 +60,7 @@ pub(crate) fn of_section(scene: &Scene, crossings: &[(usize, Vec<f64>)]) -> Opti
     let names = scene.system.formula().coordinates();
     let panels = names.iter().enumerate().filter_map(|(i, name)| {
         // A row has the time, the coordinates, and their velocities.
-        let folded = |x: f64| if scene.angles.contains(&i) { x - TAU * (x / TAU).round() } else { x };
-        let of = |(_, row): &(usize, Vec<f64>)| Some((folded(*row.get(1 + i)?), *row.get(1 + names.len() + i)?));
+        let of = |(_, row): &(usize, Vec<f64>)| Some((*row.get(1 + i)?, *row.get(1 + names.len() + i)?));
         let points: Vec<_> = crossings.iter().filter(|(event, _)| *event == 0).filter_map(of).collect();
         let size = |of: fn(&(f64, f64)) -> f64| points.iter().map(|p| of(p).abs()).fold(0.0, f64::max);
         // That the section is at one place needs no figure.
@@ -121,51 +119,22 @@ fn axis(numbers: impl Iterator<Item = f64>) -> Option<Axis> {
     Some(Axis::Linear((low / step + rounding).floor() * step, (high / step - rounding).ceil() * step, step))
 }
 
-/// The families of integrators: of each the best ones are drawn.
-fn family(by: AnyIntegrator) -> &'static str {
-    match by {
-        AnyIntegrator::Gauss { .. } | AnyIntegrator::Clocked { .. } | AnyIntegrator::Divided { .. } => "Gauss",
-        AnyIntegrator::Splitting(_) => "splitting",
-        AnyIntegrator::Composition(..) => "composition",
-        AnyIntegrator::Discrete(_) => "rule",
-    }
-}
-
-/// The integrators that are the best of their family, or near it, for most errors from 0.1 to 1e-15; by their names.
+/// The integrators that are near the best for most errors from 0.1 to 1e-15; the best ones first.
 fn near_the_best(comparison: &Comparison) -> Vec<&str> {
-    let mut families: BTreeMap<&str, Vec<&Work>> = BTreeMap::new();
-    for row in &comparison.rows {
-        let of = row.integrator.parse().map_or("another", family);
-        families.entry(of).or_default().push(row);
-    }
-    let mut shown = Vec::new();
-    for rows in families.values() {
-        let mut near: BTreeMap<&str, usize> = BTreeMap::new();
-        for error in (1..=15).map(|digits| 10f64.powi(-digits)) {
-            let reach = || rows.iter().filter(|row| row.error <= error);
-            let Some(fastest) = reach().map(|row| row.seconds).min_by(f64::total_cmp) else { continue };
-            let good = reach().filter(|row| row.seconds <= NEAR * fastest);
-            for name in good.map(|row| row.integrator.as_str()).collect::<BTreeSet<_>>() {
-                *near.entry(name).or_default() += 1;
+    let mut near: Vec<(&str, usize)> = Vec::new();
+    for error in (1..=15).map(|digits| 10f64.powi(-digits)) {
+        let Some(fastest) = comparison.best(error) else { continue };
+        let good = |row: &&Work| row.error <= error && row.seconds <= NEAR * fastest.seconds;
+        let names: BTreeSet<&str> = comparison.rows.iter().filter(good).map(|row| row.integrator.as_str()).collect();
+        for name in names {
+            match near.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, count)) => *count += 1,
+                None => near.push((name, 1)),
             }
         }
-        let mut near: Vec<(&str, usize)> = near.into_iter().collect();
-        near.sort_by_key(|(name, count)| (std::cmp::Reverse(*count), *name));
-        shown.extend(near.into_iter().take(OF_A_FAMILY).map(|(name, _)| name));
     }
-    shown.sort_unstable();
-    shown
-}
-
-/// The range of times between which no one is ten times as far from the next: one that was held up by something else is beyond the axis.
-fn without_outliers(mut times: Vec<f64>) -> Vec<f64> {
-    times.sort_by(f64::total_cmp);
-    while let [.., second, last] = times.as_slice()
-        && *last > 10.0 * second
-    {
-        times.pop();
-    }
-    times
+    near.sort_by_key(|(name, count)| (std::cmp::Reverse(*count), *name));
+    near.into_iter().take(CURVES).map(|(name, _)| name).collect()
 }
 
 /// Run time against error, both in powers of ten, of the integrators that are near the best.
@@ -173,13 +142,13 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
     let names = near_the_best(comparison);
     let drawn = |row: &&Work| row.error > 0.0 && row.error.is_finite() && row.seconds > 0.0;
     let shown = || comparison.rows.iter().filter(drawn).filter(|row| names.contains(&row.integrator.as_str()));
-    let range = |numbers: Vec<f64>| {
-        let powers = numbers.into_iter().map(f64::log10);
+    let range = |of: &dyn Fn(&Work) -> f64| {
+        let powers = shown().map(of).map(f64::log10);
         let (low, high) = powers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         (low <= high).then(|| (low.floor() as i32, (high.ceil() as i32).max(low.floor() as i32 + 1)))
     };
-    let (fast, slow) = range(without_outliers(shown().map(|row| row.seconds).collect()))?;
-    let (best, worst) = range(shown().map(|row| row.error).collect())?;
+    let (fast, slow) = range(&|row| row.seconds)?;
+    let (best, worst) = range(&|row| row.error)?;
     let curve = |(number, name): (usize, &&str)| {
         let points = shown().filter(|row| row.integrator == **name).map(|row| (row.seconds, row.error));
         Curve::new(name, Line::Coloured(number), points)

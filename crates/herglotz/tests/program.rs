@@ -119,63 +119,6 @@ fn rows_and_events_are_those_of_the_motion() {
     assert!((told["end"]["x"].as_f64().unwrap() - oscillation(-0.2, 30.0)).abs() < 1e-9);
 }
 
-/// The energy over the conformal factor is kept, as one formula; a momentum ends the motion.
-#[test]
-fn energy_factor_and_momenta_are_names_of_formulas() {
-    let at = Directory::new("names");
-    let scene =
-        OSCILLATOR.replace("\"exp(-gamma*t/2)*x\"", "\"kept = energy/sigma\", \"log_factor - gamma*t\", \"p_x - x'\"");
-    assert!(scene.contains("energy/sigma"));
-    let events =
-        "event_columns = [\"energy - gamma*z\", \"2*p_x\"]\nevents = [{ when = \"p_x + energy - energy - 0.1\" }";
-    let file = at.write("scene.toml", &scene.replace(r#"events = [{ when = "x", direction = "rising" }"#, events));
-    succeed(&["run", &file, "--out", &at.path("out"), "--set", "run.time=30"]);
-    let rows = at.read("out/rows.csv");
-    let kept = column(&rows, "kept");
-    // Contact Gauss of order 8 with h = 0.25.
-    assert!(kept.iter().all(|e| (e / kept[0] - 1.0).abs() < 1e-8), "{kept:?}");
-    assert!(column(&rows, "log_factor - gamma*t").iter().all(|x| x.abs() < 1e-13));
-    assert!(column(&rows, "p_x - x'").iter().all(|x| x.abs() < 1e-15));
-    let events = at.read("out/events.csv");
-    let of_momentum: Vec<f64> = column(&events, "p_x").into_iter().filter(|p| (p - 0.1).abs() < 1e-12).collect();
-    assert!(!of_momentum.is_empty(), "{events}");
-    assert_eq!(column(&events, "2*p_x"), column(&events, "p_x").iter().map(|p| 2.0 * p).collect::<Vec<_>>());
-    assert_eq!(column(&events, "energy - gamma*z").len(), of_momentum.len());
-    // In a sweep each member has its own parameters.
-    succeed(&["sweep", &file, "--out", &at.path("sweep"), "--set", "run.time=10"]);
-    let swept = at.read("sweep/events.csv");
-    let [gamma, x, v, z, mechanical] = ["gamma", "x", "x'", "z", "energy - gamma*z"].map(|name| column(&swept, name));
-    for i in 0..gamma.len() {
-        let expected = 0.5 * (v[i] * v[i] + x[i] * x[i]) - 2.0 * gamma[i] * z[i];
-        assert!((mechanical[i] - expected).abs() < 1e-14, "{i}: {} for {expected}", mechanical[i]);
-    }
-}
-
-/// A whole number, an integrator, one number for an array; and each way to say the steps in place of the other.
-#[test]
-fn parts_of_the_run_can_be_set() {
-    let at = Directory::new("set");
-    let file = at.write("scene.toml", OSCILLATOR);
-    let run = |changes: &[&str]| {
-        let set: Vec<&str> = changes.iter().flat_map(|change| ["--set", change]).collect();
-        succeed(&[["run", &file, "--out", &at.path("out"), "--set", "run.time=10"].as_slice(), &set].concat())
-    };
-    assert!(
-        run(&["run.integrator=kahan_li_8", "run.steps=50"]).starts_with("completed: 50 steps of 0.2 by kahan_li_8")
-    );
-    assert!(run(&["run.step=0.1"]).starts_with("completed: 100 steps of 0.1 by gauss_4"));
-    assert!(run(&["run.accuracy=1e-6"]).contains("estimated error"));
-    let (code, told) = fail(&["run", &file, "--set", "run.steps=2.5"]);
-    assert!(code == Some(2) && told.contains("where a whole number is needed"), "{told}");
-    let (code, told) = fail(&["run", &file, "--set", "run.integrator=gaus_4"]);
-    assert!(code == Some(2) && told.contains("no integrator `gaus_4`"), "{told}");
-    let array = at.write(
-        "array.toml",
-        "[system]\ncoordinates = [\"q[3]\"]\nlagrangian = \"sum(i, 0, 2, q'[i]^2 - q[i]^2)/2\"\n[start]\nq = 0.5\n\"q'\" = 0.0\n[run]\ntime = 1.0\naccuracy = 1e-9\n",
-    );
-    assert!(succeed(&["run", &array, "--out", &at.path("array")]).contains("q[2] = 0.2701511529"));
-}
-
 /// Interrupted runs go on to the last byte, whatever rows they have and wherever they stop.
 #[test]
 fn resumed_runs_are_those_that_were_not_interrupted() {
@@ -208,41 +151,6 @@ fn resumed_runs_are_those_that_were_not_interrupted() {
     fail(&["run", &file, "--out", &at.path("parts_0"), "--interrupt-at", "0.3"]);
     let (code, told) = fail(&["run", &file, "--out", &at.path("parts_0"), "--resume", "--set", "gamma=-0.3"]);
     assert!(code == Some(2) && told.contains("the scene is not the one"), "{told}");
-}
-
-/// A run that is killed goes on from the checkpoint that it has written by itself, to the last byte.
-#[test]
-fn killed_runs_go_on_from_their_last_checkpoint() {
-    let at = Directory::new("killed");
-    let scene = OSCILLATOR.replace("every = 0.3", "every_step = 1000");
-    let file = at.write("scene.toml", &scene);
-    let long = ["--set", "run.time=1000000"];
-    let first = ["run", &file, "--out", &at.path("killed"), "--checkpoint-every", "0.01"];
-    let mut child = Command::new(env!("CARGO_BIN_EXE_herglotz")).args(first).args(long).spawn().unwrap();
-    // Until it has written some of them.
-    let beside = at.path("killed/checkpoint.json");
-    let (mut seen, mut last) = (0, String::new());
-    while seen < 3 && child.try_wait().unwrap().is_none() {
-        let now = std::fs::read_to_string(&beside).unwrap_or_default();
-        seen += usize::from(now != last);
-        last = now;
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
-    assert_eq!(seen, 3, "the run has ended before it was killed");
-    let written = at.read("killed/rows.csv").len();
-    succeed(&[["run", &file, "--out", &at.path("killed"), "--resume"].as_slice(), &long].concat());
-    succeed(&[["run", &file, "--out", &at.path("whole")].as_slice(), &long].concat());
-    for table in ["rows.csv", "events.csv"] {
-        assert_eq!(at.read(&format!("whole/{table}")), at.read(&format!("killed/{table}")), "{table}");
-    }
-    assert!(written < at.read("whole/rows.csv").len());
-    // It has ended: no checkpoint is left.
-    let left: Vec<_> = std::fs::read_dir(at.path("killed")).unwrap().map(|f| f.unwrap().file_name()).collect();
-    assert!(left.iter().all(|name| !name.to_str().unwrap().contains("checkpoint")), "{left:?}");
-    let (code, told) = fail(&["run", &file, "--out", &at.path("killed"), "--checkpoint-every", "-1"]);
-    assert!(code == Some(2) && told.contains("--checkpoint-every is -1"), "{told}");
 }
 
 #[test]

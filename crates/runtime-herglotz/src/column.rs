@@ -25,8 +25,8 @@ pub enum Column {
 }
 
 impl Column {
-    /// Reads a column over the names of a formula: `t`, `x`, `x'`, `z`; `p_x` for the momentum of `x` (`p_q[0]` in an array), `energy`, `sigma`,
-    /// `log_factor`, unless a coordinate or a parameter has the name; else any expression of these, with a name or without.
+    /// Reads a column over the names of a formula: `t`, `x`, `x'`, `z`; `p_x` for the momentum of `x` (`p_q[0]` in an array), `energy`,
+    /// `log_factor`, unless a coordinate or a parameter has the name; else any expression, with a name or without.
     ///
     /// # Errors
     /// [`RuntimeError::Formula`] with the place in the text.
@@ -52,15 +52,6 @@ impl Column {
             return Ok(Column::Momentum(i));
         }
         Ok(Column::Expression(Box::new(formula.named_expression(text)?)))
-    }
-
-    /// Whether it depends on the conformal factor since the start.
-    pub fn has_conformal_factor(&self) -> bool {
-        match self {
-            Column::LogFactor => true,
-            Column::Expression(expression) => expression.has_conformal_factor(),
-            _ => false,
-        }
     }
 
     /// All that a state has: `t`, the coordinates, the velocities and `z`, with their names.

@@ -8,11 +8,11 @@ use std::time::{Duration, Instant};
 /// The errors that are asked of the reference, until one is had.
 const REFERENCES: [f64; 5] = [1e-13, 1e-12, 1e-10, 1e-8, 1e-6];
 
-/// What all runs may take together; each integrator has the same part of it, and one run at the least.
-const BUDGET: Duration = Duration::from_secs(2);
+/// No integrator is tried with shorter steps after a run that took so long.
+const LONGEST: Duration = Duration::from_millis(500);
 
-/// A run is repeated for such a part of that, and so often, for the least time.
-const REPEATED: u32 = 16;
+/// A run is repeated for so long, and so often, for the least time.
+const REPEATED: Duration = Duration::from_millis(10);
 const REPETITIONS: usize = 5;
 
 /// The halvings of the step of an integrator.
@@ -69,8 +69,8 @@ fn apart(a: &Outcome, b: &Outcome) -> f64 {
 
 impl System {
     /// Runs a motion by all integrators that apply, with steps from long to short, and measures time and error of each. Of `motion` the start
-    /// and the end are taken. `progress` is told the part that is done; `false` ends it there. Steps are halved until round-off, or as
-    /// long as the runs of an integrator take no more than its part of two seconds.
+    /// and the end are taken. `progress` is told the part that is done; `false` ends it there. Steps are halved until round-off, or until a
+    /// run takes half a second.
     ///
     /// # Errors
     /// Those of the reference, which is by contact Gauss collocation with 16 stages.
@@ -99,7 +99,6 @@ impl System {
             ended: false,
         };
         let all = AnyIntegrator::all();
-        let share = BUDGET / all.len().max(1) as u32;
         for (i, by) in all.iter().copied().enumerate() {
             if !progress(i as f64 / all.len() as f64) {
                 comparison.ended = true;
@@ -111,7 +110,7 @@ impl System {
             }
             // So long that the reference would need as many evaluations.
             let first = count.div_ceil(8).max(1);
-            work_of(by, (first, span), share, &run, &reference, &mut comparison);
+            work_of(by, (first, span), &run, &reference, &mut comparison);
         }
         progress(1.0);
         Ok(comparison)
@@ -122,12 +121,11 @@ impl System {
 fn work_of(
     by: AnyIntegrator,
     (first, span): (usize, f64),
-    share: Duration,
     run: &dyn Fn(AnyIntegrator, usize) -> Result<Outcome, RuntimeError>,
     reference: &Outcome,
     to: &mut Comparison,
 ) {
-    let (mut least, mut worse, start) = (f64::INFINITY, 0, Instant::now());
+    let (mut least, mut worse) = (f64::INFINITY, 0);
     for halving in 0..HALVINGS {
         let Some(count) = first.checked_shl(halving) else { break };
         let begin = Instant::now();
@@ -138,7 +136,7 @@ fn work_of(
             let error = largest([apart(&outcome, reference), to.reference_error]);
             let mut spent = seconds;
             for _ in 1..REPETITIONS {
-                if spent > share / REPEATED {
+                if spent > REPEATED {
                     break;
                 }
                 let begin = Instant::now();
@@ -164,8 +162,7 @@ fn work_of(
                 break;
             }
         }
-        // The next one takes twice as long.
-        if start.elapsed() + 2 * seconds > share {
+        if seconds > LONGEST {
             break;
         }
     }

@@ -86,16 +86,6 @@ pub trait Watch {
     /// The motion as it would go on from where [`poll`](Self::poll) has ended it, where its steps can be saved; those of a
     /// [resumable](crate::Motion::resumable) one can.
     fn interrupted(&mut self, _at: discrete_herglotz::Interrupted) {}
-
-    /// Whether the motion is to be saved where [`poll`](Self::poll) was called last, and goes on.
-    fn saves(&mut self) -> bool {
-        false
-    }
-
-    /// The motion as it would go on from there, after so many steps, where its steps can be saved.
-    fn saved(&mut self, _at: discrete_herglotz::Interrupted, _steps: usize) -> std::ops::ControlFlow<()> {
-        std::ops::ControlFlow::Continue(())
-    }
 }
 
 /// Nothing is watched.

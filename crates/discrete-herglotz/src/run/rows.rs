@@ -223,13 +223,6 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
     }
 
     fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
-        // A run that goes on has the rows before it behind it.
-        let backward = self.course.t_end < self.course.t0;
-        if let When::At { times, recorded } = &mut self.when
-            && at.k > 0
-        {
-            *recorded = times.partition_point(|t| if backward { *t > at.t } else { *t < at.t });
-        }
         self.step(at)
     }
 

@@ -42,7 +42,7 @@ impl Compare {
             let counts = [order.to_string(), exact(*step_size), steps.to_string(), evaluations.to_string()];
             csv.record([integrator.clone()].into_iter().chain(counts).chain([exact(*error), exact(*seconds)]))?;
         }
-        csv.flush()?;
+        csv.finish()?;
         if let Some(figure) = plot::of_comparison(&comparison) {
             directory.write("compare.svg", &figure)?;
         }

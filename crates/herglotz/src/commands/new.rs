@@ -77,8 +77,7 @@ time = {time}
 accuracy = 1e-8  # or integrator = "gauss_8", step = 0.5; `herglotz list integrators` lists them
 
 [want]
-# Rows by every = TIME, at = [TIMES] or every_step = STEPS. Columns are names and any formulas; without them, the whole state. The energy
-# is {first_velocity} p_{first} - L, which holds the action z; sigma is the conformal factor since the start, log_factor its logarithm.
+# Rows by every = TIME, at = [TIMES] or every_step = STEPS. Columns are names and any formulas; without them, the whole state.
 rows = {{ every = 0.5, columns = ["t", "{first}", "{first_velocity}", "z", "energy", "log_factor", "{first}^2"] }}
 # The times at which a formula changes its sign: direction = "rising", "falling" or "both"; terminal = true ends the motion.
 events = [{{ when = "{first}", direction = "rising" }}]

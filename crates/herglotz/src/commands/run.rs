@@ -8,8 +8,8 @@ use clap::Args;
 use herglotz::Scene;
 use indicatif::{ProgressBar, ProgressStyle};
 use runtime_herglotz::{
-    AnyIntegrator, Crossing, Expression, Interrupted, Motion, Outcome, Plan, RuntimeError, Status, Steps, Watch, Way,
-    When, velocity_name,
+    AnyIntegrator, Crossing, Interrupted, Motion, Outcome, Plan, RuntimeError, Status, Steps, Watch, Way, When,
+    velocity_name,
 };
 use serde::{Deserialize, Serialize};
 use std::io::IsTerminal;
@@ -17,12 +17,10 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
 
 const ROWS: &str = "rows.csv";
 pub(crate) const EVENTS: &str = "events.csv";
-/// The names that checkpoints have by turns: one is whole while the other is written.
-const CHECKPOINTS: [&str; 2] = ["checkpoint", "checkpoint_2"];
+const CHECKPOINT: &str = "checkpoint";
 const BESIDE: &str = "checkpoint.json";
 
 #[derive(Args)]
@@ -32,12 +30,9 @@ pub(crate) struct Run {
     /// The directory of the results; that with the name of the scene otherwise.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Go on where the run was interrupted by Ctrl-C, or from its last checkpoint where it was killed.
+    /// Go on where Ctrl-C interrupted the run.
     #[arg(long)]
     resume: bool,
-    /// The seconds between two checkpoints, from which --resume goes on.
-    #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
-    checkpoint_every: f64,
     /// Draw the columns against time, and phase portraits: columns.svg, phase.svg, path.svg, section.svg.
     #[arg(long)]
     plot: bool,
@@ -62,64 +57,14 @@ struct Beside {
     rows_bytes: u64,
     events: usize,
     events_bytes: u64,
-    /// Which of the checkpoints it belongs to.
-    checkpoint: usize,
-}
-
-/// Writes checkpoints.
-struct Saver {
-    directory: Directory,
-    scene: String,
-    integrator: String,
-    count: usize,
-    by_clock: bool,
-    /// The checkpoint that was written last.
-    last: usize,
-    every: Duration,
-    saved: Instant,
-}
-
-impl Saver {
-    /// Writes a checkpoint with what is known of the files; that before it is whole until then.
-    fn save(&mut self, at: &Interrupted, taken: usize, of_files: [(usize, u64); 2]) -> Result<(), Failure> {
-        let [(rows, rows_bytes), (events, events_bytes)] = of_files;
-        let next = (self.last + 1) % CHECKPOINTS.len();
-        let path = self.directory.file(CHECKPOINTS[next]);
-        at.write(&path).map_err(Failure::of_file(&path))?;
-        let Saver { scene, integrator, count, by_clock, .. } = self;
-        let (scene, integrator, count, by_clock) = (scene.clone(), integrator.clone(), *count, *by_clock);
-        let beside = Beside {
-            scene,
-            integrator,
-            count,
-            by_clock,
-            taken,
-            rows,
-            rows_bytes,
-            events,
-            events_bytes,
-            checkpoint: next,
-        };
-        self.directory.replace(BESIDE, &serde_json::to_string(&beside).map_err(std::io::Error::from)?)?;
-        (self.last, self.saved) = (next, Instant::now());
-        Ok(())
-    }
-}
-
-/// Removes what a run would go on from.
-fn remove_checkpoints(directory: &Directory) -> Result<(), Failure> {
-    directory.remove(BESIDE)?;
-    CHECKPOINTS.iter().try_for_each(|name| directory.remove(name))
 }
 
 /// Sees a motion, and writes what it sees.
 struct Writer {
-    saver: Saver,
     rows: Table,
     /// Where the scene has events.
     events: Option<Table>,
     names: Vec<String>,
-    event_columns: Vec<(String, Expression)>,
     row_count: usize,
     event_count: usize,
     /// The rows in which each column is not finite.
@@ -134,12 +79,6 @@ struct Writer {
 }
 
 impl Writer {
-    /// Writes all to the files, and tells how many rows and events they have, and their lengths.
-    fn flush(&mut self) -> Result<[(usize, u64); 2], Failure> {
-        let events_bytes = self.events.as_mut().map(Table::flush).transpose()?.unwrap_or(0);
-        Ok([(self.row_count, self.rows.flush()?), (self.event_count, events_bytes)])
-    }
-
     fn keep(&mut self, written: Result<(), Failure>) -> ControlFlow<()> {
         match written {
             Ok(()) => ControlFlow::Continue(()),
@@ -169,7 +108,7 @@ impl Watch for Writer {
             return ControlFlow::Continue(());
         };
         self.event_count += 1;
-        let written = table.record([name.clone()].into_iter().chain(numbers_of_event(crossing, &self.event_columns)));
+        let written = table.record([name.clone()].into_iter().chain(numbers_of_event(crossing)));
         self.keep(written)
     }
 
@@ -183,22 +122,12 @@ impl Watch for Writer {
     fn interrupted(&mut self, at: Interrupted) {
         self.interrupted = Some(at);
     }
-
-    fn saves(&mut self) -> bool {
-        self.saver.saved.elapsed() >= self.saver.every
-    }
-
-    fn saved(&mut self, at: Interrupted, steps: usize) -> ControlFlow<()> {
-        let written = self.flush().and_then(|of_files| self.saver.save(&at, steps, of_files));
-        self.keep(written)
-    }
 }
 
 /// What follows the name of the event in a row of events.csv.
-pub(crate) fn numbers_of_event(crossing: &Crossing, columns: &[(String, Expression)]) -> Vec<String> {
+pub(crate) fn numbers_of_event(crossing: &Crossing) -> impl Iterator<Item = String> {
     let Crossing { t, q, v, p, z, .. } = crossing;
-    let more = columns.iter().map(|(_, expression)| expression.at(*t, q, v, *z));
-    [*t].into_iter().chain(q.iter().chain(v).chain(p).copied()).chain([*z]).chain(more).map(exact).collect()
+    [*t].into_iter().chain(q.iter().chain(v).chain(p).copied()).chain([*z]).map(exact)
 }
 
 /// A flag that Ctrl-C sets; a second one ends the program.
@@ -233,8 +162,7 @@ pub(crate) fn header_of_events(scene: &Scene) -> Vec<String> {
     let velocities = names.iter().map(|name| velocity_name(name));
     let momenta = names.iter().map(|name| format!("p_{name}"));
     let first = ["event", "t"].map(str::to_owned).into_iter();
-    let more = scene.event_columns.iter().map(|(name, _)| name.clone());
-    first.chain(names.iter().cloned()).chain(velocities).chain(momenta).chain(["z".to_owned()]).chain(more).collect()
+    first.chain(names.iter().cloned()).chain(velocities).chain(momenta).chain(["z".to_owned()]).collect()
 }
 
 impl Run {
@@ -258,26 +186,17 @@ impl Run {
             motion.way = steps(&plan.integrator.name, plan.steps).unwrap_or(motion.way);
         }
         let from = match &beside {
-            Some(beside) => {
-                let path = directory.file(CHECKPOINTS[beside.checkpoint % CHECKPOINTS.len()]);
+            Some(_) => {
+                let path = directory.file(CHECKPOINT);
                 let read = Interrupted::read(&path);
                 Some(read.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?)
             }
             None => None,
         };
-        let saver = Saver {
-            directory: directory.clone(),
-            scene: scene.fingerprint(),
-            integrator: plan.integrator.name.to_string(),
-            count: plan.steps,
-            by_clock: plan.integrator.by_clock,
-            last: beside.as_ref().map_or(0, |beside| beside.checkpoint),
-            every: self.every()?,
-            saved: Instant::now(),
-        };
-        let mut writer = self.writer(saver, &scene, &mut motion, beside.as_ref())?;
+        let mut writer = self.writer(&directory, &scene, &mut motion, beside.as_ref())?;
         if beside.is_none() {
-            remove_checkpoints(&directory)?;
+            directory.remove(BESIDE)?;
+            directory.remove(CHECKPOINT)?;
         }
         let outcome = match from {
             Some(from) => scene.system.resume(&motion, from, &mut writer),
@@ -285,17 +204,33 @@ impl Run {
         };
         writer.bar.finish_and_clear();
         let outcome = outcome.map_err(explain)?;
-        let of_files = writer.flush()?;
-        let Writer { mut saver, row_count, event_count, not_finite, interrupted, failure, .. } = writer;
+        let Writer { rows, events, row_count, event_count, not_finite, interrupted, failure, .. } = writer;
+        let rows_bytes = rows.finish()?;
+        let events_bytes = events.map(Table::finish).transpose()?.unwrap_or(0);
         if let Some(failure) = failure {
             return Err(failure);
         }
         for (count, (name, _)) in not_finite.iter().zip(&scene.columns).filter(|(count, _)| **count > 0) {
             eprintln!("warning: the column `{name}` is not a finite number in {count} rows");
         }
-        match &interrupted {
-            Some(interrupted) => saver.save(interrupted, outcome.steps, of_files)?,
-            None => remove_checkpoints(&directory)?,
+        if let Some(interrupted) = &interrupted {
+            let path = directory.file(CHECKPOINT);
+            interrupted.write(&path).map_err(Failure::of_file(&path))?;
+            let beside = Beside {
+                scene: scene.fingerprint(),
+                integrator: plan.integrator.name.to_string(),
+                count: plan.steps,
+                by_clock: plan.integrator.by_clock,
+                taken: outcome.steps,
+                rows: row_count,
+                rows_bytes,
+                events: event_count,
+                events_bytes,
+            };
+            directory.write(BESIDE, &serde_json::to_string(&beside).map_err(std::io::Error::from)?)?;
+        } else {
+            directory.remove(BESIDE)?;
+            directory.remove(CHECKPOINT)?;
         }
         if self.plot {
             for (name, figure) in plot::of_rows(&scene, &read_numbers(&directory.file(ROWS))?) {
@@ -308,13 +243,6 @@ impl Run {
             }
         }
         self.tell(&scene, &plan, &outcome, (row_count, event_count), interrupted.is_some())
-    }
-
-    /// The time between two checkpoints.
-    fn every(&self) -> Result<Duration, Failure> {
-        let refused =
-            |_| Failure::Input(format!("--checkpoint-every is {}, where seconds are needed", self.checkpoint_every));
-        Duration::try_from_secs_f64(self.checkpoint_every).map_err(refused)
     }
 
     /// What was left beside the checkpoint.
@@ -333,12 +261,11 @@ impl Run {
     /// The files, from their beginning or where they are to go on; of the rows of the motion those that are left.
     fn writer(
         &self,
-        saver: Saver,
+        directory: &Directory,
         scene: &Scene,
         motion: &mut Motion,
         beside: Option<&Beside>,
     ) -> Result<Writer, Failure> {
-        let directory = &saver.directory;
         directory.create()?;
         let (rows_at, events_at) = (directory.file(ROWS), directory.file(EVENTS));
         let has_events = !scene.events.is_empty();
@@ -361,11 +288,9 @@ impl Run {
         let stride = scene.rows_every_step();
         let skip = beside.zip(stride).is_some_and(|(beside, stride)| beside.taken.is_multiple_of(stride));
         Ok(Writer {
-            saver,
             rows,
             events,
             names: scene.events.iter().map(|(name, _)| name.clone()).collect(),
-            event_columns: scene.event_columns.clone(),
             row_count: beside.map_or(0, |beside| beside.rows),
             event_count: beside.map_or(0, |beside| beside.events),
             not_finite: vec![0; scene.columns.len()],

@@ -66,18 +66,10 @@ fn words(ending: &Ending) -> (&'static str, String) {
 impl Writer<'_> {
     fn events_of(&mut self, member: &MemberEnd, values: &[f64]) -> Result<(), Failure> {
         let Some(table) = &mut self.events else { return Ok(()) };
-        let mut columns = self.scene.event_columns.clone();
-        let members = self.scene.members();
-        for (name, value) in members.parameters().into_iter().zip(members.parameter_values(member.index)) {
-            for (_, expression) in &mut columns {
-                // Every expression of a scene knows its parameters.
-                let _ = expression.set(name, value);
-            }
-        }
         for crossing in &member.crossings {
             let name = self.scene.events.get(crossing.event).map(|(name, _)| name.clone()).unwrap_or_default();
             let which = [member.index.to_string()].into_iter().chain(values.iter().map(|x| exact(*x)));
-            table.record(which.chain([name]).chain(numbers_of_event(crossing, &columns)))?;
+            table.record(which.chain([name]).chain(numbers_of_event(crossing)))?;
         }
         Ok(())
     }
@@ -180,9 +172,9 @@ impl Sweep {
         let tally = scene.system.ensemble(&ensemble, &mut writer);
         writer.bar.finish_and_clear();
         let tally = tally.map_err(|error| self.scene.explain(scene.explain(&error)))?;
-        let Writer { mut csv, mut events, drawn, stop, failure, members: written, .. } = writer;
-        csv.flush()?;
-        events.as_mut().map(Table::flush).transpose()?;
+        let Writer { csv, events, drawn, stop, failure, members: written, .. } = writer;
+        csv.finish()?;
+        events.map(Table::finish).transpose()?;
         if let Some(failure) = failure {
             return Err(failure);
         }

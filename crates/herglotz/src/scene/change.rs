@@ -8,18 +8,8 @@ use runtime_herglotz::CatalogueEntry;
 /// Where errors of changes are.
 const SOURCE: &str = "--set";
 
-/// What of `[run]` can be set.
-const OF_RUN: [&str; 5] = ["run.time", "run.accuracy", "run.integrator", "run.step", "run.steps"];
-
-/// Changes a value: `gamma=-0.2` of a parameter, `start.x=1`, `run.time=10`, `run.integrator=gauss_8`; `run.accuracy=1e-6`, `run.step=0.1` and
-/// `run.steps=100` each in place of the others.
+/// Changes a value: `gamma=-0.2` of a parameter, `start.x=1`, `run.time=10`, `run.accuracy=1e-6`, `run.step=0.1`.
 pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str) -> Result<(), SceneError> {
-    let at_run = file.run.span();
-    if let Some(name) = text.trim().strip_prefix("run.integrator=") {
-        let at = file.run.integrator.as_ref().map_or(at_run, At::span);
-        file.run.integrator = Some(At::new(name.trim().to_owned(), at));
-        return Ok(());
-    }
     let parsed = text.split_once('=').and_then(|(name, value)| Some((name.trim(), value.trim().parse::<f64>().ok()?)));
     let Some((name, value)) = parsed.filter(|(_, value)| value.is_finite()) else {
         let message = "a change is a name, `=` and a finite number, as in gamma=-0.2";
@@ -29,25 +19,11 @@ pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str)
     let put = |place: &mut Option<At<f64>>, at| {
         *place = Some(At::new(value, place.as_ref().map_or(at, At::span)));
     };
+    let at_run = file.run.span();
     match name {
         "run.time" => *file.run.time = value,
-        "run.accuracy" => {
-            put(&mut file.run.accuracy, at_run);
-            (file.run.step, file.run.steps) = (None, None);
-        }
-        "run.step" => {
-            put(&mut file.run.step, at_run);
-            (file.run.accuracy, file.run.steps) = (None, None);
-        }
-        "run.steps" if value >= 0.0 && value.fract() == 0.0 && value < 1e15 => {
-            let at = file.run.steps.as_ref().map_or(at_run, At::span);
-            file.run.steps = Some(At::new(value as usize, at));
-            (file.run.accuracy, file.run.step) = (None, None);
-        }
-        "run.steps" => {
-            let message = format!("`run.steps` is {value:?}, where a whole number is needed");
-            return Err(SceneError::at(text, (0, text.len()), message).in_file(SOURCE));
-        }
+        "run.accuracy" => put(&mut file.run.accuracy, at_run),
+        "run.step" => put(&mut file.run.step, at_run),
         _ => match name.strip_prefix("start.") {
             Some(of_start) => {
                 let at = file.system.span();
@@ -61,7 +37,7 @@ pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str)
                 let known: Vec<String> = own.chain(of_entry).map(str::to_owned).collect();
                 if !known.iter().any(|parameter| parameter == name) {
                     let known = known.iter().map(String::as_str);
-                    let all = known.clone().chain(["start.NAME"]).chain(OF_RUN);
+                    let all = known.clone().chain(["start.NAME", "run.time", "run.accuracy", "run.step"]);
                     let message = format!(
                         "there is no `{name}` that can be set; there are {}",
                         all.collect::<Vec<_>>().join(", ")

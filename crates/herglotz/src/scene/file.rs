@@ -22,7 +22,7 @@ pub(crate) struct File {
     /// The Lagrangian: a formula, or one of the catalogue.
     pub system: At<SystemTable>,
     /// Where the motion starts: a number for each coordinate `x`, and for its velocity `x'` or its momentum `p_x`; of the action `z` and
-    /// the time `t`, which are 0 otherwise. An array of coordinates has a list, or one number for all. A system of the catalogue has a start of its own.
+    /// the time `t`, which are 0 otherwise. An array of coordinates has a list. A system of the catalogue has a start of its own.
     #[serde(default)]
     pub start: Option<At<Named<Numbers>>>,
     /// How long, and how.
@@ -76,12 +76,6 @@ pub(crate) struct WantTable {
     /// Functions of the state whose changes of sign are written to events.csv.
     #[serde(default)]
     pub events: Vec<EventTable>,
-    /// More columns of events.csv: any expressions of the state there, with `energy` and the momenta `p_x`.
-    #[serde(default)]
-    pub event_columns: Vec<At<String>>,
-    /// The coordinates that are angles: section.svg has them between -pi and pi.
-    #[serde(default)]
-    pub wrap: Vec<At<String>>,
     /// Whether the conformal factor of the whole motion is in the summary.
     #[serde(default)]
     pub conformal_factor: bool,
@@ -100,9 +94,7 @@ pub(crate) struct RowsTable {
     pub at: Option<At<Vec<At<f64>>>>,
     /// The number of steps between two rows.
     pub every_step: Option<At<usize>>,
-    /// `t`, coordinates, velocities, `z`, momenta `p_x`, the energy `energy = x' p_x - L` (which holds the action: with a drag gamma it is what the
-    /// motion has left of its mechanical energy, less gamma z), the conformal factor `sigma` since the start and its logarithm `log_factor`, and
-    /// any expressions of these, with a name (`E = ...`) or without; without it, the whole state.
+    /// `t`, coordinates, velocities, `z`, momenta `p_x`, `energy`, `log_factor`, and any expressions, with a name (`E = ...`) or without; without it, the whole state.
     pub columns: Option<At<Vec<At<String>>>>,
 }
 
@@ -110,7 +102,7 @@ pub(crate) struct RowsTable {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `when`")]
 pub(crate) struct EventTable {
-    /// The function: an expression of `t`, coordinates, velocities, `z`, momenta `p_x` and `energy`.
+    /// The function.
     pub when: At<String>,
     /// Which changes count.
     #[serde(default)]

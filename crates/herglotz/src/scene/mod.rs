@@ -16,8 +16,8 @@ pub use sweep::Knob;
 use at::{At, Span};
 use file::{File, RunTable, SystemTable, VERSION};
 use runtime_herglotz::{
-    AnyIntegrator, CatalogueEntry, Column, Event, Expression, Formula, FormulaError, InputError, Motion, RuntimeError,
-    Start, Steps, System, Way,
+    AnyIntegrator, CatalogueEntry, Column, Event, Formula, FormulaError, InputError, Motion, RuntimeError, Start,
+    Steps, System, Way,
 };
 use serde::Deserialize;
 use want::RowTimes;
@@ -31,10 +31,6 @@ pub struct Scene {
     pub columns: Vec<(String, Column)>,
     /// The events with the texts of their functions, in their order.
     pub events: Vec<(String, Event)>,
-    /// What is written of each crossing beside its state, with its names.
-    pub event_columns: Vec<(String, Expression)>,
-    /// The coordinates that are angles, by their index.
-    pub angles: Vec<usize>,
     /// What a sweep takes through its values.
     pub knobs: Vec<Knob>,
     /// The formula's text.
@@ -88,8 +84,8 @@ impl Scene {
         Self::read_with(text, &[])
     }
 
-    /// Reads a scene file and changes some of its values: `gamma=-0.2` for a parameter, `start.x=1`, `run.time=10`, `run.integrator=gauss_8`,
-    /// and one of `run.accuracy=1e-6`, `run.step=0.1` and `run.steps=100`, in place of what the file has of these.
+    /// Reads a scene file and changes some of its values: `gamma=-0.2` for a parameter, `start.x=1`, `run.time=10`, `run.accuracy=1e-6`,
+    /// `run.step=0.1`.
     ///
     /// # Errors
     /// [`SceneError`] with the place in the text, or in the change.
@@ -122,15 +118,9 @@ impl Scene {
             let refused = |error: InputError| SceneError::at(text, name.span(), in_words(&error));
             runs.check_integrator(by).map_err(refused)?;
         }
-        let columns = want::columns(text, &formula, file.want.rows.as_ref())?;
-        let events = want::events(text, &formula, &file.want.events)?;
-        let event_columns = want::event_columns(text, &formula, &file.want.event_columns)?;
-        check_parameters(text, &file, &formula, &columns, &events, &event_columns)?;
         Ok(Scene {
-            columns,
-            events,
-            event_columns,
-            angles: want::angles(text, &formula, &file.want.wrap)?,
+            columns: want::columns(text, &formula, file.want.rows.as_ref())?,
+            events: want::events(text, &formula, &file.want.events)?,
             knobs: sweep::read(text, &formula, &start, &file.sweep)?,
             rows: RowTimes::read(text, file.want.rows.as_ref(), (start.t, end))?,
             system: runs,
@@ -191,14 +181,11 @@ impl Scene {
     pub fn fingerprint(&self) -> String {
         let columns: Vec<&str> = self.columns.iter().map(|(name, _)| name.as_str()).collect();
         let events: Vec<_> = self.events.iter().map(|(name, e)| (name, e.direction, e.terminal)).collect();
-        let of_crossings: Vec<&str> = self.event_columns.iter().map(|(name, _)| name.as_str()).collect();
         let Scene { start, end, way, rows, conformal_factor, .. } = self;
         let formula = self.system.formula();
         let (names, values) = (formula.coordinates(), formula.parameters().collect::<Vec<_>>());
         let of_system = format!("{} {names:?} {values:?}", self.lagrangian);
-        format!(
-            "{of_system} {start:?} {end:?} {way:?} {rows:?} {conformal_factor} {columns:?} {events:?} {of_crossings:?}"
-        )
+        format!("{of_system} {start:?} {end:?} {way:?} {rows:?} {conformal_factor} {columns:?} {events:?}")
     }
 
     /// The place in the file that an error is about.
@@ -322,33 +309,6 @@ fn formula(
         }
     }
     Ok(formula)
-}
-
-/// Refuses parameters that neither the formula nor anything beside it has: most are misspelt.
-fn check_parameters(
-    text: &str,
-    file: &File,
-    formula: &Formula,
-    columns: &[(String, Column)],
-    events: &[(String, Event)],
-    event_columns: &[(String, Expression)],
-) -> Result<(), SceneError> {
-    let of_columns = columns.iter().filter_map(|(_, column)| match column {
-        Column::Expression(expression) => Some(expression.as_ref()),
-        _ => None,
-    });
-    let expressions = || of_columns.clone().chain(events.iter().map(|(_, event)| &event.function));
-    let expressions = || expressions().chain(event_columns.iter().map(|(_, expression)| expression));
-    let used: Vec<&str> = formula.used_parameters().chain(expressions().flat_map(|e| e.used_parameters())).collect();
-    // The names of the catalogue are known, whether or not its formula has them.
-    let own = file.system.lagrangian.as_ref().map(|_| file.system.parameters.0.iter());
-    for (name, _) in own.into_iter().flatten() {
-        if !used.contains(&name.as_str()) {
-            let message = format!("the parameter `{}` is not in the Lagrangian, nor in an event or a column", **name);
-            return Err(SceneError::unknown(text, name.span(), name, used.iter().copied(), message));
-        }
-    }
-    Ok(())
 }
 
 /// How a motion is advanced.

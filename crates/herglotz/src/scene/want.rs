@@ -3,7 +3,7 @@
 use super::SceneError;
 use super::at::{At, Span};
 use super::file::{DirectionName, EventTable, RowsTable};
-use runtime_herglotz::{Column, Direction, Event, Expression, Formula, FormulaError, RuntimeError, When, nearest_name};
+use runtime_herglotz::{Column, Direction, Event, Formula, FormulaError, RuntimeError, When, nearest_name};
 
 /// The rows of a scene that asks for none.
 const DEFAULT_ROWS: usize = 1000;
@@ -119,8 +119,7 @@ fn with_nearest(mut error: SceneError, formula: &Formula) -> SceneError {
     let unknown = error.error.message.strip_prefix("unknown name `").and_then(|rest| rest.split('`').next());
     if let (Some(name), None) = (unknown, &error.error.nearest) {
         let momenta = formula.coordinates().into_iter().map(|name| format!("p_{name}"));
-        let known: Vec<String> =
-            ["energy", "sigma", "log_factor"].map(str::to_owned).into_iter().chain(momenta).collect();
+        let known: Vec<String> = ["energy", "log_factor"].map(str::to_owned).into_iter().chain(momenta).collect();
         error.error.nearest = nearest_name(name, known.iter().map(String::as_str)).map(str::to_owned);
         if error.error.nearest.is_none() {
             error.error.message += "; beside formulas there are the columns ";
@@ -143,31 +142,6 @@ pub(crate) fn events(text: &str, formula: &Formula, tables: &[EventTable]) -> Re
         Ok(((**when).clone(), Event { function, direction, terminal: *terminal }))
     };
     tables.iter().map(of).collect()
-}
-
-/// What is written of crossings beside their state, with its names.
-pub(crate) fn event_columns(
-    text: &str,
-    formula: &Formula,
-    columns: &[At<String>],
-) -> Result<Vec<(String, Expression)>, SceneError> {
-    let of = |column: &At<String>| match formula.expression(column) {
-        Ok(expression) => Ok(((**column).clone(), expression)),
-        Err(error) => Err(of_formula(text, column.span(), &error.into())),
-    };
-    columns.iter().map(of).collect()
-}
-
-/// The coordinates of names, by their index.
-pub(crate) fn angles(text: &str, formula: &Formula, names: &[At<String>]) -> Result<Vec<usize>, SceneError> {
-    let coordinates = formula.coordinates();
-    let of = |name: &At<String>| {
-        coordinates.iter().position(|coordinate| *coordinate == **name).ok_or_else(|| {
-            let message = format!("there is no coordinate `{}`; there are {}", **name, coordinates.join(", "));
-            SceneError::unknown(text, name.span(), name, coordinates.iter().map(String::as_str), message)
-        })
-    };
-    names.iter().map(of).collect()
 }
 
 /// An error in a text of the file that is a formula.

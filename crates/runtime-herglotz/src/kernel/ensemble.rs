@@ -35,7 +35,7 @@ pub(super) fn run<const N: usize>(
         let mut lagrangian = system.0.clone();
         varied.names.iter().try_for_each(|name| lagrangian.set(name, 0.0))?;
     }
-    let has_factor = ensemble.columns.iter().any(Column::has_conformal_factor);
+    let has_factor = ensemble.columns.iter().any(|c| matches!(c, Column::LogFactor));
     let observed = ensemble.rows.is_some() || !ensemble.events.is_empty() || has_factor;
     // In lanes the steps for an accuracy are those of a block, which then is not to depend on the time it takes.
     let (shard, mut shards, fixed) = match (&ensemble.way, &ensemble.varied) {

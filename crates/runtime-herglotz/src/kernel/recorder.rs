@@ -73,23 +73,14 @@ impl<'r, const N: usize> Recorder<'r, N> {
             let PhasePoint { q, p, z } = &at.state;
             self.watch.node(at.t, coordinates(q, self.dimension), coordinates(p, self.dimension), *z);
         }
-        let Some(Course { t0, t_end, .. }) = self.course.filter(|_| at.k.is_multiple_of(POLL)) else {
-            return ControlFlow::Continue(());
-        };
-        let ends = ControlFlow::Break(Stop::here("its watch"));
-        if self.watch.poll((at.t - t0) / (t_end - t0)).is_break() {
+        if at.k.is_multiple_of(POLL)
+            && let Some(Course { t0, t_end, .. }) = self.course
+            && self.watch.poll((at.t - t0) / (t_end - t0)).is_break()
+        {
             if let Some(interrupted) = at.interrupted() {
                 self.watch.interrupted(interrupted);
             }
-            return ends;
-        }
-        // At its end nothing is left to go on with.
-        if !at.last
-            && self.watch.saves()
-            && let Some(saved) = at.interrupted()
-            && self.watch.saved(saved, at.k).is_break()
-        {
-            return ends;
+            return ControlFlow::Break(Stop::here("its watch"));
         }
         ControlFlow::Continue(())
     }
@@ -114,7 +105,7 @@ pub(super) fn rows<'r, const N: usize>(when: &When, columns: &[Column]) -> Resul
     });
     let rows = if velocity { rows.with_velocity() } else { rows };
     let rows = if any(|c| matches!(c, Column::Energy)) { rows.with_energy() } else { rows };
-    let rows = if any(Column::has_conformal_factor) { rows.with_conformal_factor() } else { rows };
+    let rows = if any(|c| matches!(c, Column::LogFactor)) { rows.with_conformal_factor() } else { rows };
     Ok(if action { rows } else { rows.without_action() })
 }
 
@@ -132,11 +123,7 @@ pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
         Column::Expression(e) => {
             // Neither is in an expression that does not have it.
             let v = row.v.unwrap_or_else(SVector::zeros);
-            let (t, q, v, z) = (row.t, row.q.as_slice(), v.as_slice(), row.z.unwrap_or(0.0));
-            if e.has_conformal_factor() {
-                return e.with_log_factor(row.log_factor.unwrap_or(f64::NAN)).at(t, q, v, z);
-            }
-            e.at(t, q, v, z)
+            e.at(row.t, row.q.as_slice(), v.as_slice(), row.z.unwrap_or(0.0))
         }
     }
 }
