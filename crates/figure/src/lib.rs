@@ -3,7 +3,7 @@
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::legend::LegendPosition;
 use kuva::plot::{LinePlot, LineStyle, MarkerShape, ScatterPlot};
-use kuva::render::figure::Figure;
+use kuva::render::figure::{Figure, LabelConfig};
 use kuva::render::layout::{Layout, TickAlign, TickFormat, TickPos};
 use kuva::render::plots::Plot;
 use std::sync::Arc;
@@ -285,22 +285,25 @@ fn numbered(svg: &str) -> String {
     out
 }
 
-/// A figure of panels side by side, marked a, b and so on, as SVG.
+/// A figure of panels side by side, marked a, b and so on where there are several, as SVG.
 pub fn draw_row(panels: &[Panel]) -> String {
     draw_grid(panels, panels.len())
 }
 
-/// A figure of panels in rows of so many, marked a, b and so on, as SVG.
+/// A figure of panels in rows of so many, marked a, b and so on where there are several, as SVG.
 pub fn draw_grid(panels: &[Panel], in_a_row: usize) -> String {
     let plots: Vec<Vec<Plot>> = panels.iter().map(Panel::plots).collect();
     let layouts = panels.iter().zip(&plots).map(|(panel, plots)| panel.layout(plots)).collect();
     let in_a_row = in_a_row.max(1);
+    // Of the panels alone: the last row may have places without one.
+    let count = if panels.len() > 1 { panels.len() } else { 0 };
+    let letters: Vec<String> = ('a'..='z').take(count).map(String::from).collect();
     let scene = Figure::new(panels.len().div_ceil(in_a_row).max(1), in_a_row)
         .with_plots(plots)
         .with_layouts(layouts)
         .with_cell_size(SIZE.0, SIZE.1)
         .with_spacing(24.0)
-        .with_labels_lowercase()
+        .with_labels_custom(letters.iter().map(String::as_str).collect(), LabelConfig::default())
         .render();
     numbered(&SvgBackend.render_scene(&scene))
 }
@@ -308,6 +311,25 @@ pub fn draw_grid(panels: &[Panel], in_a_row: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Each of several panels has its letter; a place without a panel has none, nor has a panel by itself.
+    #[test]
+    fn letters_are_those_of_panels() {
+        let panel = Panel {
+            x_label: "x".into(),
+            y_label: "y".into(),
+            x: Axis::Linear(0.0, 1.0, 0.5),
+            y: Axis::Linear(0.0, 1.0, 0.5),
+            legend: (0.0, 1.0),
+            curves: vec![Curve::unnamed(Line::Solid, [(0.0, 0.0), (1.0, 1.0)])],
+            marks: Vec::new(),
+        };
+        for (panels, in_a_row) in [(1, 1), (1, 3), (2, 2), (3, 2), (5, 3), (7, 3)] {
+            let drawn = draw_grid(&vec![panel.clone(); panels], in_a_row);
+            let letters: String = ('a'..='w').filter(|letter| drawn.contains(&format!(">{letter}<"))).collect();
+            assert_eq!(letters, "abcdefg"[..if panels > 1 { panels } else { 0 }], "{panels} in rows of {in_a_row}");
+        }
+    }
 
     #[test]
     fn clips_are_counted_from_zero() {

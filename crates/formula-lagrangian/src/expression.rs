@@ -6,10 +6,15 @@ use crate::names::Names;
 use crate::node::Inputs;
 use crate::parser::{MOST_NODES, Parser};
 use crate::tape::Tape;
-use crate::{Formula, FormulaError, Graph};
+use crate::{Formula, FormulaError, Graph, MOST_COORDINATES};
 use contact_geom::Scalar;
 
 /// An expression over the names of a formula, to be evaluated along a motion; made by [`Formula::expression`].
+///
+/// Beside these names there are, unless a coordinate, a parameter or a definition has the name: `energy`, which is `v L_v - L` and so
+/// holds all of `L`, its terms in z too (`-gamma*z` for a drag `gamma*z`); `p_x`, the momentum `L_v` of a coordinate `x`
+/// (`p_q[0]` in an array); `log_factor`, the integral of `L_z` along the motion since its start, and `sigma`, its exponential: the
+/// conformal factor. The last two are no functions of the state, see [`at_factor`](Self::at_factor).
 ///
 /// ```
 /// use formula_lagrangian::Formula;
@@ -25,27 +30,66 @@ pub struct Expression {
     tape: Tape,
     values: Vec<f64>,
     inputs: Inputs,
+    log_factor: bool,
 }
 
 impl Expression {
     pub(crate) fn parse(formula: &Formula, text: &str, named: bool) -> Result<Self, FormulaError> {
         let (names, values) = (formula.names.clone(), formula.values.clone());
         let mut graph = Graph::new();
-        let root = Parser::parse(text, &names, &mut graph, named)?;
-        let tape = Tape::new(&graph, &[root], names.dimension).ok_or(FormulaError::TooLarge { limit: MOST_NODES })?;
+        let root = Parser::parse_beside(Some(formula), text, &names, &mut graph, named)?;
+        let log_factor = graph.has_log_factor(root, names.dimension);
+        let width = names.dimension + usize::from(log_factor);
+        let tape = Tape::new(&graph, &[root], width).ok_or(FormulaError::TooLarge { limit: MOST_NODES })?;
         let inputs = graph.inputs(root);
-        let mut expression = Expression { names, graph, tape, values, inputs };
+        let mut expression = Expression { names, graph, tape, values, inputs, log_factor };
         expression.tape.set_constants(&expression.graph.constants(&expression.values));
         Ok(expression)
     }
 
-    /// The value at a time and a state, over any number. Not a number where a slice has fewer entries than there are coordinates.
+    /// The value at a time and a state, over any number. Not a number where a slice has fewer entries than there are coordinates, or where
+    /// the expression has the [conformal factor](Self::has_conformal_factor).
     pub fn at<T: Scalar>(&self, t: T, q: &[T], v: &[T], z: T) -> T {
-        let mut value = T::from(f64::NAN);
-        if let (Some(q), Some(v)) = (q.get(..self.names.dimension), v.get(..self.names.dimension)) {
+        self.at_factor(t, (q, v, z), T::from(f64::NAN))
+    }
+
+    /// The same at a state `(q, v, z)` of a motion with the logarithm of the conformal factor since its start.
+    ///
+    /// ```
+    /// use formula_lagrangian::Formula;
+    /// let formula = Formula::parse("x'^2/2 - x^2/2 + gamma*z", &["x"], &[("gamma", -0.5)])?;
+    /// // v L_v - L = 1/2 (3^2 + 2^2) + 0.5 z
+    /// assert_eq!(formula.expression("energy")?.at(0.0, &[2.0], &[3.0], 4.0), 8.5);
+    /// assert_eq!(formula.expression("p_x/sigma")?.at_factor(0.0, (&[2.0], &[3.0], 4.0), 0.0), 3.0);
+    /// # Ok::<(), formula_lagrangian::FormulaError>(())
+    /// ```
+    pub fn at_factor<T: Scalar>(&self, t: T, (q, v, z): (&[T], &[T], T), log_factor: T) -> T {
+        let (mut value, n) = (T::from(f64::NAN), self.names.dimension);
+        let (Some(q), Some(v)) = (q.get(..n), v.get(..n)) else { return value };
+        let mut evaluate = |q: &[T], v: &[T]| {
             self.tape.evaluate::<T, 0>(At { q, v, z, t }, &mut [std::slice::from_mut(&mut value)]);
+        };
+        if !self.log_factor {
+            evaluate(q, v);
+            return value;
+        }
+        // It has the place of one more coordinate.
+        let (mut wide_q, mut wide_v) = ([T::zero(); MOST_COORDINATES + 1], [T::zero(); MOST_COORDINATES + 1]);
+        if let (Some(to_q), Some(to_v)) = (wide_q.get_mut(..=n), wide_v.get_mut(..=n)) {
+            for (to, from) in to_q.iter_mut().zip(q).chain(to_v.iter_mut().zip(v)) {
+                *to = *from;
+            }
+            if let Some(last) = to_q.last_mut() {
+                *last = log_factor;
+            }
+            evaluate(to_q, to_v);
         }
         value
+    }
+
+    /// Whether it depends on the conformal factor of the motion, `sigma` or `log_factor`.
+    pub fn has_conformal_factor(&self) -> bool {
+        self.log_factor
     }
 
     /// Whether it depends on velocities.

@@ -73,6 +73,13 @@ impl<const N: usize> FormulaLagrangian<N> {
         self.derived.smooth
     }
 
+    /// `L_z` where it is proved to be one number, so that the conformal factor of a time T is its exponential `e^(L_z T)`.
+    pub fn constant_rate(&self) -> Option<f64> {
+        let Derived { formula, structure, partials, .. } = &self.derived;
+        let rate = partials.last().filter(|_| structure.constant_rate || structure.z_free)?;
+        formula.graph.constants(&formula.values).get(rate.index()).copied()
+    }
+
     /// The symmetries that are seen, whose momenta decay as the conformal factor: moving along a coordinate on which L does not depend,
     /// and turning two coordinates where L has them in squares of lengths, products and areas alone, as `x^2 + y^2`.
     pub fn symmetries(&self) -> Vec<Symmetry<N>> {

@@ -66,6 +66,7 @@ mod lagrangian;
 mod names;
 mod node;
 mod parser;
+mod quantities;
 mod rotation;
 mod rust_source;
 mod structure;

@@ -1,9 +1,10 @@
 //! From a text to a node of a graph, by operator precedence (V. Pratt, "Top down operator precedence", 1973).
 
 use crate::functions::{FUNCTIONS, OPERATIONS};
-use crate::names::{Block, Names, is_reserved};
+use crate::names::{Block, Names, is_reserved, nearest_name};
+use crate::quantities::Quantity;
 use crate::token::{Token, Word, words};
-use crate::{Function, Graph, Id, Operation, ParseError};
+use crate::{Formula, Function, Graph, Id, Operation, ParseError};
 
 /// The longest text, in bytes.
 pub const LONGEST_TEXT: usize = 1 << 16;
@@ -35,6 +36,8 @@ pub(crate) struct Parser<'a> {
     brackets: usize,
     /// Whether the value may have any name that is free, in place of `L`.
     named: bool,
+    /// The Lagrangian beside which an expression stands: with it there are its energy, momenta and conformal factor.
+    beside: Option<&'a Formula>,
 }
 
 type Parsed<T> = Result<T, ParseError>;
@@ -43,13 +46,35 @@ impl<'a> Parser<'a> {
     /// The node of a text over a graph: definitions, one a line, and at the end the value, with `L =` before it or without; with any name
     /// where it is `named`.
     pub fn parse(text: &'a str, names: &'a Names, graph: &'a mut Graph, named: bool) -> Parsed<Id> {
+        Self::parse_beside(None, text, names, graph, named)
+    }
+
+    /// The same beside a Lagrangian, whose energy, momenta and conformal factor may be in it.
+    pub fn parse_beside(
+        beside: Option<&'a Formula>,
+        text: &'a str,
+        names: &'a Names,
+        graph: &'a mut Graph,
+        named: bool,
+    ) -> Parsed<Id> {
         if text.len() > LONGEST_TEXT {
             let message = format!("the text has {} bytes, where {LONGEST_TEXT} are possible", text.len());
             return Err(ParseError::at(text, (0, 0), message));
         }
         let words = words(text)?;
-        let mut parser =
-            Parser { text, words, at: 0, names, graph, locals: Vec::new(), depth: 0, read: 0, brackets: 0, named };
+        let mut parser = Parser {
+            text,
+            words,
+            at: 0,
+            names,
+            graph,
+            locals: Vec::new(),
+            depth: 0,
+            read: 0,
+            brackets: 0,
+            named,
+            beside,
+        };
         parser.program()
     }
 
@@ -267,8 +292,29 @@ impl<'a> Parser<'a> {
                 Ok(self.graph.velocity(i))
             }
             _ if is_reserved(name) => Err(self.error(word, format!("`{name}` is a function: write `{name}(...)`"))),
-            _ => Err(self.unknown(name, word, "name")),
+            _ => self.quantity(name, word),
         }
+    }
+
+    /// A quantity of the motion, beside a Lagrangian.
+    fn quantity(&mut self, name: &'a str, word: Word<'a>) -> Parsed<Id> {
+        let mut error = self.unknown(name, word, "name");
+        let Some(formula) = self.beside else { return Err(error) };
+        let names = self.names;
+        let block = name.strip_prefix("p_").and_then(|of| names.blocks.iter().find(|block| block.name == of));
+        let quantity = match (Quantity::of(name), block) {
+            (Some(quantity), _) => quantity,
+            (None, Some(block)) if block.count.is_some() => Quantity::Momentum(self.index(block)?),
+            (None, Some(block)) => Quantity::Momentum(block.first as u32),
+            (None, None) => {
+                let known: Vec<String> = Quantity::names(names).collect();
+                let nearest = nearest_name(name, known.iter().map(String::as_str)).map(str::to_owned);
+                error.nearest = error.nearest.or(nearest);
+                return Err(error);
+            }
+        };
+        let found = quantity.node(formula, self.graph);
+        found.ok_or_else(|| self.error(word, format!("`{name}` has more parts than an expression may have")))
     }
 
     /// Whether a name has a value, so that a bracket after it is a forgotten product.

@@ -231,3 +231,49 @@ fn values_with_names() {
     }
     assert!(formula.expression("x = 1").is_err() && formula.expression("y = x").is_err());
 }
+
+/// Beside a Lagrangian its energy, momenta and conformal factor have names, which coordinates, parameters and definitions may take.
+#[test]
+fn quantities_of_the_motion() {
+    let text = "m*x'^2/2 + a*x'*w'[1] + cosh(w'[0]) + w'[1]^4/4 - x^2*z + gamma*z + t";
+    let l = Formula::parse(text, &["x", "w[2]"], &[("m", 2.0), ("a", 0.5), ("gamma", -0.25)]).unwrap();
+    let (t, q, v, z) = (0.5, [0.3, 0.2, -0.1], [1.5, -0.5, 2.0], 0.75);
+    let at = |text: &str, log_factor: f64| l.expression(text).unwrap().at_factor(t, (&q, &v, z), log_factor);
+    let momenta = [2.0 * v[0] + 0.5 * v[2], f64::sinh(v[1]), 0.5 * v[0] + v[2].powi(3)];
+    let value = v[0] * v[0] + 0.5 * v[0] * v[2] + v[1].cosh() + v[2].powi(4) / 4.0 - q[0] * q[0] * z - 0.25 * z + t;
+    let energy = v.iter().zip(momenta).map(|(v, p)| v * p).sum::<f64>() - value;
+    // The roundings of a dozen operations on numbers up to 10.
+    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-14 * 10.0, "{a} and {b}");
+    near(at("energy", 0.0), energy);
+    for (name, p) in ["p_x", "p_w[0]", "p_w[1]"].iter().zip(momenta) {
+        near(at(name, 0.0), p);
+    }
+    near(at("sum(i, 0, 1, p_w[i]^2) + energy/sigma - log_factor", -0.5), {
+        momenta[1].powi(2) + momenta[2].powi(2) + energy * f64::exp(0.5) + 0.5
+    });
+    assert!(
+        l.expression("sigma").unwrap().has_conformal_factor()
+            && !l.expression("energy").unwrap().has_conformal_factor()
+    );
+    assert!(l.expression("p_x").unwrap().has_velocity() && l.expression("energy").unwrap().has_action());
+    // With other values of the parameters, too.
+    let mut light = l.expression("p_x - energy").unwrap();
+    let before = light.at(t, &q, &v, z);
+    light.set("m", 4.0).unwrap();
+    near(light.at(t, &q, &v, z) - before, 2.0 * v[0] - v[0] * v[0]);
+
+    // A name that is taken is what it was; in the Lagrangian itself there is none of them.
+    let taken = Formula::parse("x'^2/2 + sigma*p_x", &["x"], &[("sigma", 3.0), ("p_x", 5.0)]).unwrap();
+    assert_eq!(taken.expression("sigma + p_x").unwrap().at(0.0, &[0.0], &[0.0], 0.0), 8.0);
+    assert_eq!(taken.expression("energy = 7; energy + 1").unwrap().at(0.0, &[0.0], &[0.0], 0.0), 8.0);
+    for text in ["x'^2/2 + energy", "x'^2/2 + p_x", "x'^2/2 + sigma*z", "log_factor"] {
+        assert!(Formula::parse(text, &["x"], &[]).unwrap_err().to_string().contains("unknown name"), "{text}");
+    }
+    let wrong = |text: &str| l.expression(text).unwrap_err().to_string();
+    assert!(
+        wrong("enrgy").contains("`energy`") && wrong("p_w").contains("`p_w[0]`") || wrong("p_w").contains("entries"),
+        "{}",
+        wrong("p_w")
+    );
+    assert!(wrong("p_w[2]").contains("entry 2") && wrong("p_y").contains("unknown name"), "{}", wrong("p_w[2]"));
+}

@@ -79,6 +79,18 @@ impl Directory {
         Ok(path)
     }
 
+    /// Writes a file that is there whole or as it was before: to another name, which then is made its own.
+    pub fn replace(&self, name: &str, text: &str) -> Result<(), Failure> {
+        let (path, part) = (self.file(name), self.file(&format!("{name}.part")));
+        let write = || -> std::io::Result<()> {
+            let mut file = File::create(&part)?;
+            file.write_all(text.as_bytes())?;
+            file.sync_all()?;
+            std::fs::rename(&part, &path)
+        };
+        write().map_err(Failure::of_file(&path))
+    }
+
     /// Removes a file, if it is there.
     pub fn remove(&self, name: &str) -> Result<(), Failure> {
         let path = self.file(name);
@@ -130,6 +142,11 @@ impl Table {
 
     /// Writes all to the file, and tells its length.
     pub fn finish(mut self) -> Result<u64, Failure> {
+        self.flush()
+    }
+
+    /// Writes all that there is so far to the file, and tells its length.
+    pub fn flush(&mut self) -> Result<u64, Failure> {
         let flushed = self.out.flush().and_then(|()| std::fs::metadata(&self.path));
         Ok(flushed.map_err(Failure::of_file(&self.path))?.len())
     }

@@ -3,7 +3,6 @@
 use contact_figure::{Axis, Curve, Line, Panel, draw, draw_grid};
 use herglotz::Scene;
 use runtime_herglotz::{Column, Comparison, Work, velocity_name};
-use std::collections::BTreeSet;
 
 /// The most points of a curve: more are not seen.
 const POINTS: usize = 2000;
@@ -14,11 +13,15 @@ const MANY: usize = 500;
 /// The panels beside each other.
 const IN_A_ROW: usize = 3;
 
-/// The most integrators of a comparison that are drawn.
-const CURVES: usize = 12;
+/// The families of integrators, with the number of those that are drawn of each in a comparison.
+const FAMILIES: [(&str, usize); 5] =
+    [("gauss_", 3), ("clocked_gauss_", 2), ("midpoint_by_", 2), ("rules", 2), ("splittings", 3)];
 
-/// How much slower than the best one an integrator may be for an error to be drawn.
-const NEAR: f64 = 3.0;
+/// The discrete Lagrangians by a quadrature rule.
+const RULES: [&str; 4] = ["rectangle", "left_midpoint", "midpoint", "trapezoidal"];
+
+/// A run that takes so many times what twice its steps take, or so many times what half of them take, was held up.
+const HELD_UP: (f64, f64) = (2.0, 8.0);
 
 /// The longest label of an axis, in characters.
 const LABEL: usize = 30;
@@ -119,29 +122,57 @@ fn axis(numbers: impl Iterator<Item = f64>) -> Option<Axis> {
     Some(Axis::Linear((low / step + rounding).floor() * step, (high / step - rounding).ceil() * step, step))
 }
 
-/// The integrators that are near the best for most errors from 0.1 to 1e-15; the best ones first.
-fn near_the_best(comparison: &Comparison) -> Vec<&str> {
-    let mut near: Vec<(&str, usize)> = Vec::new();
-    for error in (1..=15).map(|digits| 10f64.powi(-digits)) {
-        let Some(fastest) = comparison.best(error) else { continue };
-        let good = |row: &&Work| row.error <= error && row.seconds <= NEAR * fastest.seconds;
-        let names: BTreeSet<&str> = comparison.rows.iter().filter(good).map(|row| row.integrator.as_str()).collect();
-        for name in names {
-            match near.iter_mut().find(|(known, _)| *known == name) {
-                Some((_, count)) => *count += 1,
-                None => near.push((name, 1)),
-            }
-        }
-    }
-    near.sort_by_key(|(name, count)| (std::cmp::Reverse(*count), *name));
-    near.into_iter().take(CURVES).map(|(name, _)| name).collect()
+/// The index of the family of an integrator.
+fn family(name: &str) -> usize {
+    let by_rule = RULES.contains(&name);
+    let of = |(family, _): &(&str, usize)| name.starts_with(family) || by_rule && *family == "rules";
+    FAMILIES.iter().position(of).unwrap_or(FAMILIES.len() - 1)
 }
 
-/// Run time against error, both in powers of ten, of the integrators that are near the best.
+/// Of each family the integrators that are its fastest for most errors from 1 to 1e-15, by name.
+fn best_of_families(rows: &[&Work]) -> Vec<String> {
+    let mut chosen = Vec::new();
+    for (index, (_, most)) in FAMILIES.iter().enumerate() {
+        let of_family = || rows.iter().filter(|row| family(&row.integrator) == index);
+        let mut counts: Vec<(&str, usize)> = Vec::new();
+        for error in (0..=15).map(|digits| 10f64.powi(-digits)) {
+            let reached = of_family().filter(|row| row.error <= error);
+            let Some(fastest) = reached.min_by(|a, b| a.seconds.total_cmp(&b.seconds)) else { continue };
+            match counts.iter_mut().find(|(known, _)| *known == fastest.integrator) {
+                Some((_, count)) => *count += 1,
+                None => counts.push((&fastest.integrator, 1)),
+            }
+        }
+        counts.sort_by_key(|(name, count)| (std::cmp::Reverse(*count), *name));
+        chosen.extend(counts.into_iter().take(*most).map(|(name, _)| name.to_owned()));
+    }
+    // gauss_4 before gauss_12.
+    chosen.sort_by_key(|name| {
+        let digits = name.len() - name.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+        let (stem, number) = name.split_at(name.len() - digits);
+        (stem.to_owned(), number.parse::<u32>().unwrap_or(0))
+    });
+    chosen
+}
+
+/// The runs that can be drawn, without those that were held up: they say nothing of their integrator, and would set the axis.
+fn to_draw(comparison: &Comparison) -> Vec<&Work> {
+    let shown = |row: &&Work| row.error > 0.0 && row.error.is_finite() && row.seconds > 0.0;
+    let rows: Vec<&Work> = comparison.rows.iter().filter(shown).collect();
+    let held_up = |row: &Work| {
+        rows.iter().filter(|other| other.integrator == row.integrator).any(|other| {
+            other.steps > row.steps && row.seconds > HELD_UP.0 * other.seconds
+                || other.steps < row.steps && 2 * other.steps >= row.steps && row.seconds > HELD_UP.1 * other.seconds
+        })
+    };
+    rows.iter().copied().filter(|row| !held_up(row)).collect()
+}
+
+/// Run time against error, both in powers of ten, of the best integrators of each family.
 pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
-    let names = near_the_best(comparison);
-    let drawn = |row: &&Work| row.error > 0.0 && row.error.is_finite() && row.seconds > 0.0;
-    let shown = || comparison.rows.iter().filter(drawn).filter(|row| names.contains(&row.integrator.as_str()));
+    let rows = to_draw(comparison);
+    let names = best_of_families(&rows);
+    let shown = || rows.iter().copied().filter(|row| names.contains(&row.integrator));
     let range = |of: &dyn Fn(&Work) -> f64| {
         let powers = shown().map(of).map(f64::log10);
         let (low, high) = powers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
@@ -149,8 +180,8 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
     };
     let (fast, slow) = range(&|row| row.seconds)?;
     let (best, worst) = range(&|row| row.error)?;
-    let curve = |(number, name): (usize, &&str)| {
-        let points = shown().filter(|row| row.integrator == **name).map(|row| (row.seconds, row.error));
+    let curve = |(number, name): (usize, &String)| {
+        let points = shown().filter(|row| row.integrator == *name).map(|row| (row.seconds, row.error));
         Curve::new(name, Line::Coloured(number), points)
     };
     Some(draw(&Panel {
@@ -162,4 +193,43 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
         curves: names.iter().enumerate().map(curve).collect(),
         marks: Vec::new(),
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn work(integrator: &str, steps: usize, error: f64, seconds: f64) -> Work {
+        Work { integrator: integrator.into(), order: 2, step_size: 0.1, steps, evaluations: 1, error, seconds }
+    }
+
+    /// Of each family its best ones by name, however fast the others are; a run that was held up is not among them.
+    #[test]
+    fn families_and_outliers() {
+        let mut rows = Vec::new();
+        for stages in 1..=16 {
+            for k in 1..=4 {
+                let error = f64::powi(0.1, k * stages);
+                rows.push(work(&format!("gauss_{stages}"), 8 << k, error, 1e-5 * f64::from(k + stages)));
+            }
+        }
+        for (name, slow) in [("strang", 3.0), ("blanes_moan_6", 1.0), ("rectangle", 80.0), ("midpoint", 10.0)] {
+            rows.extend((1..=4).map(|k| work(name, 8 << k, f64::powi(0.1, k), 1e-3 * slow * f64::from(k))));
+        }
+        rows.push(work("midpoint_by_yoshida_4", 16, 1e-3, 1e-2));
+        rows.push(work("strang", 256, 1e-5, 40.0));
+        let left_out = Vec::new();
+        let comparison = Comparison { rows, reference: String::new(), reference_error: 1e-15, left_out, ended: false };
+        let rows = to_draw(&comparison);
+        assert_eq!(rows.len() + 1, comparison.rows.len());
+        assert!(rows.iter().all(|row| row.seconds < 1.0));
+        let names = best_of_families(&rows);
+        assert_eq!(names.iter().filter(|name| name.starts_with("gauss_")).count(), 3, "{names:?}");
+        for name in ["blanes_moan_6", "midpoint", "midpoint_by_yoshida_4"] {
+            assert!(names.iter().any(|known| known == name), "{names:?}");
+        }
+        let figure = of_comparison(&comparison).unwrap_or_default();
+        let places: Vec<Option<usize>> = names.iter().map(|name| figure.find(&format!(">{name}<"))).collect();
+        assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{names:?} {places:?}");
+    }
 }

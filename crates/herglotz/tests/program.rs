@@ -153,6 +153,41 @@ fn resumed_runs_are_those_that_were_not_interrupted() {
     assert!(code == Some(2) && told.contains("the scene is not the one"), "{told}");
 }
 
+/// A run that was killed goes on from its last checkpoint, to the last byte.
+#[test]
+fn killed_runs_go_on_from_their_checkpoint() {
+    let at = Directory::new("killed");
+    let long = OSCILLATOR.replace("time = 400.0", "time = 8000.0").replace("gamma = -0.2", "gamma = -1e-5");
+    for (i, rows) in ["every = 30.1", "every_step = 256", "every_step = 100"].iter().enumerate() {
+        let file = at.write(&format!("{i}.toml"), &long.replace("every = 0.3", rows));
+        let (whole, parts) = (at.path(&format!("whole_{i}")), at.path(&format!("parts_{i}")));
+        succeed(&["run", &file, "--out", &whole]);
+        assert!(!Path::new(&whole).join("checkpoint.json").exists());
+        // One after every few steps takes longer than the steps do.
+        let mut child = Command::new(env!("CARGO_BIN_EXE_herglotz"))
+            .args(["run", &file, "--out", &parts, "--checkpoint-every", "0", "--json"])
+            .spawn()
+            .unwrap();
+        let saved = Path::new(&parts).join("checkpoint.json");
+        let taken = || -> Option<u64> {
+            serde_json::from_str::<serde_json::Value>(&std::fs::read_to_string(&saved).ok()?).ok()?["taken"].as_u64()
+        };
+        while taken().is_none_or(|taken| taken < 2000) {
+            assert!(child.try_wait().unwrap().is_none(), "it has ended without a checkpoint");
+            std::thread::yield_now();
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert!(taken().is_some_and(|taken| (2000..32_000).contains(&taken)), "{:?}", taken());
+        succeed(&["run", &file, "--out", &parts, "--resume"]);
+        for table in ["rows.csv", "events.csv"] {
+            let read = |of: &str| std::fs::read_to_string(Path::new(of).join(table)).unwrap();
+            assert_eq!(read(&whole), read(&parts), "{rows}: {table}");
+        }
+        assert!(!saved.exists());
+    }
+}
+
 #[test]
 fn sweeps_do_not_depend_on_threads() {
     let at = Directory::new("sweep");

@@ -211,6 +211,73 @@ fn changes_are_those_of_the_file() {
     assert_ne!(set.fingerprint(), read(GOOD).unwrap().fingerprint());
 }
 
+/// All values of the run can be changed; an accuracy and steps replace each other.
+#[test]
+fn changes_of_the_run() {
+    let set = |changes: &[&str]| Scene::read_with(GOOD, &changes.iter().map(|c| (*c).to_owned()).collect::<Vec<_>>());
+    let written = |run: &str| read(&changed(("accuracy = 1e-10", run))).unwrap();
+    for (changes, run) in [
+        (["run.integrator=gauss_8", "run.step=0.1"].as_slice(), "integrator = \"gauss_8\"\nstep = 0.1"),
+        (&["run.step = 0.1", "run.integrator = \"gauss_8\""], "integrator = \"gauss_8\"\nstep = 0.1"),
+        (&["run.integrator=strang", "run.steps=100"], "integrator = \"strang\"\nsteps = 100"),
+        (&["run.steps=7", "run.accuracy=1e-6"], "accuracy = 1e-6"),
+        (&["run.integrator=gauss_6"], "accuracy = 1e-10\nintegrator = \"gauss_6\""),
+    ] {
+        assert_eq!(set(changes).unwrap().fingerprint(), written(run).fingerprint(), "{changes:?}");
+    }
+    let by_steps = changed(("accuracy = 1e-10", "integrator = \"gauss_8\"\nsteps = 30"));
+    let by_accuracy = Scene::read_with(&by_steps, &["run.accuracy=1e-4".to_owned()]).unwrap();
+    assert_eq!(by_accuracy.fingerprint(), written("accuracy = 1e-4\nintegrator = \"gauss_8\"").fingerprint());
+    let refused = |change: &str| set(&[change]).err().unwrap().to_string();
+    for (change, why) in [
+        ("run.steps=1.5", "whole number"),
+        ("run.steps=-1", "whole number"),
+        ("run.integrator=gaus_8", "there is no integrator `gaus_8`"),
+        ("run.acuracy=1", "did you mean `run.accuracy`"),
+        ("run.step=0.1", "name one"),
+    ] {
+        assert!(refused(change).contains(why), "{change}: {}", refused(change));
+    }
+}
+
+/// A number for an array is that of all its entries.
+#[test]
+fn one_number_for_all_entries() {
+    let one = SEVERAL.replace("u = [1, 2.5]", "u = 2.5").replace("p_u = [0.25, -1]", "p_u = -1");
+    let (one, all) = (read(&one).unwrap(), SEVERAL.replace("[1, 2.5]", "[2.5, 2.5]").replace("[0.25, -1]", "[-1, -1]"));
+    assert_eq!(one.motion().start, read(&all).unwrap().motion().start);
+    // A list is as long as the array, and a coordinate by itself has none.
+    assert!(read(&SEVERAL.replace("u = [1, 2.5]", "u = [1]")).is_err());
+    assert!(read(&SEVERAL.replace("x = 0.5", "x = [0.5]")).is_err());
+}
+
+/// A parameter that is nowhere is misspelt; one that only a column or an event has is not.
+#[test]
+fn parameters_that_are_nowhere_are_refused() {
+    let with = |parameters: &str| changed(("gamma = -0.1 }", parameters));
+    let error = read(&with("gamma = -0.1, gama = -5.0 }")).err().unwrap();
+    let told = error.to_string();
+    assert!(told.contains("line 4") && told.contains("`gama`") && told.contains("did you mean `gamma`?"), "{told}");
+    let told = read(&with("gamma = -0.1, level = 1.0 }")).err().unwrap().to_string();
+    assert!(told.contains("there are gamma"), "{told}");
+    // In a longer name it is not.
+    let levels = with("gamma = -0.1, level = 1.0, levels = 2.0 }").replace("exp(-0.1*t)*theta", "levels*theta");
+    assert!(read(&levels).err().unwrap().to_string().contains("`level`"));
+    for (from, to) in [("exp(-0.1*t)*theta", "a = level; a*theta"), ("when = \"theta\"", "when = \"theta - level\"")] {
+        assert!(read(&with("gamma = -0.1, level = 1.0 }").replace(from, to)).is_ok(), "{to}");
+    }
+}
+
+/// Energy, momenta and conformal factor are names in columns and events.
+#[test]
+fn quantities_in_columns_and_events() {
+    let quantities = changed(("exp(-0.1*t)*theta", "E = energy/sigma; E - p_theta^2"));
+    assert!(read(&quantities.replace("when = \"theta\"", "when = \"energy - 0.5*sigma\"")).is_ok());
+    let error = read(&changed(("when = \"theta\"", "when = \"enrgy - 1\""))).err().unwrap();
+    assert_eq!(error.error.nearest.as_deref(), Some("energy"));
+    assert!(read(&changed(("theta'^2/2", "energy"))).is_err());
+}
+
 #[test]
 fn places_in_formulas_of_several_lines_are_those_of_the_file() {
     let bad = SEVERAL.replace("- r^2", "- rr^2");

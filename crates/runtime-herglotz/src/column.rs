@@ -16,9 +16,9 @@ pub enum Column {
     Momentum(usize),
     /// The action z.
     Action,
-    /// The energy `E_L = v.p - L`.
+    /// The energy `E_L = v.p - L`, which holds all of L, its terms in z too: `-gamma z` for a drag `gamma z`.
     Energy,
-    /// The logarithm of the conformal factor since the start.
+    /// The logarithm of the conformal factor since the start: the integral of `L_z`.
     LogFactor,
     /// An expression of time and state.
     Expression(Box<Expression>),
@@ -26,7 +26,7 @@ pub enum Column {
 
 impl Column {
     /// Reads a column over the names of a formula: `t`, `x`, `x'`, `z`; `p_x` for the momentum of `x` (`p_q[0]` in an array), `energy`,
-    /// `log_factor`, unless a coordinate or a parameter has the name; else any expression, with a name or without.
+    /// `sigma`, `log_factor`, unless a coordinate or a parameter has the name; else any expression of all these, with a name or without.
     ///
     /// # Errors
     /// [`RuntimeError::Formula`] with the place in the text.
@@ -52,6 +52,15 @@ impl Column {
             return Ok(Column::Momentum(i));
         }
         Ok(Column::Expression(Box::new(formula.named_expression(text)?)))
+    }
+
+    /// Whether it needs the conformal factor of the motion.
+    pub fn has_conformal_factor(&self) -> bool {
+        match self {
+            Column::LogFactor => true,
+            Column::Expression(expression) => expression.has_conformal_factor(),
+            _ => false,
+        }
     }
 
     /// All that a state has: `t`, the coordinates, the velocities and `z`, with their names.

@@ -8,11 +8,17 @@ use std::time::{Duration, Instant};
 /// The errors that are asked of the reference, until one is had.
 const REFERENCES: [f64; 5] = [1e-13, 1e-12, 1e-10, 1e-8, 1e-6];
 
-/// No integrator is tried with shorter steps after a run that took so long.
-const LONGEST: Duration = Duration::from_millis(500);
+/// The time for all integrators together, in which each has an equal part: so that a comparison is short where its motion is.
+const BUDGET: Duration = Duration::from_millis(2000);
+
+/// The part of an integrator is at least so many times what the reference takes by half its steps: of a long motion enough to be compared.
+const OF_REFERENCE: u32 = 4;
+
+/// The runs of each integrator that do not depend on the time they take, so that each is seen; the first ones are short.
+const LEAST: usize = 6;
 
 /// A run is repeated for so long, and so often, for the least time.
-const REPEATED: Duration = Duration::from_millis(10);
+const REPEATED: Duration = Duration::from_millis(2);
 const REPETITIONS: usize = 5;
 
 /// The halvings of the step of an integrator.
@@ -69,8 +75,8 @@ fn apart(a: &Outcome, b: &Outcome) -> f64 {
 
 impl System {
     /// Runs a motion by all integrators that apply, with steps from long to short, and measures time and error of each. Of `motion` the start
-    /// and the end are taken. `progress` is told the part that is done; `false` ends it there. Steps are halved until round-off, or until a
-    /// run takes half a second.
+    /// and the end are taken. `progress` is told the part that is done; `false` ends it there. Steps are halved until round-off, or until
+    /// the integrator has used its part of two seconds, or four times what the reference takes.
     ///
     /// # Errors
     /// Those of the reference, which is by contact Gauss collocation with 16 stages.
@@ -99,6 +105,10 @@ impl System {
             ended: false,
         };
         let all = AnyIntegrator::all();
+        let begin = Instant::now();
+        run(by, count)?;
+        let applicable = all.iter().filter(|by| self.check_integrator(**by).is_ok()).count();
+        let part = (BUDGET / (applicable as u32).max(1)).max(OF_REFERENCE * begin.elapsed());
         for (i, by) in all.iter().copied().enumerate() {
             if !progress(i as f64 / all.len() as f64) {
                 comparison.ended = true;
@@ -110,7 +120,7 @@ impl System {
             }
             // So long that the reference would need as many evaluations.
             let first = count.div_ceil(8).max(1);
-            work_of(by, (first, span), &run, &reference, &mut comparison);
+            work_of(by, (first, span, part), &run, &reference, &mut comparison);
         }
         progress(1.0);
         Ok(comparison)
@@ -120,12 +130,12 @@ impl System {
 /// One integrator with steps from long to short.
 fn work_of(
     by: AnyIntegrator,
-    (first, span): (usize, f64),
+    (first, span, part): (usize, f64, Duration),
     run: &dyn Fn(AnyIntegrator, usize) -> Result<Outcome, RuntimeError>,
     reference: &Outcome,
     to: &mut Comparison,
 ) {
-    let (mut least, mut worse) = (f64::INFINITY, 0);
+    let (mut least, mut worse, beginning) = (f64::INFINITY, 0, Instant::now());
     for halving in 0..HALVINGS {
         let Some(count) = first.checked_shl(halving) else { break };
         let begin = Instant::now();
@@ -162,7 +172,8 @@ fn work_of(
                 break;
             }
         }
-        if seconds > LONGEST {
+        // The next run takes twice as long.
+        if halving as usize + 1 >= LEAST && beginning.elapsed() + 2 * seconds > part {
             break;
         }
     }

@@ -55,6 +55,19 @@ pub enum RuntimeError {
         /// The velocities, by name.
         velocities: String,
     },
+    /// An event has the conformal factor of a motion whose rate is not one number.
+    #[error(
+        "an event has `sigma` or `log_factor`, which are known between the ends of steps where L_z is constant alone; take a column, or an event of time and state"
+    )]
+    FactorInEvent,
+    /// A parameter is in no formula.
+    #[error("the parameter `{name}` is not in the Lagrangian, nor in an event or a column: {hint}")]
+    UnusedParameter {
+        /// The parameter.
+        name: String,
+        /// The nearest one that is used, or all.
+        hint: String,
+    },
     /// There is no system of this name in the catalogue.
     #[error("there is no system {name:?} in the catalogue{}; there are {known}", nearest.as_ref().map(|n| format!(", did you mean {n:?}?")).unwrap_or_default())]
     UnknownSystem {

@@ -27,6 +27,7 @@ mod error;
 mod geometry;
 mod kernel;
 mod outcome;
+mod parameters;
 mod request;
 mod system;
 
@@ -38,6 +39,7 @@ pub use ensemble::{Ending, Ensemble, EnsembleWatch, MemberEnd, Varied};
 pub use error::RuntimeError;
 pub use geometry::Geometry;
 pub use outcome::{Crossing, Outcome, Plan, Watch};
+pub use parameters::check_parameters;
 pub use request::{Direction, Event, Motion, Rate, Start, Way, When};
 pub use system::{SeenSymmetry, System};
 

@@ -86,6 +86,17 @@ pub trait Watch {
     /// The motion as it would go on from where [`poll`](Self::poll) has ended it, where its steps can be saved; those of a
     /// [resumable](crate::Motion::resumable) one can.
     fn interrupted(&mut self, _at: discrete_herglotz::Interrupted) {}
+
+    /// Is asked after each [`poll`](Self::poll) whether the motion is to be saved there, and goes on.
+    fn wants_checkpoint(&mut self) -> bool {
+        false
+    }
+
+    /// The motion after so many steps as it would go on from there, where a [checkpoint](Self::wants_checkpoint) is wanted and its steps can
+    /// be saved. All rows and crossings up to there were handed on.
+    fn checkpoint(&mut self, _steps: usize, _at: discrete_herglotz::Interrupted) -> std::ops::ControlFlow<()> {
+        std::ops::ControlFlow::Continue(())
+    }
 }
 
 /// Nothing is watched.

@@ -115,8 +115,8 @@ impl System {
         self.kernel.run(motion, watch, None)
     }
 
-    /// Goes on with a motion where it was interrupted, to the last bit. Rows at times are to be those that are left; the events and rows
-    /// that follow are seen.
+    /// Goes on with a motion where it was interrupted, to the last bit. The events and the rows that follow are seen; of rows at steps the
+    /// first is that at which it goes on, of rows at times the first is after it.
     ///
     /// # Errors
     /// Those of [`run`](Self::run); [`InputError::AnotherRun`].

@@ -292,6 +292,79 @@ fn a_run_is_that_of_the_typed_formula() {
     }
 }
 
+/// Energy, momenta and conformal factor by their names in columns and events, of one motion and of many.
+#[test]
+fn quantities_in_columns_and_events() {
+    let system = System::parse("x'^2 - x^2/2 + gamma*z", &["x"], &[("gamma", -0.2)]).unwrap();
+    let formula = system.formula();
+    let column = |text: &str| Column::parse(text, formula).unwrap();
+    let event =
+        |text: &str| Event { function: formula.expression(text).unwrap(), direction: Direction::Both, terminal: false };
+    let motion = Motion {
+        rows: Some(When::At(vec![1.0, 1.25, 3.0, 6.0])),
+        columns: ["t", "energy/sigma", "sigma", "log_factor + 1", "p_x/2 - x'", "energy", "x'^2 + x^2/2 - gamma*z"]
+            .map(column)
+            .into(),
+        events: ["sigma - 0.5", "energy - 0.25", "p_x"].map(event).into(),
+        ..Motion::new(Start::new(1.0, [1.0], [0.0], 0.0), 6.0, Way::Steps { by: GAUSS, steps: Steps::Count(50) })
+    };
+    let mut seen = Seen::default();
+    system.run(&motion, &mut seen).unwrap();
+    for row in &seen.rows {
+        let exact = f64::exp(-0.2 * (row[0] - 1.0));
+        // Those of steps to round-off: gauss_8 at h = 0.1.
+        assert!((row[1] - 0.5).abs() < 1e-13 && (row[2] - exact).abs() < 1e-14, "{row:?}");
+        assert!((row[3] - 1.0 - exact.ln()).abs() < 1e-14 && row[4].abs() < 1e-14, "{row:?}");
+        assert!((row[5] - row[6]).abs() < 1e-14, "{row:?}");
+    }
+    // sigma = 1/2 where e^(gamma (t - t0)) is, and the energy, which is sigma/2, is 1/4 there.
+    let half = 1.0 + f64::ln(0.5) / -0.2;
+    let times = |event: usize| seen.crossings.iter().filter(|c| c.event == event).map(|c| c.t).collect::<Vec<_>>();
+    for event in 0..2 {
+        assert!(matches!(times(event)[..], [t] if (t - half).abs() < 1e-11), "{:?}", times(event));
+    }
+    assert!(times(2).len() == 1 && seen.crossings.iter().all(|c| c.event != 2 || c.v[0].abs() < 1e-13));
+
+    let starts = |i: usize| Start::new(1.0, [1.0 + i as f64], [0.0], 0.0);
+    let many = Ensemble {
+        count: 3,
+        start: &starts,
+        t0: 1.0,
+        varied: Some(Varied { names: &["gamma"], values: &|i| vec![-0.1 * i as f64] }),
+        end: 6.0,
+        way: Way::Steps { by: GAUSS, steps: Steps::Count(50) },
+        rows: None,
+        columns: &["sigma", "energy"].map(column),
+        events: &[event("sigma - 0.75")],
+        threads: Some(1),
+    };
+    for (i, member) in members(&system, &many).into_iter().enumerate() {
+        let (gamma, ending) = (-0.1 * i as f64, member.ending.unwrap());
+        let (sigma, x) = (f64::exp(5.0 * gamma), 1.0 + i as f64);
+        assert!((ending.columns[0] - sigma).abs() < 1e-14, "{:?}", ending.columns);
+        assert!((ending.columns[1] - sigma * x * x / 2.0).abs() < 1e-12, "{:?}", ending.columns);
+        assert_eq!(member.crossings.len(), usize::from(sigma < 0.75));
+        assert!(member.crossings.iter().all(|c| (gamma * (c.t - 1.0) - f64::ln(0.75)).abs() < 1e-12));
+    }
+
+    // A rate that depends on the motion is known in rows, not in events.
+    let system = System::parse("x'^2/2 - x^2/2 - z^2/8", &["x"], &[]).unwrap();
+    let function = system.formula().expression("sigma - 0.5").unwrap();
+    let motion = Motion {
+        rows: Some(When::At(vec![0.55, 2.0])),
+        columns: vec![
+            Column::parse("log(sigma) - log_factor", system.formula()).unwrap(),
+            Column::parse("log_factor", system.formula()).unwrap(),
+        ],
+        ..Motion::new(Start::new(0.0, [1.0], [0.0], 1.0), 2.0, by_steps(20))
+    };
+    let (_, rows) = system.record(&motion).unwrap();
+    assert!(rows.iter().all(|row| row[0].abs() < 1e-15 && row[1] < -1e-3), "{rows:?}");
+    let events = vec![Event { function, direction: Direction::Both, terminal: false }];
+    let error = system.run(&Motion { events, ..motion }, &mut ()).unwrap_err();
+    assert!(matches!(error, RuntimeError::FactorInEvent), "{error}");
+}
+
 #[test]
 fn a_terminal_event_ends_the_rows_too() {
     let system = pendulum();
@@ -315,18 +388,26 @@ fn a_terminal_event_ends_the_rows_too() {
 
 #[test]
 fn an_interrupted_motion_goes_on_to_the_last_bit() {
+    goes_on(When::Every(100), 100.0);
+    // Rows at all times of the whole motion, one of which is that of the interruption, on and back.
+    let times = |end: f64| (0..=1000).map(move |k| if k == 1000 { end } else { end * f64::from(k) / 1000.0 }).collect();
+    goes_on(When::At(times(100.0)), 100.0);
+    goes_on(When::At(times(-100.0)), -100.0);
+}
+
+fn goes_on(rows: When, end: f64) {
     let system = pendulum();
     let motion = Motion {
-        rows: Some(When::Every(100)),
+        rows: Some(rows),
         columns: vec![Column::Time, Column::Position(0), Column::Action],
         resumable: true,
-        ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 100.0, by_steps(2000))
+        ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), end, by_steps(2000))
     };
     let mut whole = Seen::default();
     let expected = system.run(&motion, &mut whole).unwrap();
     let mut first = Seen { polls: Some(3), ..Seen::default() };
     let ended = system.run(&motion, &mut first).unwrap();
-    assert!(matches!(ended.status, Status::Stopped { .. }) && ended.t < 100.0, "{ended:?}");
+    assert!(matches!(ended.status, Status::Stopped { .. }) && ended.t.abs() < 100.0, "{ended:?}");
     let mut rest = Seen::default();
     let outcome = system.resume(&motion, first.interrupted.unwrap(), &mut rest).unwrap();
     assert_eq!(outcome, expected);

@@ -78,6 +78,7 @@ impl<'f, const N: usize> Rows<'f, N> {
 
     /// The states at these times exactly, ascending, or descending for a run that goes back; a run is refused that does not reach the
     /// last of them. States between the ends of steps are as exact as those at the ends; see [`LastStep::at`](super::LastStep::at).
+    /// A run that is [resumed](super::Run::resume) records those after the time at which it goes on, so that each is in one of the two runs.
     ///
     /// # Errors
     /// [`InputError::Times`] for times that are not finite or not in order.
@@ -223,6 +224,13 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
     }
 
     fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        let backward = self.course.t_end < self.course.t0;
+        if let When::At { times, recorded } = &mut self.when
+            && at.k > 0
+        {
+            // A run that goes on: the times up to here were recorded by the one before it.
+            *recorded = times.partition_point(|t| if backward { *t >= at.t } else { *t <= at.t });
+        }
         self.step(at)
     }
 

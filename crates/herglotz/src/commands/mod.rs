@@ -1,6 +1,7 @@
 //! The commands of the program, one file each.
 
 mod check;
+mod checkpoint;
 mod compare;
 mod list;
 mod new;

@@ -78,6 +78,7 @@ accuracy = 1e-8  # or integrator = "gauss_8", step = 0.5; `herglotz list integra
 
 [want]
 # Rows by every = TIME, at = [TIMES] or every_step = STEPS. Columns are names and any formulas; without them, the whole state.
+# energy is v L_v - L (a drag gamma*z is in it as -gamma*z), p_{first} a momentum, log_factor the integral of L_z, sigma its exponential.
 rows = {{ every = 0.5, columns = ["t", "{first}", "{first_velocity}", "z", "energy", "log_factor", "{first}^2"] }}
 # The times at which a formula changes its sign: direction = "rising", "falling" or "both"; terminal = true ends the motion.
 events = [{{ when = "{first}", direction = "rising" }}]

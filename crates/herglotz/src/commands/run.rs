@@ -1,6 +1,7 @@
 //! `herglotz run`.
 
 use super::SceneArguments;
+use super::checkpoint::{Checkpoint, Saves, Written};
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, read_rows, short};
 use crate::plot;
@@ -8,20 +9,17 @@ use clap::Args;
 use herglotz::Scene;
 use indicatif::{ProgressBar, ProgressStyle};
 use runtime_herglotz::{
-    AnyIntegrator, Crossing, Interrupted, Motion, Outcome, Plan, RuntimeError, Status, Steps, Watch, Way, When,
-    velocity_name,
+    AnyIntegrator, Crossing, Interrupted, Outcome, Plan, RuntimeError, Status, Steps, Watch, Way, velocity_name,
 };
-use serde::{Deserialize, Serialize};
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 const ROWS: &str = "rows.csv";
 pub(crate) const EVENTS: &str = "events.csv";
-const CHECKPOINT: &str = "checkpoint";
-const BESIDE: &str = "checkpoint.json";
 
 #[derive(Args)]
 pub(crate) struct Run {
@@ -30,9 +28,12 @@ pub(crate) struct Run {
     /// The directory of the results; that with the name of the scene otherwise.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Go on where Ctrl-C interrupted the run.
+    /// Go on from the last checkpoint of a run that Ctrl-C has interrupted, or that was killed.
     #[arg(long)]
     resume: bool,
+    /// The time between two checkpoints, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 60)]
+    checkpoint_every: u32,
     /// Draw the columns against time, and phase portraits: columns.svg, phase.svg, path.svg, section.svg.
     #[arg(long)]
     plot: bool,
@@ -42,21 +43,6 @@ pub(crate) struct Run {
     /// Interrupt the run as Ctrl-C does, once this part of it is done: for tests.
     #[arg(long, hide = true)]
     interrupt_at: Option<f64>,
-}
-
-/// What is known of the files when a run is interrupted.
-#[derive(Serialize, Deserialize)]
-struct Beside {
-    /// The scene, in words.
-    scene: String,
-    integrator: String,
-    count: usize,
-    by_clock: bool,
-    taken: usize,
-    rows: usize,
-    rows_bytes: u64,
-    events: usize,
-    events_bytes: u64,
 }
 
 /// Sees a motion, and writes what it sees.
@@ -75,10 +61,18 @@ struct Writer {
     stop: Arc<AtomicBool>,
     interrupt_at: Option<f64>,
     interrupted: Option<Interrupted>,
+    saves: Saves,
     failure: Option<Failure>,
 }
 
 impl Writer {
+    /// What is in the files, once all is there that was written to them.
+    fn written(&mut self) -> Result<Written, Failure> {
+        let rows_bytes = self.rows.flush()?;
+        let events_bytes = self.events.as_mut().map(Table::flush).transpose()?.unwrap_or(0);
+        Ok(Written { rows: self.row_count, rows_bytes, events: self.event_count, events_bytes })
+    }
+
     fn keep(&mut self, written: Result<(), Failure>) -> ControlFlow<()> {
         match written {
             Ok(()) => ControlFlow::Continue(()),
@@ -121,6 +115,15 @@ impl Watch for Writer {
 
     fn interrupted(&mut self, at: Interrupted) {
         self.interrupted = Some(at);
+    }
+
+    fn wants_checkpoint(&mut self) -> bool {
+        self.saves.is_due()
+    }
+
+    fn checkpoint(&mut self, taken: usize, at: Interrupted) -> ControlFlow<()> {
+        let saved = self.written().and_then(|written| self.saves.save(taken, written, &at));
+        self.keep(saved)
     }
 }
 
@@ -172,11 +175,11 @@ impl Run {
         let mut motion = scene.motion();
         motion.resumable = true;
         let directory = Directory::new(self.out.clone(), &self.scene.file);
-        let beside = if self.resume { Some(self.beside(&directory, &scene)?) } else { None };
-        let plan = match &beside {
+        let saved = if self.resume { Some(Checkpoint::read(&directory, &scene)?) } else { None };
+        let plan = match &saved {
             // The steps are known: they are not looked for once more.
-            Some(beside) if !beside.by_clock => {
-                motion.way = steps(&beside.integrator, beside.count).unwrap_or(motion.way);
+            Some(saved) if !saved.by_clock => {
+                motion.way = steps(&saved.integrator, saved.count).unwrap_or(motion.way);
                 scene.system.plan(&motion).map_err(explain)?
             }
             _ => scene.system.plan(&motion).map_err(explain)?,
@@ -185,18 +188,12 @@ impl Run {
         if !plan.integrator.by_clock {
             motion.way = steps(&plan.integrator.name, plan.steps).unwrap_or(motion.way);
         }
-        let from = match &beside {
-            Some(_) => {
-                let path = directory.file(CHECKPOINT);
-                let read = Interrupted::read(&path);
-                Some(read.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?)
-            }
-            None => None,
-        };
-        let mut writer = self.writer(&directory, &scene, &mut motion, beside.as_ref())?;
-        if beside.is_none() {
-            directory.remove(BESIDE)?;
-            directory.remove(CHECKPOINT)?;
+        let from = saved.as_ref().map(|saved| saved.state(&directory)).transpose()?;
+        let every = Duration::from_secs(self.checkpoint_every.into());
+        let saves = Saves::new(&directory, &scene, &plan, every);
+        let mut writer = self.writer(&directory, &scene, saves, saved.as_ref())?;
+        if saved.is_none() {
+            Checkpoint::remove(&directory)?;
         }
         let outcome = match from {
             Some(from) => scene.system.resume(&motion, from, &mut writer),
@@ -204,33 +201,17 @@ impl Run {
         };
         writer.bar.finish_and_clear();
         let outcome = outcome.map_err(explain)?;
-        let Writer { rows, events, row_count, event_count, not_finite, interrupted, failure, .. } = writer;
-        let rows_bytes = rows.finish()?;
-        let events_bytes = events.map(Table::finish).transpose()?.unwrap_or(0);
+        let written = writer.written()?;
+        let Writer { not_finite, interrupted, mut saves, failure, .. } = writer;
         if let Some(failure) = failure {
             return Err(failure);
         }
         for (count, (name, _)) in not_finite.iter().zip(&scene.columns).filter(|(count, _)| **count > 0) {
             eprintln!("warning: the column `{name}` is not a finite number in {count} rows");
         }
-        if let Some(interrupted) = &interrupted {
-            let path = directory.file(CHECKPOINT);
-            interrupted.write(&path).map_err(Failure::of_file(&path))?;
-            let beside = Beside {
-                scene: scene.fingerprint(),
-                integrator: plan.integrator.name.to_string(),
-                count: plan.steps,
-                by_clock: plan.integrator.by_clock,
-                taken: outcome.steps,
-                rows: row_count,
-                rows_bytes,
-                events: event_count,
-                events_bytes,
-            };
-            directory.write(BESIDE, &serde_json::to_string(&beside).map_err(std::io::Error::from)?)?;
-        } else {
-            directory.remove(BESIDE)?;
-            directory.remove(CHECKPOINT)?;
+        match &interrupted {
+            Some(state) => saves.save(outcome.steps, written, state)?,
+            None => Checkpoint::remove(&directory)?,
         }
         if self.plot {
             for (name, figure) in plot::of_rows(&scene, &read_numbers(&directory.file(ROWS))?) {
@@ -242,37 +223,25 @@ impl Run {
                 directory.write("section.svg", &figure)?;
             }
         }
-        self.tell(&scene, &plan, &outcome, (row_count, event_count), interrupted.is_some())
+        self.tell(&scene, &plan, &outcome, (written.rows, written.events), interrupted.is_some())
     }
 
-    /// What was left beside the checkpoint.
-    fn beside(&self, directory: &Directory, scene: &Scene) -> Result<Beside, Failure> {
-        let path = directory.file(BESIDE);
-        let refuse = |why: &str| Failure::Input(format!("{}: {why}", path.display()));
-        let text = std::fs::read_to_string(&path)
-            .map_err(|_| refuse("there is no interrupted run in this directory; run without --resume"))?;
-        let beside: Beside = serde_json::from_str(&text).map_err(|_| refuse("it is damaged; run without --resume"))?;
-        if beside.scene != scene.fingerprint() {
-            return Err(refuse("the scene is not the one that was interrupted; run without --resume"));
-        }
-        Ok(beside)
-    }
-
-    /// The files, from their beginning or where they are to go on; of the rows of the motion those that are left.
+    /// The files, from their beginning or where they are to go on.
     fn writer(
         &self,
         directory: &Directory,
         scene: &Scene,
-        motion: &mut Motion,
-        beside: Option<&Beside>,
+        saves: Saves,
+        saved: Option<&Checkpoint>,
     ) -> Result<Writer, Failure> {
         directory.create()?;
         let (rows_at, events_at) = (directory.file(ROWS), directory.file(EVENTS));
         let has_events = !scene.events.is_empty();
-        let (rows, events) = match beside {
-            Some(beside) => {
-                let events = has_events.then(|| Table::go_on(events_at, beside.events_bytes)).transpose()?;
-                (Table::go_on(rows_at, beside.rows_bytes)?, events)
+        let before = saved.map(|saved| saved.written);
+        let (rows, events) = match before {
+            Some(before) => {
+                let events = has_events.then(|| Table::go_on(events_at, before.events_bytes)).transpose()?;
+                (Table::go_on(rows_at, before.rows_bytes)?, events)
             }
             None => {
                 let header = header_of_events(scene);
@@ -281,24 +250,23 @@ impl Run {
                 (Table::new(rows_at, scene.columns.iter().map(|(name, _)| name.as_str()))?, events)
             }
         };
-        if let (Some(beside), Some(When::At(times))) = (beside, &mut motion.rows) {
-            times.drain(..beside.rows.min(times.len()));
-        }
         // Rows at steps begin with that at which the motion goes on.
         let stride = scene.rows_every_step();
-        let skip = beside.zip(stride).is_some_and(|(beside, stride)| beside.taken.is_multiple_of(stride));
+        let skip = saved.zip(stride).is_some_and(|(saved, stride)| saved.taken.is_multiple_of(stride));
+        let before = before.unwrap_or_default();
         Ok(Writer {
             rows,
             events,
             names: scene.events.iter().map(|(name, _)| name.clone()).collect(),
-            row_count: beside.map_or(0, |beside| beside.rows),
-            event_count: beside.map_or(0, |beside| beside.events),
+            row_count: before.rows,
+            event_count: before.events,
             not_finite: vec![0; scene.columns.len()],
             skip,
             bar: progress_bar(!self.json),
             stop: stop_flag(),
             interrupt_at: self.interrupt_at,
             interrupted: None,
+            saves,
             failure: None,
         })
     }

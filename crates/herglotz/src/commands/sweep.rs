@@ -119,7 +119,7 @@ impl Sweep {
                 "there is nothing to sweep; add [sweep] with a parameter, as in gamma = { from = -1.0, to = 0.0, count = 11 }",
             ));
         }
-        let factor = scene.columns.iter().find(|(_, column)| matches!(column, Column::LogFactor));
+        let factor = scene.columns.iter().find(|(_, column)| column.has_conformal_factor());
         let terminal = scene.events.iter().find(|(_, event)| event.terminal);
         if let (Some((column, _)), Some((event, _))) = (factor, terminal) {
             return Err(refuse(&format!(

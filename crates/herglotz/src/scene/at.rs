@@ -134,7 +134,7 @@ impl<T: JsonSchema> JsonSchema for Named<T> {
 #[derive(Clone, Debug, JsonSchema)]
 #[schemars(untagged, inline)]
 pub(crate) enum Numbers {
-    /// A number.
+    /// A number; of an array, for all its entries.
     One(f64),
     /// As many as an array has entries.
     Many(Vec<At<f64>>),

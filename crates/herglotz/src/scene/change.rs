@@ -8,22 +8,46 @@ use runtime_herglotz::CatalogueEntry;
 /// Where errors of changes are.
 const SOURCE: &str = "--set";
 
-/// Changes a value: `gamma=-0.2` of a parameter, `start.x=1`, `run.time=10`, `run.accuracy=1e-6`, `run.step=0.1`.
+/// The names of the run's own values.
+const OF_RUN: [&str; 5] = ["run.time", "run.accuracy", "run.step", "run.steps", "run.integrator"];
+
+/// Changes a value: `gamma=-0.2` of a parameter, `start.x=1`, `run.time=10`, `run.accuracy=1e-6`, `run.step=0.1`, `run.steps=100`,
+/// `run.integrator=gauss_8`. An accuracy and steps replace each other, as they exclude each other.
 pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str) -> Result<(), SceneError> {
-    let parsed = text.split_once('=').and_then(|(name, value)| Some((name.trim(), value.trim().parse::<f64>().ok()?)));
+    let refuse = |message: &str| Err(SceneError::at(text, (0, text.len()), message).in_file(SOURCE));
+    let at_run = file.run.span();
+    let pair = text.split_once('=').map(|(name, value)| (name.trim(), value.trim()));
+    if let Some(("run.integrator", name)) = pair {
+        let at = file.run.integrator.as_ref().map_or(at_run, At::span);
+        file.run.integrator = Some(At::new(name.trim_matches('"').to_owned(), at));
+        return Ok(());
+    }
+    let parsed = pair.and_then(|(name, value)| Some((name, value.parse::<f64>().ok()?)));
     let Some((name, value)) = parsed.filter(|(_, value)| value.is_finite()) else {
-        let message = "a change is a name, `=` and a finite number, as in gamma=-0.2";
-        return Err(SceneError::at(text, (0, text.len()), message).in_file(SOURCE));
+        return refuse("a change is a name, `=` and a finite number, as in gamma=-0.2");
     };
     // What is wrong with the value later is shown where that of the file is.
     let put = |place: &mut Option<At<f64>>, at| {
         *place = Some(At::new(value, place.as_ref().map_or(at, At::span)));
     };
-    let at_run = file.run.span();
+    let run = &mut *file.run;
     match name {
-        "run.time" => *file.run.time = value,
-        "run.accuracy" => put(&mut file.run.accuracy, at_run),
-        "run.step" => put(&mut file.run.step, at_run),
+        "run.time" => *run.time = value,
+        "run.accuracy" => {
+            (run.step, run.steps) = (None, None);
+            put(&mut run.accuracy, at_run);
+        }
+        "run.step" => {
+            (run.accuracy, run.steps) = (None, None);
+            put(&mut run.step, at_run);
+        }
+        "run.steps" => {
+            if value.fract() != 0.0 || !(0.0..=2f64.powi(53)).contains(&value) {
+                return refuse("`run.steps` is a whole number, as in run.steps=100");
+            }
+            let at = run.steps.as_ref().map_or(at_run, At::span);
+            (run.accuracy, run.step, run.steps) = (None, None, Some(At::new(value as usize, at)));
+        }
         _ => match name.strip_prefix("start.") {
             Some(of_start) => {
                 let at = file.system.span();
@@ -37,12 +61,13 @@ pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str)
                 let known: Vec<String> = own.chain(of_entry).map(str::to_owned).collect();
                 if !known.iter().any(|parameter| parameter == name) {
                     let known = known.iter().map(String::as_str);
-                    let all = known.clone().chain(["start.NAME", "run.time", "run.accuracy", "run.step"]);
+                    let all = known.clone().chain(["start.NAME"]).chain(OF_RUN);
                     let message = format!(
                         "there is no `{name}` that can be set; there are {}",
                         all.collect::<Vec<_>>().join(", ")
                     );
-                    return Err(SceneError::unknown(text, (0, name.len()), name, known, message).in_file(SOURCE));
+                    let near = known.chain(OF_RUN);
+                    return Err(SceneError::unknown(text, (0, name.len()), name, near, message).in_file(SOURCE));
                 }
                 let at = file.system.parameters.get(name).map_or(file.system.span(), At::span);
                 file.system.parameters.set(name, At::new(value, at));

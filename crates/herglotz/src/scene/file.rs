@@ -22,7 +22,8 @@ pub(crate) struct File {
     /// The Lagrangian: a formula, or one of the catalogue.
     pub system: At<SystemTable>,
     /// Where the motion starts: a number for each coordinate `x`, and for its velocity `x'` or its momentum `p_x`; of the action `z` and
-    /// the time `t`, which are 0 otherwise. An array of coordinates has a list. A system of the catalogue has a start of its own.
+    /// the time `t`, which are 0 otherwise. An array of coordinates has a list, or one number for all its
+    /// entries. A system of the catalogue has a start of its own.
     #[serde(default)]
     pub start: Option<At<Named<Numbers>>>,
     /// How long, and how.
@@ -94,7 +95,9 @@ pub(crate) struct RowsTable {
     pub at: Option<At<Vec<At<f64>>>>,
     /// The number of steps between two rows.
     pub every_step: Option<At<usize>>,
-    /// `t`, coordinates, velocities, `z`, momenta `p_x`, `energy`, `log_factor`, and any expressions, with a name (`E = ...`) or without; without it, the whole state.
+    /// `t`, coordinates, velocities, `z`, momenta `p_x`, `energy`, `sigma`, `log_factor`, and any expressions of these, with a name
+    /// (`E = ...`) or without; without it, the whole state. `energy` is `v L_v - L`, which holds all of L, its terms in z too (`-gamma*z` for
+    /// a drag `gamma*z`); `log_factor` is the integral of `L_z`, `sigma` its exponential: the conformal factor.
     pub columns: Option<At<Vec<At<String>>>>,
 }
 
@@ -102,7 +105,7 @@ pub(crate) struct RowsTable {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `when`")]
 pub(crate) struct EventTable {
-    /// The function.
+    /// The function, an expression as those of columns: with `energy` and `p_x`, and with `sigma` and `log_factor` where `L_z` is constant.
     pub when: At<String>,
     /// Which changes count.
     #[serde(default)]

@@ -17,7 +17,7 @@ use at::{At, Span};
 use file::{File, RunTable, SystemTable, VERSION};
 use runtime_herglotz::{
     AnyIntegrator, CatalogueEntry, Column, Event, Formula, FormulaError, InputError, Motion, RuntimeError, Start,
-    Steps, System, Way,
+    Steps, System, Way, check_parameters,
 };
 use serde::Deserialize;
 use want::RowTimes;
@@ -85,7 +85,7 @@ impl Scene {
     }
 
     /// Reads a scene file and changes some of its values: `gamma=-0.2` for a parameter, `start.x=1`, `run.time=10`, `run.accuracy=1e-6`,
-    /// `run.step=0.1`.
+    /// `run.step=0.1`, `run.steps=100`, `run.integrator=gauss_8`. Of the accuracy and the steps the last one that is set counts.
     ///
     /// # Errors
     /// [`SceneError`] with the place in the text, or in the change.
@@ -98,6 +98,7 @@ impl Scene {
         }
         let formula = formula(text, &file.system, entry)?;
         let system = &file.system;
+        check_used(text, &formula, &file)?;
         let lagrangian = system.lagrangian.as_ref().map_or(system.span(), At::span);
         let runs = System::new(&formula).map_err(|error| want::of_formula(text, lagrangian, &error))?;
         let run = &file.run;
@@ -309,6 +310,21 @@ fn formula(
         }
     }
     Ok(formula)
+}
+
+/// Refuses parameters that are neither in the formula nor in a column or an event.
+fn check_used(text: &str, formula: &Formula, file: &File) -> Result<(), SceneError> {
+    let columns = file.want.rows.iter().filter_map(|rows| rows.columns.as_ref()).flat_map(|columns| columns.iter());
+    let events = file.want.events.iter().map(|event| &event.when);
+    let texts: Vec<&str> = columns.chain(events).map(|text| text.as_str()).collect();
+    check_parameters(formula, &texts).map_err(|error| {
+        let named = |name: &str| file.system.parameters.0.iter().find(|(known, _)| **known == *name);
+        let span = match &error {
+            RuntimeError::UnusedParameter { name, .. } => named(name).map(|(name, _)| name.span()),
+            _ => None,
+        };
+        SceneError::at(text, span.unwrap_or(file.system.span()), error.to_string())
+    })
 }
 
 /// How a motion is advanced.

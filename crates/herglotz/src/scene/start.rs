@@ -106,13 +106,13 @@ pub(crate) fn read(
         let wrong_count = |found: &str| {
             let wanted = match key.entries.len() {
                 _ if !key.is_list => "a number".to_owned(),
-                count => format!("a list of {count} numbers"),
+                count => format!("a list of {count} numbers, or one number for all,"),
             };
             SceneError::at(text, numbers.span(), format!("`{}` is {found}, where {wanted} is needed", **name))
         };
         let values: Vec<At<f64>> = match &**numbers {
-            Numbers::One(x) if !key.is_list => vec![At::new(*x, numbers.span())],
-            Numbers::One(_) => return Err(wrong_count("a number")),
+            // Of an array, for all its entries.
+            Numbers::One(x) => vec![At::new(*x, numbers.span()); key.entries.len()],
             Numbers::Many(list) if key.is_list && list.len() == key.entries.len() => list.clone(),
             Numbers::Many(list) => return Err(wrong_count(&format!("a list of {}", list.len()))),
         };

@@ -114,15 +114,16 @@ fn name_of(column: &str) -> &str {
     last.map(|(name, _)| name.trim()).filter(is_name).unwrap_or(column)
 }
 
-/// An unknown name of a column may be that of something else than a formula is made of.
+/// An unknown name of a column or an event may be that of something else than a formula is made of.
 fn with_nearest(mut error: SceneError, formula: &Formula) -> SceneError {
     let unknown = error.error.message.strip_prefix("unknown name `").and_then(|rest| rest.split('`').next());
     if let (Some(name), None) = (unknown, &error.error.nearest) {
         let momenta = formula.coordinates().into_iter().map(|name| format!("p_{name}"));
-        let known: Vec<String> = ["energy", "log_factor"].map(str::to_owned).into_iter().chain(momenta).collect();
+        let known: Vec<String> =
+            ["energy", "sigma", "log_factor"].map(str::to_owned).into_iter().chain(momenta).collect();
         error.error.nearest = nearest_name(name, known.iter().map(String::as_str)).map(str::to_owned);
         if error.error.nearest.is_none() {
-            error.error.message += "; beside formulas there are the columns ";
+            error.error.message += "; beside the names of the formula there are ";
             error.error.message += &known.join(", ");
         }
     }
@@ -133,7 +134,8 @@ fn with_nearest(mut error: SceneError, formula: &Formula) -> SceneError {
 pub(crate) fn events(text: &str, formula: &Formula, tables: &[EventTable]) -> Result<Vec<(String, Event)>, SceneError> {
     let of = |table: &EventTable| {
         let EventTable { when, direction, terminal } = table;
-        let function = formula.expression(when).map_err(|error| of_formula(text, when.span(), &error.into()))?;
+        let of_expression = |error: FormulaError| with_nearest(of_formula(text, when.span(), &error.into()), formula);
+        let function = formula.expression(when).map_err(of_expression)?;
         let direction = match direction {
             DirectionName::Rising => Direction::Rising,
             DirectionName::Falling => Direction::Falling,

@@ -1,7 +1,7 @@
 //! Many motions at once.
 
 use super::observed::{Observed, Seen};
-use super::recorder::{Crossings, number};
+use super::recorder::{Crossings, check_events, number};
 use super::{Sized, coordinates};
 use crate::{Column, Ending, EnsembleWatch, Event, MemberEnd, RuntimeError, Varied, Way};
 use contact_geom::nalgebra::SVector;
@@ -35,7 +35,8 @@ pub(super) fn run<const N: usize>(
         let mut lagrangian = system.0.clone();
         varied.names.iter().try_for_each(|name| lagrangian.set(name, 0.0))?;
     }
-    let has_factor = ensemble.columns.iter().any(|c| matches!(c, Column::LogFactor));
+    check_events(&system.0, ensemble.events)?;
+    let has_factor = ensemble.columns.iter().any(Column::has_conformal_factor);
     let observed = ensemble.rows.is_some() || !ensemble.events.is_empty() || has_factor;
     // In lanes the steps for an accuracy are those of a block, which then is not to depend on the time it takes.
     let (shard, mut shards, fixed) = match (&ensemble.way, &ensemble.varied) {

@@ -35,7 +35,7 @@ impl<'r, const N: usize> Observed<'r, N> {
         crossings: Option<Crossings<'r, N>>,
     ) -> Result<Self, InputError> {
         let of_rows = when.map(|when| rows(when, columns)).transpose()?;
-        let has_factor = columns.iter().any(|column| matches!(column, Column::LogFactor));
+        let has_factor = columns.iter().any(Column::has_conformal_factor);
         let last = has_factor.then(|| rows(&When::Every(usize::MAX), columns)).transpose()?;
         Ok(Observed { rows: of_rows, last, crossings, found: Vec::new(), forward: true })
     }

@@ -10,6 +10,7 @@ use discrete_herglotz::{
 use formula_lagrangian::{Expression, FormulaLagrangian};
 use std::cell::Cell;
 use std::ops::ControlFlow;
+use std::rc::Rc;
 
 /// The steps between two polls.
 const POLL: usize = 256;
@@ -36,6 +37,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
     ) -> Result<Self, RuntimeError> {
         let columns = motion.columns.as_slice();
         let rows = motion.rows.as_ref().map(|when| rows(when, columns)).transpose()?;
+        check_events(lagrangian, &motion.events)?;
         let crossings = Crossings::of(lagrangian, &motion.events);
         let needs = |of: Option<Needs>| of.unwrap_or_default();
         let of_rows = needs(rows.as_ref().map(Observer::needs)).and(needs(crossings.as_ref().map(Crossings::needs)));
@@ -82,6 +84,13 @@ impl<'r, const N: usize> Recorder<'r, N> {
             }
             return ControlFlow::Break(Stop::here("its watch"));
         }
+        if at.k.is_multiple_of(POLL)
+            && self.watch.wants_checkpoint()
+            && let Some(saved) = at.interrupted()
+            && self.watch.checkpoint(at.k, saved).is_break()
+        {
+            return ControlFlow::Break(Stop::here("its watch"));
+        }
         ControlFlow::Continue(())
     }
 }
@@ -105,7 +114,7 @@ pub(super) fn rows<'r, const N: usize>(when: &When, columns: &[Column]) -> Resul
     });
     let rows = if velocity { rows.with_velocity() } else { rows };
     let rows = if any(|c| matches!(c, Column::Energy)) { rows.with_energy() } else { rows };
-    let rows = if any(|c| matches!(c, Column::LogFactor)) { rows.with_conformal_factor() } else { rows };
+    let rows = if any(Column::has_conformal_factor) { rows.with_conformal_factor() } else { rows };
     Ok(if action { rows } else { rows.without_action() })
 }
 
@@ -123,18 +132,31 @@ pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
         Column::Expression(e) => {
             // Neither is in an expression that does not have it.
             let v = row.v.unwrap_or_else(SVector::zeros);
-            e.at(row.t, row.q.as_slice(), v.as_slice(), row.z.unwrap_or(0.0))
+            let state = (row.q.as_slice(), v.as_slice(), row.z.unwrap_or(0.0));
+            e.at_factor(row.t, state, row.log_factor.unwrap_or(f64::NAN))
         }
     }
 }
 
-/// The value of an expression at states `(q, p, z)`.
+/// Refuses events that have the conformal factor where it is not known at all times.
+pub(super) fn check_events<const N: usize>(
+    lagrangian: &FormulaLagrangian<N>,
+    events: &[crate::Event],
+) -> Result<(), RuntimeError> {
+    let has_factor = events.iter().any(|event| event.function.has_conformal_factor());
+    if has_factor && lagrangian.constant_rate().is_none() { Err(RuntimeError::FactorInEvent) } else { Ok(()) }
+}
+
+/// The value of an expression at states `(q, p, z)` of a motion that begins at a time.
 fn at_states<'r, const N: usize>(
     lagrangian: &'r FormulaLagrangian<N>,
     function: &'r Expression,
+    began: Rc<Cell<f64>>,
 ) -> impl FnMut(f64, &PhasePoint<N>) -> f64 + 'r {
     // The last velocity is near the next.
     let last = Cell::new(SVector::<f64, N>::zeros());
+    // Known where it is needed: see `check_events`.
+    let rate = lagrangian.constant_rate().unwrap_or(f64::NAN);
     move |t, state| {
         if function.has_velocity() {
             match legendre_inverse(lagrangian, t, state, &last.get()) {
@@ -142,7 +164,8 @@ fn at_states<'r, const N: usize>(
                 Err(_) => return f64::NAN,
             }
         }
-        function.at(t, state.q.as_slice(), last.get().as_slice(), state.z)
+        let v = last.get();
+        function.at_factor(t, (state.q.as_slice(), v.as_slice(), state.z), rate * (t - began.get()))
     }
 }
 
@@ -151,6 +174,8 @@ pub(super) struct Crossings<'r, const N: usize> {
     events: Events<'r, N>,
     /// Whether one of them has the action in it.
     action: bool,
+    /// The time at which the motion begins.
+    began: Rc<Cell<f64>>,
     dimension: usize,
 }
 
@@ -158,9 +183,10 @@ impl<'r, const N: usize> Crossings<'r, N> {
     /// `None` where there are no events.
     pub fn of(lagrangian: &'r FormulaLagrangian<N>, events: &'r [crate::Event]) -> Option<Self> {
         let action = events.iter().any(|event| event.function.has_action());
-        let all = || Events::new(events.iter().map(|event| of(lagrangian, event)));
+        let began = Rc::new(Cell::new(0.0));
+        let all = || Events::new(events.iter().map(|event| of(lagrangian, event, began.clone())));
         let dimension = lagrangian.formula().dimension();
-        (!events.is_empty()).then(|| Crossings { events: all(), action, dimension })
+        (!events.is_empty()).then(|| Crossings { events: all(), action, began: began.clone(), dimension })
     }
 
     pub fn needs(&self) -> Needs {
@@ -168,6 +194,7 @@ impl<'r, const N: usize> Crossings<'r, N> {
     }
 
     pub fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+        self.began.set(course.t0);
         self.events.prepare(course)
     }
 
@@ -200,8 +227,12 @@ impl<'r, const N: usize> Crossings<'r, N> {
     }
 }
 
-fn of<'r, const N: usize>(lagrangian: &'r FormulaLagrangian<N>, event: &'r crate::Event) -> Event<'r, N> {
-    let found = Event::new(at_states(lagrangian, &event.function));
+fn of<'r, const N: usize>(
+    lagrangian: &'r FormulaLagrangian<N>,
+    event: &'r crate::Event,
+    began: Rc<Cell<f64>>,
+) -> Event<'r, N> {
+    let found = Event::new(at_states(lagrangian, &event.function, began));
     let found = match event.direction {
         Direction::Rising => found.rising(),
         Direction::Falling => found.falling(),

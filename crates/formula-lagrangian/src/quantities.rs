@@ -1,0 +1,99 @@
+//! Quantities of a motion by name, for expressions beside a Lagrangian: energy, momenta, and the conformal factor.
+
+use crate::names::Names;
+use crate::node::{Function, Id, Node, Operation};
+use crate::parser::MOST_NODES;
+use crate::{Formula, Graph};
+
+/// The most nodes that an expression has with the derivatives of L in it.
+const MOST_WITH_DERIVATIVES: usize = 10 * MOST_NODES;
+
+/// What a name stands for beside those of a formula. Coordinates, parameters and definitions of the same name come first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Quantity {
+    /// `energy`: `v . L_v - L`.
+    Energy,
+    /// `log_factor`: the logarithm of the conformal factor, the integral of `L_z` along the motion since its start.
+    LogFactor,
+    /// `sigma`: the conformal factor.
+    Sigma,
+    /// `p_x`: the momentum `L_v` of a coordinate of this index.
+    Momentum(u32),
+}
+
+/// The names but those of momenta.
+const NAMES: [(&str, Quantity); 3] =
+    [("energy", Quantity::Energy), ("log_factor", Quantity::LogFactor), ("sigma", Quantity::Sigma)];
+
+impl Quantity {
+    /// That of a name which is not that of a momentum.
+    pub fn of(name: &str) -> Option<Self> {
+        NAMES.iter().find(|(known, _)| *known == name).map(|(_, quantity)| *quantity)
+    }
+
+    /// All names, those of the momenta of arrays without an index.
+    pub fn names(names: &Names) -> impl Iterator<Item = String> {
+        let momenta = names.blocks.iter().map(|block| format!("p_{}", block.name));
+        NAMES.iter().map(|(name, _)| (*name).to_owned()).chain(momenta)
+    }
+
+    /// Its node in the graph of an expression; `None` where the graph would be too large.
+    pub fn node(self, formula: &Formula, graph: &mut Graph) -> Option<Id> {
+        let log_factor = log_factor(graph, formula.names.dimension);
+        let (first, count) = match self {
+            Quantity::LogFactor => return Some(log_factor),
+            Quantity::Sigma => return Some(graph.unary(Function::Exp, log_factor)),
+            Quantity::Energy => (0, formula.names.dimension),
+            Quantity::Momentum(i) => (i as usize, 1),
+        };
+        let value = graph.copied(&formula.graph, formula.root);
+        let velocities: Vec<Id> = (first..first + count).map(|i| graph.velocity(i as u32)).collect();
+        let momenta = graph.gradient(value, &velocities, MOST_WITH_DERIVATIVES)?;
+        if let Quantity::Momentum(_) = self {
+            return momenta.first().copied();
+        }
+        let mut sum = graph.number(0.0);
+        for (v, p) in velocities.into_iter().zip(momenta) {
+            let product = graph.binary(Operation::Mul, v, p);
+            sum = graph.binary(Operation::Add, sum, product);
+        }
+        Some(graph.binary(Operation::Sub, sum, value))
+    }
+}
+
+/// The node of the logarithm of the conformal factor, which is no function of the state: it has the place of one more coordinate.
+fn log_factor(graph: &mut Graph, dimension: usize) -> Id {
+    graph.position(dimension as u32)
+}
+
+impl Graph {
+    /// Whether a node depends on the logarithm of the conformal factor.
+    pub(crate) fn has_log_factor(&self, of: Id, dimension: usize) -> bool {
+        let needed = self.needed(of);
+        let mut nodes = needed.iter().enumerate().filter(|(_, needed)| **needed).map(|(i, _)| self.node(Id(i as u32)));
+        nodes.any(|node| node == Node::Position(dimension as u32))
+    }
+
+    /// A node of another graph with all that it is made of.
+    fn copied(&mut self, from: &Graph, root: Id) -> Id {
+        let zero = self.number(0.0);
+        let needed = from.needed(root);
+        let mut copies = vec![zero; needed.len()];
+        for i in (0..needed.len()).filter(|i| needed[*i]) {
+            let of = |id: Id| copies.get(id.index()).copied().unwrap_or(zero);
+            copies[i] = match from.node(Id(i as u32)) {
+                Node::Number(bits) => self.number(f64::from_bits(bits)),
+                Node::Parameter(i) => self.parameter(i),
+                Node::Position(i) => self.position(i),
+                Node::Velocity(i) => self.velocity(i),
+                Node::Action => self.action(),
+                Node::Time => self.time(),
+                Node::Unary(function, a) => self.unary(function, of(a)),
+                Node::Binary(operation, a, b) => self.binary(operation, of(a), of(b)),
+                Node::Powi(a, n) => self.powi(of(a), n),
+                Node::Select(all) => self.select(all.map(of)),
+            };
+        }
+        copies.last().copied().unwrap_or(zero)
+    }
+}

@@ -1,0 +1,110 @@
+//! The checkpoints of `herglotz run`: a file from which a run that was interrupted or killed goes on.
+
+use crate::failure::Failure;
+use crate::output::Directory;
+use herglotz::Scene;
+use runtime_herglotz::{Interrupted, Plan};
+use serde::{Deserialize, Serialize};
+use std::time::{Duration, Instant};
+
+const FILE: &str = "checkpoint.json";
+
+/// What is saved of a run: its state, and how much of its files belongs to what is before it. One file holds both, so that they never
+/// belong to different steps.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct Checkpoint {
+    /// The scene, in words.
+    scene: String,
+    pub integrator: String,
+    pub count: usize,
+    pub by_clock: bool,
+    pub taken: usize,
+    pub written: Written,
+    /// The bytes of [`Interrupted`].
+    state: Vec<u8>,
+}
+
+/// What is in the files.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Written {
+    pub rows: usize,
+    pub rows_bytes: u64,
+    pub events: usize,
+    pub events_bytes: u64,
+}
+
+impl Checkpoint {
+    /// That of a directory, for a scene.
+    pub fn read(directory: &Directory, scene: &Scene) -> Result<Self, Failure> {
+        let path = directory.file(FILE);
+        let refuse = |why: &str| Failure::Input(format!("{}: {why}", path.display()));
+        let text = std::fs::read_to_string(&path)
+            .map_err(|_| refuse("there is no interrupted run in this directory; run without --resume"))?;
+        let read: Checkpoint =
+            serde_json::from_str(&text).map_err(|_| refuse("it is damaged; run without --resume"))?;
+        if read.scene != scene.fingerprint() {
+            return Err(refuse("the scene is not the one that was interrupted; run without --resume"));
+        }
+        Ok(read)
+    }
+
+    /// The state from which the run goes on.
+    pub fn state(&self, directory: &Directory) -> Result<Interrupted, Failure> {
+        let read = Interrupted::from_bytes(&self.state);
+        read.map_err(|error| Failure::Input(format!("{}: {error}", directory.file(FILE).display())))
+    }
+
+    /// Removes that of a directory.
+    pub fn remove(directory: &Directory) -> Result<(), Failure> {
+        directory.remove(FILE)
+    }
+}
+
+/// Saves a run.
+pub(crate) struct Saves {
+    directory: Directory,
+    scene: String,
+    integrator: String,
+    count: usize,
+    by_clock: bool,
+    every: Duration,
+    last: Instant,
+}
+
+impl Saves {
+    /// In a directory, each so much time.
+    pub fn new(directory: &Directory, scene: &Scene, plan: &Plan, every: Duration) -> Self {
+        Saves {
+            directory: directory.clone(),
+            scene: scene.fingerprint(),
+            integrator: plan.integrator.name.to_string(),
+            count: plan.steps,
+            by_clock: plan.integrator.by_clock,
+            every,
+            last: Instant::now(),
+        }
+    }
+
+    /// Whether it is time for the next one.
+    pub fn is_due(&self) -> bool {
+        self.last.elapsed() >= self.every
+    }
+
+    /// Saves the state after so many steps.
+    pub fn save(&mut self, taken: usize, written: Written, state: &Interrupted) -> Result<(), Failure> {
+        let Saves { scene, integrator, count, by_clock, .. } = &*self;
+        let checkpoint = Checkpoint {
+            scene: scene.clone(),
+            integrator: integrator.clone(),
+            count: *count,
+            by_clock: *by_clock,
+            taken,
+            written,
+            state: state.to_bytes(),
+        };
+        let text = serde_json::to_string(&checkpoint).map_err(std::io::Error::from)?;
+        self.directory.replace(FILE, &text)?;
+        self.last = Instant::now();
+        Ok(())
+    }
+}

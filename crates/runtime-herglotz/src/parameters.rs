@@ -1,0 +1,36 @@
+//! Parameters that are in no formula: most are misspelt.
+
+use crate::RuntimeError;
+use formula_lagrangian::{Formula, nearest_name};
+
+/// Refuses parameters of a formula that are neither in its value nor, as a word, in the texts of expressions beside it.
+///
+/// ```
+/// use runtime_herglotz::{Formula, check_parameters};
+/// let formula = Formula::parse("x'^2/2 + gamma*z", &["x"], &[("gamma", -0.1), ("gama", -5.0), ("level", 2.0)])?;
+/// let error = check_parameters(&formula, &["x - level"]).unwrap_err();
+/// assert!(error.to_string().contains("`gama`") && error.to_string().ends_with("did you mean `gamma`?"));
+/// # Ok::<(), runtime_herglotz::FormulaError>(())
+/// ```
+///
+/// # Errors
+/// [`RuntimeError::UnusedParameter`], with the nearest name that is used.
+pub fn check_parameters(formula: &Formula, texts: &[&str]) -> Result<(), RuntimeError> {
+    let of_formula: Vec<&str> = formula.used_parameters().collect();
+    let in_texts = |name: &str| texts.iter().any(|text| words(text).any(|word| word == name));
+    let (used, unused): (Vec<&str>, Vec<&str>) =
+        formula.parameters().map(|(name, _)| name).partition(|name| of_formula.contains(name) || in_texts(name));
+    let Some(name) = unused.first() else { return Ok(()) };
+    let known = || used.iter().copied();
+    let hint = match nearest_name(name, known()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None if used.is_empty() => "there are none that are used".to_owned(),
+        None => format!("there are {}", known().collect::<Vec<_>>().join(", ")),
+    };
+    Err(RuntimeError::UnusedParameter { name: (*name).to_owned(), hint })
+}
+
+/// The names in a text.
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !(c.is_alphanumeric() || c == '_'))
+}
