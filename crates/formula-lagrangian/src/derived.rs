@@ -26,6 +26,8 @@ pub(crate) struct Derived {
     /// The value, and `L_q`.
     pub with_force: Tape,
     pub gradient: Tape,
+    /// `L_z`.
+    pub rate: Tape,
     /// `L_q`, `L_v`, `L_z`, and the value.
     pub with_gradient: Tape,
     /// `W` by columns.
@@ -58,6 +60,7 @@ impl Derived {
         let of_kick: Vec<Id> = std::iter::once(root).chain(partials.iter().copied().take(n)).collect();
         let with_force = tape(&graph, &of_kick)?;
         let gradient = tape(&graph, &partials)?;
+        let rate = tape(&graph, partials.get(2 * n..).unwrap_or(&[]))?;
         let all: Vec<Id> = partials.iter().copied().chain([root]).collect();
         let with_gradient = tape(&graph, &all)?;
 
@@ -96,6 +99,7 @@ impl Derived {
             force,
             with_force,
             gradient,
+            rate,
             with_gradient,
             mass,
             second,
@@ -117,8 +121,9 @@ impl Derived {
 
     fn set_constants(&mut self) {
         let constants = self.formula.graph.constants(&self.formula.values);
-        let Derived { value, force, with_force, gradient, with_gradient, mass, second, switching, .. } = &mut *self;
-        for tape in [value, force, with_force, gradient, with_gradient, mass, second, switching] {
+        let Derived { value, force, with_force, gradient, rate, with_gradient, mass, second, switching, .. } =
+            &mut *self;
+        for tape in [value, force, with_force, gradient, rate, with_gradient, mass, second, switching] {
             tape.set_constants(&constants);
         }
         let rate = self.partials.last().filter(|_| self.structure.constant_rate);

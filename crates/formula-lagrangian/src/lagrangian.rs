@@ -151,6 +151,13 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     }
 
     #[inline(always)]
+    fn closed_rate<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
+        let mut rate = T::zero();
+        self.derived.rate.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [std::slice::from_mut(&mut rate)]);
+        Some(whole(rate))
+    }
+
+    #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
         let mut w: SMatrix<T, N, N> = SMatrix::from_fn(|_, _| T::zero());
         self.derived.mass.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [w.as_mut_slice()]);

@@ -152,3 +152,21 @@ fn branches_that_are_not_taken_leave_no_trace() {
         assert!(found.iter().zip(exact).all(|(a, b)| near(*a, b)), "{text} at {x}: {found:?}, not {exact:?}");
     }
 }
+
+/// The rate alone is that of the gradient, to the bit, whatever parameters it has.
+#[test]
+fn the_rate_alone_is_that_of_the_gradient() {
+    let texts =
+        ["x'^2/2 + gamma*cos(w*t)*z", "x'^2/2 - x^2 - z*exp(-t)*gamma - w*z^2", "x'^2/2 + x*z*x' + gamma*z", "x'^2/2"];
+    for text in texts {
+        let formula = Formula::parse(text, &["x"], &[("gamma", -0.1), ("w", 1.3)]).unwrap();
+        let mut l = formula.lagrangian::<1>().unwrap();
+        for gamma in [-0.1, 0.4] {
+            l.set("gamma", gamma).unwrap();
+            for t in [0.0, 0.7, -3.0] {
+                let at = VelocityPoint::new([0.3], [1.1], -0.6);
+                assert_eq!(l.rate(t, &at).to_bits(), l.gradient(t, &at).z.to_bits(), "{text}, {gamma}, {t}");
+            }
+        }
+    }
+}

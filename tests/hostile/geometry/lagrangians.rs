@@ -28,6 +28,7 @@ pub const ATTACKS: &[Attack] = &[
             "Derivatives::with_gradient",
             "Derivatives::with_force",
             "Derivatives::force",
+            "Derivatives::rate",
             "Derivatives::mass_matrix",
             "Derivatives::gradient",
             "Derivatives::hessian",
@@ -91,6 +92,7 @@ fn lagrangians(report: &mut Report) {
         report.formula(&(t, x), fine(l.with_gradient(t, &at)));
         report.formula(&(t, x), fine(l.with_force(t, &at)));
         report.formula(&(t, x), fine(l.force(t, &at)));
+        report.formula(&(t, x), fine(l.rate(t, &at)));
         report.formula(&(t, x), fine(l.mass_matrix(t, &at)));
         report.formula(&(t, x), fine(l.gradient(t, &at)));
         report.formula(&(t, x), fine(derived_gradient(&l, t, &at)));

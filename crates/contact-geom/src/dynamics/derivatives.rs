@@ -28,6 +28,9 @@ pub trait Derivatives<const N: usize>: Lagrangian<N> {
     /// `L_q` without the value, for kernels.
     fn force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N>;
 
+    /// `L_z` alone, for kernels.
+    fn rate<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> T;
+
     /// The matrix `W = L_vv` alone, for kernels.
     fn mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SMatrix<T, N, N>;
 
@@ -102,6 +105,19 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
             Some(force) => force,
             None => self.with_force(t, x).1,
         }
+    }
+
+    #[inline(always)]
+    fn rate<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> T {
+        if let Some(rate) = self.closed_rate(t, x) {
+            return rate;
+        }
+        if const { Self::PROVED } {
+            return T::from(f64::NAN);
+        }
+        let mut z = KernelDual::<T, SVector<T, 1>>::constant(x.z);
+        z.d[0] = T::one();
+        self.value(KernelDual::constant(t), &still(&x.q), &still(&x.v), z).d[0]
     }
 
     #[inline(always)]

@@ -73,6 +73,13 @@ pub trait Lagrangian<const N: usize> {
         self.closed_force(t, x).map(|force| (self.value(t, &x.q, &x.v, x.z), force))
     }
 
+    /// `L_z` alone, where it is less work than the gradient and the compiler cannot see that: splittings ask for it at several times of each
+    /// step where it depends on time.
+    #[inline(always)]
+    fn closed_rate<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
+        self.closed_gradient(t, x).map(|gradient| gradient.z)
+    }
+
     /// `W = L_vv` alone, where it is less work than all second derivatives and the compiler cannot see that.
     #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
@@ -155,6 +162,10 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
     #[inline(always)]
     fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
         (**self).closed_with_force(t, x)
+    }
+    #[inline(always)]
+    fn closed_rate<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
+        (**self).closed_rate(t, x)
     }
     #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {

@@ -25,7 +25,6 @@ pub use sharded::{Merge, ShardedEnsemble};
 use crate::gauss::instructions::Instructions;
 use crate::gauss::lanes::{branched, forget_branches};
 use crate::run::may_drift;
-use crate::run::watch::size;
 use crate::run::{digest, rows};
 use crate::switching::has_switching_functions;
 use crate::{GaussCollocation, InputError, Integrator, Observer, Rows, SplittingScheme, Start, Status, Steps, Until};
@@ -299,6 +298,15 @@ enum Kernel<'a, L, const N: usize> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> Kernel<'_, L, N> {
+    /// Whether a motion is left to a run of its own, since lanes would lose what its steps add.
+    fn leaves(&self, state: &PhasePoint<N>) -> bool {
+        match self {
+            Kernel::Splitting(packs) => packs.is_tiny(state),
+            // Their sums are in two parts.
+            Kernel::Gauss(_) | Kernel::OneByOne => false,
+        }
+    }
+
     fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: Wants) {
         match self {
             Kernel::OneByOne => {}
@@ -430,7 +438,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         if !matches!(kernel, Kernel::OneByOne) {
             for (place, (_, start)) in starts.iter().enumerate() {
                 if let Some(state) = start.state(lagrangian, t0)
-                    && !tiny(&state, h)
+                    && !kernel.leaves(&state)
                 {
                     places.push(place);
                     states.push(state);
@@ -486,12 +494,6 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         }
         in_lanes
     }
-}
-
-/// Whether steps are so short that a single run compensates their sums: half of the digits are lost in each.
-fn tiny<const N: usize>(state: &PhasePoint<N>, h: f64) -> bool {
-    let moved = h.abs() * size(&state.p);
-    moved > 0.0 && moved < f64::EPSILON.sqrt() * size(&state.q)
 }
 
 impl<const N: usize> Start<N> {

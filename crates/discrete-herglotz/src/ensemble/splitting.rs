@@ -76,6 +76,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         Ok(SplittingPacks { form, drag, table, look, h, t0, steps })
     }
 
+    /// Whether a run of its own would compensate the sums of a motion.
+    pub fn is_tiny(&self, state: &PhasePoint<N>) -> bool {
+        self.form.has_tiny_steps(self.h, state, &self.form.force(self.t0, &state.q, state.z))
+    }
+
     /// Takes all steps of some motions, in place, with a state recorded after each `rows` of them. One that is not finite at its start or
     /// its end is not finite then.
     pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: Wants) {

@@ -4,7 +4,7 @@ use super::separable::SeparableForm;
 use crate::InputError;
 use crate::gauss::coefficients::Coefficients;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, VelocityPoint};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 
 /// The nodes of the quadrature along a drift: its error is that of order 12, far below that of any scheme here.
 const NODES: usize = 6;
@@ -37,15 +37,7 @@ impl<const N: usize> Drag<N> {
     fn rate(&self, lagrangian: &impl Lagrangian<N>, t: f64) -> f64 {
         match self {
             Drag::Constant(gamma) => *gamma,
-            Drag::Timed { q, z } => {
-                let still = |x: f64| Dual::<f64, SVector<f64, 1>>::constant(x);
-                let x = VelocityPoint {
-                    q: q.map(still),
-                    v: SVector::from_element(still(0.0)),
-                    z: Dual { re: *z, d: SVector::<f64, 1>::new(1.0) },
-                };
-                lagrangian.along(t, &x).d[0]
-            }
+            Drag::Timed { q, z } => lagrangian.rate(t, &VelocityPoint { q: *q, v: SVector::zeros(), z: *z }),
         }
     }
 
@@ -56,6 +48,10 @@ impl<const N: usize> Drag<N> {
             let damping = (gamma * s).exp_m1();
             let length = if *gamma == 0.0 { s } else { damping / gamma };
             return Drift { length, damping, lift: 0.5 * (1.0 + damping) * length };
+        }
+        // What ends a step that begins with a kick drifts not at all.
+        if s == 0.0 {
+            return Drift { length: 0.0, damping: 0.0, lift: 0.0 };
         }
         let g = Coefficients::of(NODES);
         let rates: [f64; NODES] = std::array::from_fn(|j| self.rate(lagrangian, t + g.c[j].0 * s));
@@ -81,4 +77,53 @@ pub(crate) struct Drift {
     pub(crate) damping: f64,
     /// The action of `p.M^-1 p`: `e^g(s) length / 2`.
     pub(crate) lift: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Splitting, SplittingScheme, Stepper};
+    use contact_geom::nalgebra::SVector;
+    use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint};
+    use std::cell::Cell;
+
+    /// `v^2/2 - q^2/2 + cos(t) z/10` with its derivatives in closed form, which counts what it is asked for.
+    #[derive(Default)]
+    struct Counting {
+        gradients: Cell<usize>,
+        rates: Cell<usize>,
+    }
+
+    impl Lagrangian<1> for Counting {
+        fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+            (v[0] * v[0] - q[0] * q[0]) * 0.5 + t.cos() * z * 0.1
+        }
+        fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<1, T>) -> Option<Triple<1, T>> {
+            self.gradients.set(self.gradients.get() + 1);
+            Some(Triple { x: -x.q, y: x.v, z: t.cos() * 0.1 })
+        }
+        fn closed_force<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<SVector<T, 1>> {
+            Some(-x.q)
+        }
+        fn closed_rate<T: Scalar>(&self, t: T, _x: &VelocityPoint<1, T>) -> Option<T> {
+            self.rates.set(self.rates.get() + 1);
+            Some(t.cos() * 0.1)
+        }
+        fn structure(&self) -> Structure {
+            Structure { separable: true, z_affine: true, constant_mass: true, ..Structure::default() }
+        }
+    }
+
+    /// A rate that depends on time is asked for alone: once a node of each drift, and of a step that ends without one not at all.
+    #[test]
+    fn a_rate_in_time_is_asked_for_alone() {
+        let system = Counting::default();
+        let start = PhasePoint::new([1.0], [0.0], 0.0);
+        let mut motion = Splitting::new(&system, &SplittingScheme::STRANG, 0.1, 0.0, start).unwrap();
+        system.gradients.set(0);
+        system.rates.set(0);
+        for _ in 0..10 {
+            motion.advance(1).unwrap();
+        }
+        assert_eq!((system.gradients.get(), system.rates.get()), (0, 10 * super::NODES));
+    }
 }

@@ -1,7 +1,6 @@
 //! Splitting schemes as integrators.
 
 use super::{ActionSplitting, Splitting, SplittingScheme};
-use crate::run::watch::size;
 use crate::{Facts, InLanes, InputError, Integrator, Problem, Stepper, Wants};
 use contact_geom::Lagrangian;
 use std::borrow::Cow;
@@ -42,21 +41,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         h: f64,
         Wants { action, watched }: Wants,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-        let Problem { lagrangian, t0, start, state, structure } = *problem;
-        // Steps that move by so little of the position that half of the digits are lost in each change so little from step to step that they
-        // are rounded in the same way, and the error piles up.
-        let moved = h.abs() * size(&start.v);
-        let little = moved > 0.0 && moved < f64::EPSILON.sqrt() * size(&start.q);
+        let Problem { lagrangian, t0, state, structure, .. } = *problem;
         if !structure.is_affine_in_z() {
-            let splitting = ActionSplitting::new(lagrangian, self, h, t0, state)?;
-            let splitting = if watched { splitting.doubting() } else { splitting };
-            return Ok(Box::new(if little { splitting.compensated() } else { splitting }));
+            let splitting = ActionSplitting::new(lagrangian, self, h, t0, state)?.compensated_where_tiny();
+            return Ok(Box::new(if watched { splitting.doubting() } else { splitting }));
         }
-        let splitting = Splitting::new(lagrangian, self, h, t0, state)?;
+        let splitting = Splitting::new(lagrangian, self, h, t0, state)?.compensated_where_tiny();
         let splitting = if watched { splitting.watched() } else { splitting };
-        let splitting = if little { splitting.compensated() } else { splitting };
         Ok(Box::new(if action { splitting } else { splitting.without_action() }))
     }
+
     fn in_lanes(&self) -> Option<InLanes> {
         Some(InLanes::Splitting(*self))
     }

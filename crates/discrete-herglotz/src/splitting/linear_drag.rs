@@ -99,6 +99,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         Splitting { compensated: true, ..self }
     }
 
+    /// With compensated sums where the steps from the start are tiny.
+    pub(crate) fn compensated_where_tiny(self) -> Self {
+        let SplittingRun { h, state, motion, .. } = &self.progress;
+        if self.form.has_tiny_steps(*h, state, &motion.force) { self.compensated() } else { self }
+    }
+
     /// With a look at each drift whether it resolves the motion, for [`suspicion`](Stepper::suspicion). It costs a sixth of the
     /// time of a Kepler orbit, a third of a pendulum's and up to twice an oscillator's more, so it is for motions that are not known.
     pub fn watched(self) -> Self {

@@ -104,6 +104,12 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
         ActionSplitting { compensated: true, ..self }
     }
 
+    /// With compensated sums where the steps from the start are tiny.
+    pub(crate) fn compensated_where_tiny(self) -> Self {
+        let SplittingRun { h, state, motion, .. } = &self.progress;
+        if self.form.has_tiny_steps(*h, state, &motion.force) { self.compensated() } else { self }
+    }
+
     /// With doubts, for a run that looks at them: they cost a tenth of its time.
     pub(crate) fn doubting(self) -> Self {
         ActionSplitting { doubting: true, ..self }

@@ -102,6 +102,19 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if finite { Ok((value, force)) } else { Err(InputError::FirstStep(StepError::NonFinite)) }
     }
 
+    /// Whether steps of this length from a state under this force move a position, or kick a momentum, by so little that half of its digits
+    /// are lost in each: they change so little from step to step that they are rounded in the same way, and the error piles up.
+    pub(crate) fn has_tiny_steps(&self, h: f64, state: &PhasePoint<N>, force: &SVector<f64, N>) -> bool {
+        let (v, a) = (self.velocity(&state.p), self.velocity(force));
+        let is_tiny = |change: f64, number: f64| change < f64::EPSILON.sqrt() * number.abs();
+        // A momentum without force stays, unless the force begins later.
+        let kicks = |i: usize| force[i] != 0.0 || !self.lagrangian.structure().autonomous;
+        (0..N).any(|i| {
+            let moved = h.abs() * (v[i].abs() + h.abs() * a[i].abs());
+            is_tiny(moved, state.q[i]) || kicks(i) && is_tiny(h.abs() * force[i].abs(), state.p[i])
+        })
+    }
+
     /// `v.Mv`.
     pub(crate) fn twice_kinetic<T: Scalar>(&self, v: &SVector<T, N>) -> T {
         let mut sum = T::zero();
@@ -142,4 +155,72 @@ fn probes<const N: usize>(state: &PhasePoint<N>) -> [VelocityPoint<N>; 2] {
 /// Numbers between 0.3 and 1.3 without special relation.
 pub(super) fn without_symmetry(i: usize) -> f64 {
     0.3 + (((i + 1) * (i + 1)) as f64 * std::f64::consts::SQRT_2).fract()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Ensemble, Problem, SplittingScheme, Steps, Until};
+    use contact_geom::nalgebra::SVector;
+    use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, larger};
+
+    /// `v.v/2 + c f(t) q0 - b q1^2/2`: the first coordinate is pushed by next to nothing, from the start on or later.
+    struct Whisper {
+        force: f64,
+        later: bool,
+        spring: f64,
+    }
+
+    impl Lagrangian<2> for Whisper {
+        fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
+            let push = q[0] * self.force;
+            let push = if self.later { push * t } else { push };
+            v.dot(v) * 0.5 + push - q[1] * q[1] * (0.5 * self.spring)
+        }
+
+        fn structure(&self) -> Structure {
+            Structure {
+                separable: true,
+                z_affine: true,
+                constant_rate: true,
+                autonomous: !self.later,
+                ..Structure::default()
+            }
+        }
+    }
+
+    /// From rest too, beside what moves much, and where it is the momentum that is kicked by little: alone and in lanes.
+    #[test]
+    fn a_force_of_next_to_nothing_adds_up() {
+        let (h, count) = (1e-3, 2000_u32);
+        let t = h * f64::from(count);
+        for (v, later, spring) in [0.0, 1.0]
+            .into_iter()
+            .flat_map(|v| [false, true].into_iter().flat_map(move |later| [0.0, 1.0].map(|spring| (v, later, spring))))
+        {
+            let system = Whisper { force: 1e-13, later, spring };
+            // What the force has added to position and momentum; of one that is t, t^3/6 and t^2/2.
+            let added = if later { [t * t * t / 6.0, t * t / 2.0] } else { [t * t / 2.0, t] }.map(|x| x * 1e-13);
+            let start = VelocityPoint::new([1.0, spring], [v, 0.0], 0.0);
+            for scheme in [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_6, SplittingScheme::KAHAN_LI_8] {
+                let steps = Steps::Count(count as usize);
+                let problem = Problem::new(&system, 0.0, start).unwrap();
+                let end = problem.by(scheme).steps(steps).run(Until::Time(t)).unwrap();
+                let mut ends = vec![(end.q, end.p)];
+                let ensemble = Ensemble::new(&system, 0.0, 3, |_| start).by(scheme).steps(steps);
+                ensemble
+                    .run(Until::Time(t), |member| {
+                        let state = member.ending.clone().unwrap().state;
+                        ends.push((state.q, state.p));
+                    })
+                    .unwrap();
+                assert_eq!(ends.len(), 4);
+                for (q, p) in ends {
+                    // A rounding of the end, and of t; the sums have none beside it.
+                    let off = larger((q[0] - (1.0 + v * t + added[0])).abs(), (p[0] - (v + added[1])).abs());
+                    let name = scheme.name();
+                    assert!(off <= 2.0 * f64::EPSILON * (1.0 + v * t), "{name}, v = {v}, {later}, {spring}: {off:e}");
+                }
+            }
+        }
+    }
 }
