@@ -42,9 +42,10 @@ pub use rules::*;
 #[cfg(feature = "csv")]
 pub use run::CsvRows;
 pub use run::{
-    AnyIntegrator, Checkpoint, CheckpointError, Course, Crossing, Doubt, Event, Events, Facts, Halt, Integrator,
-    Interrupted, Item, LastStep, Moment, MomentumDecay, MomentumRow, Needs, Observer, Outcome, Plan, Problem, Progress,
-    Quotient, Row, Rows, Run, Start, Stepper, Steps, Stop, UnknownIntegrator, Until, Wants, verified,
+    AnyIntegrator, Checkpoint, CheckpointError, Course, Crossing, Doubt, Event, Events, Facts, Halt, INTERRUPTION,
+    Integrator, Interrupt, Interrupted, Item, LastStep, Moment, MomentumDecay, MomentumRow, Needs, Observer, Outcome,
+    Plan, Problem, Progress, Quotient, Row, Rows, Run, Start, Stepper, Steps, Stop, UnknownIntegrator, Until, Wants,
+    verified,
 };
 pub use solve::{CROSSOVER, ITERATION_LIMIT, Solver, last_correction};
 pub use splitting::{

@@ -42,7 +42,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         h: f64,
         Wants { action, watched }: Wants,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-        let Problem { lagrangian, t0, start, state, structure } = *problem;
+        let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
         // Steps that move by so little of the position that half of the digits are lost in each change so little from step to step that they
         // are rounded in the same way, and the error piles up.
         let moved = h.abs() * size(&start.v);
