@@ -137,7 +137,7 @@ impl Dense {
             rest = others;
             let mut different: Vec<f64> = these.iter().map(|(t, _)| *t).collect();
             different.dedup();
-            let rows = self.within(k, different.clone(), &all)?;
+            let rows = py.detach(|| self.within(k, different.clone(), &all))?;
             for (t, index) in these {
                 let row = different.iter().position(|x| x == t).and_then(|i| rows.get(i));
                 if let (Some(row), Some(to)) = (row, found.get_mut(index * width..(index + 1) * width)) {

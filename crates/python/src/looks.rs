@@ -2,10 +2,12 @@
 
 use crate::arrays::{number, numbers, value_error, whole};
 use crate::motion::Motion;
+use crate::signals::heard;
 use crate::system::System;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use runtime_herglotz::Start;
+use runtime_herglotz::{Interrupt, Start};
+use std::sync::atomic::Ordering;
 
 /// The contact geometry of a Lagrangian at a time and a point, by name.
 #[pyfunction]
@@ -40,8 +42,14 @@ type Checked = (String, f64, Vec<Place>, Vec<(String, String, f64)>, bool);
 #[pyfunction]
 pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyResult<Checked> {
     let places = whole("places", &places, 1)?;
-    let found = py.detach(|| motion.system.check(&motion.motion, places));
-    if let Some(raised) = motion.signals.take() {
+    // It works on threads of its own, which hear no signals.
+    let (found, raised) = heard(py, |ended| {
+        let ended = ended.clone();
+        let interrupt = Some(Interrupt::when(move || ended.load(Ordering::Relaxed)));
+        let asked = runtime_herglotz::Motion { interrupt, ..motion.motion.clone() };
+        motion.system.check(&asked, places)
+    })?;
+    if let Some(raised) = raised {
         return Err(raised);
     }
     let found = found.map_err(value_error)?;
