@@ -22,6 +22,9 @@ use contact_geom::PhasePoint;
 
 pub const EXCEPTIONS: Exceptions = &[
     ("Method::name", "takes no number"),
+    ("Interrupt::when", "takes no number"),
+    ("Problem::with_interrupt", "takes no number"),
+    ("Ensemble::with_interrupt", "takes no number"),
     ("jumps_between", "compares signs along a curve; every point of a run with switching functions is an attack on it"),
     ("Method::order", "takes no number"),
     ("Method::symmetric", "takes no number"),

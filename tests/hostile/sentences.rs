@@ -8,9 +8,9 @@ use contact_geom::{
 };
 use discrete_herglotz::{
     AnyIntegrator, BoundaryPath, Checkpoint, Composition, DiscreteLagrangian, DiscretePath, End, Event, Events, Facts,
-    Flow, Gauss, Halt, InputError, Integrator, Interrupted, LeftMidpoint, Method, Midpoint, Moment, Obstacle, Problem,
-    Rectangle, Rows, Solver, SplittingScheme, Status, StepError, Stepper, Steps, Stop, Strang, Suspicion,
-    UnknownIntegrator, UnknownMethod, Until, Wants,
+    Flow, Gauss, Halt, InputError, Integrator, Interrupt, Interrupted, LeftMidpoint, Method, Midpoint, Moment,
+    Obstacle, Problem, Rectangle, Rows, Solver, SplittingScheme, Status, StepError, Stepper, Steps, Stop, Strang,
+    Suspicion, UnknownIntegrator, UnknownMethod, Until, Wants,
 };
 use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow};
 use std::ops::ControlFlow;
@@ -225,6 +225,11 @@ fn input_errors() {
         InputError::TooMany { .. } => in_steps(Steps::Size(1e-300)), ["the number of steps", "e300", "longer steps"];
         InputError::NoSteps => problem.by(AnyIntegrator::Gauss { stages: 8 }).plan(Until::Time(5.5)).err().unwrap(), ["`steps`", "`accuracy`"];
         InputError::NoIntegrator => problem.accuracy(0.5).steps(Steps::Count(1)).plan(Until::Time(5.5)).err().unwrap(), ["`by`", "`accuracy`"];
+        InputError::Interrupted => {
+            let asked = || true;
+            let interrupted = problem.with_interrupt(Interrupt::when(&asked));
+            interrupted.accuracy(1e-6).plan(Until::Time(5.5)).err().unwrap()
+        }, ["the trial runs were interrupted", "run it again", "give a step"];
         InputError::AnotherRun => {
             let path = std::env::temp_dir().join(format!("another_run_{}", std::process::id()));
             let mut saved = Checkpoint::every(1, &path).unwrap();
@@ -290,6 +295,10 @@ enum Odd {
     Explosive,
     /// Duffing's, driven into chaos.
     Chaotic,
+    /// A potential with a step at q = 3.
+    Stepped,
+    /// A force that begins at t = 1.
+    Beginning,
 }
 
 impl Lagrangian<1> for Odd {
@@ -300,6 +309,8 @@ impl Lagrangian<1> for Odd {
             Odd::Jumping => kinetic - q[0].abs(),
             Odd::Kicked => kinetic - square * square + (t * 1e12).sin() * q[0] * 1e12,
             Odd::Explosive => kinetic + z * z,
+            Odd::Stepped => kinetic + q[0] - ((q[0] - 3.0) * 1e10).tanh() * 0.0015,
+            Odd::Beginning => kinetic - square * 0.5 + T::from(1.0).if_less(t, q[0], T::from(0.0)),
             Odd::Chaotic => kinetic + square * 0.5 - square * square * 0.25 + (t * 1.4).cos() * q[0] * 0.35 - z * 0.1,
         }
     }
@@ -321,6 +332,8 @@ fn obstacles() {
         Obstacle::RoundOff => obstacle(&Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "ask for less"];
         Obstacle::Chaos { .. } => obstacle(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "ask for less"];
         Obstacle::Order { .. } => obstacle(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "ask for less"];
+        Obstacle::Misfit { .. } => obstacle(&Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
+        Obstacle::Hidden { .. } => obstacle(&Odd::Beginning, "gauss_8", 2.0, 1e-6), ["one step more", "at the ends of their steps", "end the span beside it"];
         Obstacle::Halted { .. } => obstacle(&Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
         Obstacle::Unresolved { .. } => obstacle(&Odd::Kicked, "gauss_8", 1.0, 1e-6), ["near t = ", "shorter span"];
         Obstacle::Budget => obstacle(&Odd::Chaotic, "rectangle", 10.0, 1e-12), ["too many", "higher order", "give a step"];

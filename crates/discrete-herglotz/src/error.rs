@@ -27,11 +27,12 @@ pub enum InputError {
         wanted: f64,
     },
     /// A wanted accuracy is not reached.
-    #[error("the wanted relative error {wanted:e} is not reached (the best estimate was {reached:.1e}): {cause}")]
+    #[error("the wanted relative error {wanted:e} is not {}: {cause}", how_near(*wanted, *reached))]
     Accuracy {
         /// The error that was asked for.
         wanted: f64,
-        /// The smallest estimate of the pilot runs; infinite where none was made.
+        /// The smallest distance of pilot runs; infinite where none were compared. Below the wanted error where something else than their
+        /// distance stands in the way.
         reached: f64,
         /// What stands in the way.
         cause: Obstacle,
@@ -54,6 +55,9 @@ pub enum InputError {
     /// A run with given steps names no integrator.
     #[error("the run has no integrator; name one by `by`, or ask for an `accuracy` for which one is chosen")]
     NoIntegrator,
+    /// The trial runs of a plan were ended from outside.
+    #[error("the trial runs were interrupted before a step was found; run it again, or give a step")]
+    Interrupted,
     /// A run is resumed that is not the one which was interrupted.
     #[error(
         "the run is not the one that was interrupted; resume it with the same problem, integrator, steps, end and requests"
@@ -155,6 +159,17 @@ pub enum InputError {
     /// The first step cannot be solved.
     #[error("no first step from this start: {0}")]
     FirstStep(StepError),
+}
+
+/// What is said of an accuracy that was not reached, by the distance of the trial runs.
+fn how_near(wanted: f64, reached: f64) -> String {
+    if !reached.is_finite() {
+        "reached, and no two trial runs could be compared".to_owned()
+    } else if reached <= wanted {
+        format!("certain, though trial runs agree to {reached:.1e}")
+    } else {
+        format!("reached (trial runs agree to {reached:.1e})")
+    }
 }
 
 impl InputError {
@@ -268,13 +283,31 @@ pub enum Obstacle {
         t: f64,
     },
     /// Runs approach each other, but more slowly than a smooth motion lets them.
-    #[error(
-        "runs converge only with order {order:.1}: the Lagrangian is not smooth along the motion, or the method's order is \
-         low; ask for less, or take a method of higher order if the Lagrangian is smooth"
-    )]
+    #[error("{}", how_runs_converge(*order))]
     Order {
         /// The order that the last runs showed.
         order: f64,
+    },
+    /// Runs agree where they are compared, and between the nodes of their steps the motion does not solve its equations.
+    #[error(
+        "between the nodes of their steps the motion misses its equations by {misfit:.1e} of its size, which shorter steps better only \
+         with order {order:.1}: a kink, a jump or something narrow lies there; ask for less, or smooth the Lagrangian"
+    )]
+    Misfit {
+        /// The largest misfit of the finer run, relative to the largest momentum.
+        misfit: f64,
+        /// The order with which it falls.
+        order: f64,
+    },
+    /// Runs whose nodes coincide agree, and one with other nodes does not agree with them.
+    #[error(
+        "a trial run with one step more {}: a kink, a jump or a pulse lies at the ends of their steps; end the span beside it, or smooth the \
+         Lagrangian",
+        how_far(*distance)
+    )]
+    Hidden {
+        /// The distance of the ends; infinite where the run with one step more comes to none.
+        distance: f64,
     },
     /// A step cannot be taken however short it is.
     #[error(
@@ -287,16 +320,44 @@ pub enum Obstacle {
         cause: StepError,
     },
     /// What is near some time is too fast or too narrow for the steps that can be tried.
-    #[error("near t = {t} the motion is not resolved by any step that was tried; take a clock, or a shorter span")]
+    #[error(
+        "near t = {t} the motion is not resolved by any step that was tried: it is too fast or too narrow there; take a shorter span"
+    )]
     Unresolved {
         /// The time.
         t: f64,
     },
     /// The pilot runs would cost too much.
     #[error(
-        "the steps that it needs are too many to be tried; take a method of higher order, a shorter span, or give a step"
+        "the budget of the trial runs is used up, since the steps that the motion needs are too many to be tried; take a method of higher \
+         order, a shorter span, or give a step"
     )]
     Budget,
+}
+
+/// What is said of a run that ends so far from others.
+fn how_far(distance: f64) -> String {
+    if distance.is_finite() {
+        format!("ends {distance:.1e} away from them")
+    } else {
+        "does not resolve the motion".to_owned()
+    }
+}
+
+/// What is said of runs that converge with a low order, or not at all.
+fn how_runs_converge(order: f64) -> String {
+    // As little as noise shows.
+    const NONE: f64 = 0.25;
+    if order >= NONE {
+        format!(
+            "runs converge only with order {order:.1}: the Lagrangian is not smooth along the motion, or the method's order is low; ask for \
+             less, or take a method of higher order if the Lagrangian is smooth"
+        )
+    } else {
+        "runs do not converge as their steps get shorter: the Lagrangian is not smooth along the motion, or the motion amplifies its \
+         round-off; ask for less, or end the run before"
+            .to_owned()
+    }
 }
 
 /// A step whose ends do not fit each other by far more than the error of a step that resolves the motion: it may have crossed
@@ -364,6 +425,38 @@ impl std::fmt::Display for Status {
                  its structure and run again"
             ),
             Status::Failed { step, t, cause } => write!(f, "failed in step {step} at t = {t}: {cause}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An estimate below what was asked for is no reason by itself: the sentence says that something else is in the way, and what. One that was not made
+    /// is not told, and runs that do not converge have no order.
+    #[test]
+    fn an_accuracy_says_what_was_not_reached() {
+        let said = |reached: f64, cause: Obstacle| InputError::Accuracy { wanted: 1e-9, reached, cause }.to_string();
+        let misfit = Obstacle::Misfit { misfit: 3e-4, order: 0.5 };
+        let table = [
+            (said(1e-16, misfit), "1e-9 is not certain, though trial runs agree to 1.0e-16: between the nodes"),
+            (said(1e-16, misfit), "misses its equations by 3.0e-4 of its size"),
+            (said(1e-16, Obstacle::Hidden { distance: 2e-3 }), "with one step more ends 2.0e-3 away from them: a kink"),
+            (
+                said(1e-7, Obstacle::Budget),
+                "1e-9 is not reached (trial runs agree to 1.0e-7): the budget of the trial runs",
+            ),
+            (said(f64::INFINITY, Obstacle::Budget), "1e-9 is not reached, and no two trial runs could be compared: "),
+            (said(1e-7, Obstacle::Order { order: 1.9 }), "runs converge only with order 1.9: "),
+            (said(1e-7, Obstacle::Order { order: 0.0 }), "runs do not converge as their steps get shorter: "),
+            (said(1e-7, Obstacle::Order { order: -0.7 }), "runs do not converge as their steps get shorter: "),
+            (said(1e-7, Obstacle::Order { order: f64::NAN }), "runs do not converge as their steps get shorter: "),
+        ];
+        for (sentence, words) in table {
+            assert!(sentence.contains(words), "no {words:?} in {sentence:?}");
+            let foreign = ["inf", "NaN", "best estimate", "clock"];
+            assert!(foreign.iter().all(|word| !sentence.contains(word)), "{sentence:?}");
         }
     }
 }

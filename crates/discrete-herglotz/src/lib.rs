@@ -43,9 +43,9 @@ pub use rules::*;
 pub use run::CsvRows;
 pub use run::{
     AnyIntegrator, Checkpoint, CheckpointError, Course, Crossing, Doubt, EnergyDrift, EnergyLook, Event, Events, Facts,
-    Halt, Integrator, Interrupted, Item, LastStep, Moment, MomentumDecay, MomentumRow, Needs, Observer, Outcome, Plan,
-    Problem, Progress, Quotient, Row, Rows, Run, Start, Stepper, Steps, Stop, Terminal, UnknownIntegrator, Until,
-    Wants, verified,
+    Halt, INTERRUPTION, Integrator, Interrupt, Interrupted, Item, LastStep, Moment, MomentumDecay, MomentumRow, Needs,
+    Observer, Outcome, Plan, Problem, Progress, Quotient, Row, Rows, Run, Start, Stepper, Steps, Stop, Terminal,
+    UnknownIntegrator, Until, Wants, verified,
 };
 pub use solve::{CROSSOVER, ITERATION_LIMIT, Solver, last_correction};
 pub use splitting::{

@@ -62,6 +62,7 @@ mod expression;
 mod formula;
 mod functions;
 mod graph;
+mod hints;
 mod lagrangian;
 mod names;
 mod node;

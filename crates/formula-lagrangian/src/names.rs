@@ -82,7 +82,8 @@ impl Names {
         let known = self.blocks.iter().map(|b| b.name.as_str()).chain(self.parameters.iter().map(String::as_str));
         let known = known.chain(others.iter().map(String::as_str)).chain(RESERVED).chain(["pi", "q", "v", "n"]);
         let known = known.chain(FUNCTIONS.iter().map(|f| f.0)).chain(OPERATIONS.iter().map(|o| o.0));
-        nearest_name(name, known).map(str::to_owned)
+        // What is known and cannot stand here is no remedy for itself.
+        nearest_name(name, known.filter(|other| *other != name)).map(str::to_owned)
     }
 }
 

@@ -1,6 +1,7 @@
 //! From a text to a node of a graph, by operator precedence (V. Pratt, "Top down operator precedence", 1973).
 
 use crate::functions::{FUNCTIONS, OPERATIONS};
+use crate::hints::{CHOICE, instead_of_function, instead_of_name, velocity_of};
 use crate::names::{Block, Names, is_reserved, nearest_name};
 use crate::quantities::Quantity;
 use crate::token::{Token, Word, words};
@@ -180,6 +181,16 @@ impl<'a> Parser<'a> {
     fn unexpected(&self, word: Word<'a>, wanted: &str) -> ParseError {
         let before = self.at.checked_sub(1).and_then(|i| self.words.get(i)).map(|w| w.token);
         let hint = match (before, word.token) {
+            (Some(_), Token::Name("if" | "and" | "or" | "else")) => "; write `if(a < b, then, otherwise)`",
+            (Some(Token::Sign('<' | '>' | '=')), Token::Sign('=')) | (_, Token::Sign('<' | '>' | '='))
+                if wanted != "`=`" =>
+            {
+                "; a condition is `if(a < b, then, otherwise)`, with `<` or `>`"
+            }
+            (Some(Token::Name(name)), Token::Sign('(')) if self.is_value(name) => {
+                "; a product is written with `*`, and a coordinate, which is a function of time, by its name alone"
+            }
+            (_, Token::Sign('\'')) => "; only coordinates have a velocity, `x'`",
             (Some(Token::Number(_) | Token::Name(_) | Token::Sign(')' | ']')), Token::Name(_) | Token::Number(_))
             | (Some(Token::Number(_) | Token::Sign(')' | ']')), Token::Sign('(')) => "; a product is written with `*`",
             (Some(Token::Number(_)), Token::Sign(',')) if wanted == "an operator" => {
@@ -271,16 +282,28 @@ impl<'a> Parser<'a> {
         if self.word(0).token == Token::Sign('(') && !self.is_value(name) {
             return self.call(name, word);
         }
+        let prime = self.word(0);
+        let has_prime = prime.token == Token::Sign('\'');
         if let Some((_, value)) = self.locals.iter().rev().find(|(local, _)| *local == name) {
+            if has_prime {
+                return Err(self.error(prime, format!("`{name}` is a definition, whose rate is to be written out")));
+            }
             return Ok(*value);
         }
         if let Some(block) = self.names.blocks.iter().find(|b| b.name == name) {
             return self.coordinate(block, word);
         }
         if let Some(i) = self.names.parameters.iter().position(|p| p == name) {
+            if has_prime {
+                let message = format!("`{name}` is a parameter, which is constant: only coordinates have a velocity");
+                return Err(self.error(prime, message));
+            }
             return Ok(self.graph.parameter(i as u32));
         }
         let all = Block { name: name.to_owned(), first: 0, count: Some(self.names.dimension) };
+        if let Some(message) = self.has_no_velocity(name) {
+            return Err(self.error(self.word(0), message));
+        }
         match name {
             "t" => Ok(self.graph.time()),
             "z" => Ok(self.graph.action()),
@@ -291,6 +314,8 @@ impl<'a> Parser<'a> {
                 let i = self.index(&all)?;
                 Ok(self.graph.velocity(i))
             }
+            "if" => Err(self.error(word, format!("`if` is a function: {CHOICE}"))),
+            "sum" => Err(self.error(word, "`sum` is a function: write `sum(i, 0, n-1, q[i]^2)`")),
             _ if is_reserved(name) => Err(self.error(word, format!("`{name}` is a function: write `{name}(...)`"))),
             _ => self.quantity(name, word),
         }
@@ -327,8 +352,43 @@ impl<'a> Parser<'a> {
     fn unknown(&self, name: &str, word: Word<'a>, kind: &str) -> ParseError {
         let locals: Vec<String> = self.locals.iter().map(|(local, _)| (*local).to_owned()).collect();
         let mut error = self.error(word, format!("unknown {kind} `{name}`"));
-        error.nearest = self.names.nearest(name, &locals);
+        let is_function = kind == "function";
+        let instead = match name {
+            "q" | "v" if !is_function => Some(self.all_of(name)),
+            _ if is_function => instead_of_function(name).map(str::to_owned),
+            _ => instead_of_name(name).map(str::to_owned),
+        };
+        match instead {
+            Some(instead) => error.message = format!("{}; {instead}", error.message),
+            None => {
+                let velocity = velocity_of(name, &self.names.blocks).filter(|_| !is_function);
+                error.nearest = velocity.or_else(|| self.names.nearest(name, &locals));
+            }
+        }
         error
+    }
+
+    /// What to write for all coordinates, or for all velocities.
+    fn all_of(&self, name: &str) -> String {
+        let prime = if name == "v" { "'" } else { "" };
+        let what = if name == "v" { "velocities" } else { "coordinates" };
+        let named = self.names.blocks.first().map_or(String::new(), |block| match block.count {
+            Some(_) => format!("`{}{prime}[0]`", block.name),
+            None => format!("`{}{prime}`", block.name),
+        });
+        format!("the {what} are {named} and so on, or `{name}[0]` to `{name}[n-1]`")
+    }
+
+    /// What is said of the velocity of something that has none, where a prime follows its name.
+    fn has_no_velocity(&self, name: &str) -> Option<String> {
+        if self.word(0).token != Token::Sign('\'') {
+            return None;
+        }
+        match name {
+            "z" => Some("the rate of `z` is the Lagrangian itself, which cannot depend on it".to_owned()),
+            "t" => Some("the rate of `t` is 1".to_owned()),
+            _ => None,
+        }
     }
 
     /// A coordinate, or with a prime its velocity.
@@ -353,7 +413,11 @@ impl<'a> Parser<'a> {
         }
         self.next()?;
         if self.word(0).token == sign {
-            let message = "a second derivative, which no Lagrangian of Herglotz' principle has";
+            let name = self.text.get(word.span.0..word.span.1).unwrap_or("x");
+            let message = format!(
+                "a second derivative, which no Lagrangian of Herglotz' principle has: write L of `{name}` and `{name}'` alone; the \
+                 acceleration follows from it"
+            );
             return Err(self.error(word, message));
         }
         Ok(true)
@@ -464,6 +528,11 @@ impl<'a> Parser<'a> {
             self.at = self.at.saturating_sub(1);
             return Err(self.unexpected(word, "the name of an index, as in `sum(i, 0, n-1, q[i]^2)`,"));
         };
+        if self.word(0).token != Token::Sign(',') {
+            let message =
+                format!("{} where `,` is expected: a sum has the form `sum(i, 0, n-1, q[i]^2)`", self.word(0).shown());
+            return Err(self.error(self.word(0), message));
+        }
         if is_reserved(index) || self.is_value(index) {
             return Err(self.error(word, format!("the name `{index}` is taken; take another for the index")));
         }

@@ -1,6 +1,7 @@
 //! The words of a text.
 
 use crate::ParseError;
+use crate::hints::instead_of_character;
 
 /// A word of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,6 +65,10 @@ pub(crate) fn words(text: &str) -> Result<Vec<Word<'_>>, ParseError> {
             c if c.is_ascii_digit() || c == '.' => match word.parse::<f64>() {
                 Ok(x) if x.is_finite() => Token::Number(x),
                 Ok(_) => return Err(ParseError::at(text, span, "this number is too large")),
+                Err(_) if word == "." && matches!(words.last(), Some(Word { token: Token::Name(_), .. })) => {
+                    let message = "a name has no point: write `sin(x)` for `np.sin(x)`, and `pi` for `math.pi`";
+                    return Err(ParseError::at(text, span, message));
+                }
                 Err(_) => return Err(ParseError::at(text, span, format!("`{word}` is not a number"))),
             },
             '*' if length == 2 => Token::Sign('^'),
@@ -72,7 +77,8 @@ pub(crate) fn words(text: &str) -> Result<Vec<Word<'_>>, ParseError> {
             '\u{b7}' | '\u{d7}' => Token::Sign('*'),
             '\u{2212}' => Token::Sign('-'),
             c => {
-                let message = format!("the character {c:?} has no meaning here");
+                let instead = instead_of_character(c).map(|instead| format!("; {instead}")).unwrap_or_default();
+                let message = format!("the character {c:?} has no meaning here{instead}");
                 return Err(ParseError::at(text, span, message));
             }
         };

@@ -168,6 +168,61 @@ fn errors_show_the_place_and_the_remedy() {
     );
 }
 
+/// What other languages write, and what is written here in its place.
+#[test]
+fn errors_say_what_to_write_instead() {
+    let table = [
+        ("v^2/2", "the velocities are `x'` and so on, or `v[0]` to `v[n-1]`"),
+        ("x'^2 - q^2", "the coordinates are `x` and so on, or `q[0]` to `q[n-1]`"),
+        ("xdot^2/2", "did you mean `x'`?"),
+        ("y_dot^2/2", "did you mean `y'`?"),
+        ("vx^2/2", "did you mean `x'`?"),
+        ("v_y^2/2", "did you mean `y'`?"),
+        ("dx^2/2", "did you mean `x'`?"),
+        ("x'^2/2 + z'", "the rate of `z` is the Lagrangian itself"),
+        ("x'^2/2 + t'", "the rate of `t` is 1"),
+        ("x'^2/2 + a'", "`a` is a parameter, which is constant"),
+        ("r = x^2; x'^2/2 + r'", "`r` is a definition"),
+        ("x'^2/2 + x*x''", "write L of `x` and `x'` alone"),
+        ("x'^2/2 + diff(x, t)", "write `x'` for the velocity of `x`"),
+        ("x(t)^2", "a coordinate, which is a function of time, by its name alone"),
+        ("v@v/2", "written `sum(i, 0, n-1, q[i]*v[i])`"),
+        ("np.sin(x)", "write `sin(x)` for `np.sin(x)`"),
+        ("x + math.pi", "`pi` for `math.pi`"),
+        ("e^x", "write `exp(x)`"),
+        ("heaviside(t - 1)*x", "write `if(t > 1, 1, 0)`"),
+        ("where(x > 0, x, y)", "write `if(a < b, then, otherwise)`"),
+        ("x if x > 0 else y", "write `if(a < b, then, otherwise)`"),
+        ("if(x <= 0, x, y)", "with `<` or `>`"),
+        ("if(x == 0, x, y)", "with `<` or `>`"),
+        ("if(x > 0 and y > 0, x, y)", "write `if(a < b, then, otherwise)`"),
+        ("x > 0", "a condition is `if(a < b, then, otherwise)`"),
+        ("x*if", "write `if(a < b, then, otherwise)`"),
+        ("interp(x, 1, 2)", "write its pieces by `if(a < b, then, otherwise)`"),
+        ("polyval(x, 1)", "`c0 + x*(c1 + x*c2)`"),
+        ("log10(x)", "write `ln(x)/ln(10)`"),
+        ("norm(x)", "`hypot(x, y)`"),
+        ("sum(x^2)", "a sum has the form `sum(i, 0, n-1, q[i]^2)`"),
+        ("x\u{b2}", "write `^2`"),
+        ("arcsin(x)", "did you mean `asin`?"),
+    ];
+    for (text, instead) in table {
+        let found = error(text).to_string();
+        assert!(found.contains(instead), "{text}: {found}");
+    }
+    // In arrays by their own names; and no name is the remedy for itself.
+    let of_array = |text: &str| match Formula::parse(text, &["q[2]"], &[]) {
+        Err(FormulaError::Parse(error)) => error.to_string(),
+        other => panic!("{text}: {other:?}"),
+    };
+    assert!(of_array("v^2/2").contains("the velocities are `q'[0]` and so on"), "{}", of_array("v^2/2"));
+    assert!(of_array("qdot[0]^2").contains("did you mean `q'[0]`?"), "{}", of_array("qdot[0]^2"));
+    for name in ["v", "q", "n", "pi", "t", "x", "a"] {
+        let found = error(&format!("x'^2 + {name}(1)")).to_string();
+        assert!(!found.contains(&format!("did you mean `{name}`?")), "{found}");
+    }
+}
+
 #[test]
 fn names_and_values_that_are_none() {
     let parse = |coordinates: &[&str], parameters: &[(&str, f64)]| {

@@ -165,9 +165,9 @@ fn bad_input_is_told_with_its_place_and_a_remedy() {
     }
     // Round-off depends on the instructions of the processor.
     if let Some((before, (_, after))) =
-        told.split_once("best estimate was ").and_then(|(a, b)| Some((a, b.split_once(')')?)))
+        told.split_once("trial runs agree to ").and_then(|(a, b)| Some((a, b.split_once(')')?)))
     {
-        told = format!("{before}best estimate was round-off){after}");
+        told = format!("{before}trial runs agree to round-off){after}");
     }
     let expected = include_str!("snapshots/errors.txt");
     if told != expected {

@@ -21,8 +21,33 @@ pub fn number(name: &str, from: &Bound<'_, PyAny>) -> PyResult<f64> {
     if x.is_finite() { Ok(x) } else { Err(wrong()) }
 }
 
+/// The integer of an argument, at least so large: a whole number of floating point is none, and is told how it is written.
+pub fn whole(name: &str, from: &Bound<'_, PyAny>, least: usize) -> PyResult<usize> {
+    let wrong = |instead: String| {
+        value_error(format!("`{name}` is {}, where an integer of at least {least} is needed{instead}", shown(from)))
+    };
+    let is_boolean = from.is_instance_of::<PyBool>() || from.get_type().name().is_ok_and(|name| name == "bool");
+    if is_boolean {
+        return Err(wrong(String::new()));
+    }
+    if let Ok(found) = from.extract::<usize>() {
+        return if found >= least { Ok(found) } else { Err(wrong(String::new())) };
+    }
+    // Whatever is an integer, and too large or negative.
+    match from.extract::<f64>() {
+        Ok(x) if x.fract() == 0.0 && x >= least as f64 && x <= 1e15 => Err(wrong(format!(": write {x}"))),
+        _ => Err(wrong(String::new())),
+    }
+}
+
+/// The text of an argument.
+pub fn word(name: &str, from: &Bound<'_, PyAny>, example: &str) -> PyResult<String> {
+    from.extract()
+        .map_err(|_| value_error(format!("`{name}` is {}, where a text is needed, as {example}", shown(from))))
+}
+
 /// An object in an error, cut where it is long.
-fn shown(from: &Bound<'_, PyAny>) -> String {
+pub fn shown(from: &Bound<'_, PyAny>) -> String {
     const LONGEST: usize = 60;
     let text = from.repr().map_or_else(|_| "an object".to_owned(), |text| text.to_string());
     if text.chars().count() <= LONGEST { text } else { text.chars().take(LONGEST).chain("...".chars()).collect() }

@@ -58,7 +58,8 @@ type States =
 /// Runs a motion up to a time again and keeps the ends of its steps.
 #[pyfunction]
 pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
-    let mut keeps = Keeps { nodes: Nodes::default(), until, done: false, signals: Signals::new() };
+    let signals = motion.signals.clone();
+    let mut keeps = Keeps { nodes: Nodes::default(), until, done: false, signals };
     let by = py.detach(|| {
         let plan = motion.system.plan(&motion.motion)?;
         let by = match motion.motion.way {
@@ -78,7 +79,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
         motion.system.run(&again, &mut keeps)?;
         Ok(Some(by))
     });
-    if let Some(raised) = keeps.signals.raised {
+    if let Some(raised) = motion.signals.take() {
         return Err(raised);
     }
     let by = by.map_err(|error: runtime_herglotz::RuntimeError| value_error(error))?;
@@ -129,13 +130,14 @@ impl Dense {
         let mut rest = order.as_slice();
         while let Some(&(t, _)) = rest.first() {
             // The step that ends there, or has it inside.
+            py.check_signals()?;
             let k = nodes.partition_point(|node| sign * node < sign * t).saturating_sub(1);
             let end = nodes.get(k + 1).copied().unwrap_or(last);
             let (these, others) = rest.split_at(rest.partition_point(|(t, _)| sign * t <= sign * end).max(1));
             rest = others;
             let mut different: Vec<f64> = these.iter().map(|(t, _)| *t).collect();
             different.dedup();
-            let rows = self.within(k, different.clone(), &all)?;
+            let rows = py.detach(|| self.within(k, different.clone(), &all))?;
             for (t, index) in these {
                 let row = different.iter().position(|x| x == t).and_then(|i| rows.get(i));
                 if let (Some(row), Some(to)) = (row, found.get_mut(index * width..(index + 1) * width)) {

@@ -1,13 +1,18 @@
 //! Many motions of one formula.
 
-use crate::arrays::{matrix, number, numbers, table, value_error, vector};
+use crate::arrays::{matrix, number, numbers, table, value_error, vector, whole};
 use crate::motion::{self, GivenEvent, GivenWay};
-use crate::signals::Signals;
+use crate::signals::heard;
 use crate::system::System;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use runtime_herglotz::{Column, Crossing, Ensemble, EnsembleWatch, MemberEnd, Rate, Start, Status, Varied, When};
+use runtime_herglotz::{
+    Column, Crossing, Ensemble, EnsembleWatch, INTERRUPTION, Interrupt, MemberEnd, Rate, Start, Status, Tally, Varied,
+    When, in_words,
+};
 use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Keeps the members' ends, or their rows.
 struct Kept {
@@ -21,7 +26,8 @@ struct Kept {
     success: Vec<bool>,
     troubles: Vec<(usize, String)>,
     crossings: Vec<(usize, Crossing)>,
-    signals: Signals,
+    /// Whether a signal's handler has raised something.
+    ended: Arc<AtomicBool>,
 }
 
 impl Kept {
@@ -36,13 +42,30 @@ impl Kept {
     }
 }
 
+impl Kept {
+    /// Adds the members that an interruption has left out.
+    fn fill(&mut self, count: usize) {
+        while self.success.len() < count {
+            let index = self.success.len();
+            self.success.push(false);
+            self.troubles.push((index, "interrupted before it began".to_owned()));
+            self.t.push(f64::NAN);
+            self.steps.push(0);
+            for _ in 0..self.rows.unwrap_or(1) {
+                self.states(&[]);
+            }
+        }
+    }
+}
+
 impl EnsembleWatch for Kept {
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()> {
         let MemberEnd { index, ending, rows, crossings } = member;
         self.crossings.extend(crossings.into_iter().map(|crossing| (index, crossing)));
         let trouble = match &ending {
-            Err(cause) => Some(cause.to_string()),
+            Err(cause) => Some(in_words(cause)),
             Ok(end) => match (&end.status, &end.suspicion) {
+                (Status::Stopped { by: INTERRUPTION, t, .. }, _) => Some(format!("interrupted at t = {t}")),
                 // A terminal event is what was asked for.
                 (Status::Completed | Status::Stopped { .. }, suspicion) => {
                     suspicion.map(|suspicion| suspicion.to_string())
@@ -50,7 +73,10 @@ impl EnsembleWatch for Kept {
                 (status, _) => Some(status.to_string()),
             },
         };
-        let reached = |status| matches!(status, Status::Completed | Status::Stopped { .. });
+        let reached = |status| match status {
+            Status::Stopped { by, .. } => by != INTERRUPTION,
+            status => status == Status::Completed,
+        };
         self.success.push(ending.as_ref().is_ok_and(|end| reached(end.status)));
         self.troubles.extend(trouble.map(|trouble| (index, trouble)));
         self.t.push(ending.as_ref().map_or(f64::NAN, |end| end.t));
@@ -66,11 +92,17 @@ impl EnsembleWatch for Kept {
                 }
             }
         }
-        self.signals.look()
+        // Those that are done are handed on to the last.
+        ControlFlow::Continue(())
+    }
+
+    fn interrupt(&self) -> Option<Interrupt> {
+        let ended = self.ended.clone();
+        Some(Interrupt::when(move || ended.load(Ordering::Relaxed)))
     }
 
     fn poll(&mut self) -> ControlFlow<()> {
-        self.signals.look()
+        if self.ended.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
@@ -95,6 +127,8 @@ pub struct EnsembleRecord {
     /// The times of the rows.
     times: Option<Py<PyArray1<f64>>>,
     in_lanes: usize,
+    /// What a signal's handler has raised.
+    interrupted: Option<Py<PyAny>>,
 }
 
 /// Runs an ensemble, with the interpreter left to other threads.
@@ -108,9 +142,9 @@ pub fn run_ensemble(
     way: GivenWay<'_>,
     names: Vec<String>,
     values: Vec<Bound<'_, PyAny>>,
-    events: Vec<GivenEvent>,
+    events: Vec<GivenEvent<'_>>,
     observed: Vec<String>,
-    threads: Option<usize>,
+    threads: Option<Bound<'_, PyAny>>,
 ) -> PyResult<EnsembleRecord> {
     let n = system.inner.dimension();
     let (q, rate, is_momentum, z) = start;
@@ -134,6 +168,7 @@ pub fn run_ensemble(
         varied.push(members(&format!("parameters[{name:?}]"), value)?);
     }
     let way = motion::way(&way)?;
+    let threads = threads.map(|threads| whole("threads", &threads, 1)).transpose()?;
     let times = motion::times(&t)?;
     let (Some(&t0), Some(&end)) = (times.first(), times.last()) else { return Err(value_error("`t` is empty")) };
     let rows = (times.len() > 2).then(|| times.clone());
@@ -155,7 +190,7 @@ pub fn run_ensemble(
         success: Vec::with_capacity(count),
         troubles: Vec::new(),
         crossings: Vec::new(),
-        signals: Signals::new(),
+        ended: Arc::new(AtomicBool::new(false)),
     };
     let start = |i: usize| {
         let part = |x: &[f64]| x.get(i * n..(i + 1) * n).unwrap_or_default().to_vec();
@@ -164,21 +199,30 @@ pub fn run_ensemble(
     };
     let of_member = |i: usize| varied.iter().map(|all| all.get(i).copied().unwrap_or(f64::NAN)).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let ensemble = Ensemble {
-        count,
-        start: &start,
-        t0,
-        varied: (!names.is_empty()).then_some(Varied { names: &names, values: &of_member }),
-        end,
-        way,
-        rows: rows.clone().map(When::At),
-        columns: &columns,
-        events: &events,
-        threads,
+    let run = |ended: &Arc<AtomicBool>| {
+        kept.ended = ended.clone();
+        let ensemble = Ensemble {
+            count,
+            start: &start,
+            t0,
+            varied: (!names.is_empty()).then_some(Varied { names: &names, values: &of_member }),
+            end,
+            way,
+            rows: rows.clone().map(When::At),
+            columns: &columns,
+            events: &events,
+            threads,
+        };
+        system.inner.ensemble(&ensemble, &mut kept)
     };
-    let tally = py.detach(|| system.inner.ensemble(&ensemble, &mut kept)).map_err(value_error)?;
-    if let Some(raised) = kept.signals.raised {
-        return Err(raised);
+    let (tally, raised) = heard(py, run)?;
+    let tally = match tally {
+        // Nothing had begun.
+        Err(_) if raised.is_some() => Tally::default(),
+        tally => tally.map_err(value_error)?,
+    };
+    if raised.is_some() {
+        kept.fill(count);
     }
     let [q, v, p, z, columns] = kept.parts;
     Ok(EnsembleRecord {
@@ -194,5 +238,6 @@ pub fn run_ensemble(
         crossings: kept.crossings.into_iter().map(|(i, c)| (i, c.event, c.t, c.q, c.v, c.p, c.z)).collect(),
         times: rows.map(|rows| vector(py, rows)),
         in_lanes: tally.in_lanes,
+        interrupted: raised.map(|raised| raised.into_value(py).into_any()),
     })
 }

@@ -1,6 +1,7 @@
 //! The exact discrete Lagrangian, the contact exponential map and its inverse.
 
 use crate::arrays::{number, numbers, value_error};
+use crate::signals::heard_at_once;
 use crate::system::System;
 use ::exact_lagrangian::ExactLagrangian;
 use contact_geom::nalgebra::{DMatrix, SVector};
@@ -69,16 +70,16 @@ fn of_system(
             return Err(value_error(format!("`{name}` has {} numbers, where the system has {n} coordinates", x.len())));
         }
     }
-    let formula = system.inner.formula();
-    py.detach(|| match n {
-        1 => found::<1>(formula, what, &at),
-        2 => found::<2>(formula, what, &at),
-        3 => found::<3>(formula, what, &at),
-        4..=8 => found::<8>(formula, what, &at),
+    let formula = system.inner.formula().clone();
+    heard_at_once(py, move || match n {
+        1 => found::<1>(&formula, what, &at),
+        2 => found::<2>(&formula, what, &at),
+        3 => found::<3>(&formula, what, &at),
+        4..=8 => found::<8>(&formula, what, &at),
         _ => Err(value_error(format!(
             "the system has {n} coordinates, where the exact Lagrangian is compiled for 1 to 8: write the system in Rust"
         ))),
-    })
+    })?
 }
 
 /// The position after a time h, and the smallest singular value of its derivative by the velocity.

@@ -9,6 +9,7 @@ mod ensemble;
 mod exact;
 mod looks;
 mod motion;
+mod path;
 mod run;
 mod signals;
 mod symbol;
@@ -35,6 +36,8 @@ mod _core {
     use crate::looks::{check, compare, geometry};
     #[pymodule_export]
     use crate::motion::Motion;
+    #[pymodule_export]
+    use crate::path::{PathRecord, search_path};
     #[pymodule_export]
     use crate::run::{Record, resume, run};
     #[pymodule_export]
@@ -66,8 +69,10 @@ fn catalogue() -> Vec<Entry> {
     CATALOGUE.iter().map(entry).collect()
 }
 
-/// The names of all integrators, with their orders.
+/// The names of all integrators that take formulas, which have no clock, with their orders.
 #[pyfunction]
 fn integrators() -> Vec<(String, u32)> {
-    AnyIntegrator::all().into_iter().map(|integrator| (integrator.to_string(), integrator.order())).collect()
+    let all =
+        AnyIntegrator::all().into_iter().filter(|integrator| !matches!(integrator, AnyIntegrator::Clocked { .. }));
+    all.map(|integrator| (integrator.to_string(), integrator.order())).collect()
 }

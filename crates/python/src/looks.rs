@@ -1,12 +1,13 @@
 //! What is looked at beside a motion: the geometry at a point, whether steps are contact, which integrator is the best.
 
-use crate::arrays::{number, numbers, value_error};
+use crate::arrays::{number, numbers, value_error, whole};
 use crate::motion::Motion;
-use crate::signals::Signals;
+use crate::signals::heard;
 use crate::system::System;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use runtime_herglotz::Start;
+use runtime_herglotz::{Interrupt, Start};
+use std::sync::atomic::Ordering;
 
 /// The contact geometry of a Lagrangian at a time and a point, by name.
 #[pyfunction]
@@ -39,8 +40,19 @@ type Checked = (String, f64, Vec<Place>, Vec<(String, String, f64)>, bool);
 
 /// Whether the steps of a motion are contact, and the theorems of the discrete theory on it.
 #[pyfunction]
-pub fn check(py: Python<'_>, motion: &Motion, places: usize) -> PyResult<Checked> {
-    let found = py.detach(|| motion.system.check(&motion.motion, places)).map_err(value_error)?;
+pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyResult<Checked> {
+    let places = whole("places", &places, 1)?;
+    // It works on threads of its own, which hear no signals.
+    let (found, raised) = heard(py, |ended| {
+        let ended = ended.clone();
+        let interrupt = Some(Interrupt::when(move || ended.load(Ordering::Relaxed)));
+        let asked = runtime_herglotz::Motion { interrupt, ..motion.motion.clone() };
+        motion.system.check(&asked, places)
+    })?;
+    if let Some(raised) = raised {
+        return Err(raised);
+    }
+    let found = found.map_err(value_error)?;
     let is_contact = found.is_contact();
     let place = |place: runtime_herglotz::Place| {
         let momenta = place.momenta.iter().map(|m| (m.momentum, m.predicted)).collect();
@@ -61,10 +73,9 @@ type Compared = (Vec<Work>, String, Vec<(String, String)>);
 /// Run time against error for all integrators that apply.
 #[pyfunction]
 pub fn compare(py: Python<'_>, motion: &Motion) -> PyResult<Compared> {
-    let mut signals = Signals::new();
-    let mut go_on = |_: f64| signals.look().is_continue();
+    let mut go_on = |_: f64| motion.signals.look().is_continue();
     let found = py.detach(|| motion.system.compare(&motion.motion, &mut go_on));
-    if let Some(raised) = signals.raised {
+    if let Some(raised) = motion.signals.take() {
         return Err(raised);
     }
     let found = found.map_err(value_error)?;

@@ -1,6 +1,7 @@
 //! What is asked of a motion.
 
-use crate::arrays::{number, numbers, value_error};
+use crate::arrays::{number, numbers, shown, value_error, whole, word};
+use crate::signals::Signals;
 use crate::system::System;
 use pyo3::prelude::*;
 use runtime_herglotz::{AnyIntegrator, Column, Direction, Event, Formula, Rate, Start, Steps, Way, When};
@@ -12,20 +13,25 @@ pub struct Motion {
     pub motion: runtime_herglotz::Motion,
     /// Whether the rows have the conformal factor.
     pub conformal_factor: bool,
+    /// What ends its plan and its runs.
+    pub signals: Signals,
 }
 
 /// The arguments accuracy, integrator, step and steps.
-pub type GivenWay<'py> = (Option<Bound<'py, PyAny>>, Option<String>, Option<Bound<'py, PyAny>>, Option<usize>);
+pub type GivenWay<'py> = [Option<Bound<'py, PyAny>>; 4];
 
 /// The way that arguments say.
-pub fn way((accuracy, integrator, step, steps): &GivenWay<'_>) -> PyResult<Way> {
+pub fn way([accuracy, integrator, step, steps]: &GivenWay<'_>) -> PyResult<Way> {
     /// What is computed to where nothing is said.
     const ACCURACY: f64 = 1e-9;
-    let by = integrator.as_deref().map(|name| name.parse::<AnyIntegrator>().map_err(value_error)).transpose()?;
-    let given = match (step, *steps) {
+    let named = |name: &Bound<'_, PyAny>| -> PyResult<AnyIntegrator> {
+        word("integrator", name, "\"gauss_8\"")?.parse().map_err(value_error)
+    };
+    let by = integrator.as_ref().map(named).transpose()?;
+    let given = match (step, steps) {
         (Some(_), Some(_)) => return Err(value_error("`step` and `steps` are both given: give one of them")),
         (Some(step), None) => Some(Steps::Size(number("step", step)?)),
-        (None, Some(count)) => Some(Steps::Count(count)),
+        (None, Some(count)) => Some(Steps::Count(whole("steps", count, 1)?)),
         (None, None) => None,
     };
     match (given, by, accuracy) {
@@ -74,19 +80,27 @@ fn named<T>(what: &str, text: &str, read: Result<T, runtime_herglotz::RuntimeErr
 }
 
 /// The text of an event, its direction, and whether it ends the motion.
-pub type GivenEvent = (String, String, bool);
+pub type GivenEvent<'py> = (String, Bound<'py, PyAny>, bool);
 
 /// The events that were asked for.
-pub fn events(given: Vec<GivenEvent>, formula: &Formula) -> PyResult<Vec<Event>> {
-    let read = |(text, direction, terminal): GivenEvent| {
+pub fn events(given: Vec<GivenEvent<'_>>, formula: &Formula) -> PyResult<Vec<Event>> {
+    let read = |(text, direction, terminal): GivenEvent<'_>| {
         let function = named("the event", &text, formula.expression(&text).map_err(Into::into))?;
-        let direction = match direction.as_str() {
-            "rising" => Direction::Rising,
-            "falling" => Direction::Falling,
-            "both" => Direction::Both,
-            other => {
+        let direction = match direction.extract::<String>().as_deref() {
+            Ok("rising") => Direction::Rising,
+            Ok("falling") => Direction::Falling,
+            Ok("both") => Direction::Both,
+            _ => {
+                let shown = direction.extract().map_or_else(|_| shown(&direction), |text: String| format!("{text:?}"));
+                // As SciPy has them.
+                let instead = match direction.extract::<f64>() {
+                    Ok(x) if x > 0.0 => ": write \"rising\"",
+                    Ok(x) if x < 0.0 => ": write \"falling\"",
+                    Ok(_) => ": write \"both\"",
+                    Err(_) => "",
+                };
                 return Err(value_error(format!(
-                    "the direction {other:?} of the event {text:?} is none of \"rising\", \"falling\", \"both\""
+                    "the direction {shown} of the event {text:?} is none of \"rising\", \"falling\", \"both\"{instead}"
                 )));
             }
         };
@@ -103,9 +117,9 @@ impl Motion {
         system: &System,
         start: (Bound<'_, PyAny>, Bound<'_, PyAny>, bool, Bound<'_, PyAny>),
         t: Bound<'_, PyAny>,
-        every: Option<usize>,
+        every: Option<Bound<'_, PyAny>>,
         way: GivenWay<'_>,
-        events: Vec<GivenEvent>,
+        events: Vec<GivenEvent<'_>>,
         columns: Vec<String>,
         conformal_factor: bool,
         estimate: bool,
@@ -129,6 +143,7 @@ impl Motion {
         }
         let times = times(&t)?;
         let (Some(&first), Some(&end)) = (times.first(), times.last()) else { return Err(no_times()) };
+        let every = every.map(|every| whole("every", &every, 1)).transpose()?;
         let rows = Some(every.map_or(When::At(times), When::Every));
         let way = self::way(&way)?;
         let mut all = self::columns(expected, conformal_factor);
@@ -137,20 +152,26 @@ impl Motion {
         }
         let events = self::events(events, formula)?;
         let start = Start { t: first, q, rate, z: number("z0", &z)? };
+        let signals = Signals::new();
         let motion = runtime_herglotz::Motion {
             rows,
             columns: all,
             events,
             conformal_factor,
             estimate,
+            interrupt: Some(signals.interrupt()),
             ..runtime_herglotz::Motion::new(start, end, way)
         };
-        Ok(Motion { system: system.inner.clone(), motion, conformal_factor })
+        Ok(Motion { system: system.inner.clone(), motion, conformal_factor, signals })
     }
 
     /// The plan in words, with the name of the integrator, the step, the number of steps and the predicted error.
     fn plan(&self, py: Python<'_>) -> PyResult<(String, String, f64, usize, Option<f64>)> {
-        let plan = py.detach(|| self.system.plan(&self.motion)).map_err(value_error)?;
+        let plan = py.detach(|| self.system.plan(&self.motion));
+        if let Some(raised) = self.signals.take() {
+            return Err(raised);
+        }
+        let plan = plan.map_err(value_error)?;
         Ok((plan.text, plan.integrator.name.into_owned(), plan.step_size, plan.steps, plan.error))
     }
 }

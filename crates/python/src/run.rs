@@ -5,7 +5,9 @@ use crate::motion::Motion;
 use crate::signals::Signals;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use runtime_herglotz::{Crossing, Interrupted, Outcome, Status, Watch, When};
+use runtime_herglotz::{
+    Crossing, INTERRUPTION, InputError, Interrupted, Outcome, Rate, RuntimeError, Status, Watch, When,
+};
 use std::ops::ControlFlow;
 
 /// Keeps the rows of a motion by their parts.
@@ -22,6 +24,8 @@ struct Kept {
     columns: Vec<f64>,
     crossings: Vec<Crossing>,
     signals: Signals,
+    /// What a signal's handler has raised.
+    raised: Option<PyErr>,
     /// Where a signal has ended it.
     halted: Option<Interrupted>,
 }
@@ -95,7 +99,7 @@ pub struct Record {
 #[pyfunction]
 pub fn run(py: Python<'_>, motion: &Motion) -> PyResult<Record> {
     let (mut kept, request) = (Kept::new(motion), &motion.motion);
-    let outcome = py.detach(|| motion.system.run(request, &mut kept)).map_err(value_error)?;
+    let outcome = py.detach(|| motion.system.run(request, &mut kept));
     record(py, motion, kept, outcome)
 }
 
@@ -108,8 +112,30 @@ pub fn resume(py: Python<'_>, motion: &Motion, halted: &[u8], at: f64) -> PyResu
         let onward = request.end >= request.start.t;
         times.retain(|t| if onward { *t > at } else { *t < at });
     }
-    let outcome = py.detach(|| motion.system.resume(&request, from, &mut kept)).map_err(value_error)?;
+    let outcome = py.detach(|| motion.system.resume(&request, from, &mut kept));
     record(py, motion, kept, outcome)
+}
+
+/// What is known of a motion whose plan was interrupted: its start, without rows.
+fn nothing_yet(motion: &Motion) -> Outcome {
+    let start = &motion.motion.start;
+    let p = match &start.rate {
+        Rate::Momentum(p) => Some(p.clone()),
+        Rate::Velocity(_) => motion.system.geometry(start).ok().map(|geometry| geometry.momentum),
+    };
+    Outcome {
+        status: Status::Stopped { step: 0, t: start.t, by: INTERRUPTION },
+        suspicion: None,
+        steps: 0,
+        t: start.t,
+        q: start.q.clone(),
+        p: p.unwrap_or_else(|| vec![f64::NAN; start.q.len()]),
+        v: None,
+        z: Some(start.z),
+        log_factor: None,
+        error_estimate: None,
+        evaluations: 0,
+    }
 }
 
 impl Kept {
@@ -127,13 +153,19 @@ impl Kept {
             log_factor: Vec::new(),
             columns: Vec::new(),
             crossings: Vec::new(),
-            signals: Signals::new(),
+            signals: motion.signals.clone(),
+            raised: None,
             halted: None,
         }
     }
 }
 
-fn record(py: Python<'_>, motion: &Motion, kept: Kept, outcome: Outcome) -> PyResult<Record> {
+fn record(py: Python<'_>, motion: &Motion, mut kept: Kept, outcome: Result<Outcome, RuntimeError>) -> PyResult<Record> {
+    kept.raised = motion.signals.take();
+    let outcome = match outcome {
+        Err(RuntimeError::Input(InputError::Interrupted)) if kept.raised.is_some() => nothing_yet(motion),
+        outcome => outcome.map_err(value_error)?,
+    };
     let n = kept.n;
     let own = crate::motion::columns(n, motion.conformal_factor).len();
     let extra = motion.motion.columns.len() - own;
@@ -152,12 +184,12 @@ fn record(py: Python<'_>, motion: &Motion, kept: Kept, outcome: Outcome) -> PyRe
         end: (outcome.t, outcome.q, outcome.p, outcome.z),
         status: outcome.status.to_string(),
         // A terminal event is what was asked for.
-        success: matches!(outcome.status, Status::Completed | Status::Stopped { .. }) && kept.signals.raised.is_none(),
+        success: matches!(outcome.status, Status::Completed | Status::Stopped { .. }) && kept.raised.is_none(),
         suspicion: outcome.suspicion.map(|suspicion| suspicion.to_string()),
         error_estimate: outcome.error_estimate,
         steps: outcome.steps,
         evaluations: outcome.evaluations,
         halted: kept.halted.map(|halted| halted.to_bytes()),
-        interrupted: kept.signals.raised.map(|raised| raised.into_value(py).into_any()),
+        interrupted: kept.raised.map(|raised| raised.into_value(py).into_any()),
     })
 }

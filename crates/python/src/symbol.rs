@@ -40,8 +40,8 @@ pub enum Operand {
 pub fn no_number() -> PyErr {
     PyTypeError::new_err(
         "control flow on a traced value: the function is called once, with symbols in place of numbers, so that `if`, `and`, \
-         `while`, `min`, `float` and the functions of `math` cannot see a value; write np.where(a < b, x, y) or hz.where, \
-         np.minimum, np.maximum, and functions of NumPy",
+         `while`, `min`, `float`, the functions of `math` and splines of SciPy cannot see a value; write np.where(a < b, x, y) or \
+         hz.where, np.minimum, np.maximum, and functions of NumPy; a spline as its pieces by hz.where, np.polyval or np.interp",
     )
 }
 
@@ -292,8 +292,9 @@ impl Symbol {
     /// A function of one number by the name that NumPy has for it.
     #[pyo3(name = "apply")]
     fn apply_named(&self, name: &str) -> PyResult<Symbol> {
-        self.named(name)
-            .unwrap_or_else(|| Err(PyTypeError::new_err(format!("np.{name} is not known of a traced value"))))
+        self.named(name).unwrap_or_else(|| {
+            Err(PyTypeError::new_err(format!("np.{name} is not known of a traced value: write it out")))
+        })
     }
 
     /// A function of two numbers by the name that NumPy has for it.
@@ -304,7 +305,7 @@ impl Symbol {
             "maximum" => Operation::Max,
             "arctan2" => Operation::Atan2,
             "hypot" => Operation::Hypot,
-            _ => return Err(PyTypeError::new_err(format!("np.{name} is not known of a traced value"))),
+            _ => return Err(PyTypeError::new_err(format!("np.{name} is not known of a traced value: write it out"))),
         };
         self.binary(operation, other, turned)
     }

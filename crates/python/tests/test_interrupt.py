@@ -107,3 +107,106 @@ def test_other_threads_run_meanwhile():
     done.set()
     thread.join()
     assert len(ticks) > 10
+
+
+def heard_within(seconds, asked, error=KeyboardInterrupt, after=0.4):
+    """What is raised by a computation of minutes when Ctrl-C is pressed: within so many seconds."""
+    press(after)
+    begin = time.monotonic()
+    with pytest.raises(error) as caught:
+        asked()
+    assert time.monotonic() - begin < seconds
+    return caught.value
+
+
+# Its trial runs take some seconds, and find nothing.
+COSTLY = dict(
+    L="x'^2/2 - x^2/2 - x^4/10 - x'^2*x^2/10", q0=[1.0], v0=[0.0], t=200_000.0, accuracy=1e-9, coordinates=["x"]
+)
+WEAK = dict(coordinates=["theta"], parameters={"gamma": -1e-9})
+
+
+def test_ctrl_c_is_heard_in_trial_runs():
+    caught = heard_within(2.0, lambda: hz.solve(**COSTLY), hz.Interrupted)
+    sol = caught.solution
+    assert not sol.success and sol.t_end == 0.0 and sol.steps == 0 and len(sol.t) == 0
+    # What was asked for begins anew.
+    rest = heard_within(2.0, sol.resume, hz.Interrupted)
+    assert rest.solution.t_end == 0.0
+
+
+def test_ctrl_c_is_heard_in_a_plan():
+    kept = hz.solve(**COSTLY | dict(t=1.0))
+    kept._request = (kept._request[0], COSTLY["t"], *kept._request[2:])
+    kept._plan = None
+    heard_within(2.0, lambda: kept.plan)
+
+
+def test_ctrl_c_is_heard_in_a_check():
+    heard_within(2.0, lambda: hz.check(**COSTLY))
+    heard_within(2.0, lambda: hz.check(PENDULUM, [1.0], [0.0], 1e6, integrator="gauss_2", steps=100_000_000, **WEAK))
+
+
+def test_ctrl_c_is_heard_in_the_trial_runs_of_a_comparison():
+    heard_within(2.0, lambda: hz.compare(**{name: x for name, x in COSTLY.items() if name != "accuracy"}))
+
+
+def test_ctrl_c_is_heard_in_an_estimate():
+    """The run with half of the steps takes twice as long as that which comes before it."""
+    asked = dict(integrator="gauss_2", steps=5_000_000, **WEAK)
+    begin = time.monotonic()
+    hz.solve(PENDULUM, [1.0], [0.0], 5e4, **asked)
+    first = time.monotonic() - begin
+    after = 1.3 * first
+    caught = heard_within(
+        after + 0.5 * first, lambda: hz.solve(PENDULUM, [1.0], [0.0], 5e4, estimate=True, **asked), hz.Interrupted, after
+    )
+    assert caught.solution.t_end == 5e4 and caught.solution.error_estimate == np.inf
+
+
+def test_ctrl_c_is_heard_in_dense_output():
+    sol = hz.solve(PENDULUM, [1.0], [0.0], 1e3, integrator="gauss_2", steps=20_000, **WEAK)
+    sol(1.0)
+    # Some ten seconds.
+    many = np.linspace(0.0, 1e3, 300_000)
+    heard_within(2.0, lambda: sol(many))
+
+
+def test_ctrl_c_is_heard_in_the_exponential():
+    # Some ten seconds.
+    heard_within(1.5, lambda: hz.exponential(PENDULUM, 1e5, [1.0], [0.0], **WEAK))
+
+
+@pytest.mark.parametrize("events", [(), "theta"], ids=["plain", "events"])
+@pytest.mark.parametrize("integrator", ["gauss_2", "strang", "midpoint"])
+def test_ctrl_c_is_heard_in_an_ensemble_of_long_members(integrator, events):
+    """The members that were done before are kept."""
+    count = 40
+    ends = np.full((count, 1), 1.0)
+    # Those of no steps to speak of come first: a terminal event.
+    stop = [hz.Event("theta - 3", terminal=True)]
+    q = ends.copy()
+    v = ends.copy()
+    v[:8] = 50.0
+    asked = dict(integrator=integrator, step=1e-3, coordinates=["theta"], parameters={"gamma": -1e-9}, threads=2)
+    if events:
+        asked["events"] = stop
+    caught = heard_within(4.0, lambda: hz.ensemble(PENDULUM, q, v, 1e6, **asked), hz.Interrupted)
+    found = caught.solution
+    assert len(found) == count and not found.success[-1] and np.isnan(found.t[-1]) | (found.t[-1] < 1e6)
+    assert all("interrupted" in found.troubles[i] for i in range(count) if not found.success[i])
+    if events:
+        assert found.success[:8].all() and np.allclose(found.q[:8], 3.0) and not found.success[8:].any()
+
+
+def test_the_finished_members_are_kept():
+    count = 3_000
+    many = np.linspace(0.5, 1.5, count).reshape(-1, 1)
+    asked = dict(integrator="gauss_2", step=1e-2, coordinates=["theta"], parameters={"gamma": -1e-3 * np.ones(count)})
+    caught = heard_within(5.0, lambda: hz.ensemble(PENDULUM, many, many, 1e3, **asked), hz.Interrupted, after=3.0)
+    found = pickle.loads(pickle.dumps(caught)).solution
+    done = int(np.sum(found.success))
+    assert 0 < done < count and found.success[0]
+    # To the last bit what they are by themselves.
+    first = hz.ensemble(PENDULUM, many[:1], many[:1], 1e3, **asked | dict(parameters={"gamma": [-1e-3]}))
+    assert found.q[0] == first.q[0] and np.isnan(found.q[~found.success & np.isnan(found.t)]).all()

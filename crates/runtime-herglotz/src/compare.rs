@@ -1,8 +1,9 @@
 //! Run time against error on a motion, for all integrators that apply.
 
-use crate::{Motion, Outcome, RuntimeError, System, Way};
+use crate::{Interrupt, Motion, Outcome, RuntimeError, System, Watch, Way};
 use contact_geom::largest;
 use discrete_herglotz::{AnyIntegrator, InputError, Steps};
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 /// The errors that are asked of the reference, until one is had.
@@ -52,7 +53,7 @@ pub struct Comparison {
     pub reference: String,
     /// The error of the reference: its distance from a run by half as many steps.
     pub reference_error: f64,
-    /// Integrators that do not apply, and why.
+    /// Integrators that do not apply, and why; not those by a clock, which no formula states.
     pub left_out: Vec<(String, String)>,
     /// Whether it was ended before all integrators were tried.
     pub ended: bool,
@@ -73,6 +74,15 @@ fn apart(a: &Outcome, b: &Outcome) -> f64 {
     if square == 0.0 { 0.0 } else { (square / size).sqrt() }
 }
 
+/// Ends a run that is to be interrupted.
+struct Asking<'i>(Option<&'i Interrupt>);
+
+impl Watch for Asking<'_> {
+    fn poll(&mut self, _part: f64) -> ControlFlow<()> {
+        if self.0.is_some_and(Interrupt::is_wanted) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
 impl System {
     /// Runs a motion by all integrators that apply, with steps from long to short, and measures time and error of each. Of `motion` the start
     /// and the end are taken. `progress` is told the part that is done; `false` ends it there. Steps are halved until round-off, or until
@@ -81,7 +91,11 @@ impl System {
     /// # Errors
     /// Those of the reference, which is by contact Gauss collocation with 16 stages.
     pub fn compare(&self, motion: &Motion, progress: &mut dyn FnMut(f64) -> bool) -> Result<Comparison, RuntimeError> {
-        let bare = |way: Way| Motion { action: false, ..Motion::new(motion.start.clone(), motion.end, way) };
+        let bare = |way: Way| Motion {
+            action: false,
+            interrupt: motion.interrupt.clone(),
+            ..Motion::new(motion.start.clone(), motion.end, way)
+        };
         let by = AnyIntegrator::Gauss { stages: 16 };
         let mut count = Err(RuntimeError::from(InputError::NoSteps));
         for wanted in REFERENCES {
@@ -93,8 +107,9 @@ impl System {
             }
         }
         let (count, span) = (count?, motion.end - motion.start.t);
-        let run =
-            |by: AnyIntegrator, count: usize| self.run(&bare(Way::Steps { by, steps: Steps::Count(count) }), &mut ());
+        let run = |by: AnyIntegrator, count: usize| {
+            self.run(&bare(Way::Steps { by, steps: Steps::Count(count) }), &mut Asking(motion.interrupt.as_ref()))
+        };
         let (coarse, reference) = (run(by, count)?, run(by, 2 * count)?);
         let reference_error = apart(&coarse, &reference);
         let mut comparison = Comparison {
@@ -114,8 +129,12 @@ impl System {
                 comparison.ended = true;
                 return Ok(comparison);
             }
+            // No formula states a clock.
+            if let AnyIntegrator::Clocked { .. } = by {
+                continue;
+            }
             if let Err(why) = self.check_integrator(by) {
-                comparison.left_out.push((by.to_string(), why.to_string()));
+                comparison.left_out.push((by.to_string(), RuntimeError::from(why).to_string()));
                 continue;
             }
             // So long that the reference would need as many evaluations.

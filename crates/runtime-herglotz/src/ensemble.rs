@@ -1,6 +1,6 @@
 //! Many motions of one formula.
 
-use crate::{Column, Crossing, Event, RuntimeError, Start, System, Way, When};
+use crate::{Column, Crossing, Event, Interrupt, RuntimeError, Start, System, Way, When};
 use discrete_herglotz::{InputError, Status, Suspicion, Tally};
 use std::ops::ControlFlow;
 
@@ -77,6 +77,11 @@ pub struct Ending {
 pub trait EnsembleWatch {
     /// A member at its end; `Break` ends the ensemble after the members under way.
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()>;
+
+    /// Whether the members under way are to end: asked on the threads of their runs, where [`poll`](Self::poll) waits for them.
+    fn interrupt(&self) -> Option<Interrupt> {
+        None
+    }
 
     /// Is called every few thousand members, or fewer where each has rows, events or parameters of its own, or where they take long.
     fn poll(&mut self) -> ControlFlow<()> {

@@ -12,10 +12,10 @@ pub enum RuntimeError {
     #[error(transparent)]
     Formula(#[from] FormulaError),
     /// The start, the span, the integrator or the steps.
-    #[error(transparent)]
+    #[error("{}", in_words(.0))]
     Input(#[from] InputError),
     /// What holds for all members of an ensemble, or for one of them.
-    #[error(transparent)]
+    #[error("{}", of_ensemble(.0))]
     Ensemble(#[from] EnsembleError),
     /// A point at which the geometry is not defined.
     #[error(transparent)]
@@ -78,4 +78,40 @@ pub enum RuntimeError {
         /// All known.
         known: String,
     },
+}
+
+/// What is wrong with a run, to those who have written a formula or a function: what is proved of it cannot be claimed, it states no clock, and they
+/// know no names of Rust.
+pub fn in_words(error: &InputError) -> String {
+    match error {
+        InputError::Unclaimed { claim } => {
+            let claim = match *claim {
+                "separable" => "separable (a kinetic part of the velocities and a potential of the positions, with no product of both)",
+                "quadratic" => "quadratic (so that its equation is linear)",
+                "z_affine" => "affine in z (with the drag that it says proportional to z)",
+                "constant_rate" => "of constant rate (with a derivative by z that is a number)",
+                "constant_mass" => "of constant mass (with kinetic energy whose coefficients are numbers)",
+                "autonomous" => "autonomous (without t)",
+                "z_free" => "free of z",
+                other => other,
+            };
+            format!("the Lagrangian is not {claim}, as this integrator needs; take another integrator")
+        }
+        InputError::Hypothesis { hypothesis } if hypothesis.contains("clock") => {
+            "the integrator needs a clock, which Lagrangians by a formula or a function do not have; take another integrator".to_owned()
+        }
+        InputError::Hypothesis { hypothesis } => format!("the integrator needs {hypothesis}; take another integrator"),
+        InputError::Unsaved => "this integrator's motion cannot be saved on the way; take another integrator".to_owned(),
+        InputError::NoIntegrator => "steps are given without an integrator; name one".to_owned(),
+        InputError::NoSteps => "neither steps nor an accuracy are given; give one".to_owned(),
+        error => error.to_string(),
+    }
+}
+
+/// The same of an ensemble.
+fn of_ensemble(error: &EnsembleError) -> String {
+    match error {
+        EnsembleError::Member { index, cause } => format!("member {index}: {}", in_words(cause)),
+        error => error.to_string(),
+    }
 }

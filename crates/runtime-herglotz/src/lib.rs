@@ -25,6 +25,7 @@ mod compare;
 mod ensemble;
 mod error;
 mod geometry;
+mod interrupt;
 mod kernel;
 mod outcome;
 mod parameters;
@@ -36,8 +37,9 @@ pub use check::{CONTACT, Check, MomentumThere, Place, Stated};
 pub use column::{Column, velocity_name};
 pub use compare::{Comparison, Work};
 pub use ensemble::{Ending, Ensemble, EnsembleWatch, MemberEnd, Varied};
-pub use error::RuntimeError;
+pub use error::{RuntimeError, in_words};
 pub use geometry::Geometry;
+pub use interrupt::Interrupt;
 pub use outcome::{Crossing, Outcome, Plan, Watch};
 pub use parameters::check_parameters;
 pub use request::{Direction, Event, Motion, Rate, Start, Way, When};
@@ -45,6 +47,7 @@ pub use system::{SeenSymmetry, System};
 
 pub use contact_geom::{Statement, Structure};
 pub use discrete_herglotz::{
-    AnyIntegrator, Facts, InputError, Interrupted, Item, Status, Steps, Suspicion, Tally, UnknownIntegrator,
+    AnyIntegrator, Facts, INTERRUPTION, InputError, Interrupted, Item, Status, Steps, Suspicion, Tally,
+    UnknownIntegrator,
 };
 pub use formula_lagrangian::{Expression, Formula, FormulaError, Graph, ParseError, Symbol, Symbols, nearest_name};

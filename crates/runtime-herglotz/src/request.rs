@@ -1,6 +1,6 @@
 //! What is asked of a motion.
 
-use crate::Column;
+use crate::{Column, Interrupt};
 use discrete_herglotz::{AnyIntegrator, Steps};
 use formula_lagrangian::Expression;
 
@@ -122,6 +122,8 @@ pub struct Motion {
     pub nodes: bool,
     /// Whether it is refused where it could not be interrupted and [resumed](crate::System::resume).
     pub resumable: bool,
+    /// Whether its plan, its check or its comparison is to end; the motion itself is ended by its [`Watch`](crate::Watch).
+    pub interrupt: Option<Interrupt>,
 }
 
 impl Motion {
@@ -139,6 +141,7 @@ impl Motion {
             estimate: false,
             nodes: false,
             resumable: false,
+            interrupt: None,
         }
     }
 }

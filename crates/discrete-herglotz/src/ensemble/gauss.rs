@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::judge::Judge;
-use super::lane::{Lane, Wants};
+use super::lane::{Lane, Wants, interrupted};
 use super::pack::Pack;
 use super::twofold::{Pair, Summed};
 use crate::gauss::FEW;
@@ -12,9 +12,10 @@ use crate::gauss::coefficients::{Coefficients, MOST};
 use crate::gauss::condensed::Condensed;
 use crate::gauss::instructions::Instructions;
 use crate::gauss::resolution::{MOVED, of_sigma};
+use crate::run::interrupt::BETWEEN;
 use crate::run::watch::ROUNDED;
 use crate::splitting::separable::SeparableForm;
-use crate::{InputError, StepError};
+use crate::{InputError, Interrupt, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use num_traits::{One, Zero};
@@ -33,6 +34,7 @@ pub(super) struct GaussPacks<'a, L, const N: usize> {
     t0: f64,
     h: f64,
     steps: usize,
+    interrupt: Option<Interrupt<'a>>,
 }
 
 /// What a step multiplies with, in two parts where it acts in the same direction in every step.
@@ -107,7 +109,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
             return Err(InputError::Step { h });
         }
         let table = Box::new(Table::new(&condensed));
-        Ok(GaussPacks { form, table, t0, h, steps })
+        Ok(GaussPacks { form, table, t0, h, steps, interrupt: None })
     }
 
     /// Takes all steps of some motions, in place, with a state recorded after each `rows` of them. One whose steps could not be solved, or
@@ -173,7 +175,12 @@ struct Moving<S: Simd, const K: usize, const N: usize> {
     doubt: Pack<S, K>,
 }
 
-impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
+impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
+    /// The same with a question that is asked from time to time: then no member is finished.
+    pub fn with_interrupt(self, interrupt: Option<Interrupt<'a>>) -> Self {
+        Self { interrupt, ..self }
+    }
+
     #[inline(always)]
     fn all<S: Simd, const K: usize, const ACTION: bool>(&self, lanes: &mut [Lane<N>], stride: usize) {
         let width = Pack::<S, K>::COUNT;
@@ -184,6 +191,10 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
                 moving.push(self.start::<S, K>(own));
             }
             for k in 0..self.steps {
+                if k % BETWEEN == 0 && self.interrupt.is_some_and(Interrupt::is_wanted) {
+                    interrupted(some);
+                    break;
+                }
                 self.step::<S, K, ACTION>(&mut moving, self.t0 + k as f64 * self.h, k > 0);
                 let taken = k + 1;
                 if taken % stride == 0 || taken == self.steps {

@@ -48,3 +48,8 @@ impl<const N: usize> Lane<N> {
 fn row<const N: usize>(t: f64, PhasePoint { q, p, z }: PhasePoint<N>, action: bool) -> Row<N> {
     Row { t, q, v: None, p, z: action.then_some(z), energy: None, log_factor: None, columns: Vec::new() }
 }
+
+/// Marks members as not finished: each then has a run of its own, which says how far it has come.
+pub(super) fn interrupted<const N: usize>(some: &mut [Lane<N>]) {
+    some.iter_mut().for_each(|lane| lane.state.z = f64::NAN);
+}

@@ -27,7 +27,9 @@ use crate::gauss::lanes::{branched, forget_branches};
 use crate::run::may_drift;
 use crate::run::{digest, rows};
 use crate::switching::has_switching_functions;
-use crate::{GaussCollocation, InputError, Integrator, Observer, Rows, SplittingScheme, Start, Status, Steps, Until};
+use crate::{
+    GaussCollocation, InputError, Integrator, Interrupt, Observer, Rows, SplittingScheme, Start, Status, Steps, Until,
+};
 use accuracy::Length;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
 use gauss::GaussPacks;
@@ -106,6 +108,7 @@ pub struct Ensemble<'a, L, const N: usize> {
     threads: Option<usize>,
     instructions: Instructions,
     checkpoint: Option<PathBuf>,
+    interrupt: Option<Interrupt<'a>>,
     progress: Option<Box<dyn Fn(f64) + 'a>>,
 }
 
@@ -141,6 +144,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
             threads: None,
             instructions: Instructions::new(),
             checkpoint: None,
+            interrupt: None,
             progress: None,
         }
     }
@@ -188,6 +192,12 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
     /// With a function that is told, on the thread of the caller, which part of the members is done.
     pub fn progress(self, tell: impl Fn(f64) + 'a) -> Self {
         Ensemble { progress: Some(Box::new(tell)), ..self }
+    }
+
+    /// With a question that is asked from time to time: once it is true, the members under way and those that follow end where they are, with a
+    /// [`Status::Stopped`] by an [`INTERRUPTION`](crate::INTERRUPTION), or with [`InputError::Interrupted`] where they have not begun.
+    pub fn with_interrupt(self, interrupt: Interrupt<'a>) -> Self {
+        Ensemble { interrupt: Some(interrupt), ..self }
     }
 
     /// Only with these instructions.
@@ -262,10 +272,12 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         let (mut planned, mut refused) = (None, None);
         for index in self.sample() {
             let (lagrangian, start) = (self.members)(index);
-            match common.plan(integrator, lagrangian, start) {
+            match common.plan(integrator, lagrangian, start, self.interrupt) {
                 Ok(plan) if planned.is_some_and(|(_, most): (usize, (f64, usize))| plan.1 <= most.1) => {}
                 Ok(plan) => planned = Some((index, plan)),
-                Err(cause @ InputError::FalseClaim { .. }) => return Err(EnsembleError::Member { index, cause }),
+                Err(cause @ (InputError::FalseClaim { .. } | InputError::Interrupted)) => {
+                    return Err(EnsembleError::Member { index, cause });
+                }
                 Err(cause) => refused = refused.or(Some(EnsembleError::Member { index, cause })),
             }
         }
@@ -274,13 +286,23 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         if length.wanted().is_some() && integrator.in_lanes().is_some() {
             let length = Length::Given(Steps::Count(plan.1 + plan.1.div_ceil(8)));
             let (lagrangian, start) = (self.members)(index);
-            plan = Common { length, ..common }.plan(integrator, lagrangian, start).map_err(refused)?;
+            plan = Common { length, ..common }.plan(integrator, lagrangian, start, self.interrupt).map_err(refused)?;
         }
         rows::check(common.rows_of(plan.1).saturating_mul(self.count.min(SHARD))).map_err(refused)?;
         let (members, count, instructions, watched) =
             (&*self.members, self.count, self.instructions, self.watched && length.wanted().is_none());
-        let mut task =
-            Task { members, count, instructions, watched, integrator, common, plan, kernels: None, fingerprint: 0 };
+        let mut task = Task {
+            members,
+            count,
+            instructions,
+            watched,
+            integrator,
+            common,
+            plan,
+            interrupt: self.interrupt,
+            kernels: None,
+            fingerprint: 0,
+        };
         task.fingerprint = task.fingerprint_of(self.sample());
         if self.shared {
             let (lagrangian, start) = members(index);
@@ -326,6 +348,7 @@ struct Task<'e, 'a, L, const N: usize> {
     common: Common<L, N>,
     /// The step, and how many.
     plan: (f64, usize),
+    interrupt: Option<Interrupt<'a>>,
     /// Those of all members, where they have one Lagrangian.
     kernels: Option<[Kernel<'a, L, N>; 2]>,
     fingerprint: u64,
@@ -356,12 +379,14 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         }
         let kernel = match self.integrator.in_lanes() {
             Some(InLanes::Splitting(scheme)) if structure.separable && structure.is_affine_in_z() => {
-                SplittingPacks::new(lagrangian, &scheme, plan, self.common.t0, state).map(Kernel::Splitting)
+                SplittingPacks::new(lagrangian, &scheme, plan, self.common.t0, state)
+                    .map(|packs| Kernel::Splitting(packs.with_interrupt(self.interrupt)))
             }
             Some(InLanes::Gauss(GaussCollocation { stages }))
                 if structure.separable && structure.has_constant_rate() =>
             {
-                GaussPacks::new(lagrangian, stages, plan, self.common.t0, state).map(Kernel::Gauss)
+                GaussPacks::new(lagrangian, stages, plan, self.common.t0, state)
+                    .map(|packs| Kernel::Gauss(packs.with_interrupt(self.interrupt)))
             }
             _ => Ok(Kernel::OneByOne),
         };
@@ -406,7 +431,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
     /// Runs a member by itself, under the eyes of an observer.
     fn by_itself(&self, index: usize, observer: Option<&mut impl Observer<N>>) -> Member<N> {
         let (lagrangian, start) = (self.members)(index);
-        self.common.run(self.integrator, lagrangian, (index, start), observer)
+        self.common.run(self.integrator, lagrangian, (index, start), observer, self.interrupt)
     }
 
     /// Runs the members of a shard.
@@ -490,7 +515,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         for ((_, start), (member, _)) in starts.iter().zip(members.iter_mut().zip(done)).filter(|(_, (_, done))| !done)
         {
             let of = (member.index, *start);
-            *member = self.common.run(self.integrator, lagrangian, of, None::<&mut Rows<'_, N>>);
+            *member = self.common.run(self.integrator, lagrangian, of, None::<&mut Rows<'_, N>>, self.interrupt);
         }
         in_lanes
     }

@@ -2,7 +2,10 @@
 
 use super::accuracy::Length;
 use super::member::{Ending, Member};
-use crate::{Facts, InLanes, InputError, Integrator, Observer, Plan, Problem, Rows, Run, Start, Stepper, Until, Wants};
+use crate::run::interrupt::Asking;
+use crate::{
+    Facts, InLanes, InputError, Integrator, Interrupt, Observer, Plan, Problem, Rows, Run, Start, Stepper, Until, Wants,
+};
 use contact_geom::Lagrangian;
 
 /// The integrator of an ensemble, for as long as a run of one member lasts.
@@ -27,7 +30,11 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
         wants: Wants,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
         let Problem { t0, start, state, structure, .. } = *problem;
-        self.integrator.stepper(&Problem { lagrangian: self.lagrangian, t0, start, state, structure }, h, wants)
+        self.integrator.stepper(
+            &Problem { lagrangian: self.lagrangian, t0, start, state, structure, interrupt: None },
+            h,
+            wants,
+        )
     }
 
     fn in_lanes(&self) -> Option<InLanes> {
@@ -60,9 +67,10 @@ impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
         integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
         lagrangian: &'a L,
         start: Start<N>,
+        interrupt: Option<Interrupt<'a>>,
         then: impl FnOnce(Run<'_, '_, L, N>) -> Result<R, InputError>,
     ) -> Result<R, InputError> {
-        let problem = Problem::new(lagrangian, self.t0, start)?;
+        let problem = Problem { interrupt, ..Problem::new(lagrangian, self.t0, start)? };
         let run = self.length.of(problem.by(OfMember { integrator, lagrangian }));
         then(if self.action { run } else { run.without_action() })
     }
@@ -74,9 +82,14 @@ impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
         lagrangian: &'a L,
         (index, start): (usize, Start<N>),
         observer: Option<&mut impl Observer<N>>,
+        interrupt: Option<Interrupt<'a>>,
     ) -> Member<N> {
-        let mut rows = Vec::new();
-        let outcome = self.with(integrator, lagrangian, start, |run| {
+        let (mut rows, mut asking) = (Vec::new(), interrupt.map(Asking));
+        let outcome = self.with(integrator, lagrangian, start, interrupt, |run| {
+            let run = match &mut asking {
+                Some(asking) => run.observe(asking),
+                None => run,
+            };
             let recorded = self.rows.map(Rows::every).transpose()?;
             let mut recorded = recorded.map(|rows| if self.action { rows } else { rows.without_action() });
             let run = match observer {
@@ -104,8 +117,9 @@ impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
         integrator: &(dyn Integrator<'a, L, N> + Sync + 'a),
         lagrangian: &'a L,
         start: Start<N>,
+        interrupt: Option<Interrupt<'a>>,
     ) -> Result<(f64, usize), InputError> {
-        self.with(integrator, lagrangian, start, |run| {
+        self.with(integrator, lagrangian, start, interrupt, |run| {
             let plan: Plan<'_, L, N> = run.plan(self.until)?;
             Ok((plan.step_size(), plan.count()))
         })

@@ -1,13 +1,14 @@
 //! Splittings with trajectories in lanes.
 
-use super::lane::{Lane, Wants};
+use super::lane::{Lane, Wants, interrupted};
 use super::pack::Pack;
 use crate::gauss::instructions::Instructions;
+use crate::run::interrupt::BETWEEN;
 use crate::run::watch::ROUNDED;
 use crate::splitting::drag::{Drag, Drift};
 use crate::splitting::linear_drag::{Stage, SubstepTable};
 use crate::splitting::separable::SeparableForm;
-use crate::{InputError, SplittingScheme};
+use crate::{InputError, Interrupt, SplittingScheme};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, largest};
 use pulp::{Simd, WithSimd};
@@ -22,6 +23,7 @@ pub(super) struct SplittingPacks<'a, L, const N: usize> {
     h: f64,
     t0: f64,
     steps: usize,
+    interrupt: Option<Interrupt<'a>>,
 }
 
 /// A look at one drift of each step, the longest: whether it resolves the motion.
@@ -73,7 +75,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         let drag = Drag::of(&form, t0, state)?;
         let table = SubstepTable::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
         let look = Look::new(&table);
-        Ok(SplittingPacks { form, drag, table, look, h, t0, steps })
+        Ok(SplittingPacks { form, drag, table, look, h, t0, steps, interrupt: None })
     }
 
     /// Whether a run of its own would compensate the sums of a motion.
@@ -162,7 +164,12 @@ impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
     }
 }
 
-impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
+impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
+    /// The same with a question that is asked from time to time: then no member is finished.
+    pub fn with_interrupt(self, interrupt: Option<Interrupt<'a>>) -> Self {
+        Self { interrupt, ..self }
+    }
+
     #[inline(always)]
     fn all<S: Simd, const K: usize, const ACTION: bool, const WATCH: bool>(
         &self,
@@ -176,23 +183,27 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
             for (own, m) in some.chunks(width).zip(moving.iter_mut()) {
                 *m = Moving::from_lanes(own);
             }
-            self.take_steps::<S, K, ACTION, WATCH>(moving, stride, |t, w, at| {
+            let whole = self.take_steps::<S, K, ACTION, WATCH>(moving, stride, |t, w, at| {
                 for (i, lane) in some.iter_mut().skip(w * width).take(width).enumerate() {
                     lane.reach(t, at.state(i));
                     lane.doubtful = at.doubt.lanes()[i] != 0.0;
                 }
             });
+            if !whole {
+                interrupted(some);
+            }
         }
     }
 
-    /// The operations of a single run, in its order. What is reached after each stride, and at the end, is handed on.
+    /// The operations of a single run, in its order. What is reached after each stride, and at the end, is handed on. Whether it came to its
+    /// end: false where it was interrupted.
     #[inline(always)]
     fn take_steps<S: Simd, const K: usize, const ACTION: bool, const WATCH: bool>(
         &self,
         moving: &mut [Moving<S, K, N>],
         stride: usize,
         mut reach: impl FnMut(f64, usize, &Moving<S, K, N>),
-    ) {
+    ) -> bool {
         let SplittingPacks { t0, h, steps, .. } = self;
         let mut table = Cow::Borrowed(&self.table);
         for m in moving.iter_mut() {
@@ -202,6 +213,9 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
         while taken < *steps {
             let next = taken.saturating_add(stride).min(*steps);
             for k in taken..next {
+                if k % BETWEEN == 0 && self.interrupt.is_some_and(Interrupt::is_wanted) {
+                    return false;
+                }
                 let t = t0 + k as f64 * h;
                 self.set_time(&mut table, t);
                 let stages = if k == 0 { &table.first } else { &table.joined };
@@ -230,6 +244,7 @@ impl<L: Lagrangian<N>, const N: usize> SplittingPacks<'_, L, N> {
                 reach(t0 + taken as f64 * h, w, &at);
             }
         }
+        true
     }
 
     /// Looks at the drift, by the force before it.

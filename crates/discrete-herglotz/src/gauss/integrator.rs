@@ -56,7 +56,7 @@ impl GaussCollocation {
         h: f64,
         Wants { action, watched }: Wants,
     ) -> Result<GaussStepper<'a, L, N>, InputError> {
-        let Problem { lagrangian, t0, start, state, structure } = *problem;
+        let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
         let products = products(self.stages, h)?;
         let run = GaussStepper::new(lagrangian, products, Some(structure), t0, state, start.v, action)?;
         Ok(if watched { run.doubting() } else { run })
@@ -70,7 +70,7 @@ impl ClockedGauss {
         problem: &Problem<'a, L, N>,
         h: f64,
     ) -> Result<ClockedStepper<'a, L, OwnClock<'a, L>, N>, InputError> {
-        let Problem { lagrangian, t0, start, state, structure } = *problem;
+        let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
         let (products, clock) = (products(self.stages, h)?, OwnClock(lagrangian));
         ClockedStepper::new(lagrangian, products, clock, Some(structure), t0, state, start.v)
     }

@@ -308,7 +308,8 @@ fn converge<L: Lagrangian<N>, const N: usize>(
     let first = k.max(LONG / UNEVEN);
     let mut marks = marks_of(k);
     let (mut best, mut strikes, mut narrows, mut halts) = (f64::INFINITY, 0, 0, (0, 0.0));
-    let mut cause = Obstacle::Budget;
+    // The smallest distance of two runs, whatever a third one says; and what keeps them from agreeing.
+    let (mut nearest, mut cause) = (f64::INFINITY, Obstacle::Budget);
     // The finer of the last two runs, and their distance.
     let (mut known, mut before): (Option<Track<N>>, f64) = (None, f64::NAN);
     let (mut guessed, mut rough) = (false, false);
@@ -341,8 +342,14 @@ fn converge<L: Lagrangian<N>, const N: usize>(
                     continue;
                 }
                 PilotEnd::Elsewhere(elsewhere) => return Err(Ended::Elsewhere(elsewhere)),
+                PilotEnd::Interrupted => return Err(InputError::Interrupted.into()),
                 PilotEnd::Exhausted => {
-                    return refuse(wanted, best, if best.is_finite() { Obstacle::Budget } else { cause });
+                    let told = matches!(cause, Obstacle::Misfit { .. } | Obstacle::Hidden { .. });
+                    return refuse(
+                        wanted,
+                        nearest,
+                        if nearest.is_finite() && !told { Obstacle::Budget } else { cause },
+                    );
                 }
                 PilotEnd::Narrow { part } => {
                     narrows += 1;
@@ -396,21 +403,25 @@ fn converge<L: Lagrangian<N>, const N: usize>(
             });
         }
         rough |= !falls || hidden.is_some();
+        let apart = error;
         let error = larger(error, hidden.unwrap_or(0.0));
         strikes = if error < 0.5 * best { 0 } else { strikes + 1 };
-        cause = if !falls {
+        cause = if !falls && agreed {
+            Obstacle::Misfit { misfit: fine.misfit, order }
+        } else if !falls {
             Obstacle::Order { order }
+        } else if let Some(distance) = hidden {
+            Obstacle::Hidden { distance }
         } else if before.is_nan() {
             // The first two runs show no order, and are the last if others would cost too much.
             Obstacle::Budget
-        } else if hidden.is_some() {
-            Obstacle::Order { order: (before / error).log2() }
         } else if fine.has_underflown() {
             Obstacle::RoundOff
         } else {
             obstacle(&distances, (before / error).log2(), wanted, t0, span)
         };
         (best, before) = (if error < best { error } else { best }, error);
+        nearest = if apart < nearest { apart } else { nearest };
         // Not begun, if it cannot end.
         let affordable = pilots.left.max(pilots.reserve);
         if strikes == 3 || 2 * (left - pilots.reserve) > affordable {
@@ -419,7 +430,7 @@ fn converge<L: Lagrangian<N>, const N: usize>(
         known = Some(fine.clone());
         k *= 2;
     }
-    refuse(wanted, best, cause)
+    refuse(wanted, nearest, cause)
 }
 
 /// How far the end of a run with one step more is from that of two runs that agree, where that is too far: nodes of both lie on the ends of the k

@@ -2,7 +2,7 @@
 
 use super::accuracy::Choice;
 use super::noise::{DECAYED, all_together};
-use super::{Plan, Problem, Request, Shared, Wants};
+use super::{Interrupt, Plan, Problem, Request, Shared, Wants};
 use crate::gauss::{Look, SETS, UNDERFLOWN};
 use crate::run::verified::refuted;
 use crate::switching::{DividedGauss, Reach, SwitchingStepper, has_switching_functions};
@@ -39,6 +39,9 @@ const POINTS: usize = 2000;
 
 /// The steps between two looks at budget and progress.
 const CHUNK: usize = 1024;
+
+/// The looks between two at whether the plan is to end.
+const LOOKS: usize = 16;
 
 /// The parts of a span at whose ends runs are compared.
 const PARTS: usize = 10;
@@ -164,6 +167,8 @@ pub(super) enum PilotEnd<const N: usize> {
     Halted { part: f64, cause: StepError },
     /// No evaluations are left.
     Exhausted,
+    /// From outside.
+    Interrupted,
 }
 
 /// What is cheaper than the steps of a run.
@@ -324,7 +329,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
         };
         // Each step is looked at, which costs twice its stages.
         let look = |run: &_, _: f64| (None, 2 * Stepper::evaluations(run));
-        Ok(self.follow(&mut stepper, count, marks, 1, look))
+        self.follow(&mut stepper, count, marks, 1, look).unless_interrupted()
     }
 
     /// The length of steps of which so many fill the span; by a clock, if its rate stayed what it is at the start.
@@ -379,7 +384,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
         }
         Ok(match ending {
             PilotEnd::Followed(track) => PilotEnd::Followed(Track { misfit: seen.misfit(), cost, ..track }),
-            other => other,
+            other => other.unless_interrupted()?,
         })
     }
 
@@ -399,7 +404,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
         };
         let price = integrator.facts().price;
         let look = |run: &(dyn Stepper<N> + '_), _: f64| (None, run.evaluations().saturating_mul(price));
-        Ok(self.follow(&mut *stepper, count, marks, CHUNK, look))
+        self.follow(&mut *stepper, count, marks, CHUNK, look).unless_interrupted()
     }
 
     /// Takes `count` steps, at most `stride` at a time; `look` sees the run in between with the part that is done, may end it, and says
@@ -417,10 +422,17 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
         let (mut states, mut noise, mut taken, mut spent) =
             (Vec::with_capacity(PARTS), Vec::with_capacity(PARTS), 0, 0);
         let mut reach = norm(&[problem.state.q, problem.state.p]);
-        let mut ending = None;
+        let (mut ending, mut looks) = (None, 0_usize);
         while ending.is_none()
             && let Some((steps, time)) = marks.stop(states.len(), count, t0, span)
         {
+            // Single steps are short.
+            let asks = stride > 1 || looks.is_multiple_of(LOOKS);
+            if asks && self.request.problem.interrupt.is_some_and(Interrupt::is_wanted) {
+                ending = Some(PilotEnd::Interrupted);
+                break;
+            }
+            looks += 1;
             let (done, cause) = match run.advance_until(stride.min(steps - taken), time) {
                 Ok(done) => (done, None),
                 Err(Halt { taken, cause }) => (taken, Some(cause)),
@@ -463,6 +475,11 @@ struct PilotCourse<'m> {
 }
 
 impl<const N: usize> PilotEnd<N> {
+    /// Itself; an interruption ends the whole search.
+    fn unless_interrupted(self) -> Result<Self, InputError> {
+        if let PilotEnd::Interrupted = self { Err(InputError::Interrupted) } else { Ok(self) }
+    }
+
     /// With the span in the time of a clock.
     fn with_tau(self, tau: f64) -> Self {
         if let PilotEnd::Followed(track) = self { PilotEnd::Followed(Track { tau, ..track }) } else { self }

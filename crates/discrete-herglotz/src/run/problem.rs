@@ -1,6 +1,6 @@
 //! Problems: a Lagrangian with a start.
 
-use super::{Integrator, Run, Steps};
+use super::{Integrator, Interrupt, Run, Steps};
 use crate::run::verified::verified;
 use crate::{
     DiscreteLagrangian, Ensemble, GaussCollocation, InputError, StepError, discrete_regularity, legendre_inverse,
@@ -56,6 +56,8 @@ pub struct Problem<'a, L, const N: usize> {
     pub(crate) state: PhasePoint<N>,
     /// What the Lagrangian claims, probed at the start.
     pub(crate) structure: Structure,
+    /// Whether its trial runs are to end.
+    pub(crate) interrupt: Option<Interrupt<'a>>,
 }
 
 impl<L, const N: usize> Clone for Problem<'_, L, N> {
@@ -90,7 +92,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
         check_regular(lagrangian, t0, &start)?;
         let structure = verified(lagrangian, t0, &start)?;
         let state = state.unwrap_or_else(|| legendre(lagrangian, t0, &start));
-        Ok(Problem { lagrangian, t0, start, state, structure })
+        Ok(Problem { lagrangian, t0, start, state, structure, interrupt: None })
     }
 
     /// The motion from two positions and the action, as the paper starts: its state at `t0` is `F-L_d (q0, q1, z0)`.
@@ -107,6 +109,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
         check_time(t0)?;
         let state = start_of(ld, t0, &x)?;
         Self::new(lagrangian, t0, Start::Momentum(state, (x.q1 - x.q0) / ld.step_size()))
+    }
+
+    /// The same with a question that its trial runs, and estimates of its error, ask from time to time. Runs themselves are ended by an
+    /// [`Observer`](crate::Observer), which sees how far they have come.
+    pub fn with_interrupt(self, interrupt: Interrupt<'a>) -> Self {
+        Problem { interrupt: Some(interrupt), ..self }
     }
 
     /// A run of it by an integrator.

@@ -17,7 +17,7 @@ use at::{At, Span};
 use file::{File, RunTable, SystemTable, VERSION};
 use runtime_herglotz::{
     AnyIntegrator, CatalogueEntry, Column, Event, Formula, FormulaError, InputError, Motion, RuntimeError, Start,
-    Steps, System, Way, check_parameters,
+    Steps, System, Way, check_parameters, in_words,
 };
 use serde::Deserialize;
 use want::RowTimes;
@@ -208,27 +208,7 @@ impl Scene {
             RuntimeError::Length { .. } | RuntimeError::NotFinite { .. } | RuntimeError::Geometry(_) => places.start,
             _ => places.run,
         };
-        let message = match error {
-            RuntimeError::Input(error) => in_words(error),
-            error => error.to_string(),
-        };
-        SceneError::at(&self.text, span, message)
-    }
-}
-
-/// What is wrong with a run, to those who have written a formula: what is proved of it cannot be claimed, and it states no clock.
-fn in_words(error: &InputError) -> String {
-    match error {
-        InputError::Unclaimed { claim } => {
-            let claim = claim.replace('_', " ");
-            format!(
-                "the formula is not {claim}, which this integrator needs; take another integrator, or another formula"
-            )
-        }
-        InputError::Hypothesis { hypothesis } if hypothesis.contains("HAS_CLOCK") => {
-            "a formula states no clock, which this integrator needs; take another integrator".into()
-        }
-        error => error.to_string(),
+        SceneError::at(&self.text, span, error.to_string())
     }
 }
 

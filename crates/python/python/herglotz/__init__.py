@@ -30,6 +30,7 @@ __version__ = "0.1.0"
 _LATER = {
     "_ensemble": "Ensemble MemberCrossings ensemble",
     "_exact": "DiscreteLagrangian Exponential Retraction exact_lagrangian exponential retract",
+    "_path": "Path path",
     "_looks": "Check Comparison Contact Geometry check compare geometry is_contact",
 }
 _LATER = {name: module for module, names in _LATER.items() for name in names.split()}
@@ -69,6 +70,7 @@ __all__ = [
     "Geometry",
     "Interrupted",
     "MemberCrossings",
+    "Path",
     "Plan",
     "Retraction",
     "Solution",
@@ -84,6 +86,7 @@ __all__ = [
     "geometry",
     "integrators",
     "is_contact",
+    "path",
     "retract",
     "solve",
     "system",

@@ -100,9 +100,24 @@ class Solution:
     def to_pandas(self) -> Any: ...
     def plot(self, *names: str, ax: Any = None) -> Any: ...
 
+class Path:
+    system: System
+    t: Vector
+    q: Vector
+    p: Vector
+    z: Vector
+    found: bool
+    status: str
+    residual: float
+    log_factor: float
+    iterations: int
+    @property
+    def action(self) -> float: ...
+    def __bool__(self) -> bool: ...
+
 class Interrupted(KeyboardInterrupt):
-    solution: Solution
-    def __init__(self, solution: Solution) -> None: ...
+    solution: Solution | Ensemble
+    def __init__(self, solution: Solution | Ensemble) -> None: ...
 
 class Ensemble:
     system: System
@@ -246,6 +261,19 @@ def geometry(
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Geometry: ...
+def path(
+    L: Lagrangian,
+    q0: ArrayLike,
+    q1: ArrayLike,
+    t: float | tuple[float, float],
+    *,
+    steps: int,
+    integrator: str = "gauss_4",
+    z0: float = 0.0,
+    guess: ArrayLike | None = None,
+    coordinates: Sequence[Any] | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Path: ...
 def is_contact(
     map: Callable[[Any, Any, Any], tuple[Any, Any, Any]],
     at: tuple[ArrayLike, ArrayLike, float],

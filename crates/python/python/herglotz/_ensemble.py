@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from . import _core
-from ._solution import crossings
-from ._solve import events_of, system_and_start
-from ._system import check_parameters, expression
+from ._solution import Interrupted, crossings
+from ._solve import columns_of, events_of, system_and_start
+from ._system import check_parameters
 
 
 def ensemble(
@@ -54,7 +54,16 @@ def ensemble(
     Returns
     -------
     Ensemble
+
+    Raises
+    ------
+    ValueError
+        For all that is wrong with an argument.
+    Interrupted
+        A `KeyboardInterrupt` with the ensemble: the members that were done, and the others without success.
     """
+    if parameters is not None and not hasattr(parameters, "items"):
+        raise ValueError(f"`parameters` is {parameters!r}, where values by name are needed: parameters={{\"gamma\": -0.1}}")
     parameters = dict(parameters or {})
     varied = {name: value for name, value in parameters.items() if np.ndim(value)}
     # Any value of these will do for the formula.
@@ -70,7 +79,7 @@ def ensemble(
     if (v0 is None) == (p0 is None):
         raise ValueError("give `v0` or `p0`, one of them")
     given = events_of(events, system) if events else []
-    columns = [expression(column, system) for column in observe.values()] if observe else []
+    columns = columns_of(observe, system)
     if parameters:
         check_parameters(system, parameters, L, [*(event[0] for event in given), *columns])
     record = _core.run_ensemble(
@@ -85,7 +94,12 @@ def ensemble(
         threads,
     )
     event_names = tuple(events) if isinstance(events, dict) else len(given)
-    return Ensemble(system, record, event_names, tuple(observe or ()))
+    found = Ensemble(system, record, event_names, tuple(observe or ()))
+    if record.interrupted is not None:
+        if isinstance(record.interrupted, KeyboardInterrupt):
+            raise Interrupted(found)
+        raise record.interrupted
+    return found
 
 
 class MemberCrossings(NamedTuple):

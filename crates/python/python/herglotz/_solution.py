@@ -44,10 +44,12 @@ class Plan:
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run that Ctrl-C has ended: ``solution`` has what was computed, and `Solution.resume` goes on with it."""
+    """A run that Ctrl-C has ended: ``solution`` has what was computed, and `Solution.resume` goes on with it; of an ensemble the members
+    that were done."""
 
     def __init__(self, solution):
-        super().__init__(f"interrupted at t = {solution.t_end}")
+        done = f"t = {solution.t_end}" if isinstance(solution, Solution) else f"{sum(solution.success)} of {len(solution)} members"
+        super().__init__(f"interrupted at {done}")
         self.solution = solution
 
     def __reduce__(self):
@@ -163,6 +165,10 @@ class Solution:
 
         if t is None and self._halted is not None:
             return run(self.system, self._request, self._event_names, self._observed, (self._halted, self.t_end))
+
+        if t is None and len(self.t) == 0 and not self.success:
+            # Its plan was interrupted.
+            return run(self.system, self._request, self._event_names, self._observed)
 
         at, q, p, z = self._end
         if z is None:

@@ -86,7 +86,7 @@ def solve(
         every,
         (accuracy, integrator, step, steps),
         events_of(events, L) if events else [],
-        [expression(column, L) for column in observe.values()] if observe else [],
+        columns_of(observe, L),
         conformal_factor,
         estimate,
     )
@@ -144,6 +144,15 @@ class Event:
 
     def __repr__(self):
         return f"Event({self.when!r}, {self.direction!r}, terminal={self.terminal})"
+
+
+def columns_of(observe, L):
+    """The texts of the expressions that are observed."""
+    if not observe:
+        return []
+    if not hasattr(observe, "values"):
+        raise ValueError(f'`observe` is {observe!r}, where expressions by name are needed: observe={{"square": "x^2"}}')
+    return [expression(column, L) for column in observe.values()]
 
 
 def events_of(events, L):

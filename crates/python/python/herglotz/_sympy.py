@@ -12,10 +12,21 @@ def formula_of_expression(L, coordinates, parameters):
 
     The coordinates are symbols, with velocities named as `xdot`, `x_dot`, `vx`, `v_x` or `Derivative(x(t), t)` of functions of t.
     """
+    L = sympy.sympify(L)
+    functions = _functions(L)
     if coordinates is None:
-        coordinates = _functions(L)
+        if not functions:
+            raise ValueError("`coordinates` is not given: the symbols that are coordinates, as [x, y]")
+        coordinates = [f for f in functions if f.has(sympy.Symbol("t")) and any(d.expr == f for d in L.atoms(sympy.Derivative))]
+        if len(coordinates) < len(functions):
+            others = _shown(f for f in functions if f not in coordinates)
+            raise ValueError(
+                f"the expression has the functions {_shown(functions)}, and not all have a velocity: give those that are coordinates, "
+                f"as coordinates=[{_shown(coordinates or functions[:1])}], and write {others} out as expressions of t"
+            )
     given = [sympy.Symbol(c) if isinstance(c, str) else c for c in coordinates]
-    return _text(sympy.sympify(L), tuple(given), tuple(parameters or ())), [_name(c) for c in given]
+    _check(L, given, functions)
+    return _text(L, tuple(given), tuple(parameters or ())), [_name(c) for c in given]
 
 
 def _name(coordinate):
@@ -25,10 +36,37 @@ def _name(coordinate):
 
 def _functions(L):
     """The functions of t in an expression, by name."""
-    found = sorted(L.atoms(sympy.core.function.AppliedUndef), key=str)
-    if not found:
-        raise ValueError("`coordinates` is not given: the symbols that are coordinates, as [x, y]")
-    return found
+    return sorted(L.atoms(sympy.core.function.AppliedUndef), key=str)
+
+
+def _shown(expressions):
+    return ", ".join(str(x) for x in expressions)
+
+
+def _check(L, coordinates, functions):
+    """Refuses derivatives and functions that are none of the coordinates', with what to give instead."""
+    named = [f for f in functions if any(not isinstance(c, sympy.core.function.AppliedUndef) and _name(c) == _name(f) for c in coordinates)]
+    if named:
+        raise ValueError(
+            f"the coordinates of the expression are the functions {_shown(named)}, not symbols of their names: give "
+            f"coordinates=[{_shown(named)}]"
+        )
+    for derivative in L.atoms(sympy.Derivative):
+        if derivative.expr in coordinates and derivative.derivative_count > 1:
+            raise ValueError(
+                f"{derivative} is a second derivative, which no Lagrangian of Herglotz' principle has: write L of "
+                f"{derivative.expr} and its first derivative alone"
+            )
+    for f in functions:
+        if f not in coordinates and _name(f) == "z":
+            raise ValueError(f"the action is {f} in the expression, where it is the symbol `z`, whose rate is L itself")
+    others = [f for f in functions if f not in coordinates]
+    if others:
+        names = ", ".join(f"`{f}`" for f in others)
+        raise ValueError(
+            f"the expression has {names}, neither coordinate nor known function: write it out as an expression of t, or give it as a "
+            "coordinate"
+        )
 
 
 @functools.lru_cache(256)

@@ -33,6 +33,8 @@ def system(L, coordinates=None, parameters=None, *, n=None):
     -------
     System
     """
+    if parameters is not None and not hasattr(parameters, "keys"):
+        raise ValueError(f"`parameters` is {parameters!r}, where values by name are needed: parameters={{\"gamma\": -0.1}}")
     if isinstance(L, _core.System):
         return L.with_parameters(parameters) if parameters else L
     if isinstance(coordinates, str):

@@ -91,6 +91,7 @@ _OPERATORS = {
 _UFUNCS |= {ufunc: np.frompyfunc(function, 2, 1) for ufunc, function in _OPERATORS.items()}
 _NOT = np.frompyfunc(lambda x: ~x if isinstance(x, Condition) else not x, 1, 1)
 _UFUNCS |= {np.logical_not: _NOT, np.invert: _NOT}
+_JUMPING = "floor_divide remainder fmod divmod modf floor ceil rint trunc isnan isinf isfinite heaviside".split()
 # These do with objects what they do with numbers.
 _OWN = {np.add, np.subtract, np.multiply, np.divide, np.matmul}
 _OWN |= {getattr(np, name) for name in ("vecdot", "matvec", "vecmat") if hasattr(np, name)}
@@ -119,21 +120,8 @@ def apply(ufunc, method, inputs, kwargs):
     out = kwargs.pop("out", None)
     known = _UFUNCS.get(ufunc) or (ufunc if ufunc in _OWN else None)
     if known is None:
-        if ufunc.__name__ in (
-            "logaddexp",
-            "floor_divide",
-            "remainder",
-            "floor",
-            "ceil",
-            "rint",
-            "trunc",
-            "isnan",
-            "isfinite",
-        ):
-            hint = "; it has no use in a smooth Lagrangian" if ufunc.__name__ != "logaddexp" else "; write it out"
-        else:
-            hint = ""
-        raise TypeError(f"np.{ufunc.__name__} is not known of a traced value{hint}")
+        hint = "it jumps: write its pieces by hz.where" if ufunc.__name__ in _JUMPING else "write it out"
+        raise TypeError(f"np.{ufunc.__name__} is not known of a traced value: {hint}")
     found = getattr(known, method)(*map(_plain, inputs), **kwargs)
     if out is not None:
         out[0][...] = found
@@ -180,7 +168,32 @@ def _clip(a, a_min=None, a_max=None, **kwargs):
     return a if high is None else np.minimum(a, high)
 
 
+def _interp(x, xp, fp, left=None, right=None, period=None):
+    if period is not None:
+        raise TypeError("np.interp with a period is not known of a traced value: write its pieces by hz.where")
+    try:
+        xp, fp = np.asarray(xp, float), np.asarray(fp, float)
+    except TypeError:
+        raise TypeError("np.interp of traced knots is not known: write its pieces by hz.where") from None
+    if xp.ndim != 1 or xp.shape != fp.shape or len(xp) == 0 or not np.all(np.diff(xp) > 0):
+        raise ValueError("np.interp of a traced value needs as many values as knots, and knots that rise")
+    x = x if isinstance(x, Symbol) else array(x)
+    found = fp[-1] if right is None else _where(x > xp[-1], right, fp[-1])
+    for k in reversed(range(len(xp) - 1)):
+        slope = (fp[k + 1] - fp[k]) / (xp[k + 1] - xp[k])
+        found = _where(x < xp[k + 1], fp[k] + slope * (x - xp[k]), found)
+    return _where(x < xp[0], fp[0] if left is None else left, found)
+
+
+def _polyval(p, x):
+    found = 0.0
+    for coefficient in p:
+        found = found * x + coefficient
+    return found
+
+
 _FUNCTIONS = {np.where: _where, np.linalg.norm: _norm, np.select: _select, np.clip: _clip}
+_FUNCTIONS |= {np.interp: _interp, np.polyval: _polyval}
 
 
 def call(func, args, kwargs):
@@ -199,7 +212,16 @@ def call(func, args, kwargs):
     args = [traced(x) for x in args]
     # NumPy's own, which calls functions of numbers.
     implementation = getattr(func, "_implementation", func)
-    return _wrapped(implementation(*args, **kwargs))
+    try:
+        return _wrapped(implementation(*args, **kwargs))
+    except TypeError as error:
+        if "traced" in str(error):
+            raise
+        module = func.__module__.removeprefix("numpy").lstrip(".")
+        name = f"np.{module}.{func.__name__}" if module else f"np.{func.__name__}"
+        raise TypeError(
+            f"{name} is not known of a traced value: write it out by sums, products and functions of numbers, as np.sin"
+        ) from error
 
 
 def _vector(values):

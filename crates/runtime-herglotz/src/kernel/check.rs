@@ -2,16 +2,20 @@
 
 use super::theorems::{Points, theorems};
 use super::{Sized, coordinates};
-use crate::{Check, MomentumThere, Motion, Place, RuntimeError, Stated, Way};
+use crate::{Check, Interrupt, MomentumThere, Motion, Place, RuntimeError, Stated, Way};
 use contact_geom::{OneParameterGroup, PhasePoint, Triple, larger, largest};
-use discrete_herglotz::{AnyIntegrator, InputError, Problem, Start, Steps, Until};
+use discrete_herglotz::{AnyIntegrator, InputError, Problem, Start, Steps, Stop, Until};
 use formula_lagrangian::FormulaLagrangian;
+use std::ops::ControlFlow;
 
 /// The distance of differences, relative to the size of a state.
 const DISTANCE: f64 = 1e-3;
 
 /// The places at which the theorems are evaluated.
 const PLACES: usize = 3;
+
+/// The steps between two looks at whether it is to end.
+const POLL: usize = 256;
 
 /// The stages of the statements' discrete Lagrangian, where the motion's own has none.
 const STAGES: usize = 4;
@@ -88,7 +92,8 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
         }
     };
     let (h, lagrangian, symmetries) = (plan.step_size, &system.0, system.0.symmetries());
-    let problem = system.problem(&motion.start)?;
+    let problem = system.problem_of(motion)?;
+    let interrupted = || motion.interrupt.as_ref().is_some_and(Interrupt::is_wanted);
     let steps = Steps::Count(plan.steps);
     let stride = plan.steps.div_ceil(places.max(1));
     let momenta = |x: &PhasePoint<N>| symmetries.iter().map(|s| s.momentum(&x.q, &x.p)).collect::<Vec<f64>>();
@@ -98,12 +103,19 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
         if at.k.is_multiple_of(stride) && !at.last {
             states.push((at.t, at.state, at.log_factor.unwrap_or(f64::NAN)));
         }
-        std::ops::ControlFlow::Continue(())
+        if at.k.is_multiple_of(POLL) && interrupted() {
+            ControlFlow::Break(Stop::here("its check"))
+        } else {
+            ControlFlow::Continue(())
+        }
     };
     problem.by(by).steps(steps).with_conformal_factor().observe(&mut seen).run(Until::Time(motion.end))?;
     let way = (by, h, 1);
     let mut along = Vec::with_capacity(states.len());
     for (t, x, log_factor) in &states {
+        if interrupted() {
+            return Err(InputError::Interrupted.into());
+        }
         let there = momenta(x).into_iter().zip(&first);
         let momenta =
             there.map(|(momentum, first)| MomentumThere { momentum, predicted: first * log_factor.exp() }).collect();
@@ -120,6 +132,9 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
     let stages = plan.integrator.collocation.unwrap_or(STAGES);
     let mut shorter = h;
     let stated = loop {
+        if interrupted() {
+            return Err(InputError::Interrupted.into());
+        }
         match theorems_with(system, stages, (shorter, &of_theorems)) {
             // The discrete Lagrangian is defined for points that are near enough.
             Err(RuntimeError::Geometry(_) | RuntimeError::Step(_)) if (h / shorter) < SHORTEST => shorter *= 0.5,

@@ -3,7 +3,7 @@
 use super::observed::{Observed, Seen};
 use super::recorder::{Crossings, check_events, number};
 use super::{Sized, coordinates};
-use crate::{Column, Ending, EnsembleWatch, Event, MemberEnd, RuntimeError, Varied, Way};
+use crate::{Column, Ending, EnsembleWatch, Event, Interrupt, MemberEnd, RuntimeError, Varied, Way};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::{Ensemble, EnsembleError, InputError, Member, Row, Start, Tally, Until, legendre_inverse};
@@ -45,12 +45,14 @@ pub(super) fn run<const N: usize>(
         (Way::Accuracy { .. }, None) => (SHARD, SHARDS, true),
         (Way::Steps { .. }, None) => (SHARD, 2, false),
     };
+    let interrupt = watch.interrupt();
     let (mut tally, mut first) = (Tally::default(), 0);
     while first < ensemble.count {
         let (clock, size) = (Instant::now(), shards * shard);
         let members = first..ensemble.count.min(first + size);
         first = members.end;
-        let mut block = Block { system, ensemble, members, tally: &mut tally, watch, ended: false };
+        let mut block =
+            Block { system, ensemble, members, tally: &mut tally, interrupt: interrupt.as_ref(), watch, ended: false };
         block.run(observed)?;
         if block.ended || watch.poll().is_break() {
             break;
@@ -68,6 +70,7 @@ struct Block<'b, const N: usize> {
     ensemble: &'b crate::Ensemble<'b>,
     members: Range<usize>,
     tally: &'b mut Tally,
+    interrupt: Option<&'b Interrupt>,
     watch: &'b mut dyn EnsembleWatch,
     ended: bool,
 }
@@ -133,6 +136,10 @@ impl<const N: usize> Block<'_, N> {
         };
         let many = match ensemble.threads {
             Some(threads) => many.threads(threads),
+            None => many,
+        };
+        let many = match self.interrupt {
+            Some(interrupt) => many.with_interrupt(interrupt.asked()),
             None => many,
         };
         let own_columns = |i: usize| match &ensemble.varied {

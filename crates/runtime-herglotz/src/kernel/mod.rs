@@ -87,6 +87,15 @@ impl<const N: usize> Sized<N> {
         Problem::new(&self.0, start.t, at).map_err(|error| self.explained(error, start.t, &at))
     }
 
+    /// That of a motion, whose trial runs may be interrupted.
+    fn problem_of<'m>(&'m self, motion: &'m Motion) -> Result<Problem<'m, FormulaLagrangian<N>, N>, RuntimeError> {
+        let problem = self.problem(&motion.start)?;
+        Ok(match &motion.interrupt {
+            Some(interrupt) => problem.with_interrupt(interrupt.asked()),
+            None => problem,
+        })
+    }
+
     /// A singular start with the velocities in which L is linear, where it is for those.
     fn explained(&self, error: InputError, t: f64, at: &discrete_herglotz::Start<N>) -> RuntimeError {
         if let (InputError::FirstStep(StepError::Singular { .. }), discrete_herglotz::Start::Velocity(x)) = (&error, at)

@@ -22,7 +22,7 @@ fn of<'p, 'o, const N: usize>(
 }
 
 pub(super) fn plan<const N: usize>(system: &Sized<N>, motion: &Motion) -> Result<Plan, RuntimeError> {
-    let problem = system.problem(&motion.start)?;
+    let problem = system.problem_of(motion)?;
     let mut unwatched = ();
     let mut recorder = Recorder::new(&system.0, motion, &mut unwatched)?;
     let run = of(&problem, motion).observe(&mut recorder);
@@ -43,7 +43,7 @@ pub(super) fn run<const N: usize>(
     watch: &mut dyn Watch,
     from: Option<Interrupted>,
 ) -> Result<Outcome, RuntimeError> {
-    let problem = system.problem(&motion.start)?;
+    let problem = system.problem_of(motion)?;
     let mut recorder = Recorder::new(&system.0, motion, watch)?;
     let run = of(&problem, motion).observe(&mut recorder);
     let run = match from {

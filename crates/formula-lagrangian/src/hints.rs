@@ -1,0 +1,71 @@
+//! What to write in place of what other languages have.
+
+use crate::names::Block;
+
+/// The remedy for a choice in another form.
+pub(crate) const CHOICE: &str = "write `if(a < b, then, otherwise)`";
+
+/// What to write in place of a function of other languages.
+pub(crate) fn instead_of_function(name: &str) -> Option<&'static str> {
+    Some(match name.to_lowercase().as_str() {
+        "where" | "piecewise" | "ifelse" | "select" | "cond" => CHOICE,
+        "heaviside" | "step" | "theta_step" | "unitstep" => "write `if(t > 1, 1, 0)` for a step at 1",
+        "floor" | "ceil" | "round" | "mod" | "fmod" | "frac" => {
+            "it jumps: write each piece by `if(a < b, then, otherwise)`"
+        }
+        "interp" | "interp1d" | "spline" | "cubicspline" | "table" => {
+            "write its pieces by `if(a < b, then, otherwise)`, or a polynomial"
+        }
+        "polyval" | "poly" | "polynomial" => "write it out, as `c0 + x*(c1 + x*c2)`",
+        "log10" => "write `ln(x)/ln(10)`",
+        "log2" => "write `ln(x)/ln(2)`",
+        "cot" => "write `1/tan(x)`",
+        "sec" => "write `1/cos(x)`",
+        "csc" => "write `1/sin(x)`",
+        "square" | "sqr" => "write `x^2`",
+        "cbrt" => "write `sign(x)*abs(x)^(1/3)`",
+        "norm" => "write `sqrt(sum(i, 0, n-1, q[i]^2))`, or `hypot(x, y)`",
+        "dot" | "inner" => {
+            "write `sum(i, 0, n-1, q[i]*v[i])` for a product of vectors, and `x'` for the velocity of `x`"
+        }
+        "diff" | "derivative" | "deriv" | "ddt" => "write `x'` for the velocity of `x`",
+        _ => return None,
+    })
+}
+
+/// What to write in place of a name of other languages.
+pub(crate) fn instead_of_name(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "e" | "E" | "euler" => "write `exp(x)` for a power of Euler's number, or `exp(1)`",
+        "inf" | "infinity" | "nan" => "a formula has finite numbers alone",
+        "and" | "or" | "not" | "else" => CHOICE,
+        "lambda" | "def" | "return" => "give a function to Python's `solve` as it is, not its text",
+        _ => return None,
+    })
+}
+
+/// The velocity, as it is written here, that another language names in this way: `xdot`, `x_dot`, `dx`, `vx`, `v_x` and the like.
+pub(crate) fn velocity_of(name: &str, blocks: &[Block]) -> Option<String> {
+    const BEFORE: [&str; 6] = ["dot_", "v_", "d_", "v", "d", "D"];
+    const AFTER: [&str; 8] = ["_dot", "dot", "_prime", "prime", "_t", "_p", "p", "d"];
+    let of = |base: &str| blocks.iter().find(|block| block.name == base);
+    let before = BEFORE.iter().filter_map(|part| name.strip_prefix(part)).find_map(of);
+    let block = before.or_else(|| AFTER.iter().filter_map(|part| name.strip_suffix(part)).find_map(of))?;
+    Some(if block.count.is_some() { format!("{}'[0]", block.name) } else { format!("{}'", block.name) })
+}
+
+/// What to do about a character that has no meaning.
+pub(crate) fn instead_of_character(c: char) -> Option<&'static str> {
+    Some(match c {
+        '@' => "a product of vectors is written `sum(i, 0, n-1, q[i]*v[i])`",
+        '&' | '|' | '!' | '?' | ':' | '~' | '\u{2264}' | '\u{2265}' => CHOICE,
+        '%' => "a remainder jumps: write each piece by `if(a < b, then, otherwise)`",
+        '{' | '}' => "brackets are round: `(` and `)`",
+        '\\' | '$' => "write `sin(x)`, `x/y`, `x'` in place of TeX",
+        '\u{b2}' => "write `^2`",
+        '\u{b3}' => "write `^3`",
+        '\u{221a}' => "write `sqrt(x)`",
+        '"' => "no texts are in a formula",
+        _ => return None,
+    })
+}

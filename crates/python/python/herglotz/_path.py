@@ -1,0 +1,86 @@
+"""Motions between two given positions."""
+
+import numpy as np
+
+from . import _core
+from ._solve import system_and_start
+from ._system import copied
+
+
+class Path:
+    """A path of k steps between two positions; made by `path`.
+
+    Attributes
+    ----------
+    t, z : arrays of shape (k + 1,)
+        The times and the actions of its points.
+    q, p : arrays of shape (k + 1, n)
+        The positions and the momenta.
+    found : bool
+        Whether it is critical for the discrete action; what it is of the search otherwise, is its last path.
+    status : str
+        How the search ended, with what to do where none was found.
+    action : float
+        The action of the whole path.
+    residual : float
+        The largest residual of a discrete Herglotz equation, a momentum.
+    log_factor : float
+        The logarithm of the conformal factor of the whole path.
+    iterations : int
+        The corrections that were made.
+    """
+
+    def __init__(self, system, t, record):
+        self.system = system
+        self.t, self.q, self.p, self.z = t, record.q, record.p, record.z
+        self.found, self.status = record.found, record.status
+        self.residual, self.log_factor, self.iterations = record.residual, record.log_factor, record.iterations
+
+    @property
+    def action(self):
+        return float(self.z[-1] - self.z[0])
+
+    def __bool__(self):
+        return self.found
+
+    def __repr__(self):
+        return f"<Path: {len(self.t) - 1} steps from t = {self.t[0]} to {self.t[-1]}, {self.status}>"
+
+
+def path(L, q0, q1, t, *, steps, integrator="gauss_4", z0=0.0, guess=None, coordinates=None, parameters=None):
+    """The motion between two positions: the path that is critical for the discrete action of Herglotz' principle.
+
+    Newton's method searches for it from the straight line, or from a guess; there may be several such paths, or none.
+
+    Parameters
+    ----------
+    L, coordinates, parameters
+        As of `solve`; of one to eight coordinates.
+    q0, q1 : arrays of shape (n,)
+        The positions at the start and at the end.
+    t : float or tuple (t0, t1)
+        The times of start and end; one number is the end, of a path from 0.
+    steps : int
+        The number of steps, of one length.
+    integrator : str
+        One of Gauss', ``"gauss_1"`` to ``"gauss_16"``, or a rule as ``"midpoint"``, whose discrete action it is.
+    z0 : float
+        The action of the start.
+    guess : array of shape (steps + 1, n), optional
+        The points from which the search starts, as those of a path with another time.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ValueError
+        For all that is wrong with an argument; that no path was found is told by the path.
+    """
+    L, q0, _ = system_and_start(L, q0, np.zeros(np.shape(q0)), None, coordinates, parameters)
+    if np.ndim(t) > 1 or np.size(t) != 2 and np.ndim(t) == 1:
+        raise ValueError(f"`t` is {t!r}, where the time of the end is needed, or (t0, t1)")
+    t0, t1 = (0.0, t) if np.ndim(t) == 0 else t
+    record = _core.search_path(L, copied(q0), copied(q1), (t0, t1), steps, integrator, z0, guess)
+    return Path(L, np.linspace(t0, t1, steps + 1), record)

@@ -1,0 +1,78 @@
+"""Motions between two given positions: against the exact oscillator, and against motions from the start that they find."""
+
+import herglotz as hz
+import numpy as np
+import pytest
+
+GAMMA = -0.2
+OSCILLATOR = dict(L="x'^2/2 - x^2/2 + gamma*z", coordinates=["x"], parameters={"gamma": GAMMA})
+
+
+def exact(t, x1, t1):
+    """x'' = -x + gamma x' from 0 to x1 at t1, with its velocity and the action z' = L from 0."""
+    w = np.sqrt(1 - GAMMA**2 / 4)
+    a = x1 / (np.exp(GAMMA * t1 / 2) * np.sin(w * t1))
+    x = a * np.exp(GAMMA * t / 2) * np.sin(w * t)
+    return x, a * np.exp(GAMMA * t / 2) * (GAMMA / 2 * np.sin(w * t) + w * np.cos(w * t))
+
+
+@pytest.mark.parametrize("integrator, error", [("gauss_8", 1e-13), ("gauss_4", 1e-11), ("midpoint", 6e-4), ("trapezoidal", 6e-4)])
+def test_the_oscillator_between_two_positions(integrator, error):
+    """Of the order of the method: fourth-stage collocation with steps of 0.05 has h^8, the rules h^2/4 of a size of about one."""
+    found = hz.path(q0=[0.0], q1=[1.0], t=2.0, steps=40, integrator=integrator, **OSCILLATOR)
+    assert found.found and bool(found) and found.status == "found" and found.iterations >= 1
+    x, v = exact(found.t, 1.0, 2.0)
+    assert found.q.shape == found.p.shape == (41, 1) and found.z.shape == (41,)
+    assert np.max(np.abs(found.q[:, 0] - x)) < error and np.max(np.abs(found.p[:, 0] - v)) < 10 * error
+    assert (found.q[0, 0], found.q[-1, 0], found.z[0]) == (0.0, 1.0, 0.0)
+    # The conformal factor of a constant rate.
+    assert found.log_factor == pytest.approx(GAMMA * 2.0, abs=1e-3)
+    motion = hz.solve(q0=[0.0], v0=[v[0]], t=2.0, accuracy=1e-12, **OSCILLATOR)
+    assert found.action == pytest.approx(motion.z[-1], abs=10 * error)
+
+
+def test_a_path_goes_on_as_a_motion():
+    L = lambda t, q, v, z, k: v @ v / 2 - k * np.sum(q**4) / 4 + q[0] * q[1] - 0.1 * z
+    found = hz.path(L, [0.1, 0.4], [0.5, -0.2], (1.0, 2.5), steps=30, integrator="gauss_6", z0=0.3, parameters={"k": 0.7})
+    assert found and found.t[0] == 1.0 and found.t[-1] == 2.5
+    motion = hz.solve(L, found.q[0], p0=found.p[0], t=found.t, z0=0.3, accuracy=1e-12, parameters={"k": 0.7})
+    # Both are of one motion, to the error of order 12 with steps of 0.05 and what Newton's method leaves.
+    assert np.max(np.abs(motion.q - found.q)) < 1e-10 and np.max(np.abs(motion.z - found.z)) < 1e-10
+
+
+def test_a_search_that_finds_nothing_says_so():
+    """Half a period apart the undamped oscillator is where it began, or nowhere: its ends are conjugate."""
+    free = OSCILLATOR | dict(parameters={"gamma": 0.0})
+    # Exactly the time after which midpoint steps have turned by half a period.
+    steps = 40
+    h = 2 * np.tan(np.pi / (2 * steps))
+    missed = hz.path(q0=[0.0], q1=[1.0], t=steps * h, steps=steps, integrator="midpoint", **free)
+    assert not missed.found and not missed and missed.status != "found"
+
+
+def test_a_guess_leads_to_another_path():
+    """A pendulum's bob goes from below to below by a turn, if it is guessed."""
+    pendulum = dict(L="theta'^2/2 + cos(theta)", coordinates=["theta"])
+    straight = hz.path(q0=[0.0], q1=[0.0], t=8.0, steps=80, **pendulum)
+    t = np.linspace(0.0, 1.0, 81)
+    swung = hz.path(q0=[0.0], q1=[0.0], t=8.0, steps=80, guess=2.0 * np.sin(np.pi * t).reshape(-1, 1), **pendulum)
+    assert straight and np.all(straight.q == 0.0)
+    assert swung and np.max(np.abs(swung.q)) > 0.5
+
+
+def test_bad_arguments_are_named():
+    good = dict(q0=[0.0], q1=[1.0], t=2.0, steps=40) | OSCILLATOR
+    for change, said in [
+        (dict(q1=[1.0, 2.0]), "`q1` has 2 numbers"),
+        (dict(q0=[0.0, 1.0]), "`q0` has 2 numbers"),
+        (dict(steps=1), "`steps` is 1, where an integer of at least 2"),
+        (dict(steps=4e1), "`steps` is 40.0.*write 40"),
+        (dict(integrator="blanes_moan_6"), "no discrete Lagrangian.*gauss_4"),
+        (dict(integrator="gauss_99"), "gauss_99"),
+        (dict(t=(0.0, 1.0, 2.0)), "`t` is"),
+        (dict(t=0.0), "step"),
+        (dict(guess=np.zeros((3, 1))), "40 . 1 points"),
+        (dict(z0=np.nan), "`z0` is nan"),
+    ]:
+        with pytest.raises(ValueError, match=said):
+            hz.path(**(good | change))
