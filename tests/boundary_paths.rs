@@ -73,7 +73,7 @@ fn check<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, (t0, z0): (f64, f64),
 }
 
 fn by<L: Lagrangian<N>, const N: usize>(method: Method, system: L, h: f64) -> Discretised<L, N> {
-    let origin = contact_geom::PhasePoint { q: SVector::repeat(0.1), p: SVector::repeat(0.1), z: 0.0 };
+    let origin = PhasePoint { q: SVector::repeat(0.1), p: SVector::repeat(0.1), z: 0.0 };
     method.discretise(system, h, 0.0, &origin).unwrap()
 }
 
@@ -519,7 +519,7 @@ proptest! {
 fn conjugate_ends_are_flagged() {
     for method in Method::ALL {
         for gamma in [0.0, -0.1] {
-            let omega = (1.0 - 0.25 * gamma * gamma as f64).sqrt();
+            let omega = (1.0 - 0.25 * gamma * gamma).sqrt();
             for steps in [20, 50, 100, 1000, 5000] {
                 let path = |span: f64| {
                     let start = PhasePoint::new([0.0], [1.0], 0.0);

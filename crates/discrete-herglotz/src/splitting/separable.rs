@@ -209,7 +209,7 @@ mod tests {
                 let ensemble = Ensemble::new(&system, 0.0, 3, |_| start).by(scheme).steps(steps);
                 ensemble
                     .run(Until::Time(t), |member| {
-                        let state = member.ending.clone().unwrap().state;
+                        let state = member.ending.unwrap().state;
                         ends.push((state.q, state.p));
                     })
                     .unwrap();
