@@ -9,8 +9,10 @@ use runtime_herglotz::{Crossing, Interrupted, Outcome, Status, Watch, When};
 use std::ops::ControlFlow;
 
 /// Keeps the rows of a motion by their parts.
-struct Kept {
+pub struct Kept {
     n: usize,
+    /// The columns beside the state's.
+    extra: usize,
     conformal_factor: bool,
     t: Vec<f64>,
     q: Vec<f64>,
@@ -94,30 +96,37 @@ pub struct Record {
 /// Runs a motion, with the interpreter left to other threads.
 #[pyfunction]
 pub fn run(py: Python<'_>, motion: &Motion) -> PyResult<Record> {
-    let (mut kept, request) = (Kept::new(motion), &motion.motion);
+    let (mut kept, request) = (Kept::of(motion), &motion.motion);
     let outcome = py.detach(|| motion.system.run(request, &mut kept)).map_err(value_error)?;
-    record(py, motion, kept, outcome)
+    record(py, kept, outcome)
 }
 
 /// Goes on with a motion that was interrupted at a time; the rows that are left are kept.
 #[pyfunction]
 pub fn resume(py: Python<'_>, motion: &Motion, halted: &[u8], at: f64) -> PyResult<Record> {
-    let (mut kept, mut request) = (Kept::new(motion), motion.motion.clone());
+    let (mut kept, mut request) = (Kept::of(motion), motion.motion.clone());
     let from = Interrupted::from_bytes(halted).map_err(value_error)?;
     if let Some(When::At(times)) = &mut request.rows {
         let onward = request.end >= request.start.t;
         times.retain(|t| if onward { *t > at } else { *t < at });
     }
     let outcome = py.detach(|| motion.system.resume(&request, from, &mut kept)).map_err(value_error)?;
-    record(py, motion, kept, outcome)
+    record(py, kept, outcome)
 }
 
 impl Kept {
-    fn new(motion: &Motion) -> Self {
+    fn of(motion: &Motion) -> Self {
         let n = motion.system.dimension();
+        let own = crate::motion::columns(n, motion.conformal_factor).len();
+        Kept { extra: motion.motion.columns.len() - own, ..Kept::new(n, motion.conformal_factor) }
+    }
+
+    /// Of so many coordinates, with no columns beside the state's.
+    pub fn new(n: usize, conformal_factor: bool) -> Self {
         Kept {
             n,
-            conformal_factor: motion.conformal_factor,
+            extra: 0,
+            conformal_factor,
             t: Vec::new(),
             q: Vec::new(),
             v: Vec::new(),
@@ -133,10 +142,9 @@ impl Kept {
     }
 }
 
-fn record(py: Python<'_>, motion: &Motion, kept: Kept, outcome: Outcome) -> PyResult<Record> {
-    let n = kept.n;
-    let own = crate::motion::columns(n, motion.conformal_factor).len();
-    let extra = motion.motion.columns.len() - own;
+/// What is given to Python of a run.
+pub fn record(py: Python<'_>, kept: Kept, outcome: Outcome) -> PyResult<Record> {
+    let Kept { n, extra, .. } = kept;
     let columns = if extra > 0 { Some(matrix(py, kept.columns, extra)?) } else { None };
     let crossings = kept.crossings.into_iter().map(|c| (c.event, c.t, c.q, c.v, c.p, c.z)).collect();
     Ok(Record {
@@ -146,7 +154,7 @@ fn record(py: Python<'_>, motion: &Motion, kept: Kept, outcome: Outcome) -> PyRe
         p: matrix(py, kept.p, n)?,
         z: vector(py, kept.z),
         energy: vector(py, kept.energy),
-        log_factor: motion.conformal_factor.then(|| vector(py, kept.log_factor)),
+        log_factor: kept.conformal_factor.then(|| vector(py, kept.log_factor)),
         columns,
         crossings,
         end: (outcome.t, outcome.q, outcome.p, outcome.z),

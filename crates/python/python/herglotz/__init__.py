@@ -28,6 +28,7 @@ __version__ = "0.1.0"
 
 # What a single motion does not need is loaded when it is first asked for: that is half of what there is to load.
 _LATER = {
+    "_assembled": "AssembledSolution bodies lattice",
     "_ensemble": "Ensemble MemberCrossings ensemble",
     "_exact": "DiscreteLagrangian Exponential Retraction exact_lagrangian exponential retract",
     "_looks": "Check Comparison Contact Geometry check compare geometry is_contact",
@@ -58,6 +59,7 @@ def catalogue():
 
 
 __all__ = [
+    "AssembledSolution",
     "Check",
     "Comparison",
     "Contact",
@@ -75,6 +77,7 @@ __all__ = [
     "States",
     "System",
     "array",
+    "bodies",
     "catalogue",
     "check",
     "compare",
@@ -84,6 +87,7 @@ __all__ = [
     "geometry",
     "integrators",
     "is_contact",
+    "lattice",
     "retract",
     "solve",
     "system",
