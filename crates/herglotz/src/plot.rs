@@ -166,7 +166,7 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
 
 /// The curves of a space-time picture, and the most points of each.
 const PROFILES: usize = 40;
-const PLACES: usize = 400;
+const PLACES: usize = 150;
 
 /// The figures of a lattice with their names: the first component of all sites, as a curve at each of some times above each other; and that of three
 /// sites against time. Of several directions the sites are those of the last one, in the middle of the others.

@@ -350,12 +350,12 @@ fn a_lattice_runs() {
         "{said}"
     );
     let rows = at.read("out/rows.csv");
-    assert!(rows.starts_with("t,\"x[0,0]\",\"x[0,1]\","), "{rows}");
+    assert!(rows.starts_with("t,x[0][0],x[0][1],"), "{rows}");
     // Of the frequency of a mode in each direction.
     let half = |k: f64| 4.0 * (0.5 * k).sin().powi(2);
     let pi = std::f64::consts::PI;
     let omega = (half(pi / 3.0) + half(pi / 21.0) - 0.0025f64).sqrt();
-    let (t, x) = (column(&rows, "t"), column(&rows, "x[1,6]"));
+    let (t, x) = (column(&rows, "t"), column(&rows, "x[1][6]"));
     let shape = (2.0 * pi / 3.0).sin() * (7.0 * pi / 21.0).sin();
     assert_eq!(t, [0.0, 1.0, 2.0, 3.0]);
     for (t, x) in t.iter().zip(x) {

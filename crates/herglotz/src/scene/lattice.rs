@@ -221,7 +221,7 @@ impl LatticeScene {
         explain(&self.text, &self.places, self.run, error)
     }
 
-    /// The names of the columns of a row: `t`, `x[0]`, ..., `x'[0]`, ..., `p_x[0]`, ..., `z`, `energy`; of several directions `x[0,0]`.
+    /// The names of the columns of a row: `t`, `x[0]`, ..., `x'[0]`, ..., `p_x[0]`, ..., `z`, `energy`; of several directions `x[0][0]`.
     pub fn columns(&self) -> Vec<String> {
         let sites: usize = self.sizes.iter().product();
         let index = |site: usize| {
@@ -230,7 +230,7 @@ impl LatticeScene {
                 rest /= size;
                 (site / rest % size).to_string()
             });
-            digits.collect::<Vec<_>>().join(",")
+            digits.collect::<Vec<_>>().join("][")
         };
         let kinds: [&dyn Fn(&str) -> String; 3] = [&|x| x.to_owned(), &|x| velocity_name(x), &|x| format!("p_{x}")];
         let of_kind = |name: &dyn Fn(&str) -> String| -> Vec<String> {
