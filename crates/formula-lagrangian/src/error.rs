@@ -22,7 +22,10 @@ pub enum FormulaError {
         why: &'static str,
     },
     /// The number of coordinates is not one that is compiled in.
-    #[error("{found} coordinates, where 1 to {MOST_COORDINATES} are possible")]
+    #[error(
+        "{found} coordinates, where 1 to {MOST_COORDINATES} are possible; any number may have a lattice by the formulas of a site and of a bond, or bodies: \
+         `lattice` and `bodies` in Python, [lattice] in a scene"
+    )]
     Dimension {
         /// The number of coordinates.
         found: usize,

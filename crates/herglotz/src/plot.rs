@@ -1,8 +1,9 @@
 //! Figures of rows: columns against time, and phase portraits.
 
 use contact_figure::{Axis, Curve, Line, Panel, draw, draw_grid};
-use herglotz::Scene;
+use herglotz::{LatticeScene, Scene};
 use runtime_herglotz::{Column, Comparison, Work, velocity_name};
+use std::collections::BTreeSet;
 
 /// The most points of a curve: more are not seen.
 const POINTS: usize = 2000;
@@ -193,6 +194,71 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
         curves: names.iter().enumerate().map(curve).collect(),
         marks: Vec::new(),
     }))
+}
+
+/// The curves of a space-time picture, and the most points of each.
+const PROFILES: usize = 40;
+const PLACES: usize = 150;
+
+/// The figures of a lattice with their names: the first component of all sites, as a curve at each of some times above each other; and that of three
+/// sites against time. Of several directions the sites are those of the last one, in the middle of the others.
+pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String, String)> {
+    let (d, length) = (scene.coordinates.len(), scene.sizes.last().copied().unwrap_or(0));
+    let strides = (0..scene.sizes.len()).map(|a| scene.sizes.iter().skip(a + 1).product::<usize>());
+    let first: usize = scene
+        .sizes
+        .iter()
+        .zip(strides)
+        .take(scene.sizes.len().saturating_sub(1))
+        .map(|(size, stride)| size / 2 * stride)
+        .sum();
+    let name = scene.coordinates.first().map_or("x", String::as_str);
+    let value = |row: &[f64], i: usize| Some((*row.first()?, *row.get(1 + d * (first + i))?));
+    let mut figures = Vec::new();
+    let stride = rows.len().div_ceil(PROFILES).max(1);
+    let chosen: Vec<&Vec<f64>> = rows.iter().step_by(stride).collect();
+    let sizes = chosen.iter().flat_map(|row| (0..length).filter_map(|i| value(row, i))).map(|(_, x)| x.abs());
+    let largest = sizes.fold(0.0, f64::max);
+    let times: Vec<f64> = chosen.iter().filter_map(|row| row.first().copied()).collect();
+    if let ([start, .., end], true) = (times.as_slice(), largest > 0.0 && largest.is_finite()) {
+        // The largest value has the height of two and a half of the distances of curves.
+        let height = 2.5 * (end - start) / (times.len() - 1) as f64 / largest;
+        let every = length.div_ceil(PLACES).max(1);
+        let curves: Vec<Curve> = chosen
+            .iter()
+            .map(|row| {
+                let points =
+                    (0..length).step_by(every).filter_map(|i| value(row, i).map(|(t, x)| (i as f64, t + height * x)));
+                Curve::unnamed(Line::Solid, points)
+            })
+            .collect();
+        let along = axis([0.0, length.saturating_sub(1) as f64].into_iter());
+        let across = axis(curves.iter().flat_map(|curve| curve.points.iter().map(|p| p.1)));
+        if let (Some(x), Some(y)) = (along, across) {
+            let panel = Panel {
+                x_label: "site".into(),
+                y_label: format!("t, with {name} above it"),
+                x,
+                y,
+                legend: (0.0, 1.0),
+                curves,
+                marks: Vec::new(),
+            };
+            figures.push(("space-time.svg".to_owned(), draw(&panel)));
+        }
+    }
+    let stride = rows.len().div_ceil(POINTS).max(1);
+    let panels: Vec<Panel> = [0, length / 4, length / 2]
+        .into_iter()
+        .collect::<BTreeSet<usize>>()
+        .into_iter()
+        .filter_map(|i| {
+            let points = rows.iter().step_by(stride).chain(rows.last()).filter_map(|row| value(row, i)).collect();
+            panel(("t", &format!("{name}[{i}]")), Line::Solid, points)
+        })
+        .collect();
+    figures.extend((!panels.is_empty()).then(|| ("sites.svg".to_owned(), grid(&panels))));
+    figures
 }
 
 #[cfg(test)]

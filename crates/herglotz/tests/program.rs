@@ -328,7 +328,7 @@ fn scenes_run() {
         assert!(Path::new(REPOSITORY).join(format!("docs/scenes/{name}.svg")).exists(), "{name}");
         names.push(name);
     }
-    assert_eq!(names.len(), 10, "{names:?}");
+    assert_eq!(names.len(), 11, "{names:?}");
     // What two of them are about: a momentum that decays as the conformal factor, and a factor in closed form.
     let kept = column(&at.read("kepler/rows.csv"), "exp(-gamma*t)*(x*y' - y*x')");
     assert!(kept.iter().all(|x| (x - 1.1).abs() < 1e-10));
@@ -355,4 +355,97 @@ fn comparisons_name_the_best() {
     assert!(errors.len() > 2 && errors[0] > 10.0 * errors[errors.len() - 1], "{errors:?}");
     // The figure has those near the best.
     assert!(!of("gauss_8,").is_empty() && at.read("out/compare.svg").contains("gauss_"));
+}
+
+const LATTICE: &str = r#"
+[lattice]
+sites = [2, 20]
+boundary = "fixed"
+site = "x'^2/2 + gamma*z"
+bond = "-k*(xr - xl)^2/2"
+parameters = { k = 1.0, gamma = -0.1 }
+[start]
+x = "sin(pi*(i + 1)/3)*sin(pi*(j + 1)/21)"
+[run]
+time = 3.0
+integrator = "blanes_moan_6"
+step = 0.05
+[want.rows]
+every = 1.0
+"#;
+
+/// A lattice: its rows are those of a normal mode, it is drawn, and is told; what is not for lattices says so.
+#[test]
+fn a_lattice_runs() {
+    let at = Directory::new("lattice");
+    let (scene, out) = (at.write("lattice.toml", LATTICE), at.path("out"));
+    let said = succeed(&["run", &scene, "--out", &out, "--plot"]);
+    assert!(
+        said.starts_with("completed: 60 steps of 40 sites by blanes_moan_6\n4 rows; the end:\n  t = 3\n"),
+        "{said}"
+    );
+    let rows = at.read("out/rows.csv");
+    assert!(rows.starts_with("t,x[0][0],x[0][1],"), "{rows}");
+    // Of the frequency of a mode in each direction.
+    let half = |k: f64| 4.0 * (0.5 * k).sin().powi(2);
+    let pi = std::f64::consts::PI;
+    let omega = (half(pi / 3.0) + half(pi / 21.0) - 0.0025f64).sqrt();
+    let (t, x) = (column(&rows, "t"), column(&rows, "x[1][6]"));
+    let shape = (2.0 * pi / 3.0).sin() * (7.0 * pi / 21.0).sin();
+    assert_eq!(t, [0.0, 1.0, 2.0, 3.0]);
+    for (t, x) in t.iter().zip(x) {
+        let expected = shape * (-0.05 * t).exp() * ((omega * t).cos() + 0.05 / omega * (omega * t).sin());
+        // Steps of order 6 of a hundredth of the period.
+        assert!((x - expected).abs() < 1e-10, "{x} for {expected} at {t}");
+    }
+    for figure in ["space-time.svg", "sites.svg"] {
+        assert!(at.read(&format!("out/{figure}")).contains("<svg"), "{figure}");
+    }
+    assert!(succeed(&["run", &scene, "--out", &out, "--json"]).contains("\"rows\": 4"));
+    for command in ["plan", "check", "compare"] {
+        let (code, said) = fail(&[command, &scene]);
+        assert!(code == Some(2) && said.contains("a lattice is run by `herglotz run`"), "{command}: {said}");
+    }
+    let (code, said) = fail(&["run", &scene, "--out", &out, "--set", "k=2"]);
+    assert!(code == Some(2) && said.contains("--set"), "{said}");
+}
+
+/// What is wrong with a scene of a lattice is said with its place.
+#[test]
+fn wrong_lattices_are_refused() {
+    for (from, to, expected) in [
+        ("gamma*z", "gama*z", "line 5, column 18: unknown name `gama`; did you mean `gamma`?"),
+        ("-k*(xr - xl)^2/2", "-k*(xr - x)^2/2", "line 6, column 18: unknown name `x`"),
+        ("-k*(xr - xl)^2/2", "-k*(xr' - xl')^2/2", "line 6, column 8: `bond` depends on velocities"),
+        ("k = 1.0", "k = 1.0, c = 2.0", "line 7, column 16: `parameters` has `c`"),
+        ("[2, 20]", "[0, 20]", "line 3, column 9: `sites` has 0 along a direction"),
+        ("[2, 20]", "[2000000, 20000]", "line 3, column 9: the sites are more than 1000000"),
+        ("\"fixed\"", "\"open\"", "line 4, column 12: unknown word `open`"),
+        ("x = \"sin", "y = \"sin", "line 9, column 1: there is no `y` in a start"),
+        ("(j + 1)/21", "(k + l)/21", "line 9, column"),
+        (
+            "x = \"sin(pi*(i + 1)/3)*sin(pi*(j + 1)/21)\"",
+            "x = [1.0, 2.0]",
+            "line 9, column 5: `x` is a list of 2, where there are 40 sites",
+        ),
+        (
+            "x = \"sin(pi*(i + 1)/3)*sin(pi*(j + 1)/21)\"",
+            "x = \"1/(i - 1)\"",
+            "line 9, column 5: `x` is inf at site 20",
+        ),
+        ("\"blanes_moan_6\"", "\"gauss_8\"", "line 12, column 14: `integrator` is \"gauss_8\""),
+        ("step = 0.05", "", "line 10, column 1: the run of a lattice needs"),
+        ("step = 0.05", "accuracy = 1e-9", "line 13, column 12: a lattice is run by given steps"),
+        ("every = 1.0", "columns = [\"t\"]", "line 15, column 11: rows of a lattice have the whole state"),
+    ] {
+        let text = LATTICE.replacen(from, to, 1);
+        assert_ne!(text, LATTICE);
+        let found = herglotz::LatticeScene::read(&text).err().map(|e| e.to_string()).or_else(|| {
+            // What is seen when it is run.
+            let scene = herglotz::LatticeScene::read(&text).unwrap();
+            scene.system.run(&scene.motion, &mut ()).err().map(|e| scene.explain(&e).to_string())
+        });
+        let found = found.unwrap_or_else(|| panic!("{to} is not refused"));
+        assert!(found.starts_with(expected), "{found:?} for {expected:?}");
+    }
 }

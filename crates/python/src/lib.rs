@@ -2,6 +2,7 @@
 //! package's own files.
 
 mod arrays;
+mod assembled;
 mod condition;
 mod contact;
 mod dense;
@@ -22,6 +23,8 @@ use runtime_herglotz::{AnyIntegrator, CATALOGUE};
 /// The extension module.
 #[pymodule]
 mod _core {
+    #[pymodule_export]
+    use crate::assembled::{run_bodies, run_lattice};
     #[pymodule_export]
     use crate::condition::Condition;
     #[pymodule_export]

@@ -11,8 +11,10 @@ use runtime_herglotz::{
 use std::ops::ControlFlow;
 
 /// Keeps the rows of a motion by their parts.
-struct Kept {
+pub struct Kept {
     n: usize,
+    /// The columns beside the state's.
+    extra: usize,
     conformal_factor: bool,
     t: Vec<f64>,
     q: Vec<f64>,
@@ -98,22 +100,30 @@ pub struct Record {
 /// Runs a motion, with the interpreter left to other threads.
 #[pyfunction]
 pub fn run(py: Python<'_>, motion: &Motion) -> PyResult<Record> {
-    let (mut kept, request) = (Kept::new(motion), &motion.motion);
+    let (mut kept, request) = (Kept::of(motion), &motion.motion);
     let outcome = py.detach(|| motion.system.run(request, &mut kept));
-    record(py, motion, kept, outcome)
+    record(py, kept, whole(motion, outcome)?)
 }
 
 /// Goes on with a motion that was interrupted at a time; the rows that are left are kept.
 #[pyfunction]
 pub fn resume(py: Python<'_>, motion: &Motion, halted: &[u8], at: f64) -> PyResult<Record> {
-    let (mut kept, mut request) = (Kept::new(motion), motion.motion.clone());
+    let (mut kept, mut request) = (Kept::of(motion), motion.motion.clone());
     let from = Interrupted::from_bytes(halted).map_err(value_error)?;
     if let Some(When::At(times)) = &mut request.rows {
         let onward = request.end >= request.start.t;
         times.retain(|t| if onward { *t > at } else { *t < at });
     }
     let outcome = py.detach(|| motion.system.resume(&request, from, &mut kept));
-    record(py, motion, kept, outcome)
+    record(py, kept, whole(motion, outcome)?)
+}
+
+/// The outcome of a motion, also where its plan was interrupted.
+fn whole(motion: &Motion, outcome: Result<Outcome, RuntimeError>) -> PyResult<Outcome> {
+    match outcome {
+        Err(RuntimeError::Input(InputError::Interrupted)) => Ok(nothing_yet(motion)),
+        outcome => outcome.map_err(value_error),
+    }
 }
 
 /// What is known of a motion whose plan was interrupted: its start, without rows.
@@ -139,11 +149,18 @@ fn nothing_yet(motion: &Motion) -> Outcome {
 }
 
 impl Kept {
-    fn new(motion: &Motion) -> Self {
+    fn of(motion: &Motion) -> Self {
         let n = motion.system.dimension();
+        let own = crate::motion::columns(n, motion.conformal_factor).len();
+        Kept { extra: motion.motion.columns.len() - own, ..Kept::new(n, motion.conformal_factor, motion.signals.clone()) }
+    }
+
+    /// Of so many coordinates, with no columns beside the state's.
+    pub fn new(n: usize, conformal_factor: bool, signals: Signals) -> Self {
         Kept {
             n,
-            conformal_factor: motion.conformal_factor,
+            extra: 0,
+            conformal_factor,
             t: Vec::new(),
             q: Vec::new(),
             v: Vec::new(),
@@ -153,22 +170,17 @@ impl Kept {
             log_factor: Vec::new(),
             columns: Vec::new(),
             crossings: Vec::new(),
-            signals: motion.signals.clone(),
+            signals,
             raised: None,
             halted: None,
         }
     }
 }
 
-fn record(py: Python<'_>, motion: &Motion, mut kept: Kept, outcome: Result<Outcome, RuntimeError>) -> PyResult<Record> {
-    kept.raised = motion.signals.take();
-    let outcome = match outcome {
-        Err(RuntimeError::Input(InputError::Interrupted)) if kept.raised.is_some() => nothing_yet(motion),
-        outcome => outcome.map_err(value_error)?,
-    };
-    let n = kept.n;
-    let own = crate::motion::columns(n, motion.conformal_factor).len();
-    let extra = motion.motion.columns.len() - own;
+/// What is given to Python of a run.
+pub fn record(py: Python<'_>, mut kept: Kept, outcome: Outcome) -> PyResult<Record> {
+    kept.raised = kept.signals.take();
+    let Kept { n, extra, .. } = kept;
     let columns = if extra > 0 { Some(matrix(py, kept.columns, extra)?) } else { None };
     let crossings = kept.crossings.into_iter().map(|c| (c.event, c.t, c.q, c.v, c.p, c.z)).collect();
     Ok(Record {
@@ -178,7 +190,7 @@ fn record(py: Python<'_>, motion: &Motion, mut kept: Kept, outcome: Result<Outco
         p: matrix(py, kept.p, n)?,
         z: vector(py, kept.z),
         energy: vector(py, kept.energy),
-        log_factor: motion.conformal_factor.then(|| vector(py, kept.log_factor)),
+        log_factor: kept.conformal_factor.then(|| vector(py, kept.log_factor)),
         columns,
         crossings,
         end: (outcome.t, outcome.q, outcome.p, outcome.z),

@@ -1,5 +1,6 @@
 //! What can be wrong with a request.
 
+use assembled_herglotz::AssemblyError;
 use contact_geom::GeometryError;
 use discrete_herglotz::{CheckpointError, EnsembleError, InputError, StepError};
 use formula_lagrangian::FormulaError;
@@ -67,6 +68,25 @@ pub enum RuntimeError {
         name: String,
         /// The nearest one that is used, or all.
         hint: String,
+    },
+    /// A system of many coordinates, or its integrator.
+    #[error(transparent)]
+    Assembly(#[from] AssemblyError),
+    /// The formula of a part of a system.
+    #[error("`{part}`: {error}")]
+    Part {
+        /// Which part.
+        part: &'static str,
+        /// What is wrong with it.
+        error: FormulaError,
+    },
+    /// An argument of a system of many coordinates.
+    #[error("`{argument}` {why}")]
+    Argument {
+        /// Its name.
+        argument: &'static str,
+        /// What is wrong with it, and what is needed.
+        why: String,
     },
     /// There is no system of this name in the catalogue.
     #[error("there is no system {name:?} in the catalogue{}; there are {known}", nearest.as_ref().map(|n| format!(", did you mean {n:?}?")).unwrap_or_default())]

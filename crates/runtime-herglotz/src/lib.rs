@@ -2,7 +2,7 @@
 //!
 //! The libraries below are generic in the number of coordinates and in the Lagrangian; here is one type for all formulas of 1 to 16
 //! coordinates, behind which they are compiled once. [`System`] is a formula with its integrators, [`Motion`] what is asked of a
-//! motion, [`Ensemble`] of many.
+//! motion, [`Ensemble`] of many. More coordinates have a [`Lattice`], by the formulas of a site and of a bond, and [`Bodies`].
 //!
 //! ```
 //! use runtime_herglotz::{Column, Motion, Start, System, Way, When};
@@ -18,6 +18,7 @@
 //! # Ok::<(), runtime_herglotz::RuntimeError>(())
 //! ```
 
+mod assembled;
 mod catalogue;
 mod check;
 mod column;
@@ -32,6 +33,7 @@ mod parameters;
 mod request;
 mod system;
 
+pub use assembled::{Assembled, AssembledMotion, Bodies, Boundary, Lattice};
 pub use catalogue::{CATALOGUE, CatalogueEntry};
 pub use check::{CONTACT, Check, MomentumThere, Place, Stated};
 pub use column::{Column, velocity_name};

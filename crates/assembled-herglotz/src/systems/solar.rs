@@ -4,22 +4,37 @@ use crate::{AssembledSystem, AssemblyError, Difference, Potential};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 
-/// Newton's gravitation of a pair at the distance vector r, `V(r) = -c/|r|` with `c = G m_a m_b` its parameter.
+/// Newton's gravitation of a pair at the distance vector r of space or of a plane in it, `V(r) = -c/|r|` with `c = G m_a m_b` its parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gravitation;
 
-impl Potential<3, 1> for Gravitation {
-    #[inline(always)]
-    fn energy<T: Scalar>(&self, _t: T, r: &SVector<T, 3>, c: &[T; 1]) -> T {
-        -(c[0] / (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]).sqrt())
-    }
+macro_rules! gravitation {
+    ($($dimensions:literal)*) => {$(
+        impl Potential<$dimensions, 1> for Gravitation {
+            #[inline(always)]
+            fn energy<T: Scalar>(&self, _t: T, r: &SVector<T, $dimensions>, c: &[T; 1]) -> T {
+                -(c[0] / square(r).sqrt())
+            }
 
-    #[inline(always)]
-    fn gradient<T: Scalar>(&self, _t: T, r: &SVector<T, 3>, c: &[T; 1]) -> SVector<T, 3> {
-        let square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
-        let factor = c[0] / (square * square.sqrt());
-        SVector::from([r[0] * factor, r[1] * factor, r[2] * factor])
+            #[inline(always)]
+            fn gradient<T: Scalar>(&self, _t: T, r: &SVector<T, $dimensions>, c: &[T; 1]) -> SVector<T, $dimensions> {
+                let square = square(r);
+                let factor = c[0] / (square * square.sqrt());
+                SVector::from_fn(|i, _| r[i] * factor)
+            }
+        }
+    )*};
+}
+gravitation! { 2 3 }
+
+/// `|r|^2`, summed from the first component on.
+#[inline(always)]
+fn square<T: Scalar, const D: usize>(r: &SVector<T, D>) -> T {
+    let mut sum = r[0] * r[0];
+    for i in 1..D {
+        sum += r[i] * r[i];
     }
+    sum
 }
 
 /// Bodies in space with Newton's gravitation of each pair and linear drag,

@@ -3,6 +3,7 @@
 mod check;
 mod checkpoint;
 mod compare;
+mod lattice;
 mod list;
 mod new;
 mod plan;
@@ -68,19 +69,23 @@ impl Command {
 #[derive(Args)]
 pub(crate) struct SceneArguments {
     /// The scene file.
-    file: PathBuf,
+    pub(crate) file: PathBuf,
     /// Change a value of the scene: a parameter, start.NAME, run.time, run.accuracy or run.step.
     #[arg(long = "set", value_name = "NAME=VALUE")]
-    changes: Vec<String>,
+    pub(crate) changes: Vec<String>,
 }
 
 impl SceneArguments {
     /// Reads the scene.
     pub fn read(&self) -> Result<Scene, Failure> {
+        Scene::read_with(&self.text()?, &self.changes).map_err(|error| self.explain(error))
+    }
+
+    /// The text of the file.
+    pub fn text(&self) -> Result<String, Failure> {
         let text = std::fs::read(&self.file).map_err(Failure::of_file(&self.file))?;
-        let text = String::from_utf8(text)
-            .map_err(|_| Failure::Input(format!("{} is not a text in UTF-8; save it as such", self.file.display())))?;
-        Scene::read_with(&text, &self.changes).map_err(|error| self.explain(error))
+        String::from_utf8(text)
+            .map_err(|_| Failure::Input(format!("{} is not a text in UTF-8; save it as such", self.file.display())))
     }
 
     /// An error with the name of the file.

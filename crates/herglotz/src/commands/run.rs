@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, read_rows, short};
 use crate::plot;
 use clap::Args;
-use herglotz::Scene;
+use herglotz::{LatticeScene, Scene};
 use indicatif::{ProgressBar, ProgressStyle};
 use runtime_herglotz::{
     AnyIntegrator, Crossing, Interrupted, Outcome, Plan, RuntimeError, Status, Steps, Watch, Way, velocity_name,
@@ -18,28 +18,28 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-const ROWS: &str = "rows.csv";
+pub(super) const ROWS: &str = "rows.csv";
 pub(crate) const EVENTS: &str = "events.csv";
 
 #[derive(Args)]
 pub(crate) struct Run {
     #[command(flatten)]
-    scene: SceneArguments,
+    pub(super) scene: SceneArguments,
     /// The directory of the results; that with the name of the scene otherwise.
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    pub(super) out: Option<PathBuf>,
     /// Go on from the last checkpoint of a run that Ctrl-C has interrupted, or that was killed.
     #[arg(long)]
-    resume: bool,
+    pub(super) resume: bool,
     /// The time between two checkpoints, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 60)]
     checkpoint_every: u32,
-    /// Draw the columns against time, and phase portraits: columns.svg, phase.svg, path.svg, section.svg.
+    /// Draw the columns against time, and phase portraits: columns.svg, phase.svg, path.svg, section.svg; of a lattice space-time.svg and sites.svg.
     #[arg(long)]
-    plot: bool,
+    pub(super) plot: bool,
     /// Tell the end as JSON.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
     /// Interrupt the run as Ctrl-C does, once this part of it is done: for tests.
     #[arg(long, hide = true)]
     interrupt_at: Option<f64>,
@@ -170,6 +170,10 @@ pub(crate) fn header_of_events(scene: &Scene) -> Vec<String> {
 
 impl Run {
     pub fn run(&self) -> Result<(), Failure> {
+        let text = self.scene.text()?;
+        if LatticeScene::is_one(&text) {
+            return self.run_lattice(&text);
+        }
         let scene = self.scene.read()?;
         let explain = |error: RuntimeError| self.scene.explain(scene.explain(&error));
         let mut motion = scene.motion();

@@ -4,12 +4,14 @@ mod at;
 mod change;
 mod error;
 mod file;
+mod lattice;
 mod members;
 mod start;
 mod sweep;
 mod want;
 
 pub use error::SceneError;
+pub use lattice::LatticeScene;
 pub use members::Members;
 pub use sweep::Knob;
 
@@ -91,6 +93,10 @@ impl Scene {
     /// [`SceneError`] with the place in the text, or in the change.
     pub fn read_with(text: &str, changes: &[String]) -> Result<Self, SceneError> {
         check_version(text)?;
+        if let Some(lattice) = lattice::is_lattice(text) {
+            let message = "a lattice is run by `herglotz run`; all else is for systems of up to 16 coordinates";
+            return Err(SceneError::at(text, lattice, message));
+        }
         let mut file: File = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
         let entry = entry(text, &file.system)?;
         for text_of_change in changes {
@@ -370,5 +376,13 @@ fn positive(text: &str, x: &At<f64>, name: &str) -> Result<f64, SceneError> {
 
 /// The JSON schema of scene files.
 pub fn schema() -> serde_json::Value {
-    schemars::schema_for!(File).to_value()
+    /// A motion of a Lagrangian, or of a lattice, and what is to be recorded of it.
+    #[derive(schemars::JsonSchema)]
+    #[schemars(title = "Scene", untagged)]
+    #[expect(dead_code, reason = "it stands for its variants, which are read one by one")]
+    enum AnyFile {
+        System(File),
+        Lattice(lattice::LatticeFile),
+    }
+    schemars::schema_for!(AnyFile).to_value()
 }

@@ -28,6 +28,7 @@ __version__ = "0.1.0"
 
 # What a single motion does not need is loaded when it is first asked for: that is half of what there is to load.
 _LATER = {
+    "_assembled": "AssembledSolution bodies lattice",
     "_ensemble": "Ensemble MemberCrossings ensemble",
     "_exact": "DiscreteLagrangian Exponential Retraction exact_lagrangian exponential retract",
     "_path": "Path path",
@@ -59,6 +60,7 @@ def catalogue():
 
 
 __all__ = [
+    "AssembledSolution",
     "Check",
     "Comparison",
     "Contact",
@@ -77,6 +79,7 @@ __all__ = [
     "States",
     "System",
     "array",
+    "bodies",
     "catalogue",
     "check",
     "compare",
@@ -86,6 +89,7 @@ __all__ = [
     "geometry",
     "integrators",
     "is_contact",
+    "lattice",
     "path",
     "retract",
     "solve",

@@ -115,9 +115,29 @@ class Path:
     def action(self) -> float: ...
     def __bool__(self) -> bool: ...
 
+class AssembledSolution:
+    t: Vector
+    q: Vector
+    v: Vector
+    p: Vector
+    z: Vector
+    energy: Vector
+    log_factor: Vector | None
+    status: str
+    success: bool
+    suspicion: str | None
+    steps: int
+    evaluations: int
+    @property
+    def t_end(self) -> float: ...
+    @property
+    def momenta(self) -> dict[str, Vector]: ...
+    def resume(self, t: ArrayLike | None = None) -> AssembledSolution: ...
+    def to_xarray(self) -> Any: ...
+
 class Interrupted(KeyboardInterrupt):
-    solution: Solution | Ensemble
-    def __init__(self, solution: Solution | Ensemble) -> None: ...
+    solution: Solution | AssembledSolution | Ensemble
+    def __init__(self, solution: Solution | AssembledSolution | Ensemble) -> None: ...
 
 class Ensemble:
     system: System
@@ -233,6 +253,40 @@ def solve(
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Solution: ...
+def lattice(
+    site: str,
+    bond: str | None = None,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
+    t: ArrayLike | None = None,
+    *,
+    p0: ArrayLike | None = None,
+    z0: float = 0.0,
+    boundary: Literal["periodic", "fixed", "free"] = "periodic",
+    integrator: str = "strang",
+    step: float | None = None,
+    steps: int | None = None,
+    every: int | None = None,
+    conformal_factor: bool = False,
+    coordinates: Sequence[str] | str = ("x",),
+    parameters: Mapping[str, float] | None = None,
+) -> AssembledSolution: ...
+def bodies(
+    masses: ArrayLike,
+    q0: ArrayLike,
+    v0: ArrayLike | None = None,
+    t: ArrayLike | None = None,
+    *,
+    p0: ArrayLike | None = None,
+    G: float = 1.0,
+    gamma: float = 0.0,
+    z0: float = 0.0,
+    integrator: str = "blanes_moan_6",
+    step: float | None = None,
+    steps: int | None = None,
+    every: int | None = None,
+    conformal_factor: bool = False,
+) -> AssembledSolution: ...
 def ensemble(
     L: Lagrangian,
     q0: ArrayLike,

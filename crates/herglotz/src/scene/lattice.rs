@@ -1,0 +1,395 @@
+//! Scenes of lattices: any number of equal sites.
+
+use super::at::{At, Named, Span};
+use super::file::{RowsTable, RunTable};
+use super::want::{RowTimes, of_formula};
+use super::{SceneError, check_version, finite, way};
+use runtime_herglotz::{
+    AnyIntegrator, Assembled, AssembledMotion, Boundary, Formula, FormulaError, Lattice, Rate, RuntimeError, Start,
+    Steps, Way, velocity_name,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+/// A motion of a lattice of equal sites with bonds between neighbours.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a scene of a lattice")]
+#[schemars(title = "Scene of a lattice")]
+pub(crate) struct LatticeFile {
+    /// The version of the format: 1.
+    #[expect(dead_code, reason = "it is looked at before all else is read")]
+    pub version: Option<At<i64>>,
+    /// The lattice.
+    pub lattice: At<LatticeTable>,
+    /// Where the motion starts: a number for all sites, a list with one for each, or a formula in the index `i` of a site (`i`, `j`, `k` in several
+    /// directions), counted from 0, and the number `n` of sites; for each coordinate `x`, and for its velocity `x'` or its momentum `p_x`. A
+    /// velocity is 0 otherwise, as the action `z` and the time `t`.
+    pub start: At<Named<Profile>>,
+    /// How long, and how.
+    pub run: At<RunTable>,
+    /// What is recorded.
+    #[serde(default)]
+    pub want: LatticeWant,
+}
+
+/// The lattice.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table with `sites`, `site` and `bond`")]
+pub(crate) struct LatticeTable {
+    /// The number of sites, or their numbers along each direction.
+    pub sites: At<Sizes>,
+    /// What the first and the last site along each direction are bound to: each other, walls at 0, or nothing.
+    #[serde(default)]
+    pub boundary: BoundaryName,
+    /// The names of the components at a site, 1 to 3 of them; `x` without it.
+    pub coordinates: Option<At<Vec<At<String>>>>,
+    /// The Lagrangian of a site, `m*x'^2/2 - V(t, x) + gamma*z`. The drag is that of the whole lattice, and counts once.
+    pub site: At<String>,
+    /// That of a bond, of the coordinates `xl` before it and `xr` after it.
+    pub bond: Option<At<String>>,
+    /// The parameters with their values.
+    #[serde(default)]
+    pub parameters: Named<f64>,
+}
+
+/// The number of sites.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "a whole number, or a list of them")]
+#[schemars(inline)]
+pub(crate) enum Sizes {
+    /// In a row.
+    One(usize),
+    /// Along each direction.
+    Many(Vec<usize>),
+}
+
+/// What is beyond the ends of a lattice.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum BoundaryName {
+    /// The other end.
+    #[default]
+    Periodic,
+    /// Walls.
+    Fixed,
+    /// Nothing.
+    Free,
+}
+
+/// The values of all sites.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "a number, a list of numbers, or a formula in the index of a site")]
+#[schemars(inline)]
+pub(crate) enum Profile {
+    /// The same at all.
+    One(f64),
+    /// One at each.
+    Many(Vec<f64>),
+    /// By the index.
+    Formula(String),
+}
+
+/// What is recorded of a lattice.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table with `rows`")]
+pub(crate) struct LatticeWant {
+    /// The rows of rows.csv, of the whole state; without it, 1000.
+    pub rows: Option<At<RowsTable>>,
+}
+
+/// A scene of a lattice that has been read and checked.
+pub struct LatticeScene {
+    /// The lattice, ready to be run.
+    pub system: Assembled,
+    /// The motion, with its rows.
+    pub motion: AssembledMotion,
+    /// The names of the components at a site.
+    pub coordinates: Vec<String>,
+    /// The number of sites along each direction.
+    pub sizes: Vec<usize>,
+    text: String,
+    places: [(&'static str, Span); 6],
+    run: Span,
+}
+
+/// The most sites of a scene.
+const MOST_SITES: usize = 1_000_000;
+
+/// Whether a text is a scene of a lattice; what else is wrong with it is said by its reader.
+pub(crate) fn is_lattice(text: &str) -> Option<Span> {
+    #[derive(Deserialize)]
+    struct Kind {
+        lattice: Option<At<IgnoredAny>>,
+    }
+    toml::from_str::<Kind>(text).ok()?.lattice.map(|lattice| lattice.span())
+}
+
+impl LatticeScene {
+    /// Whether a text is a scene with `[lattice]`.
+    pub fn is_one(text: &str) -> bool {
+        is_lattice(text).is_some()
+    }
+
+    /// Reads a scene file with `[lattice]`.
+    ///
+    /// ```
+    /// let scene = herglotz::LatticeScene::read(r#"
+    ///     [lattice]
+    ///     sites = 100
+    ///     site = "x'^2/2 - (1 - cos(x)) + gamma*z"
+    ///     bond = "-(xr - xl)^2/2"
+    ///     parameters = { gamma = -0.1 }
+    ///     [start]
+    ///     x = "exp(-(i - n/2)^2/20)"
+    ///     [run]
+    ///     time = 10.0
+    ///     integrator = "strang"
+    ///     step = 0.1
+    /// "#)?;
+    /// assert_eq!(scene.system.dimension(), 100);
+    /// # Ok::<(), herglotz::SceneError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`SceneError`] with the place in the text.
+    pub fn read(text: &str) -> Result<Self, SceneError> {
+        check_version(text)?;
+        let file: LatticeFile = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
+        let LatticeFile { lattice: table, start, run, want, .. } = &file;
+        let coordinates: Vec<String> = match &table.coordinates {
+            Some(names) => names.iter().map(|name| (**name).clone()).collect(),
+            None => vec!["x".into()],
+        };
+        for (name, value) in &table.parameters.0 {
+            finite(text, value, name)?;
+        }
+        let sizes = match &*table.sites {
+            Sizes::One(sites) => vec![*sites],
+            Sizes::Many(sizes) => sizes.clone(),
+        };
+        let count = sizes.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
+        if count.is_none_or(|count| count > MOST_SITES) {
+            let message = format!(
+                "the sites are more than {MOST_SITES}, each a column of rows.csv; take the library for so many"
+            );
+            return Err(SceneError::at(text, table.sites.span(), message));
+        }
+        let parameters: Vec<(String, f64)> =
+            table.parameters.0.iter().map(|(name, value)| ((**name).clone(), **value)).collect();
+        let lattice = Lattice {
+            coordinates: coordinates.clone(),
+            site: (*table.site).clone(),
+            bond: table.bond.as_ref().map(|bond| (**bond).clone()),
+            sizes: sizes.clone(),
+            boundary: match table.boundary {
+                BoundaryName::Periodic => Boundary::Periodic,
+                BoundaryName::Fixed => Boundary::Fixed,
+                BoundaryName::Free => Boundary::Free,
+            },
+            parameters: parameters.clone(),
+        };
+        let names = table.coordinates.as_ref().map_or(table.span(), At::span);
+        let parameters_at = table.parameters.0.first().map_or(table.span(), |(name, _)| name.span());
+        let places = [
+            ("site", table.site.span()),
+            ("bond", table.bond.as_ref().map_or(table.span(), At::span)),
+            ("sites", table.sites.span()),
+            ("coordinates", names),
+            ("parameters", parameters_at),
+            ("integrator", run.integrator.as_ref().map_or(run.span(), At::span)),
+        ];
+        let explain = |error: RuntimeError| explain(text, &places, table.span(), &error);
+        let system = lattice.system().map_err(explain)?;
+        let start = read_start(text, start, &coordinates, &sizes, &parameters)?;
+        let end = finite(text, &run.time, "time")?;
+        let (by, steps) = steps(text, run)?;
+        let rows = RowTimes::read(text, want.rows.as_ref(), (start.t, end))?.when(start.t, end);
+        if let Some(columns) = want.rows.as_ref().and_then(|rows| rows.columns.as_ref()) {
+            return Err(SceneError::at(
+                text,
+                columns.span(),
+                "rows of a lattice have the whole state; leave `columns` out",
+            ));
+        }
+        let motion = AssembledMotion { rows, ..AssembledMotion::new(start, end, by, steps) };
+        Ok(LatticeScene { system, motion, coordinates, sizes, text: text.into(), places, run: run.span() })
+    }
+
+    /// The place in the file that an error is about.
+    pub fn explain(&self, error: &RuntimeError) -> SceneError {
+        explain(&self.text, &self.places, self.run, error)
+    }
+
+    /// The names of the columns of a row: `t`, `x[0]`, ..., `x'[0]`, ..., `p_x[0]`, ..., `z`, `energy`; of several directions `x[0][0]`.
+    pub fn columns(&self) -> Vec<String> {
+        let sites: usize = self.sizes.iter().product();
+        let index = |site: usize| {
+            let mut rest = sites;
+            let digits = self.sizes.iter().map(|size| {
+                rest /= size;
+                (site / rest % size).to_string()
+            });
+            digits.collect::<Vec<_>>().join("][")
+        };
+        let kinds: [&dyn Fn(&str) -> String; 3] = [&|x| x.to_owned(), &|x| velocity_name(x), &|x| format!("p_{x}")];
+        let of_kind = |name: &dyn Fn(&str) -> String| -> Vec<String> {
+            (0..sites)
+                .flat_map(|i| self.coordinates.iter().map(move |x| (i, x)))
+                .map(|(i, x)| format!("{}[{}]", name(x), index(i)))
+                .collect()
+        };
+        let state = kinds.into_iter().flat_map(of_kind);
+        ["t".to_owned()].into_iter().chain(state).chain(["z", "energy"].map(str::to_owned)).collect()
+    }
+}
+
+/// An error with the place of the argument that it names.
+fn explain(text: &str, places: &[(&'static str, Span)], otherwise: Span, error: &RuntimeError) -> SceneError {
+    let place = |name: &str| places.iter().find(|(known, _)| *known == name).map_or(otherwise, |(_, span)| *span);
+    match error {
+        RuntimeError::Part { part, error: FormulaError::Parse(error) } => {
+            let mut error = error.clone();
+            if error.message.starts_with("unknown name") && error.nearest.is_none() {
+                error.message += "; a parameter needs a value in `parameters` of [lattice]";
+            }
+            SceneError::in_string(text, place(part), &error)
+        }
+        RuntimeError::Part { part, error } => SceneError::at(text, place(part), error.to_string()),
+        RuntimeError::Argument { argument, .. } => SceneError::at(text, place(argument), error.to_string()),
+        error => SceneError::at(text, otherwise, error.to_string()),
+    }
+}
+
+/// The integrator and its steps.
+fn steps(text: &str, run: &At<RunTable>) -> Result<(AnyIntegrator, Steps), SceneError> {
+    if let Some(accuracy) = &run.accuracy {
+        let message = "a lattice is run by given steps; name an `integrator` and a `step` instead of an accuracy";
+        return Err(SceneError::at(text, accuracy.span(), message));
+    }
+    if run.step.is_none() && run.steps.is_none() || run.integrator.is_none() {
+        let message =
+            "the run of a lattice needs an `integrator` and a `step`, as integrator = \"strang\" and step = 0.1";
+        return Err(SceneError::at(text, run.span(), message));
+    }
+    match way(text, run)? {
+        Way::Steps { by, steps } => Ok((by, steps)),
+        Way::Accuracy { .. } => {
+            Err(SceneError::at(text, run.span(), "the run of a lattice needs an `integrator` and a `step`"))
+        }
+    }
+}
+
+/// The start of all sites.
+fn read_start(
+    text: &str,
+    table: &At<Named<Profile>>,
+    coordinates: &[String],
+    sizes: &[usize],
+    parameters: &[(String, f64)],
+) -> Result<Start, SceneError> {
+    let (sites, d) = (sizes.iter().product::<usize>(), coordinates.len());
+    let (mut q, mut v, mut p) = (vec![None; d], vec![None; d], vec![None; d]);
+    let (mut t, mut z) = (0.0, 0.0);
+    for (name, profile) in &table.0 {
+        let number = |into: &mut f64| match &**profile {
+            Profile::One(x) => {
+                *into = finite(text, &At::new(*x, profile.span()), name)?;
+                Ok(())
+            }
+            _ => Err(SceneError::at(text, profile.span(), format!("`{}` is one number", **name))),
+        };
+        let kinds: [(&dyn Fn(&str) -> String, &mut Vec<Option<Vec<f64>>>); 3] =
+            [(&|x| x.to_owned(), &mut q), (&|x| velocity_name(x), &mut v), (&|x| format!("p_{x}"), &mut p)];
+        let found = kinds.into_iter().find_map(|(of, all)| {
+            let place = coordinates.iter().position(|x| of(x) == **name)?;
+            all.get_mut(place)
+        });
+        match (found, name.as_str()) {
+            (Some(place), _) => *place = Some(values(text, profile, name, sizes, parameters)?),
+            (None, "t") => number(&mut t)?,
+            (None, "z") => number(&mut z)?,
+            _ => {
+                let known: Vec<String> =
+                    coordinates.iter().flat_map(|x| [x.clone(), velocity_name(x), format!("p_{x}")]).collect();
+                let known: Vec<&str> = known.iter().map(String::as_str).chain(["z", "t"]).collect();
+                let message = format!("there is no `{}` in a start; there are {}", **name, known.join(", "));
+                return Err(SceneError::unknown(text, name.span(), name, known, message));
+            }
+        }
+    }
+    let by_momentum = p.iter().any(Option::is_some);
+    if by_momentum && v.iter().any(Option::is_some) {
+        return Err(SceneError::at(
+            text,
+            table.span(),
+            "the start has velocities and momenta; give one kind for all coordinates",
+        ));
+    }
+    if let Some(place) = q.iter().position(Option::is_none) {
+        let name = &coordinates[place];
+        let message =
+            format!("the coordinate `{name}` has no start; add `{name} = 0.0` to [start], or a formula in `i`");
+        return Err(SceneError::at(text, table.span(), message));
+    }
+    // The components of one site follow each other.
+    let of = |all: &[Option<Vec<f64>>]| -> Vec<f64> {
+        (0..sites * d).map(|k| all[k % d].as_ref().and_then(|x| x.get(k / d)).copied().unwrap_or(0.0)).collect()
+    };
+    let rate = if by_momentum { Rate::Momentum(of(&p)) } else { Rate::Velocity(of(&v)) };
+    Ok(Start { t, q: of(&q), rate, z })
+}
+
+/// The value of each site.
+fn values(
+    text: &str,
+    profile: &At<Profile>,
+    name: &str,
+    sizes: &[usize],
+    parameters: &[(String, f64)],
+) -> Result<Vec<f64>, SceneError> {
+    let sites: usize = sizes.iter().product();
+    let all: Vec<f64> = match &**profile {
+        Profile::One(x) => vec![*x; sites],
+        Profile::Many(all) if all.len() == sites => all.clone(),
+        Profile::Many(all) => {
+            let message = format!("`{name}` is a list of {}, where there are {sites} sites", all.len());
+            return Err(SceneError::at(text, profile.span(), message));
+        }
+        Profile::Formula(formula) => {
+            const INDICES: [&str; 3] = ["i", "j", "k"];
+            let Some(indices) = INDICES.get(..sizes.len()) else {
+                return Err(SceneError::at(text, profile.span(), "formulas of a start are for up to three directions"));
+            };
+            let mut known: Vec<(&str, f64)> = parameters.iter().map(|(name, x)| (name.as_str(), *x)).collect();
+            if !known.iter().any(|(name, _)| *name == "n") {
+                known.push(("n", sites as f64));
+            }
+            let read = Formula::parse("0", indices, &known).and_then(|names| names.expression(formula));
+            let read = read.map_err(|error| of_formula(text, profile.span(), &error.into()))?;
+            if read.has_velocity() || read.has_action() {
+                return Err(SceneError::at(text, profile.span(), "a start is a formula in the index of a site alone"));
+            }
+            let at = |site: usize| {
+                let mut rest = sites;
+                let index: Vec<f64> = sizes
+                    .iter()
+                    .map(|size| {
+                        rest /= size;
+                        (site / rest % size) as f64
+                    })
+                    .collect();
+                read.at(0.0, &index, &vec![0.0; sizes.len()], 0.0)
+            };
+            (0..sites).map(at).collect()
+        }
+    };
+    match all.iter().enumerate().find(|(_, x)| !x.is_finite()) {
+        Some((i, x)) => Err(SceneError::at(
+            text,
+            profile.span(),
+            format!("`{name}` is {x} at site {i}, where a finite number is needed"),
+        )),
+        None => Ok(all),
+    }
+}

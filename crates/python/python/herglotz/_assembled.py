@@ -1,0 +1,306 @@
+"""Systems of many coordinates: lattices by the formulas of a site and of a bond, and bodies that attract each other."""
+
+import functools
+
+import numpy as np
+
+from . import _core
+from ._solution import Interrupted
+from ._system import copied
+
+
+class AssembledSolution:
+    """A motion of many coordinates with k rows; made by `lattice` and `bodies`.
+
+    Attributes
+    ----------
+    t : array of shape (k,)
+    q, v, p : arrays of shape (k, *sites), (k, *sites, components) or (k, bodies, dimensions)
+        Position, velocity and momentum; after the first axis as the start had them.
+    z, energy : arrays of shape (k,)
+        The action, and the energy v.p - L.
+    log_factor : array of shape (k,) or None
+        The logarithm of the conformal factor since the start, where it was asked for.
+    status : str
+        How the run ended; ``success`` says whether as it was asked to.
+    suspicion : str or None
+        The first step that was seen not to resolve the motion.
+    steps, evaluations : int
+        The steps taken, and the evaluations of all forces.
+    t_end : float
+        The time reached.
+    """
+
+    def __init__(self, run, request, shape, record, bodies):
+        self._run, self._request, self._shape, self._bodies = run, request, shape, bodies
+        self.t, self.z, self.energy, self.log_factor = record.t, record.z, record.energy, record.log_factor
+        self.q, self.v, self.p = (x.reshape(-1, *shape) for x in (record.q, record.v, record.p))
+        self.status, self.success, self.suspicion = record.status, record.success, record.suspicion
+        self.steps, self.evaluations = record.steps, record.evaluations
+        self._end = record.end
+
+    @property
+    def t_end(self):
+        return self._end[0]
+
+    @property
+    def momenta(self):
+        """The total momenta of bodies, by name: arrays of shape (k,); of a lattice there are none.
+
+        "translation of x" and so on is the total momentum, "rotation of x, y" and so on the total angular momentum. They
+        decay as the conformal factor, e^(gamma t).
+        """
+        if not self._bodies:
+            return {}
+        names = "xyz"[: self._shape[-1]]
+        found = {f"translation of {name}": self.p[..., i].sum(axis=1) for i, name in enumerate(names)}
+        for j in range(len(names)):
+            for i in range(j):
+                turned = self.q[..., i] * self.p[..., j] - self.q[..., j] * self.p[..., i]
+                found[f"rotation of {names[i]}, {names[j]}"] = turned.sum(axis=1)
+        return found
+
+    def resume(self, t=None):
+        """Goes on from the end of the motion, by the same integrator with steps of the same length.
+
+        Parameters
+        ----------
+        t : float or array, optional
+            The new end; or the times of the rows, beyond the end of this motion, of which the first may be that end. What
+            was asked for and not reached, if nothing is said.
+
+        Returns
+        -------
+        AssembledSolution
+            From the end of this motion on.
+        """
+        at, q, p, z = self._end
+        _, asked, every, (integrator, step, steps), conformal_factor = self._request
+        asked = np.atleast_1d(np.asarray(asked, dtype=float))
+        start = asked[0] if len(asked) > 1 else 0.0
+        if t is None:
+            t = asked[asked > at] if asked[-1] > start else asked[asked < at]
+            if len(t) == 0:
+                raise ValueError("the motion has reached its end: give `t`, a later one")
+        times = np.array(t, dtype=float, ndmin=1)
+        if len(times) == 0 or times[0] != at:
+            times = np.concatenate([[at], times])
+        if steps is not None:
+            # So many steps were of another span.
+            step, steps = abs(asked[-1] - start) / steps, None
+        request = (q, p, True, z), times, every, (integrator, step, steps), conformal_factor
+        return _solution(self._run, request, self._shape, self._bodies)
+
+    def to_xarray(self):
+        """The rows as an `xarray.Dataset` over time and the axes of the sites or bodies."""
+        import xarray
+
+        names = ["body", "component"] if self._bodies else [f"site_{i}" for i in range(len(self._shape))]
+        data = {name: (("t", *names), getattr(self, name)) for name in ("q", "v", "p")}
+        data |= {"z": ("t", self.z), "energy": ("t", self.energy)}
+        if self.log_factor is not None:
+            data["log_factor"] = ("t", self.log_factor)
+        return xarray.Dataset(data, {"t": self.t}, {"status": self.status})
+
+    def __repr__(self):
+        return f"<AssembledSolution: {len(self.t)} rows of {self._shape}, t = {self.t_end}, {self.steps} steps, {self.status}>"
+
+
+def lattice(
+    site,
+    bond=None,
+    q0=None,
+    v0=None,
+    t=None,
+    *,
+    p0=None,
+    z0=0.0,
+    boundary="periodic",
+    integrator="strang",
+    step=None,
+    steps=None,
+    every=None,
+    conformal_factor=False,
+    coordinates=("x",),
+    parameters=None,
+):
+    """The motion of a lattice of equal sites with bonds between neighbours, of any number of them.
+
+    Its Lagrangian is the sum of `site` over the sites, of `bond` over the pairs of neighbours along each axis, and of the
+    drag gamma(t) z. The drag stands in `site`, so that each site has Herglotz' equation of its own; z is the action of the
+    whole lattice, and the term counts once.
+
+    Parameters
+    ----------
+    site : str
+        The Lagrangian of a site, of the form m*x'^2/2 - V(t, x) + gamma*z: ``"x'^2/2 - (1 - cos(x)) + gamma*z"``.
+    bond : str, optional
+        That of a bond, of the coordinates before and after it, without velocities: ``"-k*(xr - xl)^2/2"``.
+    q0, v0 : array of shape (sites,), (sites, sites) and so on
+        Position and velocity of the start, with an axis for each direction of the lattice; of several coordinates at a
+        site, these are the last axis. One number of `v0` is that of all.
+    t : float or array of shape (k,)
+        The times of the rows: the first is that of the start, the last the end, in either direction. One number is the
+        end, of a motion from 0.
+    p0 : array, optional
+        The momentum of the start, in place of `v0`.
+    z0 : float
+        The action of the start.
+    boundary : {"periodic", "fixed", "free"}
+        What the first and the last site along each axis are bound to: each other, walls at 0, or nothing.
+    integrator : str
+        A splitting such as "strang" or "blanes_moan_6", which is explicit; or "midpoint", "gauss_1" or "gauss_2", which
+        are for stiff bonds.
+    step, steps : float, int
+        The length or the number of its steps: one of them.
+    every : int, optional
+        Rows at the ends of so many steps, in place of those at `t`.
+    conformal_factor : bool
+        Whether `AssembledSolution.log_factor` is computed.
+    coordinates : list of str
+        The names of the components at a site, 1 to 3 of them; ``xl`` and ``xr`` are those of ``x`` in a bond.
+    parameters : dict of float, optional
+        Their values by name.
+
+    Returns
+    -------
+    AssembledSolution
+
+    Raises
+    ------
+    ValueError
+        For all that is wrong with an argument.
+    Interrupted
+        A `KeyboardInterrupt` with the solution up to there.
+
+    Examples
+    --------
+    A wave in a thousand pendulums with springs:
+
+    >>> import numpy as np, herglotz as hz
+    >>> x = np.arange(1000)
+    >>> sol = hz.lattice("x'^2/2 - (1 - cos(x)) + gamma*z", "-(xr - xl)^2/2", 3*np.exp(-(x - 500)**2/100), 0.0,
+    ...                  np.linspace(0, 50, 101), step=0.05, parameters={"gamma": -0.01})
+    >>> sol.q.shape
+    (101, 1000)
+    """
+    coordinates = [coordinates] if isinstance(coordinates, str) else list(coordinates)
+    q0, request = _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor)
+    sizes = q0.shape
+    if len(coordinates) > 1:
+        if sizes[-1:] != (len(coordinates),):
+            raise ValueError(f"`q0` has the shape {sizes}, where the last axis is to have {len(coordinates)} coordinates")
+        sizes = sizes[:-1]
+    parameters = dict(parameters) if parameters else None
+    run = functools.partial(_run_lattice, (coordinates, site, bond), sizes, boundary, parameters)
+    return _solution(run, request, q0.shape, False)
+
+
+def bodies(
+    masses,
+    q0,
+    v0=None,
+    t=None,
+    *,
+    p0=None,
+    G=1.0,
+    gamma=0.0,
+    z0=0.0,
+    integrator="blanes_moan_6",
+    step=None,
+    steps=None,
+    every=None,
+    conformal_factor=False,
+):
+    """The motion of bodies with Newton's gravitation of each pair and drag, of any number of them.
+
+    L = sum m_i |v_i|^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z. Steps are of one length: choose it for the closest
+    encounter. Few bodies, 5 in space or 8 in the plane, are a system for `solve` too, which chooses its steps.
+
+    Parameters
+    ----------
+    masses : array of shape (bodies,)
+    q0, v0 : array of shape (bodies, 2) or (bodies, 3)
+        Position and velocity of the start. One number of `v0` is that of all.
+    t : float or array of shape (k,)
+        The times of the rows: the first is that of the start, the last the end, in either direction. One number is the
+        end, of a motion from 0.
+    p0 : array, optional
+        The momentum of the start, in place of `v0`.
+    G : float
+        The constant of gravitation.
+    gamma : float
+        The rate of the drag, negative for dissipation: momentum and angular momentum decay as e^(gamma t).
+    z0 : float
+        The action of the start.
+    integrator : str
+        A splitting such as "blanes_moan_6" or "strang", or "midpoint".
+    step, steps : float, int
+        The length or the number of its steps: one of them.
+    every : int, optional
+        Rows at the ends of so many steps, in place of those at `t`.
+    conformal_factor : bool
+        Whether `AssembledSolution.log_factor` is computed.
+
+    Returns
+    -------
+    AssembledSolution
+
+    Raises
+    ------
+    ValueError
+        For all that is wrong with an argument.
+    Interrupted
+        A `KeyboardInterrupt` with the solution up to there.
+    """
+    q0, request = _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor)
+    masses = _array("masses", masses)
+    if q0.ndim != 2 or len(q0) != len(masses):
+        raise ValueError(f"`q0` has the shape {q0.shape}, where a row for each of the {len(masses)} bodies is needed")
+    run = functools.partial(_run_bodies, masses, q0.shape[1], G, gamma)
+    return _solution(run, request, q0.shape, True)
+
+
+# Functions of the module, so that a solution can be pickled.
+def _run_lattice(*arguments):
+    return _core.run_lattice(*arguments)
+
+
+def _run_bodies(*arguments):
+    return _core.run_bodies(*arguments)
+
+
+def _array(name, x):
+    """The numbers of an argument, a copy."""
+    try:
+        return np.array(x, dtype=float, ndmin=1)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"`{name}` is no array of real numbers: {error}") from None
+
+
+def _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor):
+    """The position of the start with its shape, and what is asked for as the core reads it."""
+    if q0 is None:
+        raise ValueError("`q0` is not given: the position of the start")
+    if t is None:
+        raise ValueError("`t` is not given: the end, or the times of the rows")
+    if (v0 is None) == (p0 is None):
+        raise ValueError("give `v0` or `p0`, one of them")
+    q0 = _array("q0", q0)
+    name, rate = ("v0", v0) if p0 is None else ("p0", p0)
+    of_all, rate = np.ndim(rate) == 0, _array(name, rate)
+    if not of_all and rate.shape != q0.shape:
+        raise ValueError(f"`{name}` has the shape {rate.shape}, where `q0` has {q0.shape}")
+    rate = np.broadcast_to(rate, q0.shape).ravel()
+    way = integrator, step, steps
+    return q0, ((q0.ravel(), rate, p0 is not None, z0), copied(t), every, way, conformal_factor)
+
+
+def _solution(run, request, shape, bodies):
+    record = run(request)
+    sol = AssembledSolution(run, request, shape, record, bodies)
+    if record.interrupted is not None:
+        if isinstance(record.interrupted, KeyboardInterrupt):
+            raise Interrupted(sol)
+        raise record.interrupted
+    return sol

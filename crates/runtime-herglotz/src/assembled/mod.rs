@@ -1,0 +1,96 @@
+//! Systems of many coordinates: lattices by the formulas of a site and of a bond, and bodies that attract each other.
+
+mod bodies;
+mod lattice;
+mod run;
+mod stepper;
+mod term;
+
+pub use bodies::Bodies;
+pub use lattice::{Boundary, Lattice};
+pub use run::AssembledMotion;
+
+use crate::{Outcome, RuntimeError, Watch};
+use assembled_herglotz::AssembledSystem;
+use std::ops::ControlFlow;
+
+/// A system of any number of coordinates as a sum of local terms: a [`Lattice`] or [`Bodies`], ready to be run.
+///
+/// ```
+/// use runtime_herglotz::{AssembledMotion, Boundary, Lattice, Start, Steps};
+/// let chain = Lattice {
+///     site: "x'^2/2 - (1 - cos(x)) + gamma*z".into(),
+///     bond: Some("-k*(xr - xl)^2/2".into()),
+///     sizes: vec![100],
+///     boundary: Boundary::Periodic,
+///     parameters: vec![("k".into(), 4.0), ("gamma".into(), -0.1)],
+///     ..Lattice::default()
+/// };
+/// let q: Vec<f64> = (0..100).map(|i| (0.2 * std::f64::consts::PI * f64::from(i)).sin()).collect();
+/// let start = Start::new(0.0, q, vec![0.0; 100], 0.0);
+/// let motion = AssembledMotion::new(start, 10.0, "strang".parse().unwrap(), Steps::Size(0.1));
+/// let (outcome, rows) = chain.system()?.record(&motion)?;
+/// assert_eq!((outcome.steps, rows.len()), (100, 101));
+/// # Ok::<(), runtime_herglotz::RuntimeError>(())
+/// ```
+pub struct Assembled {
+    system: AssembledSystem,
+    /// What a state has: the number of places, and of components at each.
+    places: usize,
+    components: usize,
+    /// The mass of each coordinate, in the order of the assembled system.
+    masses: Vec<f64>,
+    /// Whether all coordinates act on each other, so that no matrix of theirs is sparse.
+    full: bool,
+}
+
+impl Assembled {
+    /// The number of coordinates. In a start and in rows, the components of one site or body follow each other.
+    pub fn dimension(&self) -> usize {
+        self.places * self.components
+    }
+
+    /// Runs a motion; each row has `t`, the positions, the velocities, the momenta, `z` and the energy, and the logarithm of the conformal factor
+    /// where it is asked for. What goes wrong on the way is the status of the outcome, which then has the state of the last row.
+    ///
+    /// # Errors
+    /// [`RuntimeError::Argument`], [`RuntimeError::Length`] and [`RuntimeError::NotFinite`] with the argument; [`RuntimeError::Assembly`].
+    pub fn run(&self, motion: &AssembledMotion, watch: &mut dyn Watch) -> Result<Outcome, RuntimeError> {
+        run::run(self, motion, watch)
+    }
+
+    /// Runs a motion and keeps its rows.
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run).
+    pub fn record(&self, motion: &AssembledMotion) -> Result<(Outcome, Vec<Vec<f64>>), RuntimeError> {
+        struct Kept(Vec<Vec<f64>>);
+        impl Watch for Kept {
+            fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
+                self.0.push(numbers.to_vec());
+                ControlFlow::Continue(())
+            }
+        }
+        let mut kept = Kept(Vec::new());
+        let outcome = self.run(motion, &mut kept)?;
+        Ok((outcome, kept.0))
+    }
+
+    /// From the order of users, the components of each place together, to that of the assembled system, each component of all places: then
+    /// neighbours follow each other in memory.
+    fn inward(&self, x: &[f64]) -> Vec<f64> {
+        let (n, d) = (self.places, self.components);
+        (0..n * d).map(|k| x.get(k % n * d + k / n).copied().unwrap_or(f64::NAN)).collect()
+    }
+
+    /// The other way, to the end of a row.
+    fn outward(&self, x: &[f64], row: &mut Vec<f64>) {
+        let (n, d) = (self.places, self.components);
+        row.extend((0..n * d).map(|k| x.get(k % d * n + k / d).copied().unwrap_or(f64::NAN)));
+    }
+}
+
+/// An argument with what is wrong with it.
+fn argument(argument: &'static str, why: impl Into<String>) -> RuntimeError {
+    RuntimeError::Argument { argument, why: why.into() }
+}

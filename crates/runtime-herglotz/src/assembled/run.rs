@@ -1,0 +1,299 @@
+//! Runs of systems of many coordinates.
+
+use super::stepper::{Place, Stepper};
+use super::{Assembled, argument};
+use crate::{Outcome, Rate, RuntimeError, Start, Watch, When};
+use discrete_herglotz::{AnyIntegrator, Halt, InputError, Status, StepError, Steps};
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+/// The time that steps take between two looks at what is asked from outside, and the most steps.
+const BETWEEN: Duration = Duration::from_millis(20);
+const MOST: usize = 256;
+
+/// A motion of a system of many coordinates.
+#[derive(Clone, Debug)]
+pub struct AssembledMotion {
+    /// Where it starts: the components of one site or body follow each other.
+    pub start: Start,
+    /// The time at which it ends, before or after that of the start.
+    pub end: f64,
+    /// The integrator: a splitting, `midpoint`, `gauss_1` or `gauss_2`.
+    pub by: AnyIntegrator,
+    /// The length of its steps, made a little shorter so that a whole number of them fills the span; or their number.
+    pub steps: Steps,
+    /// The states that are recorded. One at a time inside of a step is by a shorter step of the same integrator.
+    pub rows: When,
+    /// Whether rows and the outcome have the logarithm of the conformal factor.
+    pub conformal_factor: bool,
+}
+
+impl AssembledMotion {
+    /// From a start to a time by given steps, with a row of each.
+    pub fn new(start: Start, end: f64, by: AnyIntegrator, steps: Steps) -> Self {
+        AssembledMotion { start, end, by, steps, rows: When::Every(1), conformal_factor: false }
+    }
+
+    /// The length of a step, and how many there are.
+    fn step(&self) -> Result<(f64, usize), RuntimeError> {
+        let span = self.end - self.start.t;
+        if !(span != 0.0 && span.is_finite()) {
+            let why = format!(
+                "ends at {}, where the motion starts at {}; give a later or earlier end",
+                self.end, self.start.t
+            );
+            return Err(argument("t", why));
+        }
+        let count = match self.steps {
+            Steps::Count(0) => return Err(InputError::NoSteps.into()),
+            Steps::Count(count) => return Ok((span / count as f64, count)),
+            Steps::Size(h) => {
+                if !(h > 0.0 && h.is_finite()) {
+                    return Err(argument(
+                        "step",
+                        format!("is {h}, where a positive number is needed; the end says the direction"),
+                    ));
+                }
+                // As of small systems: a quotient that is an integer but for its rounding is that.
+                (span.abs() / h * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0)
+            }
+        };
+        // Steps are counted exactly up to there.
+        const LARGEST: f64 = (1u64 << 53) as f64;
+        if count > LARGEST {
+            return Err(argument(
+                "step",
+                format!("gives {count:.1e} steps, more than can be counted; take a longer one"),
+            ));
+        }
+        Ok((span / count, count as usize))
+    }
+}
+
+/// A motion that is under way.
+struct Course<'a, 'w> {
+    of: &'a Assembled,
+    motion: &'a AssembledMotion,
+    stepper: Stepper<'a>,
+    h: f64,
+    count: usize,
+    taken: usize,
+    /// The steps of one look.
+    some: usize,
+    log_factor: f64,
+    last: Place,
+    numbers: Vec<f64>,
+    watch: &'w mut dyn Watch,
+}
+
+/// Why a motion ends before its time.
+enum Ended {
+    /// From outside.
+    Stopped,
+    /// By a step.
+    Failed(StepError),
+    /// A part of a step cannot be begun.
+    Refused(RuntimeError),
+}
+
+impl From<StepError> for Ended {
+    fn from(cause: StepError) -> Self {
+        Ended::Failed(cause)
+    }
+}
+
+impl From<RuntimeError> for Ended {
+    fn from(error: RuntimeError) -> Self {
+        Ended::Refused(error)
+    }
+}
+
+pub(super) fn run(of: &Assembled, motion: &AssembledMotion, watch: &mut dyn Watch) -> Result<Outcome, RuntimeError> {
+    let (h, count) = motion.step()?;
+    check_rows(motion)?;
+    let start = place(of, &motion.start)?;
+    let stepper = Stepper::new(of, motion.by, h, &start)?;
+    let numbers = Vec::with_capacity(4 + 3 * of.dimension());
+    let mut course =
+        Course { of, motion, stepper, h, count, taken: 0, some: 1, log_factor: 0.0, last: start, numbers, watch };
+    let status = match course.go() {
+        Ok(()) => Status::Completed,
+        Err(Ended::Stopped) => Status::Stopped { step: course.taken, t: course.time(course.taken), by: "the watch" },
+        Err(Ended::Failed(cause)) => Status::Failed { step: course.taken, t: course.time(course.taken), cause },
+        Err(Ended::Refused(error)) => return Err(error),
+    };
+    Ok(course.outcome(status))
+}
+
+/// Checks the times of rows.
+fn check_rows(motion: &AssembledMotion) -> Result<(), RuntimeError> {
+    let times = match &motion.rows {
+        When::Every(0) => return Err(argument("every", "is 0, where at least 1 is needed")),
+        When::Every(_) => return Ok(()),
+        When::At(times) => times,
+    };
+    let onward = motion.end > motion.start.t;
+    let before = |a: f64, b: f64| if onward { a <= b } else { a >= b };
+    let mut last = motion.start.t;
+    for (index, time) in times.iter().enumerate() {
+        if !(before(last, *time) && before(*time, motion.end)) {
+            return Err(InputError::Times { index, t: *time }.into());
+        }
+        last = *time;
+    }
+    Ok(())
+}
+
+/// The start, checked.
+fn place(of: &Assembled, start: &Start) -> Result<Place, RuntimeError> {
+    for (what, value) in [("t", start.t), ("z", start.z)] {
+        if !value.is_finite() {
+            return Err(RuntimeError::NotFinite { what: what.into(), value });
+        }
+    }
+    let vector = |what: &'static str, x: &[f64]| {
+        if x.len() != of.dimension() {
+            return Err(RuntimeError::Length { what, found: x.len(), expected: of.dimension() });
+        }
+        match x.iter().enumerate().find(|(_, x)| !x.is_finite()) {
+            Some((i, value)) => Err(RuntimeError::NotFinite { what: format!("{what}[{i}]"), value: *value }),
+            None => Ok(of.inward(x)),
+        }
+    };
+    let v = match &start.rate {
+        Rate::Velocity(v) => vector("v", v)?,
+        Rate::Momentum(p) => vector("p", p)?.iter().zip(&of.masses).map(|(p, m)| p / m).collect(),
+    };
+    Ok(Place { t: start.t, q: vector("q", &start.q)?, v, z: start.z })
+}
+
+impl Course<'_, '_> {
+    /// The time after so many steps.
+    fn time(&self, taken: usize) -> f64 {
+        if taken == self.count { self.motion.end } else { self.motion.start.t + taken as f64 * self.h }
+    }
+
+    fn go(&mut self) -> Result<(), Ended> {
+        match &self.motion.rows {
+            When::Every(every) => {
+                self.row()?;
+                while self.taken < self.count {
+                    self.advance((self.taken / every + 1).saturating_mul(*every).min(self.count))?;
+                    self.row()?;
+                }
+            }
+            When::At(times) => {
+                for time in times {
+                    self.row_at(*time)?;
+                }
+                self.advance(self.count)?;
+                self.look()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes steps up to so many.
+    fn advance(&mut self, to: usize) -> Result<(), Ended> {
+        while self.taken < to {
+            let begin = Instant::now();
+            // The factors of single steps are seen after each.
+            let some = if self.motion.conformal_factor { 1 } else { self.some.min(to - self.taken) };
+            if let Err(Halt { taken, cause }) = self.stepper.advance(some) {
+                self.taken += taken;
+                return Err(cause.into());
+            }
+            self.taken += some;
+            if self.motion.conformal_factor {
+                self.log_factor += self.stepper.sigma().ln();
+            }
+            let slow = begin.elapsed() > BETWEEN;
+            self.some = if slow { (self.some / 2).max(1) } else { (self.some * 2).min(MOST) };
+            if self.watch.poll(self.taken as f64 / self.count as f64).is_break() {
+                return Err(Ended::Stopped);
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps the present place.
+    fn look(&mut self) -> Result<(), Ended> {
+        self.last = Place { t: self.time(self.taken), ..self.stepper.place()? };
+        Ok(())
+    }
+
+    /// A row of the present place.
+    fn row(&mut self) -> Result<(), Ended> {
+        self.look()?;
+        self.write(self.log_factor)
+    }
+
+    /// A row at a time: at the end of a step, or of a part of one.
+    fn row_at(&mut self, time: f64) -> Result<(), Ended> {
+        let steps = (time - self.motion.start.t) / self.h;
+        let (nearest, rounding) =
+            (steps.round(), 4.0 * f64::EPSILON * (1.0 + self.motion.start.t.abs() / self.h.abs() + steps));
+        let near = (steps - nearest).abs() <= rounding;
+        let whole = if near { nearest } else { steps.floor() };
+        self.advance((whole.max(0.0) as usize).min(self.count))?;
+        self.look()?;
+        let mut log_factor = self.log_factor;
+        if near || time == self.last.t {
+            self.last.t = time;
+        } else {
+            let mut part = Stepper::new(self.of, self.motion.by, time - self.last.t, &self.last)?;
+            part.advance(1).map_err(|halt| halt.cause)?;
+            if self.motion.conformal_factor {
+                log_factor += part.sigma().ln();
+            }
+            self.last = Place { t: time, ..part.place()? };
+        }
+        self.write(log_factor)
+    }
+
+    /// Hands on a row of the last place.
+    fn write(&mut self, log_factor: f64) -> Result<(), Ended> {
+        let Place { t, q, v, z } = &self.last;
+        let energy = self.of.energy(&self.last)?;
+        self.numbers.clear();
+        self.numbers.push(*t);
+        self.of.outward(q, &mut self.numbers);
+        self.of.outward(v, &mut self.numbers);
+        self.of.outward(&self.of.momenta(v), &mut self.numbers);
+        self.numbers.extend([*z, energy]);
+        self.numbers.extend(self.motion.conformal_factor.then_some(log_factor));
+        match self.watch.row(&self.numbers) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(Ended::Stopped),
+        }
+    }
+
+    fn outcome(mut self, status: Status) -> Outcome {
+        if matches!(status, Status::Stopped { .. }) {
+            // Where it can go on; the last row if it is not there.
+            if let Ok(place) = self.stepper.place() {
+                self.last = Place { t: self.time(self.taken), ..place };
+            }
+        }
+        let of = self.of;
+        let outward = |x: &[f64]| {
+            let mut all = Vec::with_capacity(x.len());
+            of.outward(x, &mut all);
+            all
+        };
+        let Place { t, q, v, z } = &self.last;
+        Outcome {
+            status,
+            suspicion: self.stepper.suspicion(),
+            steps: self.taken,
+            t: *t,
+            q: outward(q),
+            p: outward(&of.momenta(v)),
+            v: Some(outward(v)),
+            z: Some(*z),
+            log_factor: self.motion.conformal_factor.then_some(self.log_factor),
+            error_estimate: None,
+            evaluations: self.stepper.evaluations(self.taken),
+        }
+    }
+}
