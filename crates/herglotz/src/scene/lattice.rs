@@ -299,12 +299,14 @@ fn read_start(
             }
             _ => Err(SceneError::at(text, profile.span(), format!("`{}` is one number", **name))),
         };
-        let kinds: [(&dyn Fn(&str) -> String, &mut Vec<Option<Vec<f64>>>); 3] =
-            [(&|x| x.to_owned(), &mut q), (&|x| velocity_name(x), &mut v), (&|x| format!("p_{x}"), &mut p)];
-        let found = kinds.into_iter().find_map(|(of, all)| {
-            let place = coordinates.iter().position(|x| of(x) == **name)?;
-            all.get_mut(place)
-        });
+        let place = |of: &dyn Fn(&str) -> String| coordinates.iter().position(|x| of(x) == **name);
+        let found = if let Some(i) = place(&|x| x.to_owned()) {
+            q.get_mut(i)
+        } else if let Some(i) = place(&|x| velocity_name(x)) {
+            v.get_mut(i)
+        } else {
+            place(&|x| format!("p_{x}")).and_then(|i| p.get_mut(i))
+        };
         match (found, name.as_str()) {
             (Some(place), _) => *place = Some(values(text, profile, name, sizes, parameters)?),
             (None, "t") => number(&mut t)?,
