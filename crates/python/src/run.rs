@@ -152,7 +152,10 @@ impl Kept {
     fn of(motion: &Motion) -> Self {
         let n = motion.system.dimension();
         let own = crate::motion::columns(n, motion.conformal_factor).len();
-        Kept { extra: motion.motion.columns.len() - own, ..Kept::new(n, motion.conformal_factor, motion.signals.clone()) }
+        Kept {
+            extra: motion.motion.columns.len() - own,
+            ..Kept::new(n, motion.conformal_factor, motion.signals.clone())
+        }
     }
 
     /// Of so many coordinates, with no columns beside the state's.
