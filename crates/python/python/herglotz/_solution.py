@@ -48,7 +48,7 @@ class Interrupted(KeyboardInterrupt):
     that were done."""
 
     def __init__(self, solution):
-        done = f"t = {solution.t_end}" if isinstance(solution, Solution) else f"{sum(solution.success)} of {len(solution)} members"
+        done = f"t = {solution.t_end}" if hasattr(solution, "t_end") else f"{sum(solution.success)} of {len(solution)} members"
         super().__init__(f"interrupted at {done}")
         self.solution = solution
 
