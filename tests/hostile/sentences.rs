@@ -314,6 +314,17 @@ impl Lagrangian<1> for Odd {
             Odd::Chaotic => kinetic + square * 0.5 - square * square * 0.25 + (t * 1.4).cos() * q[0] * 0.35 - z * 0.1,
         }
     }
+    fn structure(&self) -> Structure {
+        let Odd::Beginning = self else { return Structure::default() };
+        Structure {
+            z_free: true,
+            z_affine: true,
+            constant_rate: true,
+            separable: true,
+            constant_mass: true,
+            ..Structure::default()
+        }
+    }
 }
 
 /// What stands in the way of an accuracy, and the sentence that says so.
@@ -333,7 +344,7 @@ fn obstacles() {
         Obstacle::Chaos { .. } => obstacle(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "ask for less"];
         Obstacle::Order { .. } => obstacle(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "ask for less"];
         Obstacle::Misfit { .. } => obstacle(&Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
-        Obstacle::Hidden { .. } => obstacle(&Odd::Beginning, "gauss_8", 2.0, 1e-6), ["one step more", "at the ends of their steps", "end the span beside it"];
+        Obstacle::Hidden { .. } => obstacle(&Odd::Beginning, "gauss_8", 2.0, 1e-9), ["one step more", "at the ends of their steps", "end the span beside it"];
         Obstacle::Halted { .. } => obstacle(&Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
         Obstacle::Unresolved { .. } => obstacle(&Odd::Kicked, "gauss_8", 1.0, 1e-6), ["near t = ", "shorter span"];
         Obstacle::Budget => obstacle(&Odd::Chaotic, "rectangle", 10.0, 1e-12), ["too many", "higher order", "give a step"];
