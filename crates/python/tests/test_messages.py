@@ -18,9 +18,8 @@ def function(L, **change):
 
 
 def spline(t, q, v, z):
-    from scipy.interpolate import CubicSpline
-
-    return v @ v / 2 - CubicSpline([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 4.0, 9.0])(q[0])
+    # What SciPy's CubicSpline does with its argument first.
+    return v @ v / 2 - np.interp(0.5, [0.0, 1.0], [0.0, 1.0]) * np.asarray(q[0], dtype=float)
 
 
 X, XDOT, Z, GAMMA, T = sympy.symbols("x xdot z gamma t")
