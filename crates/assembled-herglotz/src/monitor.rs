@@ -103,11 +103,11 @@ impl EnergyMonitor {
     #[inline]
     pub fn is_due(&self, taken: usize) -> bool {
         let early = matches!(taken, 4 | 16 | 64 | 256);
-        (early || taken.is_multiple_of(APART)) && self.wants(taken)
+        (early || taken.is_multiple_of(APART)) && self.tells(taken)
     }
 
     /// Whether a look after so many steps can tell something.
-    pub fn wants(&self, taken: usize) -> bool {
+    pub fn tells(&self, taken: usize) -> bool {
         self.suspicion.is_none() && self.known.is_some() && taken > self.looked
     }
 

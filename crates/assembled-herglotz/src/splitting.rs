@@ -245,7 +245,7 @@ impl<'a> AssembledSplitting<'a> {
     /// steps, every 1024, and here: what follows such a step may be wrong. Nothing is seen without the action where gamma is positive, and of
     /// systems that depend on time.
     pub fn suspicion(&mut self) -> Option<Suspicion> {
-        if self.monitor.wants(self.taken) {
+        if self.monitor.tells(self.taken) {
             self.look();
         }
         self.monitor.suspicion()

@@ -1,5 +1,7 @@
 //! From a text to a node of a graph, by operator precedence (V. Pratt, "Top down operator precedence", 1973).
 
+mod messages;
+
 use crate::functions::{FUNCTIONS, OPERATIONS};
 use crate::hints::{CHOICE, instead_of_function, instead_of_name, velocity_of};
 use crate::names::{Block, Names, is_reserved, nearest_name};
@@ -178,29 +180,6 @@ impl<'a> Parser<'a> {
         ParseError::at(self.text, word.span, message)
     }
 
-    fn unexpected(&self, word: Word<'a>, wanted: &str) -> ParseError {
-        let before = self.at.checked_sub(1).and_then(|i| self.words.get(i)).map(|w| w.token);
-        let hint = match (before, word.token) {
-            (Some(_), Token::Name("if" | "and" | "or" | "else")) => "; write `if(a < b, then, otherwise)`",
-            (Some(Token::Sign('<' | '>' | '=')), Token::Sign('=')) | (_, Token::Sign('<' | '>' | '='))
-                if wanted != "`=`" =>
-            {
-                "; a condition is `if(a < b, then, otherwise)`, with `<` or `>`"
-            }
-            (Some(Token::Name(name)), Token::Sign('(')) if self.is_value(name) => {
-                "; a product is written with `*`, and a coordinate, which is a function of time, by its name alone"
-            }
-            (_, Token::Sign('\'')) => "; only coordinates have a velocity, `x'`",
-            (Some(Token::Number(_) | Token::Name(_) | Token::Sign(')' | ']')), Token::Name(_) | Token::Number(_))
-            | (Some(Token::Number(_) | Token::Sign(')' | ']')), Token::Sign('(')) => "; a product is written with `*`",
-            (Some(Token::Number(_)), Token::Sign(',')) if wanted == "an operator" => {
-                "; numbers have a point, not a comma"
-            }
-            _ => "",
-        };
-        self.error(word, format!("{} where {wanted} is expected{hint}", word.shown()))
-    }
-
     /// An expression whose operators bind more strongly than `weakest`.
     fn expression(&mut self, weakest: u8) -> Parsed<Id> {
         if self.depth >= DEEPEST_NESTING {
@@ -347,48 +326,6 @@ impl<'a> Parser<'a> {
         let known = self.names.blocks.iter().map(|b| b.name.as_str());
         let known = known.chain(self.names.parameters.iter().map(String::as_str)).chain(["t", "z", "pi", "n"]);
         known.chain(self.locals.iter().map(|(local, _)| *local)).any(|k| k == name)
-    }
-
-    fn unknown(&self, name: &str, word: Word<'a>, kind: &str) -> ParseError {
-        let locals: Vec<String> = self.locals.iter().map(|(local, _)| (*local).to_owned()).collect();
-        let mut error = self.error(word, format!("unknown {kind} `{name}`"));
-        let is_function = kind == "function";
-        let instead = match name {
-            "q" | "v" if !is_function => Some(self.all_of(name)),
-            _ if is_function => instead_of_function(name).map(str::to_owned),
-            _ => instead_of_name(name).map(str::to_owned),
-        };
-        match instead {
-            Some(instead) => error.message = format!("{}; {instead}", error.message),
-            None => {
-                let velocity = velocity_of(name, &self.names.blocks).filter(|_| !is_function);
-                error.nearest = velocity.or_else(|| self.names.nearest(name, &locals));
-            }
-        }
-        error
-    }
-
-    /// What to write for all coordinates, or for all velocities.
-    fn all_of(&self, name: &str) -> String {
-        let prime = if name == "v" { "'" } else { "" };
-        let what = if name == "v" { "velocities" } else { "coordinates" };
-        let named = self.names.blocks.first().map_or(String::new(), |block| match block.count {
-            Some(_) => format!("`{}{prime}[0]`", block.name),
-            None => format!("`{}{prime}`", block.name),
-        });
-        format!("the {what} are {named} and so on, or `{name}[0]` to `{name}[n-1]`")
-    }
-
-    /// What is said of the velocity of something that has none, where a prime follows its name.
-    fn has_no_velocity(&self, name: &str) -> Option<String> {
-        if self.word(0).token != Token::Sign('\'') {
-            return None;
-        }
-        match name {
-            "z" => Some("the rate of `z` is the Lagrangian itself, which cannot depend on it".to_owned()),
-            "t" => Some("the rate of `t` is 1".to_owned()),
-            _ => None,
-        }
     }
 
     /// A coordinate, or with a prime its velocity.

@@ -33,6 +33,9 @@ struct Found {
     status: String,
     residual: f64,
     log_factor: f64,
+    regularity: f64,
+    error_estimate: Option<f64>,
+    suspicion: Option<String>,
     iterations: u32,
 }
 
@@ -85,6 +88,9 @@ fn search<D: DiscreteLagrangian<N>, const N: usize>(formula: &Formula, ld: D, as
         status: found.status.to_string(),
         residual: found.residual,
         log_factor: found.log_factor,
+        regularity: found.regularity,
+        error_estimate: found.error_estimate,
+        suspicion: found.suspicion.map(|suspicion| suspicion.to_string()),
         iterations: found.iterations,
     })
 }
@@ -119,6 +125,9 @@ pub struct PathRecord {
     status: String,
     residual: f64,
     log_factor: f64,
+    regularity: f64,
+    error_estimate: Option<f64>,
+    suspicion: Option<String>,
     iterations: u32,
 }
 
@@ -171,6 +180,9 @@ pub fn search_path(
         status: found.status,
         residual: found.residual,
         log_factor: found.log_factor,
+        regularity: found.regularity,
+        error_estimate: found.error_estimate,
+        suspicion: found.suspicion,
         iterations: found.iterations,
     })
 }

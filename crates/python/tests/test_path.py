@@ -76,3 +76,19 @@ def test_bad_arguments_are_named():
     ]:
         with pytest.raises(ValueError, match=said):
             hz.path(**(good | change))
+
+
+def test_a_path_that_is_found_says_what_it_is_worth():
+    """Of a free oscillator: far from half a period its error is estimated, and there it is flagged, however many steps there are."""
+    free = OSCILLATOR | dict(parameters={"gamma": 0.0})
+    for steps in (50, 500):
+        good = hz.path(q0=[0.0], q1=[1.0], t=2.0, steps=steps, integrator="midpoint", **free)
+        error = np.max(np.abs(good.q[:, 0] - np.sin(good.t) / np.sin(2.0)))
+        assert good and good.suspicion is None and good.regularity > 0.0
+        # To first order in it.
+        assert 0.5 * error < good.error_estimate < 2.0 * error
+        conjugate = hz.path(q0=[0.0], q1=[1.0], t=np.pi, steps=steps, integrator="midpoint", **free)
+        assert np.max(np.abs(conjugate.q)) > 100.0
+        assert not conjugate or "does not resolve" in conjugate.suspicion and conjugate.error_estimate > 0.25
+    # Of a higher order it is not known what the steps leave out.
+    assert hz.path(q0=[0.0], q1=[1.0], t=2.0, steps=20, integrator="gauss_4", **free).error_estimate is None

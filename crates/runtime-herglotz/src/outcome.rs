@@ -101,3 +101,14 @@ pub trait Watch {
 
 /// Nothing is watched.
 impl Watch for () {}
+
+/// Keeps the rows of a motion.
+#[derive(Default)]
+pub(crate) struct KeptRows(pub Vec<Vec<f64>>);
+
+impl Watch for KeptRows {
+    fn row(&mut self, numbers: &[f64]) -> std::ops::ControlFlow<()> {
+        self.0.push(numbers.to_vec());
+        std::ops::ControlFlow::Continue(())
+    }
+}

@@ -1,11 +1,11 @@
 //! Systems by their formula.
 
 use crate::kernel::{Kernel, kernel_of};
+use crate::outcome::KeptRows;
 use crate::{Check, Geometry, Motion, Outcome, Plan, RuntimeError, Start, Watch};
 use contact_geom::Structure;
 use discrete_herglotz::{AnyIntegrator, InputError, Interrupted};
 use formula_lagrangian::Formula;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// A symmetry that is seen in a formula; its momentum decays as the conformal factor.
@@ -129,14 +129,7 @@ impl System {
     /// # Errors
     /// Those of [`run`](Self::run).
     pub fn record(&self, motion: &Motion) -> Result<(Outcome, Vec<Vec<f64>>), RuntimeError> {
-        struct Kept(Vec<Vec<f64>>);
-        impl Watch for Kept {
-            fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
-                self.0.push(numbers.to_vec());
-                ControlFlow::Continue(())
-            }
-        }
-        let mut kept = Kept(Vec::new());
+        let mut kept = KeptRows::default();
         let outcome = self.run(motion, &mut kept)?;
         Ok((outcome, kept.0))
     }

@@ -202,7 +202,7 @@ impl<'a> AssembledGauss<'a> {
     /// steps, every 1024, and here: what follows such a step may be wrong. Nothing is seen without the action where gamma is positive, and of
     /// systems that depend on time; without general terms the conformal factor of a step is compared with the exponential as well.
     pub fn suspicion(&mut self) -> Option<Suspicion> {
-        if self.monitor.wants(self.taken) {
+        if self.monitor.tells(self.taken) {
             self.look();
         }
         self.monitor.suspicion()

@@ -1,7 +1,8 @@
 //! Steps of varying length for an accuracy, where equal steps would be too many.
 
 use super::accuracy::{Choice, first_guess, obstacle};
-use super::pilot::{Marks, PilotEnd, Pilots, Track};
+use super::pilot::{Marks, PilotEnd, Pilots};
+use super::track::Track;
 use crate::switching::DividedGauss;
 use crate::{InputError, Obstacle};
 use contact_geom::{Lagrangian, larger};

@@ -29,6 +29,7 @@ mod rest;
 pub(crate) mod rows;
 pub(crate) mod saved;
 mod stepper;
+mod track;
 pub(crate) mod verified;
 pub(crate) mod watch;
 

@@ -110,6 +110,9 @@ class Path:
     status: str
     residual: float
     log_factor: float
+    suspicion: str | None
+    error_estimate: float | None
+    regularity: float
     iterations: int
     @property
     def action(self) -> float: ...

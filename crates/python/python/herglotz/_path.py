@@ -26,6 +26,13 @@ class Path:
         The largest residual of a discrete Herglotz equation, a momentum.
     log_factor : float
         The logarithm of the conformal factor of the whole path.
+    suspicion : str or None
+        Why a path that was found may be far from every motion: its steps do not resolve it, as where it jumps a centre of force, or its
+        ends are conjugate to within their error.
+    error_estimate : float or None
+        By how much the steps move the path, in units of its range; by a rule of order one or two.
+    regularity : float
+        The smallest pivot of the last linearised equations, relative to its size; small where the ends are nearly conjugate.
     iterations : int
         The corrections that were made.
     """
@@ -35,6 +42,7 @@ class Path:
         self.t, self.q, self.p, self.z = t, record.q, record.p, record.z
         self.found, self.status = record.found, record.status
         self.residual, self.log_factor, self.iterations = record.residual, record.log_factor, record.iterations
+        self.suspicion, self.error_estimate, self.regularity = record.suspicion, record.error_estimate, record.regularity
 
     @property
     def action(self):
@@ -44,7 +52,8 @@ class Path:
         return self.found
 
     def __repr__(self):
-        return f"<Path: {len(self.t) - 1} steps from t = {self.t[0]} to {self.t[-1]}, {self.status}>"
+        doubt = "" if self.suspicion is None else f"; {self.suspicion}"
+        return f"<Path: {len(self.t) - 1} steps from t = {self.t[0]} to {self.t[-1]}, {self.status}{doubt}>"
 
 
 def path(L, q0, q1, t, *, steps, integrator="gauss_4", z0=0.0, guess=None, coordinates=None, parameters=None):

@@ -10,9 +10,9 @@ pub use bodies::Bodies;
 pub use lattice::{Boundary, Lattice};
 pub use run::AssembledMotion;
 
+use crate::outcome::KeptRows;
 use crate::{Outcome, RuntimeError, Watch};
 use assembled_herglotz::AssembledSystem;
-use std::ops::ControlFlow;
 
 /// A system of any number of coordinates as a sum of local terms: a [`Lattice`] or [`Bodies`], ready to be run.
 ///
@@ -64,14 +64,7 @@ impl Assembled {
     /// # Errors
     /// Those of [`run`](Self::run).
     pub fn record(&self, motion: &AssembledMotion) -> Result<(Outcome, Vec<Vec<f64>>), RuntimeError> {
-        struct Kept(Vec<Vec<f64>>);
-        impl Watch for Kept {
-            fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
-                self.0.push(numbers.to_vec());
-                ControlFlow::Continue(())
-            }
-        }
-        let mut kept = Kept(Vec::new());
+        let mut kept = KeptRows::default();
         let outcome = self.run(motion, &mut kept)?;
         Ok((outcome, kept.0))
     }

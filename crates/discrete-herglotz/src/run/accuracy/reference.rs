@@ -1,0 +1,75 @@
+//! Steps of any integrator for a wanted error, by a reference.
+
+use super::*;
+
+/// The steps of any integrator, whose runs are compared with the reference.
+pub(super) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
+    pilots: &mut Pilots<'_, 'p, L, N>,
+    integrator: &Shared<'p, L, N>,
+    found: &Converged<N>,
+) -> Result<Choice<'p, L, N>, InputError> {
+    let wanted = pilots.wanted;
+    let (order, marks) = (f64::from(integrator.facts().order), &found.marks);
+    let whole = |count: f64| marks.whole(count);
+    let refuse = |reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
+    let mut count = whole((found.k * REFERENCE) as f64 / order.min(4.0));
+    let (mut best, mut strikes) = (f64::INFINITY, 0);
+    let (mut cause, mut before) = (Obstacle::Budget, None);
+    // The fewest steps that were seen to be enough, with their error.
+    let mut enough: Option<(usize, f64)> = None;
+    for _ in 0..ATTEMPTS {
+        if count as f64 > MOST_STEPS {
+            break;
+        }
+        let factor = match pilots.own(integrator, count, marks)? {
+            PilotEnd::Followed(track) => {
+                let error = track.distance(&found.truth);
+                if error <= 0.7 * wanted {
+                    enough = Some((count, error));
+                    // Down, where an order says that much fewer steps will do.
+                    let fewer = whole(count as f64 * (error / (0.5 * wanted)).powf(1.0 / order).max(1.0 / 16.0));
+                    if error > 0.2 * wanted || fewer as f64 > 0.8 * count as f64 || strikes > 0 {
+                        break;
+                    }
+                    count = fewer;
+                    continue;
+                }
+                if enough.is_some() {
+                    break;
+                }
+                strikes = if error < 0.7 * best { 0 } else { strikes + 1 };
+                // The reference is sure, so it is no chaos that keeps a run from it.
+                if let Some((n, other)) = before.replace((count, error)) {
+                    let shown = f64::ln(other / error) / f64::ln(count as f64 / n as f64);
+                    let round_off = error < 1e-9 && shown < 0.5 * order;
+                    cause = if round_off { Obstacle::RoundOff } else { Obstacle::Order { order: shown } };
+                }
+                best = best.min(error);
+                if strikes == 4 {
+                    break;
+                }
+                if error.is_finite() {
+                    (1.05 * (error / (0.5 * wanted)).powf(1.0 / order)).clamp(1.2, 32.0)
+                } else {
+                    2.0
+                }
+            }
+            PilotEnd::Halted { part, cause: halt } => {
+                if enough.is_some() {
+                    break;
+                }
+                cause = Obstacle::Halted { t: pilots.request.problem.t0 + part * pilots.request.span, cause: halt };
+                2.0
+            }
+            _ => {
+                cause = Obstacle::Budget;
+                break;
+            }
+        };
+        count = whole(count as f64 * factor);
+    }
+    match enough {
+        Some((count, error)) => Ok(chosen(pilots, integrator, count, error, found)),
+        None => refuse(best, cause),
+    }
+}
