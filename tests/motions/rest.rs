@@ -154,6 +154,35 @@ fn a_motion_that_is_left_with_the_rounding_of_its_forces_is_right() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// The same of which nothing is claimed: its steps solve the general equations of the stages.
+#[derive(Clone, Copy, Debug)]
+struct Unclaimed(Resting);
+
+impl Lagrangian<1> for Unclaimed {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
+        self.0.value(t, q, v, z)
+    }
+}
+
+#[test]
+fn general_steps_are_solved_to_the_rounding_of_forces() {
+    for gamma in [-0.1, -0.5, -2.0] {
+        let system = Unclaimed(Resting::Morse { gamma });
+        let start = VelocityPoint::new([0.4], [-0.3], 0.0);
+        let problem = Problem::new(&system, 0.0, start).unwrap();
+        // Until the oscillation is below 1e-25 of the start.
+        let until = Until::Time(60.0 / -larger(0.5 * gamma, 2.0 / gamma));
+        for stages in [1, 2, 4, 8, 12, 16] {
+            let run = problem.by(AnyIntegrator::Gauss { stages }).steps(Steps::Size(0.1 * stages as f64));
+            let end = run.run(until).unwrap();
+            assert_eq!((end.status, end.suspicion), (Status::Completed, None), "{gamma}, {stages} stages: {end:?}");
+            // Some hundred roundings of the force, added up.
+            assert!(end.q[0].abs() < 1e-13, "{gamma}, {stages} stages: {end:?}");
+        }
+        assert!(problem.accuracy(1e-8).run(until).is_ok_and(|end| end.suspicion.is_none()), "{gamma}");
+    }
+}
+
 /// A damped pendulum down to the smallest numbers.
 #[test]
 fn what_is_at_rest_ends_and_says_so() {

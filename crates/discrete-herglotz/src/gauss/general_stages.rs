@@ -8,6 +8,7 @@ use super::stages::{Stages, blocks};
 use super::time_transformation::TimeTransformation;
 use crate::gauss::lanes::Lanes;
 use crate::rules::step_equations::{inverted, kept_mass_matrix};
+use crate::run::watch::value_rounding;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint, gradient_rounding, larger};
 use pulp::Simd;
@@ -46,7 +47,7 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
         let (s, i) = (self.table.s, self.table.s / 2);
         let (q, v) = (SVector::from_fn(|d, _| self.x[d].0[i]), SVector::from_fn(|d, _| self.v[d].0[i]));
         let x = VelocityPoint { q, v, z: self.z_stages.0[i] };
-        let (_, once) = gradient_rounding(self.lagrangian, t + self.table.times.0[i], &x);
+        let (of_value, once) = gradient_rounding(self.lagrangian, t + self.table.times.0[i], &x);
         // `start + M rates` against what it should be, in units of its terms.
         let holds = |start: f64, rates: &Stages, rounding: f64, sums: &dyn Fn(usize) -> f64| {
             let mut sum = Stages::ZERO;
@@ -58,9 +59,10 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
             })
         };
         let rho = self.falling.map(|falling| 1.0 - falling);
+        let of_action = value_rounding(of_value, &once.x, &x.q) * self.table.h.abs();
         let of_momentum = |d: usize| once.x[d] * self.table.h.abs() + once.y[d];
         holds(1.0, &self.rate.map(|rate| -rate), 0.0, &|i| rho.0[i])
-            && holds(self.z.value, &self.l, 0.0, &|i| self.z_stages.0[i])
+            && holds(self.z.value, &self.l, of_action, &|i| self.z_stages.0[i])
             && (0..N).all(|d| holds(self.p[d].value, &self.force[d], of_momentum(d), &|i| rho.0[i] * self.l_v[d].0[i]))
     }
 

@@ -1,7 +1,7 @@
 //! Discrete Lagrangians by quadrature of the action: what the rules of [`crate::rules`] share.
 
 use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
-use crate::run::watch::{factor_misfit, misfit};
+use crate::run::watch::{factor_misfit, misfit, value_rounding};
 use crate::solve::newton::{Linearised, NewtonStart, largest, newton};
 use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
@@ -319,7 +319,7 @@ fn rounding_of_residual<L: Lagrangian<N>, const N: usize>(
     p: &SVector<f64, N>,
 ) -> [f64; 2] {
     let (of_value, once) = gradient_rounding(lagrangian, t, x);
-    let of_action = of_value + largest(&once.x) * largest(&x.q);
+    let of_action = value_rounding(of_value, &once.x, &x.q);
     [h.abs() * (largest(&once.x) + largest(p) * once.z) + largest(&once.y), h.abs() * of_action].map(|e| ROUNDINGS * e)
 }
 

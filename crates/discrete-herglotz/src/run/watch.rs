@@ -104,6 +104,12 @@ fn sharpness<const N: usize>([turn, velocity, q]: [&SVector<f64, N>; 3], h: f64,
     moves.then(|| turn.dot(turn) / velocity.dot(velocity))
 }
 
+/// What rounding may have changed of the value of L, from that of its terms and of its forces at a position: beside an equilibrium at which
+/// terms cancel a potential is a square of what is left, and its rounding one of the second order.
+pub(crate) fn value_rounding<const N: usize>(of_terms: f64, of_force: &SVector<f64, N>, q: &SVector<f64, N>) -> f64 {
+    of_terms + size(of_force) * size(q)
+}
+
 /// Whether velocities move by no more than rounding in a step of h.
 pub(crate) fn at_rest<const N: usize>(velocities: [&SVector<f64, N>; 4], h: f64, floor: f64) -> bool {
     largest(velocities.into_iter().flatten().copied()) * h.abs() <= floor

@@ -6,7 +6,7 @@ use crate::gauss::look::{Compare, Curve, Look, SETS};
 use crate::gauss::resolution::ROUNDINGS;
 use crate::gauss::time_transformation::Physical;
 use crate::run::saved::saved;
-use crate::run::watch::{misfit, sharper, size};
+use crate::run::watch::{misfit, sharper, size, value_rounding};
 use crate::{Doubt, Stepper, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, gradient_rounding, larger, largest};
@@ -122,7 +122,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let (l, g) = gradient_rounding(self.lagrangian, t, &x);
         let (of, h) = (|part: &SVector<f64, N>| largest(part.iter().copied()), self.products.h.abs());
         // No bound where the derivatives have none. What is below the normal numbers has lost its digits.
-        [larger(of(&g.x) * h, of(&g.y)), l * h]
+        [larger(of(&g.x) * h, of(&g.y)), value_rounding(l, &g.x, &x.q) * h]
             .map(|once| if once.is_finite() { ROUNDINGS * once + f64::MIN_POSITIVE } else { 0.0 })
     }
 }
