@@ -3,9 +3,10 @@
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
 use contact_geom::VelocityPoint;
-use discrete_herglotz::{Outcome, Problem, Until};
+use discrete_herglotz::{InputError, Interrupt, Outcome, Problem, Until};
 use formula_lagrangian::Formula;
 use std::f64::consts::PI;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn run<const N: usize>(text: &str, names: &[&str], q: [f64; N], v: [f64; N], span: f64, wanted: f64) -> Outcome<N> {
     let lagrangian = Formula::parse(text, names, &[]).unwrap().lagrangian::<N>().unwrap();
@@ -49,4 +50,29 @@ fn a_strong_field_is_followed() {
     let (x, y) = (1e4_f64.sin() / 1e4, (1e4_f64.cos() - 1.0) / 1e4);
     let off = (found.q[0] - x).hypot(found.q[1] - y).hypot(found.p[0] - 1e4_f64.cos());
     assert!(off <= 1e-6, "{off:e} in {} steps", found.steps);
+}
+
+/// A plan ends with the first answer that is yes, in whichever of its searches it is given: that with equal steps fails here, and one with divided
+/// steps follows.
+#[test]
+fn plans_are_interrupted_in_each_search() {
+    let kepler = Formula::parse("(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)", &["x", "y"], &[]).unwrap();
+    let kepler = kepler.lagrangian::<2>().unwrap();
+    let (asked, yes) = (AtomicUsize::new(0), AtomicUsize::new(usize::MAX));
+    let question = || asked.fetch_add(1, Ordering::Relaxed) == yes.load(Ordering::Relaxed);
+    let e: f64 = 0.999_999;
+    let start = VelocityPoint::new([1.0 + e, 0.0], [0.0, f64::sqrt((1.0 - e) / (1.0 + e))], 0.0);
+    let problem = Problem::new(&kepler, 0.0, start).unwrap().with_interrupt(Interrupt::when(&question));
+    let plan = |at| {
+        yes.store(at, Ordering::Relaxed);
+        asked.store(0, Ordering::Relaxed);
+        problem.accuracy(1e-9).plan(Until::Time(6.5)).err()
+    };
+    assert_eq!(plan(usize::MAX), None);
+    let questions = asked.load(Ordering::Relaxed);
+    assert!(questions > 10, "{questions}");
+    for at in 0..questions {
+        assert_eq!(plan(at), Some(InputError::Interrupted), "at {at} of {questions}");
+        assert_eq!(asked.load(Ordering::Relaxed), at + 1, "{questions}");
+    }
 }

@@ -158,6 +158,7 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
     if let Err(Ended::Elsewhere(Elsewhere::Divided)) = found {
         match divided_steps(pilots) {
             Ok(choice) => return Ok(choice),
+            Err(interrupted @ InputError::Interrupted) => return Err(interrupted),
             Err(_) => found = by_equal_steps(pilots, &gauss(stages), stages),
         }
     }
@@ -168,14 +169,17 @@ fn choose_all<'p, L: Lagrangian<N>, const N: usize>(
     {
         return divided_steps(pilots).map_err(|divided| match divided {
             InputError::Accuracy { reached, .. } if reached.is_finite() => divided,
+            InputError::Interrupted => divided,
             _ => *refused,
         });
     }
     let Err(Ended::Elsewhere(Elsewhere::Clock)) = found else { return Ok(found?) };
     // Where the clock leads nowhere equal steps may.
     let clocked: Shared<'p, L, N> = Arc::new(ClockedGauss { stages: BY_CLOCK });
-    let by_clock = by_clock(pilots, &clocked, BY_CLOCK);
-    Ok(by_clock.or_else(|_| by_equal_steps(pilots, &gauss(stages), stages))?)
+    Ok(by_clock(pilots, &clocked, BY_CLOCK).or_else(|ended| match ended {
+        Ended::Refused(InputError::Interrupted) => Err(ended),
+        _ => by_equal_steps(pilots, &gauss(stages), stages),
+    })?)
 }
 
 /// How a search ends that finds no runs that agree.
