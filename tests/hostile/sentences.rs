@@ -7,10 +7,10 @@ use contact_geom::{
     herglotz_field, linear,
 };
 use discrete_herglotz::{
-    AnyIntegrator, BoundaryPath, Checkpoint, Composition, DiscreteLagrangian, DiscretePath, End, Event, Events, Facts,
-    Flow, Gauss, Halt, InputError, Integrator, Interrupt, Interrupted, LeftMidpoint, Method, Midpoint, Moment,
-    Obstacle, Problem, Rectangle, Rows, Solver, SplittingScheme, Status, StepError, Stepper, Steps, Stop, Strang,
-    Suspicion, UnknownIntegrator, UnknownMethod, Until, Wants,
+    AnyIntegrator, BoundaryPath, Checkpoint, Composition, DiscreteLagrangian, DiscretePath, DividedGauss, End, Event,
+    Events, Facts, Flow, Gauss, Halt, InputError, Integrator, Interrupt, Interrupted, LeftMidpoint, Method, Midpoint,
+    Moment, Obstacle, Problem, Rectangle, Rows, Solver, SplittingScheme, Status, StepError, Stepper, Steps, Stop,
+    Strang, Suspicion, UnknownIntegrator, UnknownMethod, Until, Wants,
 };
 use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow};
 use std::ops::ControlFlow;
@@ -399,6 +399,15 @@ fn step_errors() {
                 other => panic!("{other:?}"),
             }
         }, ["the function of an event", "not finite at t = 0.15", "defined along the motion"];
+        StepError::Undivided { .. } => {
+            let divided = DividedGauss { stages: 2, most_misfit: f64::MIN_POSITIVE };
+            let pendulum = Pendulum { gamma: -0.1 };
+            let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.5], 0.0)).unwrap();
+            match problem.by(divided).steps(Steps::Count(1)).run(Until::Time(1.0)).unwrap().status {
+                Status::Halted { cause, .. } => cause,
+                other => panic!("{other:?}"),
+            }
+        }, ["cannot be divided into parts", "near t = ", "allow a larger misfit"];
         StepError::Switching { .. } => {
             Switching::Restless(std::cell::Cell::new(false)).fails()
         }, ["without end", "smooth the kink"];

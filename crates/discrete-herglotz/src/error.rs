@@ -226,6 +226,15 @@ pub enum StepError {
         /// The smallest singular value of the derivative of the end position in the initial velocity, a time.
         smallest: f64,
     },
+    /// A step is divided as long as its parts do not resolve the motion, and not even the shortest does, or they are too many.
+    #[error(
+        "the step cannot be divided into parts that resolve the motion near t = {t}: its misfit there is round-off, or that of a kink that \
+         the Lagrangian does not tell; allow a larger misfit, take shorter steps, or end the run before"
+    )]
+    Undivided {
+        /// The time.
+        t: f64,
+    },
     /// The Lagrangian switches without end within a step.
     #[error(
         "the Lagrangian switches at its kinks or jumps without end near t = {t}: the motion is held on a surface from both sides, or \

@@ -1,10 +1,10 @@
 //! Whether a found path is a motion: its steps resolve it, and what they leave out does not move it by as much as it moves.
 
-use super::sweep::{Equations, Nodes, Sweep};
+use super::sweep::{Carry, Equations, Nodes, Sweep};
 use crate::run::watch::{ROUNDED, at_rest, rounding};
 use crate::{DiscreteLagrangian, Suspicion};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{DiscretePoint, PhasePoint, larger, largest};
+use contact_geom::{PhasePoint, larger, largest};
 
 /// The part of its range by which the steps may move a path that they resolve.
 const MOST: f64 = 0.25;
@@ -12,9 +12,6 @@ const MOST: f64 = 0.25;
 /// What a second-order rule leaves out of the equation of a point, in third differences of the momenta: `h^3 p'''/12` by the trapezoidal rule and
 /// kicks and drifts, of an oscillator, and twice as much by the midpoint rule.
 const DEFECT: f64 = 1.0 / 6.0;
-
-/// The momenta at the ends of steps, with `sigma_d - 1`.
-type Momenta<const N: usize> = Vec<(SVector<f64, N>, f64)>;
 
 /// What was seen of a path.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,54 +22,51 @@ pub(super) struct Judgement {
     pub error_estimate: Option<f64>,
 }
 
-/// Judges a path that satisfies its equations. The velocities of its steps are looked at as those of a run; and the correction is found that
-/// the leading term of the error of the steps makes, by the equations linearised there: it is as large as the path where the ends are conjugate
-/// to within that error, though the factorisation sees nothing of it. `to` is workspace.
+/// Judges a path that satisfies its equations, of which the last sweep was. The velocities of its steps are looked at as those of a run; and the
+/// correction is found that the leading term of the error of the steps makes, by the equations linearised there: it is as large as the path where
+/// the ends are conjugate to within that error, though the factorisation sees nothing of it. `to` is workspace.
 pub(super) fn judge<D: DiscreteLagrangian<N>, const N: usize>(
     of: &Equations<'_, D, N>,
     sweep: &mut Sweep<N>,
     x: &mut Nodes<N>,
     to: &mut [SVector<f64, N>],
 ) -> Judgement {
-    let Some((turn, momenta)) = look(of, x) else { return Judgement::default() };
-    let moved = moved(of, sweep, x, to, &momenta);
+    let turn = look(of, &sweep.momenta, x);
+    let moved = moved(of, sweep, x, to);
     let beyond = moved.filter(|(part, _)| *part > MOST);
     let of_ends = beyond.map(|(part, step)| Suspicion { step, misfit: part / MOST });
     Judgement { suspicion: turn.or(of_ends), error_estimate: moved.map(|(part, _)| part) }
 }
 
-/// The first step that does not resolve the motion by the velocities of four in sequence, and the momenta at the ends of all steps, with
-/// `sigma_d - 1`.
+/// The first step that does not resolve the motion by the velocities of four in sequence.
 fn look<D: DiscreteLagrangian<N>, const N: usize>(
     of: &Equations<'_, D, N>,
+    momenta: &[Carry<N>],
     x: &Nodes<N>,
-) -> Option<(Option<Suspicion>, Momenta<N>)> {
+) -> Option<Suspicion> {
     let h = of.ld.step_size();
-    let mut momenta = Vec::with_capacity(of.steps);
     let mut velocities = [SVector::zeros(); 4];
-    let (mut floor, mut suspicion) = (0.0, None);
-    for k in 0..of.steps {
-        let (q0, q1, z1) = (x.q[k], x.q[k + 1], x.z[k + 1]);
-        let point = DiscretePoint { q0, q1, z0: x.z[k] };
-        let jet = of.ld.jet(of.t0 + k as f64 * h, &point).ok()?;
-        momenta.push((jet.d2, jet.dz));
+    let mut floor = 0.0;
+    for (k, Carry { p, sigma, .. }) in momenta.iter().enumerate() {
+        let (q0, q1) = (x.q[k], x.q[k + 1]);
         velocities = [velocities[1], velocities[2], velocities[3], (q1 - q0) / h];
         let [.., last] = &velocities;
         if k == 0 {
             floor = rounding(&q0, last, h);
         }
+        if k < 3 {
+            continue;
+        }
         // From the fourth step on all four are velocities of the path.
         let four = velocities.each_ref();
-        let to = PhasePoint { q: q1, p: jet.d2, z: z1 };
-        if k >= 3
-            && suspicion.is_none()
-            && let Some(misfit) = of.ld.misfit(four, &to, jet.sigma())
+        let to = PhasePoint { q: q1, p: *p, z: x.z[k + 1] };
+        if let Some(misfit) = of.ld.misfit(four, &to, *sigma)
             && !at_rest(four, h, floor)
         {
-            suspicion = Some(Suspicion { step: k, misfit });
+            return Some(Suspicion { step: k, misfit });
         }
     }
-    Some((suspicion, momenta))
+    None
 }
 
 /// The largest part of its range by which the steps move a coordinate, and the step where; infinite where the equations have no solution.
@@ -81,24 +75,24 @@ fn moved<D: DiscreteLagrangian<N>, const N: usize>(
     sweep: &mut Sweep<N>,
     x: &mut Nodes<N>,
     to: &mut [SVector<f64, N>],
-    momenta: &[(SVector<f64, N>, f64)],
 ) -> Option<(f64, usize)> {
     // A third difference has four momenta.
+    let momenta = sweep.momenta.as_slice();
     let last = momenta.len().checked_sub(4)?;
     let order = of.ld.order().filter(|order| *order <= 2)?;
     let defect = |k: usize| {
         let i = k.saturating_sub(2).min(last);
-        let p = |j: usize| momenta[i + j].0;
+        let p = |j: usize| momenta[i + j].p;
         let third = (p(3) - p(0) + (p(1) - p(2)) * 3.0) * DEFECT;
         // A rule of order one takes z, or the momentum that the drag acts on, at the start of a step.
-        let (here, drag) = momenta[k.saturating_sub(1)];
-        let change = momenta[k.max(1)].0 - momenta[k.max(1) - 1].0;
+        let Carry { p: here, dz: drag, .. } = momenta[k.saturating_sub(1)];
+        let change = momenta[k.max(1)].p - momenta[k.max(1) - 1].p;
         if order == 1 { third + (change + here * drag) * (0.5 * drag) } else { third }
     };
     let first = usize::from(!of.conditions.is_periodic());
     let load: Vec<_> = (0..of.steps).map(|k| if k < first { SVector::zeros() } else { defect(k) }).collect();
     let loaded = Equations { ld: of.ld, conditions: of.conditions, t0: of.t0, steps: of.steps, load: &load };
-    let measured = sweep.with_exchanges(&loaded, x).ok()?;
+    let measured = sweep.forward(&loaded, x).ok()?;
     if measured.regularity.is_nan() || measured.regularity <= 0.0 {
         return Some((f64::INFINITY, 0));
     }

@@ -258,7 +258,7 @@ fn check_memory<const N: usize>(steps: usize, periodic: bool) -> Result<(), Inpu
     // Positions of the path, of the correction, of the trial, of the best so far and of the start; momenta and loads of the path that is judged;
     // actions; the eliminated blocks.
     let blocks = if periodic { 2 } else { 1 };
-    let reals = 7 * N + 3 + N + blocks * N * N;
+    let reals = 7 * N + 5 + N + blocks * N * N;
     let bytes = reals.saturating_mul(size_of::<f64>());
     // Not worth a question to the system.
     if steps <= (1 << 26) / bytes {

@@ -21,6 +21,24 @@ pub(super) struct Eliminated<const N: usize> {
     pub rhs: SVector<f64, N>,
 }
 
+/// What a step does to the momentum at its end.
+#[derive(Clone, Copy)]
+pub(super) struct Carry<const N: usize> {
+    /// `D2 L_d`, the momentum there.
+    pub p: SVector<f64, N>,
+    /// `Dz L_d`.
+    pub dz: f64,
+    /// `sigma_d`.
+    pub sigma: f64,
+}
+
+impl<const N: usize> Carry<N> {
+    #[inline(always)]
+    pub fn of(jet: &SecondDiscreteJet<N>) -> Self {
+        Carry { p: jet.first.d2, dz: jet.first.dz, sigma: jet.first.sigma() }
+    }
+}
+
 /// The workspace of a sweep, of a length proportional to that of the path.
 pub(super) struct Sweep<const N: usize> {
     pub points: Vec<Eliminated<N>>,
@@ -30,6 +48,8 @@ pub(super) struct Sweep<const N: usize> {
     first: Vec<SMatrix<f64, N, N>>,
     /// The correction of the last unknown position, `q_0` of a periodic path.
     last: SVector<f64, N>,
+    /// The momenta of the path of the last sweep.
+    pub momenta: Vec<Carry<N>>,
     /// Whether a second derivative of the discrete Lagrangian in the action has been seen not to vanish.
     pub coupled: bool,
 }
@@ -238,6 +258,7 @@ impl<const N: usize> Sweep<N> {
             after: Vec::new(),
             first: vec![zero; closed],
             last: SVector::zeros(),
+            momenta: vec![Carry { p: SVector::zeros(), dz: 0.0, sigma: 1.0 }; of.steps],
             coupled: false,
         }
     }
@@ -260,8 +281,8 @@ impl<const N: usize> Sweep<N> {
         self.with_exchanges(of, x)
     }
 
-    /// The same, with rows of neighbouring points exchanged where that is more accurate, and with the load of the equations.
-    pub fn with_exchanges<D: DiscreteLagrangian<N>>(
+    /// The same, with rows of neighbouring points exchanged where that is more accurate.
+    fn with_exchanges<D: DiscreteLagrangian<N>>(
         &mut self,
         of: &Equations<'_, D, N>,
         x: &mut Nodes<N>,
@@ -293,6 +314,7 @@ impl<const N: usize> Sweep<N> {
         let mut action = ActionRow::zero();
         for k in 0..steps {
             measured.factor(k, now.first.sigma());
+            self.momenta[k] = Carry::of(&now);
             x.z[k + 1] = x.z[k] + now.first.value;
             panel.action = action.recursion(&now.first);
             let ahead = if k + 1 < steps { Some(of.jet(k + 1, &x.q[k + 1], &x.q[k + 2], x.z[k + 1])?) } else { None };

@@ -1,6 +1,6 @@
 //! Block elimination without exchanges of rows: the block Thomas algorithm, for paths whose beginnings end away from conjugate points.
 
-use super::sweep::{Eliminated, Equations, Measured, Nodes, Sweep, Undefined};
+use super::sweep::{Carry, Eliminated, Equations, Measured, Nodes, Sweep, Undefined};
 use crate::DiscreteLagrangian;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscretePoint, SecondDiscreteJet};
@@ -85,12 +85,16 @@ impl<const N: usize> Sweep<N> {
             }
             let sigma = jet.first.sigma();
             measured.factor(k, sigma);
+            self.momenta[k] = Carry::of(jet);
             x.z[k + 1] = x.z[k] + jet.first.value;
             let mut point = Eliminated { next: SMatrix::zeros(), rhs: zero };
             if k > 0 || start.is_some() {
                 let p = &carried.p;
                 let (mut here, mut next) = (jet.d11 + carried.schur * sigma, jet.d12);
-                let value = jet.first.d1 + p * sigma;
+                let mut value = jet.first.d1 + p * sigma;
+                if let Some(load) = of.load.get(k) {
+                    value += load;
+                }
                 let mut rhs = -value - carried.rhs * sigma;
                 if COUPLED {
                     let by_action = jet.d1z + p * jet.dzz;

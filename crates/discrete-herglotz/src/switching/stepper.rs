@@ -280,7 +280,7 @@ where
         let (mut at, mut sigma, mut at_a_place) = (from, 1.0, 0);
         let span = t_end - from.t;
         let spacing = 4.0 * f64::EPSILON * larger(larger(from.t.abs(), t_end.abs()), span.abs());
-        let mut longest = span.abs();
+        let (mut longest, mut too_long, mut switches) = (span.abs(), false, false);
         for _ in 0..MOST_PARTS {
             let rest = t_end - at.t;
             if rest * span <= 0.0 {
@@ -288,7 +288,7 @@ where
             }
             let t = if rest.abs() <= longest { t_end } else { at.t + longest.copysign(span) };
             if longest <= spacing {
-                return Err(StepError::Switching { t: at.t });
+                return Err(if too_long { StepError::Undivided { t: at.t } } else { StepError::Switching { t: at.t } });
             }
             let (stepper, to) = match self.part(&at, t) {
                 Ok(part) => part,
@@ -300,7 +300,8 @@ where
             };
             let curve = StepCurve { from: at, to, dense: stepper.stepper().dense() };
             let change = self.surfaces.first_change(self.problem.lagrangian, &curve);
-            if change.is_none() && self.is_too_long(&stepper) {
+            too_long = change.is_none() && self.is_too_long(&stepper);
+            if too_long {
                 longest = 0.5 * (t - at.t).abs();
                 continue;
             }
@@ -317,6 +318,7 @@ where
             };
             match stepper {
                 Some(stepper) if self.is_too_long(&stepper) => {
+                    too_long = true;
                     longest = 0.5 * (to.t - at.t).abs();
                     continue;
                 }
@@ -331,9 +333,9 @@ where
                 return Err(StepError::Switching { t: at.t });
             }
             at = self.through(to, change.index, span)?;
-            longest = span.abs();
+            (longest, switches) = (span.abs(), true);
         }
-        Err(StepError::Switching { t: at.t })
+        Err(if switches { StepError::Switching { t: at.t } } else { StepError::Undivided { t: at.t } })
     }
 
     fn keep(&mut self, stepper: S) {
