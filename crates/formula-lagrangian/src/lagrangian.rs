@@ -80,16 +80,30 @@ impl<const N: usize> FormulaLagrangian<N> {
         formula.graph.constants(&formula.values).get(rate.index()).copied()
     }
 
-    /// The symmetries that are seen, whose momenta decay as the conformal factor: moving along a coordinate on which L does not depend,
-    /// and turning two coordinates where L has them in squares of lengths, products and areas alone, as `x^2 + y^2`.
+    /// The symmetries that are seen, whose momenta decay as the conformal factor: moving along a coordinate on which L does not depend, and
+    /// turning two coordinates where L has them in squares of lengths, products and areas alone, as `x^2 + y^2`; and moving or turning bodies
+    /// together, whose coordinates are those with differences in L, as `x1 - x2` and `y1 - y2`, in their order.
     pub fn symmetries(&self) -> Vec<Symmetry<N>> {
-        let along = |i: usize| Symmetry::Translation(SVector::from_fn(|j, _| if i == j { 1.0 } else { 0.0 }));
+        let along =
+            |set: &[usize]| Symmetry::Translation(SVector::from_fn(|j, _| if set.contains(&j) { 1.0 } else { 0.0 }));
         let n = self.derived.formula.dimension();
-        let moving = (0..n).filter(|i| self.derived.cyclic.get(*i) == Some(&true)).map(along);
         let Formula { graph, root, .. } = &self.derived.formula;
-        let turns = |(i, j): &(usize, usize)| graph.turns_into_itself(*root, *i as u32, *j as u32);
+        let bodies = graph.sets_of_differences(*root, n);
+        let mut seen = Vec::new();
+        seen.extend((0..n).filter(|i| self.derived.cyclic.get(*i) == Some(&true)).map(|i| along(&[i])));
+        seen.extend(bodies.iter().filter(|set| graph.moves_into_itself(*root, set)).map(|set| along(set)));
+        let turns = |(i, j): &(usize, usize)| graph.turns_into_itself(*root, &[(*i, *j)]);
         let pairs = (0..n).flat_map(|j| (0..j).map(move |i| (i, j)));
-        moving.chain(pairs.filter(turns).map(|(i, j)| Symmetry::Rotation(i, j))).collect()
+        seen.extend(pairs.filter(turns).map(|(i, j)| Symmetry::Rotation(i, j)));
+        for (k, second) in bodies.iter().enumerate() {
+            for first in bodies.iter().take(k).filter(|first| first.len() == second.len()) {
+                let planes: Vec<_> = first.iter().copied().zip(second.iter().copied()).collect();
+                if graph.turns_into_itself(*root, &planes) {
+                    seen.extend(Symmetry::rotations(&planes));
+                }
+            }
+        }
+        seen
     }
 }
 

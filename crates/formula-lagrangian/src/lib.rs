@@ -74,6 +74,7 @@ mod structure;
 mod symbol;
 mod tape;
 mod token;
+mod translation;
 
 pub use error::{FormulaError, MOST_COORDINATES, ParseError};
 pub use expression::Expression;

@@ -1,94 +1,141 @@
-//! Symmetry under rotations of two coordinates, seen in an expression.
+//! Symmetry under rotations of pairs of coordinates, seen in an expression.
 
-use crate::{Graph, Id, Node, Operation};
+use crate::{Function, Graph, Id, Node, Operation};
 
-/// A coordinate of the pair that is turned, or its velocity.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Component {
-    Position(bool),
-    Velocity(bool),
+/// A vector of the plane that turns: a sum of those of the pairs and of their velocities, each `(pair, is a velocity, factor)`, in their order and
+/// in units of the first factor.
+type Vector = Vec<(usize, bool, f64)>;
+
+/// A number times a component of a vector that turns: its first, or its second.
+#[derive(Clone, Debug)]
+struct Component {
+    number: f64,
+    vector: Vector,
+    second: bool,
 }
 
-/// A summand: a number times components of the pair times what does not turn, by the sorted nodes of its factors and divisors.
+impl Component {
+    fn of(pair: usize, velocity: bool, second: bool) -> Self {
+        Component { number: 1.0, vector: vec![(pair, velocity, 1.0)], second }
+    }
+
+    fn times(mut self, number: f64) -> Option<Self> {
+        self.number *= number;
+        (self.number != 0.0 && self.number.is_finite()).then_some(self)
+    }
+
+    /// The sum of two of one kind.
+    fn plus(&self, other: &Component) -> Option<Self> {
+        if self.second != other.second {
+            return None;
+        }
+        let mut vector: Vector =
+            self.vector.iter().map(|(pair, velocity, x)| (*pair, *velocity, x * self.number)).collect();
+        for (pair, velocity, x) in &other.vector {
+            let x = x * other.number;
+            match vector.iter_mut().find(|entry| (entry.0, entry.1) == (*pair, *velocity)) {
+                Some(entry) => entry.2 += x,
+                None => vector.push((*pair, *velocity, x)),
+            }
+        }
+        vector.retain(|entry| entry.2 != 0.0);
+        vector.sort_by_key(|entry| (entry.0, entry.1));
+        let number = vector.first()?.2;
+        vector.iter_mut().for_each(|entry| entry.2 /= number);
+        Some(Component { number, vector, second: self.second })
+    }
+}
+
+/// A summand: a number times two components of vectors that turn, times what does not turn, by the sorted nodes of its factors and divisors.
 #[derive(Default)]
 struct Summand {
     number: f64,
-    turning: Vec<Component>,
+    turning: Vec<(Vector, bool)>,
     factors: Vec<Id>,
     divisors: Vec<Id>,
 }
 
-/// The forms of two vectors of the plane that do not turn: `|q|^2`, `|v|^2`, `q.v`, and the area of q and v.
-const FORMS: [[(Component, Component, f64); 2]; 4] = {
-    use Component::{Position as Q, Velocity as V};
-    [
-        [(Q(false), Q(false), 1.0), (Q(true), Q(true), 1.0)],
-        [(V(false), V(false), 1.0), (V(true), V(true), 1.0)],
-        [(Q(false), V(false), 1.0), (Q(true), V(true), 1.0)],
-        [(Q(false), V(true), 1.0), (Q(true), V(false), -1.0)],
-    ]
-};
+impl Summand {
+    /// Whether this one and the other make up a form of two vectors u and w that does not turn: the product `u1 w1 + u2 w2`, or the area
+    /// `u1 w2 - u2 w1`.
+    fn completes(&self, other: &Summand) -> bool {
+        let [a, b] = self.turning.as_slice() else { return false };
+        let turned = [(&a.0, !a.1), (&b.0, !b.1)];
+        let [c, d] = other.turning.as_slice() else { return false };
+        let theirs = [(&c.0, c.1), (&d.0, d.1)];
+        let number = if a.1 == b.1 { self.number } else { -self.number };
+        (turned == theirs || turned == [theirs[1], theirs[0]])
+            && other.number == number
+            && other.factors == self.factors
+            && other.divisors == self.divisors
+    }
+}
+
+/// The components that the nodes are, where they are some.
+struct Components(Vec<Option<Component>>);
+
+impl Components {
+    fn get(&self, id: Id) -> Option<&Component> {
+        self.0.get(id.index()).and_then(Option::as_ref)
+    }
+}
 
 impl Graph {
-    /// Whether a node is seen to be invariant where the coordinates `i` and `j` and their velocities are turned together: where all that
-    /// it is made of is, or is a sum of the squares, of the products, or of the area. What is not seen, as in `(x + y)^2 + (x - y)^2`, is
-    /// not claimed.
-    pub(crate) fn turns_into_itself(&self, of: Id, i: u32, j: u32) -> bool {
+    /// Whether a node is seen to be invariant where pairs of coordinates and their velocities are turned together: where all that it is made of
+    /// is, or is a sum of products of the vectors that turn, or of their areas. What is not seen, as in `(x + y)^2 + (x - y)^2`, is not claimed.
+    pub(crate) fn turns_into_itself(&self, of: Id, pairs: &[(usize, usize)]) -> bool {
+        let turns = |a: u32| pairs.iter().any(|(i, j)| a as usize == *i || a as usize == *j);
         let mut invariant = vec![false; of.index() + 1];
+        let mut components = Components(vec![None; of.index() + 1]);
         for (k, needed) in self.needed(of).into_iter().enumerate() {
             let id = Id(k as u32);
             if !needed {
                 continue;
             }
+            let component = self.component(id, pairs, &components);
             let known = |a: Id| invariant.get(a.index()).copied().unwrap_or(false);
             let here = match self.node(id) {
-                Node::Position(a) | Node::Velocity(a) => a != i && a != j,
-                // The length of the pair.
-                Node::Binary(Operation::Hypot, a, b) if self.is_pair(a, b, [i, j]) => true,
-                node => node.operands().all(known) || self.is_invariant_sum(id, [i, j], &known),
+                Node::Position(a) | Node::Velocity(a) => !turns(a),
+                // The length of a vector.
+                Node::Binary(Operation::Hypot, a, b) if is_vector(components.get(a), components.get(b)) => true,
+                node => node.operands().all(known) || self.is_invariant_sum(id, &components, &known),
             };
-            if let Some(place) = invariant.get_mut(k) {
-                *place = here;
+            if let (Some(place), Some(part)) = (invariant.get_mut(k), components.0.get_mut(k)) {
+                (*place, *part) = (here, component);
             }
         }
         invariant.last() == Some(&true)
     }
 
-    /// Whether two nodes are the positions, or the velocities, of the pair.
-    fn is_pair(&self, a: Id, b: Id, [i, j]: [u32; 2]) -> bool {
-        match (self.component(a, [i, j]), self.component(b, [i, j])) {
-            (Some(Component::Position(a)), Some(Component::Position(b))) => a != b,
-            (Some(Component::Velocity(a)), Some(Component::Velocity(b))) => a != b,
-            _ => false,
-        }
-    }
-
-    fn component(&self, id: Id, [i, j]: [u32; 2]) -> Option<Component> {
+    /// The component of a vector that a node is, if it is one.
+    fn component(&self, id: Id, pairs: &[(usize, usize)], known: &Components) -> Option<Component> {
+        let of = |a: u32, velocity: bool| {
+            let pair = pairs.iter().position(|(i, j)| a as usize == *i || a as usize == *j)?;
+            Some(Component::of(pair, velocity, pairs.get(pair)?.1 == a as usize))
+        };
+        let scaled = |a: Id, number: f64| known.get(a)?.clone().times(number);
         match self.node(id) {
-            Node::Position(a) if a == i || a == j => Some(Component::Position(a == j)),
-            Node::Velocity(a) if a == i || a == j => Some(Component::Velocity(a == j)),
+            Node::Position(a) => of(a, false),
+            Node::Velocity(a) => of(a, true),
+            Node::Unary(Function::Neg, a) => scaled(a, -1.0),
+            Node::Binary(Operation::Add, a, b) => known.get(a)?.plus(known.get(b)?),
+            Node::Binary(Operation::Sub, a, b) => known.get(a)?.plus(&scaled(b, -1.0)?),
+            Node::Binary(Operation::Mul, a, b) => match (self.as_number(a), self.as_number(b)) {
+                (Some(x), _) => scaled(b, x),
+                (_, Some(x)) => scaled(a, x),
+                _ => None,
+            },
+            Node::Binary(Operation::Div, a, b) => scaled(a, 1.0 / self.as_number(b)?),
             _ => None,
         }
     }
 
     /// Whether the summands that turn make up forms that do not.
-    fn is_invariant_sum(&self, sum: Id, pair: [u32; 2], known: &impl Fn(Id) -> bool) -> bool {
-        let Some(mut summands) = self.summands(sum, pair, known) else { return false };
-        // Each of the first kind has one of the second, with the same factor.
+    fn is_invariant_sum(&self, sum: Id, components: &Components, known: &impl Fn(Id) -> bool) -> bool {
+        let Some(mut summands) = self.summands(sum, components, known) else { return false };
+        // Each has one that completes it.
         while let Some(first) = summands.pop() {
-            let is = |summand: &Summand, (a, b, sign): (Component, Component, f64), factor: f64| {
-                let [x, y] = summand.turning.as_slice() else { return false };
-                ((*x, *y) == (a, b) || (*x, *y) == (b, a)) && summand.number == sign * factor
-            };
-            let partner = FORMS.iter().find_map(|[one, other]| {
-                let (mine, its) = if is(&first, *one, one.2 * first.number) { (one, other) } else { (other, one) };
-                let factor = mine.2 * first.number;
-                let fits = |summand: &Summand| {
-                    is(summand, *its, factor) && summand.factors == first.factors && summand.divisors == first.divisors
-                };
-                is(&first, *mine, factor).then(|| summands.iter().position(fits))?
-            });
-            match partner {
+            match summands.iter().position(|other| first.completes(other)) {
                 Some(partner) => drop(summands.swap_remove(partner)),
                 None => return false,
             }
@@ -96,16 +143,16 @@ impl Graph {
         true
     }
 
-    /// The summands of a sum that turn; `None` where one is not a product of two components of the pair.
-    fn summands(&self, sum: Id, pair: [u32; 2], known: &impl Fn(Id) -> bool) -> Option<Vec<Summand>> {
+    /// The summands of a sum that turn; `None` where one is not a product of two components.
+    fn summands(&self, sum: Id, components: &Components, known: &impl Fn(Id) -> bool) -> Option<Vec<Summand>> {
         let (mut summands, mut open) = (Vec::new(), vec![(sum, 1.0)]);
         while let Some((id, sign)) = open.pop() {
             match self.node(id) {
                 _ if known(id) => {}
                 Node::Binary(Operation::Add, a, b) => open.extend([(a, sign), (b, sign)]),
                 Node::Binary(Operation::Sub, a, b) => open.extend([(a, sign), (b, -sign)]),
-                Node::Unary(crate::Function::Neg, a) => open.push((a, -sign)),
-                _ => summands.push(self.summand(id, sign, pair, known)?),
+                Node::Unary(Function::Neg, a) => open.push((a, -sign)),
+                _ => summands.push(self.summand(id, sign, components, known)?),
             }
             // Sums that share their parts may have very many summands.
             if summands.len() + open.len() > MOST_SUMMANDS {
@@ -115,12 +162,15 @@ impl Graph {
         Some(summands)
     }
 
-    fn summand(&self, id: Id, sign: f64, pair: [u32; 2], known: &impl Fn(Id) -> bool) -> Option<Summand> {
+    fn summand(&self, id: Id, sign: f64, components: &Components, known: &impl Fn(Id) -> bool) -> Option<Summand> {
         let mut summand = Summand { number: sign, ..Summand::default() };
         let mut open = vec![id];
         while let Some(id) = open.pop() {
-            match (self.component(id, pair), self.as_number(id), self.node(id)) {
-                (Some(component), ..) => summand.turning.push(component),
+            match (components.get(id), self.as_number(id), self.node(id)) {
+                (Some(Component { number, vector, second }), ..) => {
+                    summand.number *= number;
+                    summand.turning.push((vector.clone(), *second));
+                }
                 (_, Some(number), _) => summand.number *= number,
                 _ if known(id) => summand.factors.push(id),
                 (.., Node::Binary(Operation::Mul, a, b)) => open.extend([a, b]),
@@ -138,6 +188,12 @@ impl Graph {
         summand.divisors.sort_unstable();
         (summand.turning.len() == 2).then_some(summand)
     }
+}
+
+/// Whether two nodes are both components of a vector, up to signs.
+fn is_vector(a: Option<&Component>, b: Option<&Component>) -> bool {
+    let (Some(a), Some(b)) = (a, b) else { return false };
+    a.second != b.second && a.vector == b.vector && a.number.abs() == b.number.abs()
 }
 
 /// The most summands of one sum that are looked at.

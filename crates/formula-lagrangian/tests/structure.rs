@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
+use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, OneParameterGroup, Symmetry, VelocityPoint};
 use discrete_herglotz::{Problem, Steps, Until};
 use formula_lagrangian::{Formula, FormulaLagrangian};
@@ -118,6 +119,51 @@ fn rotations_are_seen_where_they_are_symmetries() {
     let text = "(x'^2 + y'^2 + w'^2)/2 + 1/sqrt(x^2 + y^2 + w^2)";
     let space = Formula::parse(text, &["x", "y", "w"], &[]).unwrap().lagrangian::<3>().unwrap();
     assert_eq!(space.symmetries().len(), 3);
+}
+
+/// The symmetries of a formula of bodies in the plane, or in space, all of which must leave L as it is, to some hundred roundings of its terms.
+fn of_bodies<const N: usize>(text: &str, names: &[&str]) -> Vec<Symmetry<N>> {
+    let l = Formula::parse(text, names, &[("g", 2.0)]).unwrap().lagrangian::<N>().unwrap();
+    let of = |i: usize, seed: f64| ((i as f64 + 1.0) * seed).sin();
+    let (q, v) = (SVector::from_fn(|i, _| of(i, 2.7)), SVector::from_fn(|i, _| of(i, 4.1)));
+    let seen = l.symmetries();
+    for symmetry in &seen {
+        let defect = symmetry.symmetry_defect(&l, 0.6, &VelocityPoint { q, v, z: 0.2 });
+        assert!(defect < 1e-13, "{text}: {symmetry:?} off by {defect:e}");
+    }
+    seen
+}
+
+#[test]
+fn symmetries_of_bodies_are_seen() {
+    let kinetic = "(3*(a'^2 + b'^2) + g*(c'^2 + d'^2))/2";
+    let names = ["a", "b", "c", "d"];
+    let together = |moved: [f64; 4]| Symmetry::Translation(SVector::from(moved));
+    let turned = Symmetry::rotations(&[(0, 1), (2, 3)]).unwrap();
+    let both = |potential: &str| of_bodies::<4>(&format!("{kinetic} + {potential}"), &names);
+    let all = vec![together([1.0, 0.0, 1.0, 0.0]), together([0.0, 1.0, 0.0, 1.0]), turned];
+    assert_eq!(both("g/sqrt((a - c)^2 + (b - d)^2) + 0.3*z"), all);
+    // The differences with other signs and factors; by a length; with a magnetic force between them.
+    assert_eq!(both("g/sqrt((2*a - 2*c)^2/4 + (d - b)^2) + (a - c)^2 + (b - d)^2"), all);
+    assert_eq!(both("exp(-hypot(a - c, d - b))"), all);
+    assert_eq!(both("(a - c)*(b' - d') - (b - d)*(a' - c') + cos(t)*(a'*c' + b'*d')"), all);
+    // About a centre they turn and do not move.
+    assert_eq!(both("1/sqrt(a^2 + b^2) + 1/sqrt(c^2 + d^2) + 1/hypot(a - c, b - d)"), [turned]);
+    // Of bodies that a field of one direction pulls the translation across it is left; a trap leaves none.
+    assert_eq!(both("1/hypot(a - c, b - d) - 9.81*(3*b + g*d)"), [together([1.0, 0.0, 1.0, 0.0])]);
+    assert_eq!(both("1/hypot(a - c, b - d) - a^2 - 2*b^2"), []);
+    // What does not turn: unequal factors, one sign, a product of other pairs.
+    let still = vec![all[0], all[1]];
+    for potential in
+        ["(a - c)^2 + 2*(b - d)^2", "(a - c)^2 - (b - d)^2", "(a - c)*(b - d)", "(a - c)^2 + (b - d)*(b' - d')"]
+    {
+        assert_eq!(both(potential), still, "{potential}");
+    }
+    // Three bodies in space: three translations and three rotations.
+    let text = "sum(i, 0, 2, x'[i]^2 + y'[i]^2 + w'[i]^2)/2 + sum(i, 1, 2, 1/sqrt((x[0] - x[i])^2 + (y[0] - y[i])^2 + (w[0] - w[i])^2))";
+    let seen = of_bodies::<9>(text, &["x[3]", "y[3]", "w[3]"]);
+    let rotations = seen.iter().filter(|s| matches!(s, Symmetry::Rotations(_))).count();
+    assert_eq!((seen.len(), rotations), (6, 3), "{seen:?}");
 }
 
 #[test]

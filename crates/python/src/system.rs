@@ -110,12 +110,12 @@ impl System {
         all.into_iter().filter(|(_, holds)| *holds).map(|(name, _)| name).collect()
     }
 
-    /// The symmetries that are seen: the coordinates that a translation moves, or the pair that a rotation turns.
+    /// The symmetries that are seen: the coordinates that a translation moves, each alone, or the pairs that a rotation turns.
     #[getter]
-    fn symmetries(&self) -> Vec<Vec<usize>> {
+    fn symmetries(&self) -> Vec<Vec<Vec<usize>>> {
         let of = |symmetry: SeenSymmetry| match symmetry {
-            SeenSymmetry::Translation(i) => vec![i],
-            SeenSymmetry::Rotation(i, j) => vec![i, j],
+            SeenSymmetry::Translation(moved) => moved.into_iter().map(|i| vec![i]).collect(),
+            SeenSymmetry::Rotation(pairs) => pairs.into_iter().map(|(i, j)| vec![i, j]).collect(),
         };
         self.inner.symmetries().into_iter().map(of).collect()
     }

@@ -9,12 +9,12 @@ use formula_lagrangian::Formula;
 use std::sync::Arc;
 
 /// A symmetry that is seen in a formula; its momentum decays as the conformal factor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SeenSymmetry {
-    /// L does not depend on the coordinate of this index.
-    Translation(usize),
-    /// Turning these two coordinates leaves L as it is.
-    Rotation(usize, usize),
+    /// Moving these coordinates by one length leaves L as it is.
+    Translation(Vec<usize>),
+    /// Turning these pairs of coordinates by one angle leaves L as it is.
+    Rotation(Vec<(usize, usize)>),
 }
 
 /// A Lagrangian by its formula, in 1 to 16 coordinates, with all that integrators need. Cloning is cheap.

@@ -579,9 +579,9 @@ fn bad_input_says_what_is_wrong() {
 #[test]
 fn symmetries_and_source() {
     let kepler = System::new(&CatalogueEntry::find("kepler").unwrap().formula().unwrap()).unwrap();
-    assert_eq!(kepler.symmetries(), [SeenSymmetry::Rotation(0, 1)]);
+    assert_eq!(kepler.symmetries(), [SeenSymmetry::Rotation(vec![(0, 1)])]);
     let free = System::new(&CatalogueEntry::find("free_particle").unwrap().formula().unwrap()).unwrap();
-    assert_eq!(free.symmetries(), [SeenSymmetry::Translation(0)]);
+    assert_eq!(free.symmetries(), [SeenSymmetry::Translation(vec![0])]);
     assert!(free.structure().separable && free.is_smooth());
     assert!(free.to_rust("Free").unwrap().contains("impl Lagrangian<1> for Free"));
     assert!(free.to_rust("not a type").is_err());

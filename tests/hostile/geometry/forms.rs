@@ -13,7 +13,7 @@ use contact_geom::{
 };
 
 pub const ATTACKS: &[Attack] = &[
-    Attack { on: &["Symmetry::rotation", "Symmetry::axis"], run: symmetries },
+    Attack { on: &["Symmetry::rotation", "Symmetry::rotations", "Symmetry::axis"], run: symmetries },
     Attack {
         on: &[
             "OneParameterGroup::generator",
@@ -76,7 +76,14 @@ pub const ATTACKS: &[Attack] = &[
 fn symmetries(report: &mut Report) {
     for (i, j) in [(0, 0), (0, 2), (2, 0), (usize::MAX, 0), (usize::MAX, usize::MAX)] {
         report.check(Symmetry::<2>::rotation(i, j).is_err(), || format!("rotation({i}, {j})"));
+        report.check(Symmetry::<2>::rotations(&[(i, j)]).is_err(), || format!("rotations({i}, {j})"));
     }
+    for planes in [[(0, 1), (0, 2)], [(0, 1), (2, 1)], [(0, 1), (1, 0)], [(0, 1), (0, 1)]] {
+        report.check(Symmetry::<4>::rotations(&planes).is_err(), || format!("rotations({planes:?})"));
+    }
+    // Of planes that are given past the constructor, none beyond the coordinates is turned.
+    let turned = Symmetry::<2>::Rotations([Some(usize::MAX), None]).act(0.3, &SVector::from([1.0, 2.0]));
+    report.check(turned == SVector::from([1.0, 2.0]), || format!("{turned}"));
     for value in HOSTILE {
         for axis in [[value, 0.0, 0.0], [1.0, value, 0.0], [value; 3]] {
             let unit = |s: Symmetry<3>| match s {

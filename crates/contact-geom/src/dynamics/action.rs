@@ -79,6 +79,9 @@ pub enum Symmetry<const N: usize> {
     Translation(SVector<f64, N>),
     /// SO(2): rotation by the angle `s` in the plane of the coordinates of these two different indices.
     Rotation(usize, usize),
+    /// The same in several planes at once, as bodies turn together: in that of the coordinates i and `planes[i]`, where there is one. No coordinate
+    /// lies in two planes.
+    Rotations([Option<usize>; N]),
     /// One axis of SO(3), for N = 3: rotation by the angle `s` about this unit vector.
     Axis(SVector<f64, N>),
     /// `q_i e^(s w_i)`.
@@ -99,6 +102,23 @@ impl<const N: usize> Symmetry<N> {
             });
         }
         Ok(Symmetry::Rotation(i, j))
+    }
+
+    /// Rotation in the planes of several pairs of coordinates at once.
+    ///
+    /// # Errors
+    /// [`GeometryError::WrongSize`] unless all indices are below `N` and differ.
+    pub fn rotations(pairs: &[(usize, usize)]) -> Result<Self, GeometryError> {
+        let (mut planes, mut taken) = ([None; N], [false; N]);
+        for &(i, j) in pairs {
+            Self::rotation(i, j)?;
+            if std::mem::replace(&mut taken[i], true) || std::mem::replace(&mut taken[j], true) {
+                let what = "the coordinates of all planes of rotation, which must differ,";
+                return Err(GeometryError::WrongSize { what, expected: N, found: 2 * pairs.len() });
+            }
+            planes[i] = Some(j);
+        }
+        Ok(Symmetry::Rotations(planes))
     }
 
     /// Rotation about an axis of R^3, given by any non-zero vector.
@@ -131,6 +151,15 @@ impl<const N: usize> OneParameterGroup<N> for Symmetry<N> {
                 let mut image = *q;
                 image[*i] = q[*i] * cos - q[*j] * sin;
                 image[*j] = q[*i] * sin + q[*j] * cos;
+                image
+            }
+            Symmetry::Rotations(planes) => {
+                let (sin, cos) = s.sin_cos();
+                let mut image = *q;
+                for (i, j) in planes.iter().enumerate().filter_map(|(i, j)| j.filter(|j| *j < N).map(|j| (i, j))) {
+                    image[i] = q[i] * cos - q[j] * sin;
+                    image[j] = q[i] * sin + q[j] * cos;
+                }
                 image
             }
             Symmetry::Axis(a) => {

@@ -17,13 +17,16 @@ pub(crate) struct Plan {
 }
 
 /// The momentum of a symmetry, as a formula.
-pub(crate) fn momentum(scene: &Scene, symmetry: SeenSymmetry) -> String {
+pub(crate) fn momentum(scene: &Scene, symmetry: &SeenSymmetry) -> String {
     let names = scene.system.formula().coordinates();
     let name = |i: usize| names.get(i).map(String::as_str).unwrap_or_default();
-    match symmetry {
-        SeenSymmetry::Translation(i) => format!("p_{}", name(i)),
-        SeenSymmetry::Rotation(i, j) => format!("{x}*p_{y} - {y}*p_{x}", x = name(i), y = name(j)),
-    }
+    let all: Vec<_> = match symmetry {
+        SeenSymmetry::Translation(moved) => moved.iter().map(|i| format!("p_{}", name(*i))).collect(),
+        SeenSymmetry::Rotation(pairs) => {
+            pairs.iter().map(|(i, j)| format!("{x}*p_{y} - {y}*p_{x}", x = name(*i), y = name(*j))).collect()
+        }
+    };
+    all.join(" + ")
 }
 
 /// What is proved of a system, in words.
@@ -46,7 +49,7 @@ impl Plan {
         let scene = self.scene.read()?;
         let plan = scene.system.plan(&scene.motion()).map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let proved = proved(&scene);
-        let momenta: Vec<String> = scene.system.symmetries().iter().map(|seen| momentum(&scene, *seen)).collect();
+        let momenta: Vec<String> = scene.system.symmetries().iter().map(|seen| momentum(&scene, seen)).collect();
         if self.json {
             let of = |item: &runtime_herglotz::Item| serde_json::json!({ "what": item.what, "computed": item.computed, "why": item.why });
             let proved: serde_json::Map<_, _> =

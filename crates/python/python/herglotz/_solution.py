@@ -193,16 +193,18 @@ class Solution:
     def momenta(self):
         """The momenta of the symmetries that are seen, by name: arrays of shape (k,).
 
-        They decay as the conformal factor: a momentum over exp(log_factor) stays what it was.
+        Those of bodies are seen where L has the differences of their coordinates: ``translation of x1, x2`` and
+        ``rotation of (x1, y1), (x2, y2)``. They decay as the conformal factor: a momentum over exp(log_factor) stays
+        what it was.
         """
-        names, found = self.system.coordinates, {}
+        coordinates, found = self.system.coordinates, {}
         for which in self.system.symmetries:
-            if len(which) == 1:
-                found[f"translation of {names[which[0]]}"] = self.p[:, which[0]].copy()
+            pairs = [", ".join(coordinates[i] for i in part) for part in which]
+            if len(which[0]) == 1:
+                found[f"translation of {', '.join(pairs)}"] = sum(self.p[:, i] for (i,) in which)
             else:
-                i, j = which
-                name = f"rotation of {names[i]}, {names[j]}"
-                found[name] = self.q[:, i] * self.p[:, j] - self.q[:, j] * self.p[:, i]
+                name = f"rotation of {', '.join(f'({pair})' for pair in pairs) if len(pairs) > 1 else pairs[0]}"
+                found[name] = sum(self.q[:, i] * self.p[:, j] - self.q[:, j] * self.p[:, i] for i, j in which)
         return found
 
     def to_xarray(self):

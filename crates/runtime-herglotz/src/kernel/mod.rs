@@ -127,8 +127,11 @@ impl<const N: usize> Kernel for Sized<N> {
 
     fn symmetries(&self) -> Vec<SeenSymmetry> {
         let seen = |symmetry: &Symmetry<N>| match symmetry {
-            Symmetry::Translation(a) => a.iter().position(|x| *x != 0.0).map(SeenSymmetry::Translation),
-            Symmetry::Rotation(i, j) => Some(SeenSymmetry::Rotation(*i, *j)),
+            Symmetry::Translation(a) => Some(SeenSymmetry::Translation((0..N).filter(|i| a[*i] != 0.0).collect())),
+            Symmetry::Rotation(i, j) => Some(SeenSymmetry::Rotation(vec![(*i, *j)])),
+            Symmetry::Rotations(planes) => {
+                Some(SeenSymmetry::Rotation(planes.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))).collect()))
+            }
             _ => None,
         };
         self.0.symmetries().iter().filter_map(seen).collect()
