@@ -69,8 +69,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
 
 impl<L: Lagrangian<N>, const N: usize> Display for Plan<'_, L, N> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        let Plan { problem, h, facts, t_end, .. } = self;
-        let (t0, count, items) = (problem.t0, self.count(), self.items());
+        let Plan { problem, count, h, facts, t_end, .. } = self;
+        let (t0, items) = (problem.t0, self.items());
         let of = if facts.by_clock { " of the clock's time" } else { "" };
         writeln!(f, "{count} steps of {h}{of} by {}, t = {t0} .. {t_end}", facts.name)?;
         for (title, computed) in [("computed", true), ("skipped", false)] {

@@ -17,8 +17,11 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// The misfit of some steps; above one where they do not resolve the motion. `None` where there is nothing to compare with.
     pub(super) fn against_halves(&self, Doubt { steps, t, from, to, .. }: &Doubt<N>) -> Option<f64> {
         let Problem { lagrangian, start, .. } = *self.problem;
-        let VelocityPoint { v, .. } = legendre_inverse(lagrangian, *t, from, &start.v).ok()?;
         let end = t + *steps as f64 * self.h;
+        // Of several velocities that of the motion.
+        let mean = (to.q - from.q) / (end - t);
+        let guess = if self.problem.structure.constant_mass { start.v } else { mean };
+        let VelocityPoint { v, .. } = legendre_inverse(lagrangian, *t, from, &guess).ok()?;
         let at_end = |x: &PhasePoint<N>| legendre_inverse(lagrangian, end, x, &v).map(|x| x.v).ok();
         if self.facts.by_clock {
             return None;
@@ -52,8 +55,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         h: f64,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
         let start = VelocityPoint { q: from.q, v: *v, z: from.z };
-        // A few steps of this length: no matrix of a linear motion is worth its price, not even a cheap one.
-        let structure = Structure { quadratic: false, ..self.problem.structure };
+        // A few steps of this length: no matrix of a linear motion is worth its price, nor are the tables of twice the working precision that
+        // depend on the length of the step.
+        let separable = self.problem.structure.separable && self.facts.collocation.is_none();
+        let structure = Structure { quadratic: false, separable, ..self.problem.structure };
         let problem = Problem { t0: t, start, state: *from, structure, ..*self.problem };
         self.make_stepper(&problem, if self.facts.by_clock { self.h } else { h }, false)
     }

@@ -1,7 +1,7 @@
 //! The one observer of a motion: rows, events, nodes, and whether it is to go on.
 
 use super::coordinates;
-use crate::{Column, Crossing, Direction, Motion, RuntimeError, Watch, When};
+use crate::{Column, Crossing, Direction, Motion, Rate, RuntimeError, Start, Watch, When};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{
@@ -10,6 +10,7 @@ use discrete_herglotz::{
 use formula_lagrangian::{Expression, FormulaLagrangian};
 use std::cell::Cell;
 use std::ops::ControlFlow;
+use std::rc::Rc;
 
 /// The steps between two polls.
 const POLL: usize = 256;
@@ -36,7 +37,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
     ) -> Result<Self, RuntimeError> {
         let columns = motion.columns.as_slice();
         let rows = motion.rows.as_ref().map(|when| rows(when, columns)).transpose()?;
-        let crossings = Crossings::of(lagrangian, &motion.events);
+        let crossings = Crossings::of(lagrangian, &motion.events, Some(&motion.start));
         let needs = |of: Option<Needs>| of.unwrap_or_default();
         let of_rows = needs(rows.as_ref().map(Observer::needs)).and(needs(crossings.as_ref().map(Crossings::needs)));
         let of_all = Needs { action: motion.nodes, conformal_factor: false, saved: motion.resumable };
@@ -71,11 +72,13 @@ impl<'r, const N: usize> Recorder<'r, N> {
     fn see(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
         if self.nodes {
             let PhasePoint { q, p, z } = &at.state;
-            self.watch.node(at.t, coordinates(q, self.dimension), coordinates(p, self.dimension), *z);
+            // Where it is not found the momentum alone goes on.
+            let v = at.velocity().unwrap_or_else(|_| SVector::zeros());
+            self.watch.node(at.t, [q, &v, p].map(|x| coordinates(x, self.dimension)), *z);
         }
         if at.k.is_multiple_of(POLL)
             && let Some(Course { t0, t_end, .. }) = self.course
-            && self.watch.poll((at.t - t0) / (t_end - t0)).is_break()
+            && self.watch.poll(if t_end == t0 { 1.0 } else { (at.t - t0) / (t_end - t0) }).is_break()
         {
             if let Some(interrupted) = at.interrupted() {
                 self.watch.interrupted(interrupted);
@@ -128,13 +131,12 @@ pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
     }
 }
 
-/// The value of an expression at states `(q, p, z)`.
+/// The value of an expression at states `(q, p, z)`. The last velocity is near the next.
 fn at_states<'r, const N: usize>(
     lagrangian: &'r FormulaLagrangian<N>,
     function: &'r Expression,
+    last: Rc<Cell<SVector<f64, N>>>,
 ) -> impl FnMut(f64, &PhasePoint<N>) -> f64 + 'r {
-    // The last velocity is near the next.
-    let last = Cell::new(SVector::<f64, N>::zeros());
     move |t, state| {
         if function.has_velocity() {
             match legendre_inverse(lagrangian, t, state, &last.get()) {
@@ -151,16 +153,25 @@ pub(super) struct Crossings<'r, const N: usize> {
     events: Events<'r, N>,
     /// Whether one of them has the action in it.
     action: bool,
+    /// Whether one of them has the velocity in it, and the last one that was found.
+    velocity: bool,
+    last: Rc<Cell<SVector<f64, N>>>,
     dimension: usize,
 }
 
 impl<'r, const N: usize> Crossings<'r, N> {
     /// `None` where there are no events.
-    pub fn of(lagrangian: &'r FormulaLagrangian<N>, events: &'r [crate::Event]) -> Option<Self> {
+    pub fn of(lagrangian: &'r FormulaLagrangian<N>, events: &'r [crate::Event], start: Option<&Start>) -> Option<Self> {
+        let numbers = match start.map(|start| &start.rate) {
+            Some(Rate::Velocity(v) | Rate::MomentumNear { v, .. }) => v.as_slice(),
+            _ => &[],
+        };
+        let last = Rc::new(Cell::new(SVector::from_fn(|i, _| numbers.get(i).copied().unwrap_or(0.0))));
+        let velocity = events.iter().any(|event| event.function.has_velocity());
         let action = events.iter().any(|event| event.function.has_action());
-        let all = || Events::new(events.iter().map(|event| of(lagrangian, event)));
+        let all = || Events::new(events.iter().map(|event| of(lagrangian, event, last.clone())));
         let dimension = lagrangian.formula().dimension();
-        (!events.is_empty()).then(|| Crossings { events: all(), action, dimension })
+        (!events.is_empty()).then(|| Crossings { events: all(), action, velocity, last: last.clone(), dimension })
     }
 
     pub fn needs(&self) -> Needs {
@@ -172,6 +183,11 @@ impl<'r, const N: usize> Crossings<'r, N> {
     }
 
     pub fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        if self.velocity
+            && let Ok(v) = at.velocity()
+        {
+            self.last.set(v);
+        }
         self.events.start(at)
     }
 
@@ -200,8 +216,12 @@ impl<'r, const N: usize> Crossings<'r, N> {
     }
 }
 
-fn of<'r, const N: usize>(lagrangian: &'r FormulaLagrangian<N>, event: &'r crate::Event) -> Event<'r, N> {
-    let found = Event::new(at_states(lagrangian, &event.function));
+fn of<'r, const N: usize>(
+    lagrangian: &'r FormulaLagrangian<N>,
+    event: &'r crate::Event,
+    last: Rc<Cell<SVector<f64, N>>>,
+) -> Event<'r, N> {
+    let found = Event::new(at_states(lagrangian, &event.function, last));
     let found = match event.direction {
         Direction::Rising => found.rising(),
         Direction::Falling => found.falling(),
