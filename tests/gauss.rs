@@ -62,6 +62,43 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     covariance / logs.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>()
 }
 
+/// A relativistic particle of mass and speed of light 1 in a field that grows with time: its momentum is a polynomial, which its velocity is not.
+struct InField {
+    growth: f64,
+}
+
+impl Lagrangian<1> for InField {
+    fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+        -(-(v[0] * v[0]) + 1.0).sqrt() + (t * self.growth + 1.0) * q[0]
+    }
+}
+
+/// Where the momenta of the last step's polynomial are those of the next to the last bit, its velocities are still solved for.
+#[test]
+fn momenta_that_are_polynomials_leave_the_order() {
+    let start = VelocityPoint::new([0.0], [-0.8], 0.0);
+    for (s, growth) in [(2, 0.0), (3, 0.0), (3, 0.5)] {
+        let system = InField { growth };
+        let (truth, ..) = run(&system, (0.0, start), 16, 1.0 / 16.0, 64);
+        if growth == 0.0 {
+            // q = sqrt(1 + p^2) from its start, in a field of 1; to the rounding of 64 steps.
+            let energy = |p: f64| (1.0 + p * p).sqrt();
+            let p = -4.0 / 3.0;
+            assert!((truth.q[0] - (energy(p + 4.0) - energy(p))).abs() <= 64.0 * f64::EPSILON, "{truth:?}");
+        }
+        let points: Vec<_> = [32, 48, 64, 96]
+            .iter()
+            .map(|steps| {
+                let h = 4.0 / f64::from(*steps);
+                let (e, ..) = run(&system, (0.0, start), s, h, *steps as usize);
+                (h, (e.q - truth.q).largest())
+            })
+            .collect();
+        let observed = slope(&points);
+        assert!((observed - 2.0 * s as f64).abs() < 0.15, "s = {s}, growth {growth}: {observed:.3}; {points:?}");
+    }
+}
+
 /// Order 2s on the problems of the other methods' orders, against 16 stages with short steps.
 ///
 /// Up to three stages in q, p and z apart. Then the error meets round-off so early that one component may be near a change of

@@ -310,6 +310,8 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             return AfterSweep::NonFinite;
         }
         let mut sweeps = Sweeps::until(1.0, 0.25);
+        // The momenta that are carried on are no L_v of the velocities that are: both may be those of the step before, and the next sweep tell.
+        let mut carried = !cold && !solved;
         // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
         loop {
             let change = if cold || solved {
@@ -335,6 +337,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             let change = if !P::PHYSICAL && (of_clock > change || of_clock.is_nan()) { of_clock } else { change };
             match sweeps.judge(change, 1.0) {
                 AfterSweep::Going => {}
+                AfterSweep::Done if carried => sweeps = Sweeps::until(1.0, 0.25),
                 AfterSweep::Done => {
                     let outcome = self.finish::<S>();
                     self.judge::<S>(sweeps.first());
@@ -347,6 +350,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
                 AfterSweep::Slow { .. } if self.holds::<S>(t) => return self.finish::<S>(),
                 refused => return refused,
             }
+            carried = false;
         }
     }
 
