@@ -219,7 +219,8 @@ impl<const N: usize> Event<'_, N> {
                 slope = (g - g_before) / (tau - before);
             }
             let change = g / slope;
-            if !change.is_finite() {
+            // A slope that overflows would make any place a root.
+            if !(slope.is_finite() && change.is_finite()) {
                 return Ok(None);
             }
             if change.abs() <= 0.5 * ROUNDINGS {

@@ -119,28 +119,35 @@ pub struct Events<'f, const N: usize> {
     events: Vec<Event<'f, N>>,
     seen: Vec<LastSign<N>>,
     pace: Pace,
+    /// About the states inside of the last step.
+    sketch: Vec<PhasePoint<N>>,
+    /// The time of its end with the rates there, if they were asked for: they are those of the start of the next.
+    rates: Option<(f64, PhasePoint<N>)>,
 }
 
 impl<'f, const N: usize> Events<'f, N> {
     /// These events, which crossings name by their place.
     pub fn new(events: impl IntoIterator<Item = Event<'f, N>>) -> Self {
         let events = events.into_iter().collect();
-        Events { crossings: Vec::new(), events, seen: Vec::new(), pace: Pace::of(&Course::NONE) }
+        let (crossings, seen, sketch) = (Vec::new(), Vec::new(), Vec::new());
+        Events { crossings, events, seen, pace: Pace::of(&Course::NONE), sketch, rates: None }
     }
 
     /// The crossings in a step, in the order of the run, and why there are no more.
     fn in_step(&mut self, step: &mut LastStep<'_, N>, way: Way<'_, N>) -> (Vec<Crossing<N>>, Option<StepError>) {
         let (mut found, mut cause) = (Vec::new(), None);
         let parts = step.parts();
-        let sketch: Result<Vec<_>, _> = (1..parts).map(|k| step.about(k as f64 / parts as f64)).collect();
-        let sketch = match sketch {
-            Ok(sketch) => sketch,
-            Err(cause) => return (found, Some(cause)),
-        };
+        self.sketch.clear();
+        for k in 1..parts {
+            match step.about(k as f64 / parts as f64) {
+                Ok(x) => self.sketch.push(x),
+                Err(cause) => return (found, Some(cause)),
+            }
+        }
         let backward = step.span().1 < step.span().0;
         let before = |a: f64, b: f64| if backward { a > b } else { a < b };
         for (index, (event, seen)) in self.events.iter_mut().zip(&mut self.seen).enumerate() {
-            if let Err(error) = event.in_step(index, (step, way), &sketch, seen, &mut found) {
+            if let Err(error) = event.in_step(index, (step, way), &self.sketch, seen, &mut found) {
                 cause = match (cause, error) {
                     (Some(StepError::Event { t: first }), StepError::Event { t }) if !before(t, first) => cause,
                     _ => Some(error),
@@ -178,6 +185,7 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
         self.pace = Pace::of(course);
         self.seen.clear();
         self.crossings.clear();
+        self.rates = None;
         Ok(())
     }
 
@@ -199,9 +207,12 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
     }
 
     fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
-        let Some(mut step) = at.last_step() else { return ControlFlow::Continue(()) };
+        let Some(step) = at.last_step() else { return ControlFlow::Continue(()) };
+        let from = step.span().0;
+        let mut step = step.with_rates_at_start(self.rates.filter(|(t, _)| *t == from).map(|(_, rates)| rates));
         let way = Way { motion: at.motion, pace: self.pace, near: at.stepper.last_velocity() };
         let (found, cause) = self.in_step(&mut step, way);
+        self.rates = step.rates_at_end().map(|rates| (at.t, rates));
         let mut end: Option<Crossing<N>> = None;
         for crossing in found {
             // The event that ends the run has no other crossing at its own instant.

@@ -192,7 +192,7 @@ impl<'r, const N: usize> Moment<'r, N> {
     pub fn last_step(&self) -> Option<LastStep<'r, N>> {
         let from = self.before?;
         let (motion, stepper) = (self.motion, self.stepper);
-        Some(LastStep { from, to: (self.t, self.state), motion, stepper, curve: None, rates: None })
+        Some(LastStep { from, to: (self.t, self.state), motion, stepper, curve: None, rates: [None; 2] })
     }
 }
 
@@ -204,7 +204,8 @@ pub struct LastStep<'r, const N: usize> {
     stepper: &'r dyn Stepper<N>,
     /// Its curve, if it has one, once it is asked for.
     curve: Option<Option<DenseStep<N>>>,
-    rates: Option<[PhasePoint<N>; 2]>,
+    /// The rates at both ends, once they are asked for.
+    rates: [Option<PhasePoint<N>>; 2],
 }
 
 impl<const N: usize> LastStep<'_, N> {
@@ -242,6 +243,16 @@ impl<const N: usize> LastStep<'_, N> {
         }
     }
 
+    /// With the rates at its start, as the step before has found them.
+    pub(super) fn with_rates_at_start(self, rates: Option<PhasePoint<N>>) -> Self {
+        LastStep { rates: [rates, None], ..self }
+    }
+
+    /// The rates at its end, if they were asked for.
+    pub(super) fn rates_at_end(&self) -> Option<PhasePoint<N>> {
+        self.rates[1]
+    }
+
     /// The parts in which a search along the step looks at it.
     pub(super) fn parts(&mut self) -> usize {
         self.curve().map_or(4, |curve| curve.stages() + 2)
@@ -258,14 +269,10 @@ impl<const N: usize> LastStep<'_, N> {
             return Ok(curve.at_fraction(fraction));
         }
         let ((t0, a), (t1, b)) = (self.from, self.to);
-        let [ra, rb] = match self.rates {
-            Some(rates) => rates,
-            None => {
-                let near = self.stepper.last_velocity();
-                let rates = [self.motion.rates(t0, &a, near)?, self.motion.rates(t1, &b, near)?];
-                *self.rates.insert(rates)
-            }
-        };
+        let ([ra, rb], near) = (self.rates, self.stepper.last_velocity());
+        let ra = ra.map_or_else(|| self.motion.rates(t0, &a, near), Ok)?;
+        let rb = rb.map_or_else(|| self.motion.rates(t1, &b, near), Ok)?;
+        self.rates = [Some(ra), Some(rb)];
         let (u, left, h) = (fraction, 1.0 - fraction, t1 - t0);
         let weights =
             [left * left * (1.0 + 2.0 * u), u * u * (1.0 + 2.0 * left), h * u * left * left, -h * u * u * left];
