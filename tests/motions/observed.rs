@@ -430,8 +430,8 @@ fn damaged_checkpoints_are_refused() {
         assert!(matches!(read(&other), Err(CheckpointError::Damaged)), "{place}");
     }
     let mut newer = whole.clone();
-    newer[8] = 3;
-    assert!(matches!(read(&newer), Err(CheckpointError::Version { found: 3 })));
+    newer[8] = 4;
+    assert!(matches!(read(&newer), Err(CheckpointError::Version { found: 4 })));
     std::fs::remove_file(path).unwrap();
     // A place that cannot be written to ends the run, and says so.
     let mut nowhere = Checkpoint::every(5, "/dev/null/checkpoint").unwrap();
