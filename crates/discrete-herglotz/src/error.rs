@@ -14,7 +14,7 @@ pub enum InputError {
         /// The step that was passed.
         h: f64,
     },
-    /// The span of a run is 0 or not finite.
+    /// The span of a run is not finite, or 0 where it must not be.
     #[error("the span of time is {span}; it must be finite and not 0 (negative to go back)")]
     Span {
         /// The span that was passed.

@@ -179,7 +179,7 @@ def overhead():
     from herglotz import _core
 
     system = hz.system(lagrangian("P2"), n=1)
-    request = ([1.0], [1.0], False, 0.0), 0.1, None, (None, "strang", None, 1), [], [], False
+    request = ([1.0], [1.0], False, 0.0, None), 0.1, None, (None, "strang", None, 1), [], [], False
     motion = _core.Motion(system, *request)
     run = median(lambda: [_core.run(motion) for _ in range(100)]) / 100
     for what, L in (("a system", system), ("a function", lagrangian("P2"))):

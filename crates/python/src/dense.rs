@@ -13,6 +13,7 @@ use std::ops::ControlFlow;
 struct Nodes {
     t: Vec<f64>,
     q: Vec<f64>,
+    v: Vec<f64>,
     p: Vec<f64>,
     z: Vec<f64>,
 }
@@ -26,7 +27,7 @@ struct Keeps {
 }
 
 impl Watch for Keeps {
-    fn node(&mut self, t: f64, q: &[f64], p: &[f64], z: f64) {
+    fn node(&mut self, t: f64, [q, v, p]: [&[f64]; 3], z: f64) {
         if self.done {
             return;
         }
@@ -34,6 +35,7 @@ impl Watch for Keeps {
         self.done = t != first && (t - first).abs() >= (self.until - first).abs();
         self.nodes.t.push(t);
         self.nodes.q.extend_from_slice(q);
+        self.nodes.v.extend_from_slice(v);
         self.nodes.p.extend_from_slice(p);
         self.nodes.z.push(z);
     }
@@ -49,6 +51,8 @@ pub struct Dense {
     system: runtime_herglotz::System,
     by: AnyIntegrator,
     nodes: Nodes,
+    /// The end of the motion, which may lie in a step that could not be taken as a whole.
+    until: f64,
 }
 
 /// The times, positions, velocities, momenta, actions and energies of states.
@@ -68,7 +72,8 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
         };
         let Ok(by) = by else { return Ok(None) };
         let again = runtime_herglotz::Motion {
-            way: Way::Steps { by, steps: Steps::Count(plan.steps) },
+            // Of a motion that ends where it starts there is no step.
+            way: Way::Steps { by, steps: Steps::Count(plan.steps.max(1)) },
             rows: None,
             columns: Vec::new(),
             events: Vec::new(),
@@ -84,21 +89,21 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
     }
     let by = by.map_err(|error: runtime_herglotz::RuntimeError| value_error(error))?;
     let by = by.ok_or_else(|| value_error("the integrator of the plan is not known by its name"))?;
-    Ok(Dense { system: motion.system.clone(), by, nodes: keeps.nodes })
+    Ok(Dense { system: motion.system.clone(), by, nodes: keeps.nodes, until })
 }
 
 impl Dense {
     /// The rows at some times within one step, in its direction.
     fn within(&self, k: usize, times: Vec<f64>, all: &[Column]) -> PyResult<Vec<Vec<f64>>> {
-        let (n, Nodes { t, q, p, z }) = (self.system.dimension(), &self.nodes);
+        let (n, Nodes { t, q, v, p, z }) = (self.system.dimension(), &self.nodes);
         let part = |x: &[f64]| x.get(k * n..(k + 1) * n).unwrap_or_default().to_vec();
         let at = |x: &[f64], k: usize| x.get(k).copied().unwrap_or(f64::NAN);
-        let start = Start { t: at(t, k), q: part(q), rate: Rate::Momentum(part(p)), z: at(z, k) };
+        let start = Start { t: at(t, k), q: part(q), rate: Rate::MomentumNear { p: part(p), v: part(v) }, z: at(z, k) };
         let way = Way::Steps { by: self.by, steps: Steps::Count(1) };
         let motion = runtime_herglotz::Motion {
             rows: Some(When::At(times)),
             columns: all.to_vec(),
-            ..runtime_herglotz::Motion::new(start, at(t, k + 1), way)
+            ..runtime_herglotz::Motion::new(start, t.get(k + 1).copied().unwrap_or(self.until), way)
         };
         Ok(self.system.record(&motion).map_err(value_error)?.1)
     }
@@ -113,7 +118,16 @@ impl Dense {
         let (Some(&first), Some(&last)) = (nodes.first(), nodes.last()) else {
             return Err(value_error("the motion has no steps"));
         };
-        let sign = if last < first { -1.0 } else { 1.0 };
+        let sign = if self.until < first { -1.0 } else { 1.0 };
+        let last = if sign * last < sign * self.until { self.until } else { last };
+        // The time of the end is rounded by the sum of the steps, and by the caller's own arithmetic.
+        let rounding = 4.0 * f64::EPSILON * (first.abs() + last.abs());
+        let nearest = |t: f64| match (first - t, t - last) {
+            (before, _) if sign * before > 0.0 && before.abs() <= rounding => first,
+            (_, beyond) if sign * beyond > 0.0 && beyond.abs() <= rounding => last,
+            _ => t,
+        };
+        let times: Vec<f64> = times.into_iter().map(nearest).collect();
         let inside = |t: f64| sign * first <= sign * t && sign * t <= sign * last;
         if let Some(t) = times.iter().find(|t| !inside(**t)) {
             return Err(value_error(format!("`t` has {t}, where the motion is from {first} to {last}")));

@@ -115,7 +115,7 @@ impl Motion {
     #[expect(clippy::too_many_arguments, reason = "they are those of `solve`, which names them")]
     fn new(
         system: &System,
-        start: (Bound<'_, PyAny>, Bound<'_, PyAny>, bool, Bound<'_, PyAny>),
+        start: (Bound<'_, PyAny>, Bound<'_, PyAny>, bool, Bound<'_, PyAny>, Option<Vec<f64>>),
         t: Bound<'_, PyAny>,
         every: Option<Bound<'_, PyAny>>,
         way: GivenWay<'_>,
@@ -125,13 +125,20 @@ impl Motion {
         estimate: bool,
     ) -> PyResult<Self> {
         let formula = system.inner.formula();
-        let (q, rate, is_momentum, z) = start;
+        let (q, rate, is_momentum, z, near) = start;
         let q = numbers("q0", &q)?;
         let rate =
             if is_momentum { Rate::Momentum(numbers("p0", &rate)?) } else { Rate::Velocity(numbers("v0", &rate)?) };
+        // The velocity of a motion that goes on.
+        let rate = match (rate, near) {
+            (Rate::Momentum(p), Some(v)) if v.len() == p.len() && v.iter().all(|v| v.is_finite()) => {
+                Rate::MomentumNear { p, v }
+            }
+            (rate, _) => rate,
+        };
         let length = match &rate {
             Rate::Velocity(v) => ("v0", v.len()),
-            Rate::Momentum(p) => ("p0", p.len()),
+            Rate::Momentum(p) | Rate::MomentumNear { p, .. } => ("p0", p.len()),
         };
         let expected = formula.dimension();
         for (what, found) in [("q0", q.len()), length] {
@@ -144,6 +151,14 @@ impl Motion {
         let times = times(&t)?;
         let (Some(&first), Some(&end)) = (times.first(), times.last()) else { return Err(no_times()) };
         let every = every.map(|every| whole("every", &every, 1)).transpose()?;
+        // To where it starts there is the start alone.
+        let times = if let [start, end] = times[..]
+            && start == end
+        {
+            vec![start]
+        } else {
+            times
+        };
         let rows = Some(every.map_or(When::At(times), When::Every));
         let way = self::way(&way)?;
         let mut all = self::columns(expected, conformal_factor);

@@ -84,8 +84,8 @@ pub struct Record {
     /// A column for each that was asked for.
     columns: Option<Py<PyArray2<f64>>>,
     crossings: Vec<Crossed>,
-    /// The end, whether it is a row or not: t, q, p, z.
-    end: (f64, Vec<f64>, Vec<f64>, Option<f64>),
+    /// The end, whether it is a row or not: t, q, p, z, and v where it is known.
+    end: (f64, Vec<f64>, Vec<f64>, Option<f64>, Option<Vec<f64>>),
     status: String,
     success: bool,
     suspicion: Option<String>,
@@ -196,7 +196,7 @@ pub fn record(py: Python<'_>, mut kept: Kept, outcome: Outcome) -> PyResult<Reco
         log_factor: kept.conformal_factor.then(|| vector(py, kept.log_factor)),
         columns,
         crossings,
-        end: (outcome.t, outcome.q, outcome.p, outcome.z),
+        end: (outcome.t, outcome.q, outcome.p, outcome.z, outcome.v),
         status: outcome.status.to_string(),
         // A terminal event is what was asked for.
         success: matches!(outcome.status, Status::Completed | Status::Stopped { .. }) && kept.raised.is_none(),

@@ -44,6 +44,42 @@ def test_states_up_to_a_terminal_event():
         sol(25.0)
 
 
+def test_the_time_of_the_end_is_inside_to_rounding():
+    for h in (0.1, 0.3, 0.7 / 3):
+        sol = pendulum(2.1, integrator="gauss_4", step=h)
+        for t in (sol.t[-1], np.nextafter(sol.t[-1], 9), np.nextafter(sol.t[0], -1)):
+            assert abs(sol(t).q[0] - sol.q[0 if t < 1 else -1, 0]) < 1e-14
+        with pytest.raises(ValueError):
+            sol(2.1 + 1e-9)
+
+
+def test_a_motion_to_its_start_is_the_start():
+    for t in (0, [2.0, 2.0]):
+        sol = pendulum(t, accuracy=1e-9)
+        assert sol.success and sol.steps == 0 and len(sol.t) == 1
+        assert sol.q[0, 0] == 1.0 and sol.v[0, 0] == 0.0 and sol(sol.t[0]).q[0] == 1.0
+        onward = sol.resume(sol.t[0] + 1.0)
+        assert onward.success and onward.t[0] == sol.t[0]
+
+
+def test_the_velocity_is_that_of_the_motion():
+    # p = sin(4) - t/10 and x' = pi - arcsin(p): of each p there are many x'.
+    def p(t):
+        return np.sin(4.0) - 0.1 * t
+
+    def integral(p):
+        return p * np.arcsin(p) + np.sqrt(1 - p * p)
+
+    def x(t):
+        return np.pi * t + 10 * (integral(p(t)) - integral(p(0)))
+
+    sol = hz.solve("-cos(x') - 0.1*x", [0.0], [4.0], 1.0, coordinates=["x"], accuracy=1e-10, events=["x' - 4.1"])
+    assert abs(sol(0.5).q[0] - x(0.5)) < 1e-9 and abs(sol(0.5).v[0] - (np.pi - np.arcsin(p(0.5)))) < 1e-9
+    assert len(sol.events[0].t) == 1
+    onward = sol.resume(2.0)
+    assert abs(onward.q[-1, 0] - x(2.0)) < 1e-9 and abs(onward.v[-1, 0] - (np.pi - np.arcsin(p(2.0)))) < 1e-9
+
+
 def test_a_motion_goes_on():
     whole, part = pendulum(30.0, accuracy=1e-11), pendulum(12.0, accuracy=1e-11, events=["theta"])
     rest = part.resume(np.array([15.0, 30.0]))

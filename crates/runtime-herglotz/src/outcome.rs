@@ -76,7 +76,7 @@ pub trait Watch {
     }
 
     /// The end of a step, or the start: time, position, momentum and action; where [nodes](crate::Motion::nodes) are asked for.
-    fn node(&mut self, _t: f64, _q: &[f64], _p: &[f64], _z: f64) {}
+    fn node(&mut self, _t: f64, [_q, _v, _p]: [&[f64]; 3], _z: f64) {}
 
     /// Is called every few steps with the part of the span that is done, from 0 to 1: for progress, and to end a motion from outside.
     fn poll(&mut self, _part: f64) -> std::ops::ControlFlow<()> {

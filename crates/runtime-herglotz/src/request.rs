@@ -11,6 +11,14 @@ pub enum Rate {
     Velocity(Vec<f64>),
     /// The momenta `L_v`.
     Momentum(Vec<f64>),
+    /// The momenta with velocities near those that belong to them, as at the end of another motion: where a momentum has several, these are
+    /// the ones of it.
+    MomentumNear {
+        /// The momenta.
+        p: Vec<f64>,
+        /// The velocities.
+        v: Vec<f64>,
+    },
 }
 
 /// Where a motion starts: as many numbers in each vector as there are coordinates.

@@ -239,7 +239,7 @@ impl Watch for Seen {
         self.crossings.push(crossing.clone());
         ControlFlow::Continue(())
     }
-    fn node(&mut self, _t: f64, _q: &[f64], _p: &[f64], _z: f64) {
+    fn node(&mut self, _t: f64, _x: [&[f64]; 3], _z: f64) {
         self.nodes += 1;
     }
     fn poll(&mut self, _part: f64) -> ControlFlow<()> {

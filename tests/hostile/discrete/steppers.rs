@@ -74,6 +74,8 @@ pub const ATTACKS: &[Attack] = &[
             "Stepper::evaluations",
             "Stepper::suspicion",
             "Stepper::doubt",
+            "Stepper::guess",
+            "Stepper::last_velocity",
         ],
         run: steppers,
     },
@@ -166,14 +168,20 @@ fn steppers(report: &mut Report) {
             Composition::new(|h| Midpoint::new(Everything, h), &SplittingScheme::YOSHIDA_4, 0.1, 0.0, start).unwrap(),
         ),
     ];
+    let mut other = gauss.stepper(0.0, PhasePoint { p: -start.p, ..start }, -start.p).unwrap();
+    let foreign = other.advance(1).ok().and_then(|()| other.dense()).unwrap();
     for mut stepper in steppers {
         // No step is no change.
         report.check(stepper.advance(0).is_ok() && stepper.state() == start && stepper.time() == 0.0, || {
             "no step".into()
         });
         let blank = stepper.sigma() == 1.0 && stepper.suspicion().is_none() && stepper.doubt().is_none();
-        report.check(blank, || "before the first step".into());
+        report.check(blank && stepper.last_velocity().is_none(), || "before the first step".into());
+        // A guess of another motion changes the work alone.
+        stepper.guess(&foreign);
         report.check(stepper.advance(2).is_ok() && stepper.evaluations() > 0, || "two steps".into());
+        let v = stepper.last_velocity();
+        report.check(v.is_none_or(|v| v.iter().all(|v| v.is_finite())), || format!("{v:?}"));
         report.check(stepper.doubt().is_none_or(|d| d.step + d.steps <= 2), || "a doubt of steps to come".into());
     }
 }

@@ -232,6 +232,10 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
         done
     }
 
+    fn last_velocity(&self) -> Option<SVector<f64, N>> {
+        Some(self.general.last_velocity())
+    }
+
     /// The last step is shorter, so that it ends at `t_end` to round-off.
     fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, Halt> {
         let halt = |taken, cause| Halt { taken, cause };

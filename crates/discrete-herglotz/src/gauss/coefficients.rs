@@ -29,6 +29,8 @@ pub(crate) struct Coefficients {
     /// The weights of the stages in the last two coefficients of the polynomial through them, in Legendre polynomials: of
     /// `P_(s-1)(2 x - 1)` and the one before, where there is one.
     pub last: [[f64; MOST]; 2],
+    /// The weights of the stages in the coefficients of the polynomial through them, in the same polynomials: `[j][k]` for stage j.
+    pub series: [[f64; MOST]; MOST],
     /// The values at the step's start and end of the Lagrange polynomials of the nodes.
     pub ends: [[f64; MOST]; 2],
 }
@@ -139,9 +141,10 @@ impl WithSimd for Make {
             let k = (s - 1).saturating_sub(i);
             from_fn(|j| (odd(k) * b.at(j) * at[k].at(j)).0)
         });
+        let series = from_fn(|j| from_fn(|k| if j.max(k) < s { (odd(k) * b.at(j) * at[k].at(j)).0 } else { 0.0 }));
         // P_k(-1) = (-1)^k and P_k(1) = 1.
         let ends = [-one, one].map(|end| values(&|k| if k % 2 == 0 { one } else { end }));
-        Coefficients { c: from_fn(|i| c.at(i)), b: from_fn(|j| b.at(j)), a, ahead, last, ends }
+        Coefficients { c: from_fn(|i| c.at(i)), b: from_fn(|j| b.at(j)), a, ahead, last, series, ends }
     }
 }
 

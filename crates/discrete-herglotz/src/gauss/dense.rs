@@ -47,21 +47,28 @@ impl<const N: usize> Solved<N> {
     ) -> Self {
         let (s, exact, mut solved) = (table.s, &table.exact, Self::ZERO);
         let sum = |row: &[qd::Quad; MOST], a: &[f64; MOST]| (0..s).fold(0.0, |sum, j| sum + row[j].0 * a[j]);
+        for d in 0..N {
+            let v = &mut solved.v[d];
+            v.iter_mut().zip(&table.inverse_rho.0).for_each(|(v, inverse)| *v = inverse * start.y[d]);
+            for (column, a) in table.d.0.iter().zip(&a[d]).take(s) {
+                v.iter_mut().zip(&column.0).for_each(|(v, entry)| *v += entry * a);
+            }
+            v[s..].fill(0.0);
+        }
         for i in 0..s {
             let rho = 1.0 / exact.inverse_rho[i].0;
-            let q = SVector::from_fn(|d, _| start.q[d] + table.u[i].0 * start.y[d] + sum(&table.b[i], &a[d]));
-            let v = SVector::from_fn(|d, _| start.y[d] / rho + sum(&exact.d[i], &a[d]));
             let force = mass * SVector::from_fn(|d, _| rho * a[d][i]);
             for d in 0..N {
-                solved.v[d][i] = v[d];
                 solved.force[d][i] = force[d];
             }
             solved.rate[i] = rho * table.gamma;
-            solved.l[i] = lagrangian.value(t + table.times.0[i], &q, &v, 0.0);
+            if wants_z {
+                let q = SVector::from_fn(|d, _| start.q[d] + table.u[i].0 * start.y[d] + sum(&table.b[i], &a[d]));
+                let v = SVector::from_fn(|d, _| solved.v[d][i]);
+                solved.l[i] = lagrangian.value(t + table.times.0[i], &q, &v, 0.0);
+            }
         }
-        if !wants_z {
-            solved.l = [0.0; MOST];
-        } else if table.gamma != 0.0 {
+        if wants_z && table.gamma != 0.0 {
             // The actions of the stages: Z = z0 + hA (L - gamma z) + gamma hA Z.
             let g = Coefficients::of(s);
             let entry = |i: usize, j: usize| if i < s && j < s { table.h * g.a[i][j].0 } else { 0.0 };
@@ -69,7 +76,7 @@ impl<const N: usize> Solved<N> {
                 SMatrix::<f64, MOST, MOST>::from_fn(|i, j| f64::from(u8::from(i == j)) - table.gamma * entry(i, j));
             let mut z =
                 SVector::<f64, MOST>::from_fn(|i, _| start.z + (0..s).fold(0.0, |z, j| z + entry(i, j) * solved.l[j]));
-            match linear::solve(&mut left, &mut z) {
+            match linear::solve(&mut left.view_mut((0, 0), (s, s)), &mut z.rows_mut(0, s)) {
                 Ok(_) => (0..s).for_each(|i| solved.l[i] += table.gamma * z[i]),
                 // The pole of the collocation polynomial of z: the step has an end, and nothing between.
                 Err(_) => solved.l = [f64::NAN; MOST],
@@ -131,6 +138,19 @@ impl<const N: usize> DenseStep<N> {
         SVector::from_fn(|d, _| self.v[d].value(&p, self.s))
     }
 
+    /// Velocity, value of L and rho at a fraction of the step.
+    pub(super) fn stage(&self, fraction: f64) -> (SVector<f64, N>, f64, f64) {
+        let p = legendre_polynomials::<_, POLYNOMIALS>(self.s, 2.0 * fraction - 1.0);
+        let v = SVector::from_fn(|d, _| self.v[d].value(&p, self.s));
+        let rho = 1.0 - self.h * self.rate.value(&integrals(self.s, &p, fraction), self.s);
+        (v, self.l.value(&p, self.s), rho)
+    }
+
+    /// The length of the step.
+    pub(super) fn length(&self) -> f64 {
+        self.h
+    }
+
     /// The number of stages.
     pub(crate) fn stages(&self) -> usize {
         self.s
@@ -139,7 +159,8 @@ impl<const N: usize> DenseStep<N> {
     /// The state at a fraction of the step.
     pub(crate) fn at_fraction(&self, fraction: f64) -> PhasePoint<N> {
         let p = legendre_polynomials::<_, POLYNOMIALS>(self.s, 2.0 * fraction - 1.0);
-        let integral = |series: &Series| self.h * series.integral(&p, fraction, self.s);
+        let integrals = integrals(self.s, &p, fraction);
+        let integral = |series: &Series| self.h * series.value(&integrals, self.s);
         let rho = 1.0 - integral(&self.rate);
         PhasePoint {
             q: SVector::from_fn(|d, _| self.start.q[d] + integral(&self.v[d])),
@@ -149,6 +170,26 @@ impl<const N: usize> DenseStep<N> {
     }
 }
 
+/// The integrals of the Legendre polynomials from 0 to a fraction of `[0, 1]`: `(2k + 1) P_k` is the derivative of `P_(k+1) - P_(k-1)`.
+fn integrals(s: usize, p: &[f64; POLYNOMIALS], fraction: f64) -> [f64; POLYNOMIALS] {
+    let mut integrals = [0.0; POLYNOMIALS];
+    integrals[0] = fraction;
+    for k in 1..s {
+        integrals[k] = (p[k + 1] - p[k - 1]) * HALF_OF_ODD[k];
+    }
+    integrals
+}
+
+/// `1 / (2 (2k + 1))`.
+const HALF_OF_ODD: [f64; MOST] = {
+    let (mut numbers, mut k) = ([0.0; MOST], 0);
+    while k < MOST {
+        numbers[k] = 0.5 / (2 * k + 1) as f64;
+        k += 1;
+    }
+    numbers
+};
+
 /// The coefficients of a polynomial on `[0, 1]` in the Legendre polynomials of `2 x - 1`.
 #[derive(Clone, Copy, Debug)]
 struct Series([f64; MOST]);
@@ -156,12 +197,10 @@ struct Series([f64; MOST]);
 impl Series {
     /// The polynomial through values at the nodes: Gauss' weights integrate its products with the Legendre polynomials exactly.
     fn through(values: &[f64; MOST], s: usize) -> Self {
-        let g = Coefficients::of(s);
         let mut c = [0.0; MOST];
-        for j in 0..s {
-            let p = legendre_polynomials::<_, POLYNOMIALS>(s, 2.0 * g.c[j].0 - 1.0);
-            for (k, c) in c.iter_mut().enumerate().take(s) {
-                *c += (2 * k + 1) as f64 * g.b[j].0 * p[k] * values[j];
+        for (row, value) in Coefficients::of(s).series.iter().zip(values).take(s) {
+            for (c, entry) in c.iter_mut().zip(row) {
+                *c += entry * value;
             }
         }
         Series(c)
@@ -169,11 +208,5 @@ impl Series {
 
     fn value(&self, p: &[f64; MOST + 1], s: usize) -> f64 {
         (0..s).fold(0.0, |sum, k| sum + self.0[k] * p[k])
-    }
-
-    /// The integral from 0 to a fraction of `[0, 1]`: `(2k + 1) P_k` is the derivative of `P_(k+1) - P_(k-1)`.
-    fn integral(&self, p: &[f64; MOST + 1], fraction: f64, s: usize) -> f64 {
-        let rest = (1..s).fold(0.0, |sum, k| sum + self.0[k] * (p[k + 1] - p[k - 1]) / (2 * k + 1) as f64);
-        self.0[0] * fraction + 0.5 * rest
     }
 }

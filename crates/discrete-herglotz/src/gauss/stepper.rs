@@ -5,6 +5,7 @@ mod words;
 
 use super::account::account;
 use super::beginning::Beginning;
+use super::coefficients::Coefficients;
 use super::condensed::Condensed;
 use super::dense::{DenseStep, Solved, StepStart};
 use super::general::General;
@@ -300,7 +301,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
                 run.linearise(t, state.q)
             }
             Route::General(run) => {
-                let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return false };
+                let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &run.last_velocity()) else { return false };
                 run.guess(&x.v);
                 run.linearise(&self.lagrangian.gradient(t, &x), &self.lagrangian.hessian(t, &x))
             }
@@ -318,7 +319,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         };
         let equations = StageEquations { lagrangian: self.lagrangian, products: &self.products, t };
         let given = Given::Start(from);
-        let VelocityPoint { v, .. } = legendre_inverse(self.lagrangian, t, &from, &SVector::zeros())?;
+        let VelocityPoint { v, .. } = legendre_inverse(self.lagrangian, t, &from, &run.last_velocity())?;
         let work = self.workspace.get_or_insert_with(|| Box::new(equations.workspace(&given)));
         equations.solve(&given, &v, &from.p, work)?;
         let Workspace { x, l, .. } = &**work;
@@ -493,6 +494,23 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     /// The collocation polynomial. It costs nothing where it is not asked for.
     fn dense(&self) -> Option<DenseStep<N>> {
         self.curve()
+    }
+
+    fn last_velocity(&self) -> Option<SVector<f64, N>> {
+        match &*self.route {
+            Route::General(run) if self.k > 0 => Some(run.last_velocity()),
+            _ => None,
+        }
+    }
+
+    fn guess(&mut self, longer: &DenseStep<N>) {
+        let Products { s, h, .. } = self.products;
+        if let Route::General(run) = &mut *self.route {
+            let part = h / longer.length();
+            // An action with a pole has no polynomial.
+            let stages = Coefficients::of(s).c.iter().take(s).map(|c| longer.stage(part * c.0));
+            run.foretell(stages.map(|(v, l, rho)| (v, if l.is_finite() { l } else { 0.0 }, rho)));
+        }
     }
 
     fn save(&self) -> Option<Vec<u64>> {

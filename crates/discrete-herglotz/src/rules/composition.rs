@@ -211,6 +211,10 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
         account_of(self.rules.iter().all(|rule| rule.is_explicit()), "substep")
     }
 
+    fn last_velocity(&self) -> Option<SVector<f64, N>> {
+        (self.taken > 0).then_some(self.velocity)
+    }
+
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
         (0..steps).try_for_each(|taken| self.step().map_err(|cause| Halt { taken, cause }))
     }

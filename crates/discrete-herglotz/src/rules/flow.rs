@@ -193,6 +193,10 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
         account_of(self.ld.is_explicit(), "step")
     }
 
+    fn last_velocity(&self) -> Option<SVector<f64, N>> {
+        (self.k > 0).then_some(self.velocities[0])
+    }
+
     fn advance(&mut self, steps: usize) -> Result<(), Halt> {
         for taken in 0..steps {
             self.step().map_err(|cause| Halt { taken, cause })?;

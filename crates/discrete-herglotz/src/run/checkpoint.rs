@@ -11,7 +11,7 @@ use thiserror::Error;
 
 /// What a file of a checkpoint begins with, and the version of what follows.
 const MAGIC: u64 = u64::from_le_bytes(*b"herglotz");
-const VERSION: u64 = 2;
+const VERSION: u64 = 3;
 
 /// Why a file is no checkpoint.
 #[derive(Debug, Error)]

@@ -97,7 +97,9 @@ impl<const N: usize> ClaimMonitor<N> {
         }
         self.last = [state.q, state.p];
         let lagrangian = plan.problem.lagrangian;
-        let x = legendre_inverse(lagrangian, t, &state, &self.guess).ok()?;
+        let guess = stepper.last_velocity().unwrap_or(self.guess);
+        let x = legendre_inverse(lagrangian, t, &state, &guess).ok()?;
+        self.guess = x.v;
         let fractions = (1..WITHIN).map(|i| i as f64 / WITHIN as f64);
         if let Some(curve) = stepper.dense() {
             let (start, end) = curve.span();
@@ -122,7 +124,6 @@ impl<const N: usize> ClaimMonitor<N> {
                 }
             }
         }
-        self.guess = x.v;
         self.compare(plan, t, &x)
     }
 

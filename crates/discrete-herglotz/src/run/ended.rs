@@ -80,7 +80,7 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         let mut terminal = observers.terminal()?;
         for _ in 0..HALVINGS {
             let fraction = 0.5 * (possible + impossible);
-            let Ok(part) = self.step_to(&from, from.0 + fraction * whole) else {
+            let Ok(part) = self.step_to(&from, from.0 + fraction * whole, stepper.last_velocity(), None) else {
                 impossible = fraction;
                 continue;
             };

@@ -3,7 +3,7 @@
 use super::Plan;
 use super::noise::Noise;
 use super::saved::saved;
-use crate::legendre_inverse;
+use crate::{Stepper, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, larger};
 
@@ -156,14 +156,16 @@ impl<const N: usize> EnergyMonitor<N> {
     pub fn look<L: Lagrangian<N>>(
         &mut self,
         plan: &Plan<'_, L, N>,
-        (t, state): (f64, &PhasePoint<N>),
+        stepper: &dyn Stepper<N>,
         (log_factor, taken): (f64, usize),
     ) -> Option<f64> {
+        let (t, state) = (stepper.time(), &stepper.state());
         let problem = plan.problem;
         if taken < self.drift.first() {
             return None;
         }
-        let x = legendre_inverse(problem.lagrangian, t, state, &self.guess).ok()?;
+        let guess = stepper.last_velocity().unwrap_or(self.guess);
+        let x = legendre_inverse(problem.lagrangian, t, state, &guess).ok()?;
         let Energies { total, kinetic, terms } = energies(problem.lagrangian, t, &x, state)?;
         let log_factor = self.rate.map_or(log_factor, |rate| rate * (t - problem.t0));
         self.guess = x.v;

@@ -18,13 +18,16 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// The misfit of some steps; above one where they do not resolve the motion. `None` where there is nothing to compare with.
     pub(super) fn against_halves(&self, Doubt { steps, t, from, to, .. }: &Doubt<N>) -> Option<f64> {
         let Problem { lagrangian, start, .. } = *self.problem;
-        let VelocityPoint { v, .. } = legendre_inverse(lagrangian, *t, from, &start.v).ok()?;
         let end = t + *steps as f64 * self.h;
+        // Of several velocities that of the motion.
+        let mean = (to.q - from.q) / (end - t);
+        let guess = if self.problem.structure.constant_mass { start.v } else { mean };
+        let VelocityPoint { v, .. } = legendre_inverse(lagrangian, *t, from, &guess).ok()?;
         let at_end = |x: &PhasePoint<N>| legendre_inverse(lagrangian, end, x, &v).map(|x| x.v).ok();
         if self.facts.by_clock {
             return None;
         }
-        let Ok(fine) = self.advanced((*t, from), &v, 0.5 * self.h, (2 * steps, end)) else {
+        let Ok(fine) = self.advanced((*t, from), &v, 0.5 * self.h, (2 * steps, end), |_| ()) else {
             // What shorter steps do not get over a longer one should not.
             return Some(f64::INFINITY);
         };
@@ -54,14 +57,18 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         v: &SVector<f64, N>,
         h: f64,
         (steps, t_end): (usize, f64),
+        guess: impl Fn(&mut dyn Stepper<N>),
     ) -> Result<Box<dyn Stepper<N> + 'p>, StepError> {
-        let linear = self.problem.structure.quadratic;
+        let Structure { quadratic: linear, separable, .. } = self.problem.structure;
         let by = |quadratic: bool| {
             let start = VelocityPoint { q: from.q, v: *v, z: from.z };
-            let structure = Structure { quadratic, ..self.problem.structure };
+            // The tables of twice the working precision depend on the length of the step: a few steps are not worth them.
+            let separable = separable && (quadratic || self.facts.collocation.is_none());
+            let structure = Structure { quadratic, separable, ..self.problem.structure };
             let problem = Problem { t0: t, start, state: *from, structure, ..*self.problem };
             let h = if self.facts.by_clock { self.h } else { h };
             let mut stepper = self.make_stepper(&problem, h, false).map_err(step_error)?;
+            guess(&mut *stepper);
             stepper.advance_until(steps, t_end).map_err(|halt| halt.cause)?;
             Ok(stepper)
         };
@@ -125,7 +132,7 @@ mod tests {
         let plan = plan(&problem, 8, 100);
         assert!(by_one_matrix(plan.stepper().unwrap()));
         for h in [0.3 * H, -0.5 * H] {
-            let part = plan.advanced((0.0, &problem.state), &problem.start.v, h, (1, h)).unwrap();
+            let part = plan.advanced((0.0, &problem.state), &problem.start.v, h, (1, h), |_| ()).unwrap();
             assert!(part.evaluations() > 0);
             // x = e^(-t/20) (cos w t + sin w t / (20 w)), w^2 = k^2 - 1/400; to round-off, of ten terms.
             let (t, state) = (h, part.state());
@@ -172,7 +179,7 @@ mod tests {
             let run = problem.by(GaussCollocation { stages }).steps(Steps::Count(64));
             assert_eq!(run.run(Until::Time(4.0)).unwrap().suspicion, None, "{stages} stages");
             let plan = problem.by(GaussCollocation { stages }).steps(Steps::Count(64)).plan(Until::Time(4.0)).unwrap();
-            let part = plan.advanced((0.0, &problem.state), &start.v, 0.03, (1, 0.03)).unwrap();
+            let part = plan.advanced((0.0, &problem.state), &start.v, 0.03, (1, 0.03), |_| ()).unwrap();
             // By the whole step's matrix: to rounding through the inverse of the mass matrix.
             let mut whole = problem.by(GaussCollocation { stages }).steps(Steps::Count(1));
             whole = whole.without_action();

@@ -4,6 +4,7 @@ mod accuracy;
 mod any_integrator;
 mod checkpoint;
 mod claims;
+mod crossings;
 #[cfg(feature = "csv")]
 mod csv_rows;
 mod divided;
@@ -26,6 +27,7 @@ mod problem;
 mod progress;
 mod quotient;
 mod rest;
+mod roots;
 pub(crate) mod rows;
 pub(crate) mod saved;
 mod stepper;
@@ -40,7 +42,6 @@ pub use checkpoint::{Checkpoint, CheckpointError, Interrupted};
 pub use csv_rows::CsvRows;
 pub(crate) use energy::may_drift;
 pub use energy::{EnergyDrift, EnergyLook};
-pub(crate) use events::bracketed_root;
 pub use events::{Crossing, Event, Events};
 pub(crate) use explain::DECOUPLED;
 pub use explain::Item;
@@ -56,15 +57,16 @@ pub use problem::{Problem, Start};
 pub(crate) use problem::{check_time, start_of};
 pub use progress::Progress;
 pub use quotient::Quotient;
+pub(crate) use roots::bracketed_root;
 pub use rows::{Row, Rows};
 pub use stepper::{Halt, Stepper};
 pub use verified::verified;
 pub use watch::Doubt;
 
-use crate::{InputError, StepError};
+use crate::{DenseStep, GaussCollocation, InputError, StepError};
 use accuracy::Choice;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint};
+use contact_geom::{Lagrangian, PhasePoint, larger};
 use std::sync::Arc;
 use verified::verified_over;
 
@@ -81,7 +83,7 @@ pub enum Steps {
 /// Where a run ends, if no observer ends it before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Until {
-    /// At this time, before or after that of the start.
+    /// At this time, before or after that of the start, or there: then the start is all that is seen.
     Time(f64),
     /// After this time, negative to go back.
     After(f64),
@@ -215,7 +217,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// Checks everything, chooses the step and the route.
     ///
     /// # Errors
-    /// [`InputError`]: a span or step that is 0 or not finite, no steps or no integrator, a false or a missing claim of structure, an
+    /// [`InputError`]: a span that is not finite, a step that is 0 or not finite, no steps or no integrator, a false or a missing claim of structure, an
     /// integrator whose hypothesis the Lagrangian does not meet, an accuracy that it does not reach.
     pub fn plan(&self, until: Until) -> Result<Plan<'p, L, N>, InputError> {
         let needs = self.needs.and(self.observers.needs());
@@ -257,8 +259,11 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
 impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     fn plan(&self, length: Length<'p, L, N>, terminal: Option<Terminal<'_, N>>) -> Result<Plan<'p, L, N>, InputError> {
         let Request { problem, span, .. } = *self;
-        if !(span != 0.0 && span.is_finite()) {
+        if !span.is_finite() {
             return Err(InputError::Span { span });
+        }
+        if span == 0.0 {
+            return self.plan_of_the_start(length);
         }
         // Beyond its rest no error relative to the motion can be told.
         if let Length::For(..) = length
@@ -297,6 +302,23 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         Ok(plan)
     }
 
+    /// The plan of a run that ends where it starts: no step is taken.
+    fn plan_of_the_start(&self, length: Length<'p, L, N>) -> Result<Plan<'p, L, N>, InputError> {
+        let (integrator, error) = match (length, &self.integrator) {
+            (Length::For(wanted, _), _) if !(wanted > 0.0 && wanted.is_finite()) => {
+                return Err(InputError::Tolerance { wanted });
+            }
+            (Length::For(..), None) => (Arc::new(GaussCollocation { stages: 8 }) as Shared<'p, L, N>, Some(0.0)),
+            (Length::For(..), Some(integrator)) => (integrator.clone(), Some(0.0)),
+            (Length::Given(steps), _) => (self.given(steps)?.integrator, None),
+            (Length::Exactly(count, _), _) => (self.given(Steps::Count(count))?.integrator, None),
+        };
+        integrator.check(self.problem.lagrangian)?;
+        // Its stepper has a step, though it takes none.
+        let h = f64::EPSILON * larger(self.problem.t0.abs(), 1.0);
+        Plan::new(self, &Choice { integrator, count: 0, h, error, ended: None })
+    }
+
     /// Given steps of a named integrator.
     fn given(&self, steps: Steps) -> Result<Choice<'p, L, N>, InputError> {
         let Some(integrator) = self.integrator.clone() else { return Err(InputError::NoIntegrator) };
@@ -331,22 +353,32 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     }
 }
 
+/// A velocity of the motion near a state; that of the start where none is known.
+pub(crate) type Near<const N: usize> = Option<SVector<f64, N>>;
+
 /// A motion as observers ask it for what its states do not hold.
 pub(crate) trait Motion<const N: usize> {
-    /// The velocity at a state.
-    fn velocity(&self, t: f64, state: &PhasePoint<N>) -> Result<SVector<f64, N>, StepError>;
+    /// The velocity at a state: the one next to another, where several belong to its momentum.
+    fn velocity(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<SVector<f64, N>, StepError>;
 
     /// The energy there.
-    fn energy(&self, t: f64, state: &PhasePoint<N>) -> Result<f64, StepError>;
+    fn energy(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<f64, StepError>;
 
     /// The rates `(qdot, pdot, zdot)` there.
-    fn rates(&self, t: f64, state: &PhasePoint<N>) -> Result<PhasePoint<N>, StepError>;
+    fn rates(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<PhasePoint<N>, StepError>;
 
     /// What tells the run from others.
     fn fingerprint(&self) -> u64;
 
-    /// The state at a time of the step that starts at a time and a state, and `sigma_d` from there to it.
-    fn inside(&self, from: &(f64, PhasePoint<N>), t: f64) -> Result<(PhasePoint<N>, f64), StepError>;
+    /// The state at a time of the step that starts at a time and a state, and `sigma_d` from there to it. The curve of the whole step, if it is
+    /// known, spares work.
+    fn inside(
+        &self,
+        from: &(f64, PhasePoint<N>),
+        t: f64,
+        near: Near<N>,
+        curve: Option<&DenseStep<N>>,
+    ) -> Result<(PhasePoint<N>, f64), StepError>;
 }
 
 /// Runs have steps.

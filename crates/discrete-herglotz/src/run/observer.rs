@@ -151,7 +151,7 @@ impl<'r, const N: usize> Moment<'r, N> {
     /// # Errors
     /// A [`StepError`] where no velocity belongs to the momentum.
     pub fn velocity(&self) -> Result<SVector<f64, N>, StepError> {
-        self.motion.velocity(self.t, &self.state)
+        self.motion.velocity(self.t, &self.state, self.stepper.last_velocity())
     }
 
     /// The velocity that belongs to another state of the motion.
@@ -159,7 +159,7 @@ impl<'r, const N: usize> Moment<'r, N> {
     /// # Errors
     /// Those of [`velocity`](Self::velocity).
     pub fn velocity_at(&self, t: f64, state: &PhasePoint<N>) -> Result<SVector<f64, N>, StepError> {
-        self.motion.velocity(t, state)
+        self.motion.velocity(t, state, self.stepper.last_velocity())
     }
 
     /// The run as it would go on from here, for [`Run::resume`](super::Run::resume); `None` where its stepper cannot be saved, or the run
@@ -185,14 +185,14 @@ impl<'r, const N: usize> Moment<'r, N> {
     /// # Errors
     /// Those of [`velocity`](Self::velocity).
     pub fn energy(&self) -> Result<f64, StepError> {
-        self.motion.energy(self.t, &self.state)
+        self.motion.energy(self.t, &self.state, self.stepper.last_velocity())
     }
 
     /// The step that ends here; `None` at the start, and where several steps were taken at once.
     pub fn last_step(&self) -> Option<LastStep<'r, N>> {
         let from = self.before?;
-        let curve = self.stepper.dense();
-        Some(LastStep { from, to: (self.t, self.state), motion: self.motion, curve, rates: None })
+        let (motion, stepper) = (self.motion, self.stepper);
+        Some(LastStep { from, to: (self.t, self.state), motion, stepper, curve: None, rates: [None; 2] })
     }
 }
 
@@ -201,8 +201,11 @@ pub struct LastStep<'r, const N: usize> {
     from: (f64, PhasePoint<N>),
     to: (f64, PhasePoint<N>),
     motion: &'r dyn Motion<N>,
-    curve: Option<DenseStep<N>>,
-    rates: Option<[PhasePoint<N>; 2]>,
+    stepper: &'r dyn Stepper<N>,
+    /// Its curve, if it has one, once it is asked for.
+    curve: Option<Option<DenseStep<N>>>,
+    /// The rates at both ends, once they are asked for.
+    rates: [Option<PhasePoint<N>>; 2],
 }
 
 impl<const N: usize> LastStep<'_, N> {
@@ -232,28 +235,44 @@ impl<const N: usize> LastStep<'_, N> {
 
     /// The same by a step of its own, with its `sigma_d`.
     fn reach(&self, t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
-        if t == self.from.0 { Ok((self.from.1, 1.0)) } else { self.motion.inside(&self.from, t) }
+        let curve = self.curve.as_ref().and_then(Option::as_ref);
+        if t == self.from.0 {
+            Ok((self.from.1, 1.0))
+        } else {
+            self.motion.inside(&self.from, t, self.stepper.last_velocity(), curve)
+        }
+    }
+
+    /// With the rates at its start, as the step before has found them.
+    pub(super) fn with_rates_at_start(self, rates: Option<PhasePoint<N>>) -> Self {
+        LastStep { rates: [rates, None], ..self }
+    }
+
+    /// The rates at its end, if they were asked for.
+    pub(super) fn rates_at_end(&self) -> Option<PhasePoint<N>> {
+        self.rates[1]
     }
 
     /// The parts in which a search along the step looks at it.
-    pub(super) fn parts(&self) -> usize {
-        self.curve.as_ref().map_or(4, |curve| curve.stages() + 2)
+    pub(super) fn parts(&mut self) -> usize {
+        self.curve().map_or(4, |curve| curve.stages() + 2)
+    }
+
+    fn curve(&mut self) -> Option<&DenseStep<N>> {
+        self.curve.get_or_insert_with(|| self.stepper.dense()).as_ref()
     }
 
     /// About the state at a fraction of the step, at no cost of a step: by the collocation polynomial where there is one, else by the
     /// cubic polynomial through both ends with their rates.
     pub(super) fn about(&mut self, fraction: f64) -> Result<PhasePoint<N>, StepError> {
-        if let Some(curve) = &self.curve {
+        if let Some(curve) = self.curve() {
             return Ok(curve.at_fraction(fraction));
         }
         let ((t0, a), (t1, b)) = (self.from, self.to);
-        let [ra, rb] = match self.rates {
-            Some(rates) => rates,
-            None => {
-                let rates = [self.motion.rates(t0, &a)?, self.motion.rates(t1, &b)?];
-                *self.rates.insert(rates)
-            }
-        };
+        let ([ra, rb], near) = (self.rates, self.stepper.last_velocity());
+        let ra = ra.map_or_else(|| self.motion.rates(t0, &a, near), Ok)?;
+        let rb = rb.map_or_else(|| self.motion.rates(t1, &b, near), Ok)?;
+        self.rates = [Some(ra), Some(rb)];
         let (u, left, h) = (fraction, 1.0 - fraction, t1 - t0);
         let weights =
             [left * left * (1.0 + 2.0 * u), u * u * (1.0 + 2.0 * left), h * u * left * left, -h * u * u * left];

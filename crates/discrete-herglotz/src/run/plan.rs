@@ -7,12 +7,13 @@ use super::ended::Before;
 use super::energy::{EnergyMonitor, EnergySums};
 use super::rest::REST;
 use super::{
-    Course, Facts, Interrupted, Item, Moment, Motion, Needs, Observer, Outcome, Problem, Request, Shared, Stop, Wants,
+    Course, Facts, Interrupted, Item, Moment, Motion, Near, Needs, Observer, Outcome, Problem, Request, Shared, Stop,
+    Wants,
 };
 use crate::gauss::FEW;
 use crate::run::verified::refuted;
 use crate::switching::{has_switching_functions, of_integrator};
-use crate::{Doubt, InputError, Status, StepError, Stepper, Suspicion, legendre_inverse};
+use crate::{DenseStep, Doubt, InputError, Status, StepError, Stepper, Suspicion, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
@@ -296,7 +297,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             }
             if let Some(energy) = &mut energy
                 && (taken >= next_energy || over)
-                && let Some(misfit) = energy.look(self, (stepper.time(), &stepper.state()), (log_factor, taken))
+                && let Some(misfit) = energy.look(self, &*stepper, (log_factor, taken))
             {
                 suspicion = first(suspicion, Some(Suspicion { step: taken - 1, misfit }));
             }
@@ -344,7 +345,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             t,
             q: state.q,
             p: state.p,
-            v: self.velocity(t, &state).ok(),
+            v: self.velocity(t, &state, stepper.last_velocity()).ok(),
             z: action.then_some(state.z),
             log_factor: conformal_factor.then_some(log_factor),
             error_estimate,
@@ -380,19 +381,27 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         }
     }
 
-    /// A stepper after one step from a time and a state to another time.
+    /// A stepper after one step from a time and a state to another time; it is guessed from the curve of a longer one.
     pub(super) fn step_to(
         &self,
         (t0, from): &(f64, PhasePoint<N>),
         t: f64,
+        near: Near<N>,
+        curve: Option<&DenseStep<N>>,
     ) -> Result<Box<dyn Stepper<N> + 'p>, StepError> {
-        let v = self.velocity(*t0, from)?;
-        self.advanced((*t0, from), &v, t - t0, (1, t))
+        let v = self.velocity(*t0, from, near)?;
+        let guess = |run: &mut dyn Stepper<N>| {
+            if let Some(curve) = curve {
+                run.guess(curve);
+            }
+        };
+        self.advanced((*t0, from), &v, t - t0, (1, t), guess)
     }
 
     /// The first claim that is false at the state of a stepper.
     fn refuted(&self, stepper: &dyn Stepper<N>) -> Option<Defect> {
-        refuted(self.problem.lagrangian, stepper.time(), &stepper.state(), &self.problem.start.v)
+        let guess = stepper.last_velocity().unwrap_or(self.problem.start.v);
+        refuted(self.problem.lagrangian, stepper.time(), &stepper.state(), &guess)
     }
 
     /// Probes the claims along the first steps.
@@ -420,18 +429,20 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
-    fn velocity(&self, t: f64, state: &PhasePoint<N>) -> Result<SVector<f64, N>, StepError> {
-        legendre_inverse(self.problem.lagrangian, t, state, &self.problem.start.v).map(|x| x.v)
+    fn velocity(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<SVector<f64, N>, StepError> {
+        // With a constant mass there is one velocity alone.
+        let near = near.filter(|_| !self.problem.structure.constant_mass);
+        legendre_inverse(self.problem.lagrangian, t, state, &near.unwrap_or(self.problem.start.v)).map(|x| x.v)
     }
 
-    fn energy(&self, t: f64, state: &PhasePoint<N>) -> Result<f64, StepError> {
-        let v = self.velocity(t, state)?;
+    fn energy(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<f64, StepError> {
+        let v = self.velocity(t, state, near)?;
         let energy = v.dot(&state.p) - self.problem.lagrangian.value(t, &state.q, &v, state.z);
         if energy.is_finite() { Ok(energy) } else { Err(StepError::NonFinite) }
     }
 
-    fn rates(&self, t: f64, state: &PhasePoint<N>) -> Result<PhasePoint<N>, StepError> {
-        let v = self.velocity(t, state)?;
+    fn rates(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<PhasePoint<N>, StepError> {
+        let v = self.velocity(t, state, near)?;
         let (value, g) = self.problem.lagrangian.with_gradient(t, &VelocityPoint { q: state.q, v, z: state.z });
         Ok(PhasePoint { q: v, p: g.x + state.p * g.z, z: value })
     }
@@ -449,8 +460,14 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
         digest(&numbers.chain(name).chain(counts).collect::<Vec<u64>>())
     }
 
-    fn inside(&self, (t0, from): &(f64, PhasePoint<N>), t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
-        let run = self.step_to(&(*t0, *from), t)?;
+    fn inside(
+        &self,
+        from: &(f64, PhasePoint<N>),
+        t: f64,
+        near: Near<N>,
+        curve: Option<&DenseStep<N>>,
+    ) -> Result<(PhasePoint<N>, f64), StepError> {
+        let run = self.step_to(from, t, near, curve)?;
         Ok((run.state(), run.sigma()))
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::{DenseStep, Doubt, Item, StepError, Suspicion};
 use contact_geom::PhasePoint;
+use contact_geom::nalgebra::SVector;
 use thiserror::Error;
 
 /// A method at work on one motion: its state, its workspace, and what it carries from one step to the next (guesses,
@@ -42,6 +43,15 @@ pub trait Stepper<const N: usize> {
     fn dense(&self) -> Option<DenseStep<N>> {
         None
     }
+
+    /// A velocity of the motion in its last step: where several belong to a momentum, that at the state is the one from which Newton's method
+    /// finds it. `None` before the first step, and where a momentum has no other.
+    fn last_velocity(&self) -> Option<SVector<f64, N>> {
+        None
+    }
+
+    /// Has the first step guessed from the curve of a longer one that has the same start; it changes nothing but the work.
+    fn guess(&mut self, _longer: &DenseStep<N>) {}
 
     /// Whether `sigma_d` is the same in all steps, as it is known before the first.
     fn has_constant_rate(&self) -> bool {

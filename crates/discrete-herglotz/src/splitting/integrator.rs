@@ -46,7 +46,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
             let splitting = ActionSplitting::new(lagrangian, self, h, t0, state)?.compensated_where_tiny();
             return Ok(Box::new(if watched { splitting.doubting() } else { splitting }));
         }
-        let splitting = Splitting::new(lagrangian, self, h, t0, state)?.compensated_where_tiny();
+        let splitting = Splitting::verified(lagrangian, self, h, t0, state)?.compensated_where_tiny();
         let splitting = if watched { splitting.watched() } else { splitting };
         Ok(Box::new(if action { splitting } else { splitting.without_action() }))
     }

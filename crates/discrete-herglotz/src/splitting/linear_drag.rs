@@ -80,7 +80,28 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         t0: f64,
         state: PhasePoint<N>,
     ) -> Result<Self, InputError> {
-        let form = SeparableForm::read(lagrangian, h, t0, &state)?;
+        Self::of(SeparableForm::read(lagrangian, h, t0, &state)?, scheme, h, t0, state)
+    }
+
+    /// The same of a Lagrangian that a problem has verified.
+    pub(crate) fn verified(
+        lagrangian: &'a L,
+        scheme: &SplittingScheme,
+        h: f64,
+        t0: f64,
+        state: PhasePoint<N>,
+    ) -> Result<Self, InputError> {
+        Self::of(SeparableForm::read_of(lagrangian, h, t0, &state, true)?, scheme, h, t0, state)
+    }
+
+    fn of(
+        form: SeparableForm<&'a L, N>,
+        scheme: &SplittingScheme,
+        h: f64,
+        t0: f64,
+        state: PhasePoint<N>,
+    ) -> Result<Self, InputError> {
+        let lagrangian = form.lagrangian;
         let drag = Drag::of(&form, t0, &state)?;
         let kick = form.first_kick(t0, &state.q, 0.0)?;
         let table = SubstepTable::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));

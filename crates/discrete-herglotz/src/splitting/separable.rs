@@ -21,6 +21,17 @@ pub(crate) struct SeparableForm<L, const N: usize> {
 impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
     /// Reads M, and verifies what the Lagrangian claims, at a state and beside it.
     pub(crate) fn read(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
+        Self::read_of(lagrangian, h, t, state, L::PROVED)
+    }
+
+    /// The same of a Lagrangian whose claims may be known to hold: probes cost as much as a hundred steps.
+    pub(crate) fn read_of(
+        lagrangian: L,
+        h: f64,
+        t: f64,
+        state: &PhasePoint<N>,
+        verified: bool,
+    ) -> Result<Self, InputError> {
         if N == 0 {
             return Err(InputError::Dimension);
         }
@@ -33,10 +44,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if !structure.separable {
             return Err(InputError::Unclaimed { claim: "separable" });
         }
-        for x in probes(state) {
-            if const { L::PROVED } {
-                break;
-            }
+        for x in probes(state).into_iter().filter(|_| !verified) {
             // A state beside the given one may be outside of the domain.
             let mut defects = structure.defects(&lagrangian, t, &x).into_iter().flatten();
             if let Some(Defect { claim, size }) = defects.find(|d| d.size > PROBE) {

@@ -10,6 +10,7 @@ use crate::{
     DenseStep, Doubt, Gauss, GaussCollocation, GaussStepper, Halt, InputError, Integrator, Item, Problem, StepError,
     Stepper, Suspicion, Wants, legendre_inverse,
 };
+use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
 use std::sync::Arc;
 
@@ -440,6 +441,10 @@ where
 
     fn time(&self) -> f64 {
         self.problem.t0 + self.k as f64 * self.h
+    }
+
+    fn last_velocity(&self) -> Option<SVector<f64, N>> {
+        (self.k > 0).then_some(self.here.v)
     }
 
     fn sigma(&self) -> f64 {

@@ -111,11 +111,6 @@ impl Scene {
         let header = file.start.as_ref().map_or(system.span(), At::span);
         let start = start::read(text, &formula, file.start.as_deref(), entry, header)?;
         let end = finite(text, &run.time, "time")?;
-        if end == start.t {
-            let message =
-                format!("the motion ends at {end}, at which it starts; give a time after it, or before it to go back");
-            return Err(SceneError::at(text, run.time.span(), message));
-        }
         let way = way(text, run)?;
         let by = match way {
             Way::Accuracy { by, .. } => by,

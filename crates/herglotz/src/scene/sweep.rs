@@ -78,7 +78,9 @@ fn slot(text: &str, formula: &Formula, start: &Start, name: &At<String>) -> Resu
     };
     match (entry_of(formula, of_start), &start.rate) {
         (Some((Part::Time, _)), _) => refuse("all members start at one time; sweep another value"),
-        (Some((Part::Velocity, _)), Rate::Momentum(_)) => refuse("the start has momenta; sweep one of them"),
+        (Some((Part::Velocity, _)), Rate::Momentum(_) | Rate::MomentumNear { .. }) => {
+            refuse("the start has momenta; sweep one of them")
+        }
         (Some((Part::Momentum, _)), Rate::Velocity(_)) => refuse("the start has velocities; sweep one of them"),
         (Some((part, entry)), _) => Ok(Slot::Start(part, entry)),
         (None, _) => {

@@ -28,6 +28,8 @@ impl RowTimes {
     /// The times of a motion from one to another.
     pub fn when(&self, t0: f64, end: f64) -> When {
         match self {
+            // The start alone.
+            RowTimes::Parts(_) | RowTimes::Every(_) if t0 == end => When::At(vec![t0]),
             RowTimes::EveryStep(steps) => When::Every(*steps),
             RowTimes::At(times) => When::At(times.clone()),
             RowTimes::Parts(parts) => {

@@ -129,7 +129,7 @@ def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters):
     L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters)
     if (v0 is None) == (p0 is None):
         raise ValueError("give `v0` or `p0`, one of them")
-    start = (q0, v0, False, z0) if p0 is None else (q0, p0, True, z0)
+    start = (q0, v0, False, z0, None) if p0 is None else (q0, p0, True, z0, None)
     if t is None:
         raise ValueError("`t` is not given: the end of the motion")
     return _core.Motion(L, start, t, None, way, [], [], False, False)

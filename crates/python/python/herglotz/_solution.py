@@ -170,7 +170,7 @@ class Solution:
             # Its plan was interrupted.
             return run(self.system, self._request, self._event_names, self._observed)
 
-        at, q, p, z = self._end
+        at, q, p, z, v = self._end
         if z is None:
             raise ValueError("the motion has no action to go on from")
         if t is None:
@@ -186,7 +186,7 @@ class Solution:
         if way[3] is not None:
             # So many steps were of another span.
             way = (None, way[1], self.plan.step, None)
-        request = (q, p, True, z), times, every, way, events, columns, conformal_factor, estimate
+        request = (q, p, True, z, v), times, every, way, events, columns, conformal_factor, estimate
         return run(self.system, request, self._event_names, self._observed)
 
     @property

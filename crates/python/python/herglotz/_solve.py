@@ -81,7 +81,7 @@ def solve(
     if (v0 is None) == (p0 is None):
         raise ValueError("give `v0` or `p0`, one of them")
     request = (
-        (copied(q0), copied(v0), False, z0) if p0 is None else (copied(q0), copied(p0), True, z0),
+        (copied(q0), copied(v0), False, z0, None) if p0 is None else (copied(q0), copied(p0), True, z0, None),
         copied(t),
         every,
         (accuracy, integrator, step, steps),

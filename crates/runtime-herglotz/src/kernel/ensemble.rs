@@ -178,7 +178,7 @@ impl<const N: usize> Block<'_, N> {
         let of_block = if observed {
             let observer = |i: usize| {
                 let events = own_of(i).map_or(Some(events), |own| own.map(|own| own.events.as_slice()));
-                let crossings = lagrangian(i).zip(events).and_then(|(l, events)| Crossings::of(l, events));
+                let crossings = lagrangian(i).zip(events).and_then(|(l, events)| Crossings::of(l, events, None));
                 Observed::<N>::new(ensemble.rows.as_ref(), columns, crossings)
             };
             let many = many.observe(observer, Observed::seen);

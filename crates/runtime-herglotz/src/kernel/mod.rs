@@ -77,6 +77,10 @@ impl<const N: usize> Sized<N> {
         let q = self.vector("q", &start.q)?;
         Ok(match &start.rate {
             Rate::Velocity(v) => VelocityPoint { q, v: self.vector("v", v)?, z: start.z }.into(),
+            Rate::MomentumNear { p, v } => discrete_herglotz::Start::Momentum(
+                PhasePoint { q, p: self.vector("p", p)?, z: start.z },
+                self.vector("v", v)?,
+            ),
             Rate::Momentum(p) => PhasePoint { q, p: self.vector("p", p)?, z: start.z }.into(),
         })
     }

@@ -1,7 +1,7 @@
 //! The one observer of a motion: rows, events, nodes, and whether it is to go on.
 
 use super::coordinates;
-use crate::{Column, Crossing, Direction, Motion, RuntimeError, Watch, When};
+use crate::{Column, Crossing, Direction, Motion, Rate, RuntimeError, Start, Watch, When};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{
@@ -38,7 +38,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
         let columns = motion.columns.as_slice();
         let rows = motion.rows.as_ref().map(|when| rows(when, columns)).transpose()?;
         check_events(lagrangian, &motion.events)?;
-        let crossings = Crossings::of(lagrangian, &motion.events);
+        let crossings = Crossings::of(lagrangian, &motion.events, Some(&motion.start));
         let needs = |of: Option<Needs>| of.unwrap_or_default();
         let of_rows = needs(rows.as_ref().map(Observer::needs)).and(needs(crossings.as_ref().map(Crossings::needs)));
         let of_all = Needs { action: motion.nodes, conformal_factor: false, saved: motion.resumable };
@@ -73,11 +73,13 @@ impl<'r, const N: usize> Recorder<'r, N> {
     fn see(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
         if self.nodes {
             let PhasePoint { q, p, z } = &at.state;
-            self.watch.node(at.t, coordinates(q, self.dimension), coordinates(p, self.dimension), *z);
+            // Where it is not found the momentum alone goes on.
+            let v = at.velocity().unwrap_or_else(|_| SVector::zeros());
+            self.watch.node(at.t, [q, &v, p].map(|x| coordinates(x, self.dimension)), *z);
         }
         if at.k.is_multiple_of(POLL)
             && let Some(Course { t0, t_end, .. }) = self.course
-            && self.watch.poll((at.t - t0) / (t_end - t0)).is_break()
+            && self.watch.poll(if t_end == t0 { 1.0 } else { (at.t - t0) / (t_end - t0) }).is_break()
         {
             if let Some(interrupted) = at.interrupted() {
                 self.watch.interrupted(interrupted);
@@ -147,25 +149,31 @@ pub(super) fn check_events<const N: usize>(
     if has_factor && lagrangian.constant_rate().is_none() { Err(RuntimeError::FactorInEvent) } else { Ok(()) }
 }
 
-/// The value of an expression at states `(q, p, z)` of a motion that begins at a time.
+/// What functions of states `(q, p, z)` need of the motion beside them.
+struct Beside<const N: usize> {
+    /// The time at which it begins.
+    began: Cell<f64>,
+    /// The last velocity that was found, which is near the next.
+    velocity: Cell<SVector<f64, N>>,
+}
+
+/// The value of an expression at states `(q, p, z)` of a motion.
 fn at_states<'r, const N: usize>(
     lagrangian: &'r FormulaLagrangian<N>,
     function: &'r Expression,
-    began: Rc<Cell<f64>>,
+    beside: Rc<Beside<N>>,
 ) -> impl FnMut(f64, &PhasePoint<N>) -> f64 + 'r {
-    // The last velocity is near the next.
-    let last = Cell::new(SVector::<f64, N>::zeros());
     // Known where it is needed: see `check_events`.
     let rate = lagrangian.constant_rate().unwrap_or(f64::NAN);
     move |t, state| {
         if function.has_velocity() {
-            match legendre_inverse(lagrangian, t, state, &last.get()) {
-                Ok(x) => last.set(x.v),
+            match legendre_inverse(lagrangian, t, state, &beside.velocity.get()) {
+                Ok(x) => beside.velocity.set(x.v),
                 Err(_) => return f64::NAN,
             }
         }
-        let v = last.get();
-        function.at_factor(t, (state.q.as_slice(), v.as_slice(), state.z), rate * (t - began.get()))
+        let v = beside.velocity.get();
+        function.at_factor(t, (state.q.as_slice(), v.as_slice(), state.z), rate * (t - beside.began.get()))
     }
 }
 
@@ -174,19 +182,26 @@ pub(super) struct Crossings<'r, const N: usize> {
     events: Events<'r, N>,
     /// Whether one of them has the action in it.
     action: bool,
-    /// The time at which the motion begins.
-    began: Rc<Cell<f64>>,
+    /// Whether one of them has the velocity in it.
+    velocity: bool,
+    beside: Rc<Beside<N>>,
     dimension: usize,
 }
 
 impl<'r, const N: usize> Crossings<'r, N> {
     /// `None` where there are no events.
-    pub fn of(lagrangian: &'r FormulaLagrangian<N>, events: &'r [crate::Event]) -> Option<Self> {
+    pub fn of(lagrangian: &'r FormulaLagrangian<N>, events: &'r [crate::Event], start: Option<&Start>) -> Option<Self> {
+        let numbers = match start.map(|start| &start.rate) {
+            Some(Rate::Velocity(v) | Rate::MomentumNear { v, .. }) => v.as_slice(),
+            _ => &[],
+        };
+        let v = SVector::from_fn(|i, _| numbers.get(i).copied().unwrap_or(0.0));
+        let beside = Rc::new(Beside { began: Cell::new(0.0), velocity: Cell::new(v) });
+        let velocity = events.iter().any(|event| event.function.has_velocity());
         let action = events.iter().any(|event| event.function.has_action());
-        let began = Rc::new(Cell::new(0.0));
-        let all = || Events::new(events.iter().map(|event| of(lagrangian, event, began.clone())));
+        let all = || Events::new(events.iter().map(|event| of(lagrangian, event, beside.clone())));
         let dimension = lagrangian.formula().dimension();
-        (!events.is_empty()).then(|| Crossings { events: all(), action, began: began.clone(), dimension })
+        (!events.is_empty()).then(|| Crossings { events: all(), action, velocity, beside: beside.clone(), dimension })
     }
 
     pub fn needs(&self) -> Needs {
@@ -194,11 +209,16 @@ impl<'r, const N: usize> Crossings<'r, N> {
     }
 
     pub fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
-        self.began.set(course.t0);
+        self.beside.began.set(course.t0);
         self.events.prepare(course)
     }
 
     pub fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+        if self.velocity
+            && let Ok(v) = at.velocity()
+        {
+            self.beside.velocity.set(v);
+        }
         self.events.start(at)
     }
 
@@ -230,9 +250,9 @@ impl<'r, const N: usize> Crossings<'r, N> {
 fn of<'r, const N: usize>(
     lagrangian: &'r FormulaLagrangian<N>,
     event: &'r crate::Event,
-    began: Rc<Cell<f64>>,
+    beside: Rc<Beside<N>>,
 ) -> Event<'r, N> {
-    let found = Event::new(at_states(lagrangian, &event.function, began));
+    let found = Event::new(at_states(lagrangian, &event.function, beside));
     let found = match event.direction {
         Direction::Rising => found.rising(),
         Direction::Falling => found.falling(),

@@ -118,7 +118,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     #[inline(never)]
     fn rounding(&self) -> [f64; 2] {
         let (t, state) = (self.time(), self.state());
-        let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return [0.0; 2] };
+        let near = self.last_velocity().unwrap_or_else(SVector::zeros);
+        let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &near) else { return [0.0; 2] };
         let (l, g) = gradient_rounding(self.lagrangian, t, &x);
         let (of, h) = (|part: &SVector<f64, N>| largest(part.iter().copied()), self.products.h.abs());
         // No bound where the derivatives have none. What is below the normal numbers has lost its digits.
