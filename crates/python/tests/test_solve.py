@@ -89,6 +89,23 @@ def test_columns_are_expressions_and_functions():
         sol["y"]
 
 
+def test_the_momenta_of_bodies_in_a_formula():
+    two = "(2*(a'^2 + b'^2) + 3*(c'^2 + d'^2))/2 + 6/hypot(a - c, b - d) - 0.05*z"
+    sol = hz.solve(
+        two,
+        [1.0, 0.2, -1.0, 0.1],
+        [0.1, 0.5, 0.2, -0.5],
+        [0.0, 1.0, 2.0],
+        coordinates=["a", "b", "c", "d"],
+        accuracy=1e-11,
+    )
+    assert list(sol.momenta) == ["translation of a, c", "translation of b, d", "rotation of (a, b), (c, d)"]
+    for name, momentum in sol.momenta.items():
+        # To the accuracy, in units of a momentum of the two.
+        assert np.allclose(momentum, momentum[0] * np.exp(-0.05 * sol.t), rtol=0, atol=1e-9), name
+    assert np.array_equal(sol.momenta["translation of a, c"], sol.p[:, 0] + sol.p[:, 2])
+
+
 def test_the_conformal_factor_and_the_momenta():
     sol = hz.solve("kepler", t=np.linspace(0, 10, 5), conformal_factor=True, accuracy=1e-11)
     assert np.allclose(sol.log_factor, -0.01 * sol.t, atol=1e-13)
