@@ -404,7 +404,7 @@ fn step_errors() {
             let pendulum = Pendulum { gamma: -0.1 };
             let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.5], 0.0)).unwrap();
             match problem.by(divided).steps(Steps::Count(1)).run(Until::Time(1.0)).unwrap().status {
-                Status::Halted { cause, .. } => cause,
+                Status::Failed { cause, .. } => cause,
                 other => panic!("{other:?}"),
             }
         }, ["cannot be divided into parts", "near t = ", "allow a larger misfit"];
