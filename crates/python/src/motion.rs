@@ -17,6 +17,9 @@ pub struct Motion {
     pub signals: Signals,
 }
 
+/// The position, the velocity or the momentum, whether it is the latter, the action, and for a momentum a velocity near its own.
+type GivenStart<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, bool, Bound<'py, PyAny>, Option<Vec<f64>>);
+
 /// The arguments accuracy, integrator, step and steps.
 pub type GivenWay<'py> = [Option<Bound<'py, PyAny>>; 4];
 
@@ -115,7 +118,7 @@ impl Motion {
     #[expect(clippy::too_many_arguments, reason = "they are those of `solve`, which names them")]
     fn new(
         system: &System,
-        start: (Bound<'_, PyAny>, Bound<'_, PyAny>, bool, Bound<'_, PyAny>, Option<Vec<f64>>),
+        start: GivenStart<'_>,
         t: Bound<'_, PyAny>,
         every: Option<Bound<'_, PyAny>>,
         way: GivenWay<'_>,

@@ -68,6 +68,9 @@ impl Watch for Kept {
     }
 }
 
+/// The end of a motion: t, q, p, z, and v where it is known.
+type End = (f64, Vec<f64>, Vec<f64>, Option<f64>, Option<Vec<f64>>);
+
 /// A crossing: the index of the event, t, q, v, p and z.
 type Crossed = (usize, f64, Vec<f64>, Vec<f64>, Vec<f64>, f64);
 
@@ -84,8 +87,8 @@ pub struct Record {
     /// A column for each that was asked for.
     columns: Option<Py<PyArray2<f64>>>,
     crossings: Vec<Crossed>,
-    /// The end, whether it is a row or not: t, q, p, z, and v where it is known.
-    end: (f64, Vec<f64>, Vec<f64>, Option<f64>, Option<Vec<f64>>),
+    /// The end, whether it is a row or not.
+    end: End,
     status: String,
     success: bool,
     suspicion: Option<String>,
@@ -130,7 +133,7 @@ fn whole(motion: &Motion, outcome: Result<Outcome, RuntimeError>) -> PyResult<Ou
 fn nothing_yet(motion: &Motion) -> Outcome {
     let start = &motion.motion.start;
     let p = match &start.rate {
-        Rate::Momentum(p) => Some(p.clone()),
+        Rate::Momentum(p) | Rate::MomentumNear { p, .. } => Some(p.clone()),
         Rate::Velocity(_) => motion.system.geometry(start).ok().map(|geometry| geometry.momentum),
     };
     Outcome {
@@ -140,7 +143,11 @@ fn nothing_yet(motion: &Motion) -> Outcome {
         t: start.t,
         q: start.q.clone(),
         p: p.unwrap_or_else(|| vec![f64::NAN; start.q.len()]),
-        v: None,
+        // Where the momentum has several velocities, the one that the motion begins with.
+        v: match &start.rate {
+            Rate::Velocity(v) | Rate::MomentumNear { v, .. } => Some(v.clone()),
+            Rate::Momentum(_) => None,
+        },
         z: Some(start.z),
         log_factor: None,
         error_estimate: None,
