@@ -1,7 +1,7 @@
 //! Figures of rows: columns against time, and phase portraits.
 
 use contact_figure::{Axis, Curve, Line, Panel, draw, draw_grid, fold, folded};
-use herglotz::{LatticeScene, Scene};
+use herglotz::{EndsScene, LatticeScene, Scene};
 use runtime_herglotz::{Column, Comparison, Work, velocity_name};
 use std::collections::BTreeSet;
 
@@ -48,30 +48,38 @@ impl<'q> Quantity<'q> {
 
 /// The figures of rows with their names: each column against time, and each velocity against its coordinate.
 pub(crate) fn of_rows(scene: &Scene, rows: &[Vec<f64>]) -> Vec<(String, String)> {
+    let columns = scene.columns.iter().map(|(name, column)| (Quantity::of(scene, name), column)).collect();
+    of_columns(columns, scene.system.dimension(), rows)
+}
+
+/// The same of the points of a path between ends.
+pub(crate) fn of_path(scene: &EndsScene, rows: &[Vec<f64>]) -> Vec<(String, String)> {
+    let columns = scene.columns.iter().map(|(name, column)| (Quantity::plain(name), column)).collect();
+    of_columns(columns, scene.system.dimension(), rows)
+}
+
+fn of_columns(columns: Vec<(Quantity<'_>, &Column)>, dimension: usize, rows: &[Vec<f64>]) -> Vec<(String, String)> {
     let stride = rows.len().div_ceil(POINTS).max(1);
     let of = |i: usize, j: usize| -> Vec<(f64, f64)> {
         let points = rows.iter().step_by(stride).chain(rows.last());
         points.filter_map(|row| Some((*row.get(i)?, *row.get(j)?))).filter(|(x, y)| (x + y).is_finite()).collect()
     };
-    let place = |wanted: &dyn Fn(&Column) -> bool| scene.columns.iter().position(|(_, column)| wanted(column));
-    let quantity =
-        |i: usize| Quantity::of(scene, scene.columns.get(i).map(|(name, _)| name.as_str()).unwrap_or_default());
-    let of_pair = |i: usize, j: usize| panel([quantity(i), quantity(j)], Line::Solid, of(i, j));
+    let place = |wanted: &dyn Fn(&Column) -> bool| columns.iter().position(|(_, column)| wanted(column));
+    let of_pair = |i: usize, j: usize| panel([columns.get(i)?.0, columns.get(j)?.0], Line::Solid, of(i, j));
     let mut figures = Vec::new();
     if let Some(t) = place(&|column| matches!(column, Column::Time)) {
-        let panels: Vec<Panel> = (0..scene.columns.len()).filter(|i| *i != t).filter_map(|i| of_pair(t, i)).collect();
+        let panels: Vec<Panel> = (0..columns.len()).filter(|i| *i != t).filter_map(|i| of_pair(t, i)).collect();
         figures.extend((!panels.is_empty()).then(|| ("columns.svg".to_owned(), grid(&panels))));
     }
-    let portraits = (0..scene.system.dimension()).filter_map(|k| {
+    let portraits = (0..dimension).filter_map(|k| {
         let q = place(&|column| matches!(column, Column::Position(i) if *i == k))?;
         let v = place(&|column| matches!(column, Column::Velocity(i) if *i == k))?;
         of_pair(q, v)
     });
     let panels: Vec<Panel> = portraits.collect();
     figures.extend((!panels.is_empty()).then(|| ("phase.svg".to_owned(), grid(&panels))));
-    let positions: Vec<usize> = (0..scene.system.dimension())
-        .filter_map(|k| place(&|column| matches!(column, Column::Position(i) if *i == k)))
-        .collect();
+    let positions: Vec<usize> =
+        (0..dimension).filter_map(|k| place(&|column| matches!(column, Column::Position(i) if *i == k))).collect();
     if let [x, y, ..] = positions.as_slice() {
         figures.extend(of_pair(*x, *y).map(|panel| ("path.svg".to_owned(), draw(&panel))));
     }
@@ -194,7 +202,7 @@ fn best_of_families(rows: &[&Work]) -> Vec<String> {
 /// The runs that can be drawn, without those that were held up: they say nothing of their integrator, and would set the axis.
 fn to_draw(comparison: &Comparison) -> Vec<&Work> {
     let shown = |row: &&Work| row.error > 0.0 && row.error.is_finite() && row.seconds > 0.0;
-    let rows: Vec<&Work> = comparison.rows.iter().filter(shown).collect();
+    let rows: Vec<&Work> = comparison.rows.iter().chain(&comparison.peers).filter(shown).collect();
     let held_up = |row: &Work| {
         rows.iter().filter(|other| other.integrator == row.integrator).any(|other| {
             other.steps > row.steps && row.seconds > HELD_UP.0 * other.seconds
@@ -204,10 +212,18 @@ fn to_draw(comparison: &Comparison) -> Vec<&Work> {
     rows.iter().copied().filter(|row| !held_up(row)).collect()
 }
 
-/// Run time against error, both in powers of ten, of the best integrators of each family.
+/// Run time against error, both in powers of ten, of the best integrators of each family and of the peers.
 pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
     let rows = to_draw(comparison);
-    let names = best_of_families(&rows);
+    let is_peer = |name: &str| comparison.peers.iter().any(|row| row.integrator == name);
+    let (peers, own): (Vec<&Work>, Vec<&Work>) = rows.iter().copied().partition(|row| is_peer(&row.integrator));
+    let mut names = best_of_families(&own);
+    let own_names = names.len();
+    for peer in peers {
+        if !names.contains(&peer.integrator) {
+            names.push(peer.integrator.clone());
+        }
+    }
     let shown = || rows.iter().copied().filter(|row| names.contains(&row.integrator));
     let range = |of: &dyn Fn(&Work) -> f64| {
         let powers = shown().map(of).map(f64::log10);
@@ -218,7 +234,8 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
     let (best, worst) = range(&|row| row.error)?;
     let curve = |(number, name): (usize, &String)| {
         let points = shown().filter(|row| row.integrator == *name).map(|row| (row.seconds, row.error));
-        Curve::new(name, Line::Coloured(number), points)
+        let line = number.checked_sub(own_names).map_or(Line::Coloured(number), Line::Grey);
+        Curve::new(name, line, points)
     };
     Some(draw(&Panel {
         x_label: "run time (s)".into(),
@@ -320,15 +337,19 @@ mod tests {
         rows.push(work("midpoint_by_yoshida_4", 16, 1e-3, 1e-2));
         rows.push(work("strang", 256, 1e-5, 40.0));
         let left_out = Vec::new();
-        let comparison = Comparison { rows, reference: String::new(), reference_error: 1e-15, left_out, ended: false };
+        // A peer is drawn after all others, whatever its name.
+        let peers = (1..=3).map(|k| work("dop853", 8 << k, f64::powi(0.01, k), 1e-4 * f64::from(k))).collect();
+        let comparison =
+            Comparison { rows, peers, reference: String::new(), reference_error: 1e-15, left_out, ended: false };
         let rows = to_draw(&comparison);
-        assert_eq!(rows.len() + 1, comparison.rows.len());
+        assert_eq!(rows.len() + 1, comparison.rows.len() + 3);
         assert!(rows.iter().all(|row| row.seconds < 1.0));
-        let names = best_of_families(&rows);
+        let mut names = best_of_families(&rows[..rows.len() - 3]);
         assert_eq!(names.iter().filter(|name| name.starts_with("gauss_")).count(), 3, "{names:?}");
         for name in ["blanes_moan_6", "midpoint", "midpoint_by_yoshida_4"] {
             assert!(names.iter().any(|known| known == name), "{names:?}");
         }
+        names.push("dop853".to_owned());
         let figure = of_comparison(&comparison).unwrap_or_default();
         let places: Vec<Option<usize>> = names.iter().map(|name| figure.find(&format!(">{name}<"))).collect();
         assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{names:?} {places:?}");

@@ -528,7 +528,7 @@ fn a_comparison_ranks_integrators() {
     let system = System::new(&CatalogueEntry::find("quadratic_in_z").unwrap().formula().unwrap()).unwrap();
     let motion = Motion::new(Start::new(0.0, [1.0], [0.0], 1.0), 5.0, accurate(1e-9));
     // What comes first in the table is enough.
-    let comparison = system.compare(&motion, &mut |part| part < 0.2).unwrap();
+    let comparison = system.compare(&motion, &[], &mut |part| part < 0.2).unwrap();
     assert!(comparison.ended && comparison.reference_error < 1e-13, "{comparison:?}");
     for (name, order) in [("midpoint", 2), ("gauss_2", 4), ("gauss_3", 6)] {
         let rows: Vec<_> = comparison.rows.iter().filter(|row| row.integrator == name).collect();

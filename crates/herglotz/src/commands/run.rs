@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, read_rows, short};
 use crate::plot;
 use clap::Args;
-use herglotz::{LatticeScene, Scene};
+use herglotz::{EndsScene, LatticeScene, Scene};
 use indicatif::{ProgressBar, ProgressStyle};
 use runtime_herglotz::{
     AnyIntegrator, Crossing, Interrupted, Outcome, Plan, RuntimeError, Status, Steps, Watch, Way, velocity_name,
@@ -169,6 +169,9 @@ impl Run {
         let text = self.scene.text()?;
         if LatticeScene::is_one(&text) {
             return self.run_lattice(&text);
+        }
+        if EndsScene::is_one(&text) {
+            return self.run_ends(&text);
         }
         let scene = self.scene.read()?;
         let explain = |error: RuntimeError| self.scene.explain(scene.explain(&error));

@@ -2,6 +2,7 @@
 
 mod at;
 mod change;
+mod ends;
 mod error;
 mod file;
 mod lattice;
@@ -10,6 +11,7 @@ mod start;
 mod sweep;
 mod want;
 
+pub use ends::EndsScene;
 pub use error::SceneError;
 pub use lattice::LatticeScene;
 pub use members::Members;
@@ -101,6 +103,10 @@ impl Scene {
             let message = "a lattice is run by `herglotz run`; all else is for systems of up to 16 coordinates";
             return Err(SceneError::at(text, lattice, message));
         }
+        if let Some(ends) = ends::has_ends(text) {
+            let message = "a path between ends is run by `herglotz run`; all else is for motions from a start";
+            return Err(SceneError::at(text, ends, message));
+        }
         let mut file: File = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
         let entry = entry(text, &file.system)?;
         for text_of_change in changes {
@@ -108,7 +114,8 @@ impl Scene {
         }
         let formula = formula(text, &file.system, entry)?;
         let system = &file.system;
-        check_used(text, &formula, &file)?;
+        let texts: Vec<&str> = expressions(&file).map(String::as_str).collect();
+        check_used(text, &formula, system, &texts)?;
         let lagrangian = system.lagrangian.as_ref().map_or(system.span(), At::span);
         let runs = System::new(&formula).map_err(|error| want::of_formula(text, lagrangian, &error))?;
         let run = &file.run;
@@ -351,16 +358,15 @@ fn expressions(file: &File) -> impl Iterator<Item = &String> {
     columns.chain(events).map(|text| &**text)
 }
 
-/// Refuses parameters that are neither in the formula nor in a column or an event.
-fn check_used(text: &str, formula: &Formula, file: &File) -> Result<(), SceneError> {
-    let texts: Vec<&str> = expressions(file).map(String::as_str).collect();
-    check_parameters(formula, &texts).map_err(|error| {
-        let named = |name: &str| file.system.parameters.0.iter().find(|(known, _)| **known == *name);
+/// Refuses parameters that are neither in the formula nor in the texts of columns and events.
+fn check_used(text: &str, formula: &Formula, system: &At<SystemTable>, texts: &[&str]) -> Result<(), SceneError> {
+    check_parameters(formula, texts).map_err(|error| {
+        let named = |name: &str| system.parameters.0.iter().find(|(known, _)| **known == *name);
         let span = match &error {
             RuntimeError::UnusedParameter { name, .. } => named(name).map(|(name, _)| name.span()),
             _ => None,
         };
-        SceneError::at(text, span.unwrap_or(file.system.span()), error.to_string())
+        SceneError::at(text, span.unwrap_or(system.span()), error.to_string())
     })
 }
 
@@ -427,13 +433,14 @@ fn positive(text: &str, x: &At<f64>, name: &str) -> Result<f64, SceneError> {
 
 /// The JSON schema of scene files.
 pub fn schema() -> serde_json::Value {
-    /// A motion of a Lagrangian, or of a lattice, and what is to be recorded of it.
+    /// A motion of a Lagrangian, or of a lattice, and what is to be recorded of it; or a path between two ends.
     #[derive(schemars::JsonSchema)]
     #[schemars(title = "Scene", untagged)]
     #[expect(dead_code, reason = "it stands for its variants, which are read one by one")]
     enum AnyFile {
         System(File),
         Lattice(lattice::LatticeFile),
+        Ends(ends::EndsFile),
     }
     schemars::schema_for!(AnyFile).to_value()
 }
