@@ -131,7 +131,7 @@ mod tests {
             assert!((1.7 * (w[1].0 - w[0].0) + 3.0 * (w[1].1 - w[0].1)).abs() < 1e-12, "{w:?}");
         }
         // Nothing is cut, or drawn, where nothing is an angle; what its points do not resolve is not joined.
-        assert_eq!(folded(&torus, (false, false)), [torus.clone()]);
+        assert_eq!(folded(&torus, (false, false)), std::slice::from_ref(&torus));
         assert_eq!(folded(&[(0.0, 0.0), (1.0, 1e300)], (false, true)).len(), 2);
         assert!(folded(&[], (true, true)).is_empty());
     }
