@@ -1,11 +1,16 @@
 //! One look for all figures: framed axes, ticks inside, few colours, lines that differ in pattern as well as in colour.
 
+mod fold;
+
+pub use fold::{fold, folded};
+
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::legend::LegendPosition;
 use kuva::plot::{LinePlot, LineStyle, MarkerShape, ScatterPlot};
 use kuva::render::figure::{Figure, LabelConfig};
 use kuva::render::layout::{Layout, TickAlign, TickFormat, TickPos};
 use kuva::render::plots::Plot;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
 /// How a curve is drawn. The four patterns can be told apart in black and white, and so can the three markers.
@@ -116,6 +121,8 @@ pub enum Axis {
     Linear(f64, f64, f64),
     /// A logarithmic axis: the powers of ten between which it extends, and the number of them between ticks.
     Logarithmic(i32, i32, u32),
+    /// A linear axis of one turn, from -pi to pi.
+    Angle,
 }
 
 impl Axis {
@@ -123,7 +130,7 @@ impl Axis {
     /// logarithmic axis ends at 1e-10.
     fn place(self, value: f64) -> Option<f64> {
         let coordinate = match self {
-            Axis::Linear(..) => value,
+            Axis::Linear(..) | Axis::Angle => value,
             Axis::Logarithmic(..) => value.log10(),
         };
         Some(coordinate).filter(|c| c.is_finite())
@@ -134,6 +141,7 @@ impl Axis {
         match self {
             Axis::Linear(from, to, step) => (from, to, step),
             Axis::Logarithmic(from, to, step) => (f64::from(from), f64::from(to), f64::from(step)),
+            Axis::Angle => (-PI, PI, FRAC_PI_2),
         }
     }
 
@@ -141,6 +149,7 @@ impl Axis {
         match self {
             Axis::Linear(..) => TickFormat::Auto,
             Axis::Logarithmic(..) => TickFormat::Custom(Arc::new(power_of_ten)),
+            Axis::Angle => TickFormat::Custom(Arc::new(part_of_a_turn)),
         }
     }
 }
@@ -258,6 +267,16 @@ fn power_of_ten(exponent: f64) -> String {
     } else {
         format!("10{}", format!("{exponent:.0}").chars().map(raised).collect::<String>())
     }
+}
+
+/// The label of a tick at a multiple of a right angle.
+fn part_of_a_turn(angle: f64) -> String {
+    let label = match (2.0 * angle.abs() / PI).round() as u32 {
+        0 => return "0".into(),
+        1 => "\u{3c0}/2",
+        _ => "\u{3c0}",
+    };
+    if angle < 0.0 { format!("\u{2212}{label}") } else { label.into() }
 }
 
 /// A figure of one panel, as SVG.

@@ -4,4 +4,4 @@
 
 mod scene;
 
-pub use scene::{Knob, LatticeScene, Members, Scene, SceneError, schema};
+pub use scene::{EndsScene, Knob, LatticeScene, Members, Scene, SceneError, schema};

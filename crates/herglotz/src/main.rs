@@ -3,6 +3,7 @@
 mod commands;
 mod failure;
 mod output;
+mod peer;
 mod plot;
 
 use clap::Parser;

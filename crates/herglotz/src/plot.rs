@@ -1,7 +1,7 @@
 //! Figures of rows: columns against time, and phase portraits.
 
-use contact_figure::{Axis, Curve, Line, Panel, draw, draw_grid};
-use herglotz::{LatticeScene, Scene};
+use contact_figure::{Axis, Curve, Line, Panel, draw, draw_grid, fold, folded};
+use herglotz::{EndsScene, LatticeScene, Scene};
 use runtime_herglotz::{Column, Comparison, Work, velocity_name};
 use std::collections::BTreeSet;
 
@@ -27,34 +27,61 @@ const HELD_UP: (f64, f64) = (2.0, 8.0);
 /// The longest label of an axis, in characters.
 const LABEL: usize = 30;
 
+/// A quantity on an axis: its name, and whether it is an angle.
+#[derive(Clone, Copy)]
+struct Quantity<'q> {
+    name: &'q str,
+    is_angle: bool,
+}
+
+impl<'q> Quantity<'q> {
+    /// A column of a scene.
+    fn of(scene: &Scene, name: &'q str) -> Self {
+        Quantity { name, is_angle: scene.is_angle(name) }
+    }
+
+    /// One that is no angle.
+    fn plain(name: &'q str) -> Self {
+        Quantity { name, is_angle: false }
+    }
+}
+
 /// The figures of rows with their names: each column against time, and each velocity against its coordinate.
 pub(crate) fn of_rows(scene: &Scene, rows: &[Vec<f64>]) -> Vec<(String, String)> {
+    let columns = scene.columns.iter().map(|(name, column)| (Quantity::of(scene, name), column)).collect();
+    of_columns(columns, scene.system.dimension(), rows)
+}
+
+/// The same of the points of a path between ends.
+pub(crate) fn of_path(scene: &EndsScene, rows: &[Vec<f64>]) -> Vec<(String, String)> {
+    let columns = scene.columns.iter().map(|(name, column)| (Quantity::plain(name), column)).collect();
+    of_columns(columns, scene.system.dimension(), rows)
+}
+
+fn of_columns(columns: Vec<(Quantity<'_>, &Column)>, dimension: usize, rows: &[Vec<f64>]) -> Vec<(String, String)> {
     let stride = rows.len().div_ceil(POINTS).max(1);
     let of = |i: usize, j: usize| -> Vec<(f64, f64)> {
         let points = rows.iter().step_by(stride).chain(rows.last());
         points.filter_map(|row| Some((*row.get(i)?, *row.get(j)?))).filter(|(x, y)| (x + y).is_finite()).collect()
     };
-    let place = |wanted: &dyn Fn(&Column) -> bool| scene.columns.iter().position(|(_, column)| wanted(column));
-    let name = |i: usize| scene.columns.get(i).map(|(name, _)| name.as_str()).unwrap_or_default();
+    let place = |wanted: &dyn Fn(&Column) -> bool| columns.iter().position(|(_, column)| wanted(column));
+    let of_pair = |i: usize, j: usize| panel([columns.get(i)?.0, columns.get(j)?.0], Line::Solid, of(i, j));
     let mut figures = Vec::new();
     if let Some(t) = place(&|column| matches!(column, Column::Time)) {
-        let against = (0..scene.columns.len()).filter(|i| *i != t).map(|i| (i, of(t, i)));
-        let panels: Vec<Panel> = against.filter_map(|(i, points)| panel(("t", name(i)), Line::Solid, points)).collect();
+        let panels: Vec<Panel> = (0..columns.len()).filter(|i| *i != t).filter_map(|i| of_pair(t, i)).collect();
         figures.extend((!panels.is_empty()).then(|| ("columns.svg".to_owned(), grid(&panels))));
     }
-    let portraits = (0..scene.system.dimension()).filter_map(|k| {
+    let portraits = (0..dimension).filter_map(|k| {
         let q = place(&|column| matches!(column, Column::Position(i) if *i == k))?;
         let v = place(&|column| matches!(column, Column::Velocity(i) if *i == k))?;
-        panel((name(q), name(v)), Line::Solid, of(q, v))
+        of_pair(q, v)
     });
     let panels: Vec<Panel> = portraits.collect();
     figures.extend((!panels.is_empty()).then(|| ("phase.svg".to_owned(), grid(&panels))));
-    let positions: Vec<usize> = (0..scene.system.dimension())
-        .filter_map(|k| place(&|column| matches!(column, Column::Position(i) if *i == k)))
-        .collect();
+    let positions: Vec<usize> =
+        (0..dimension).filter_map(|k| place(&|column| matches!(column, Column::Position(i) if *i == k))).collect();
     if let [x, y, ..] = positions.as_slice() {
-        let path = panel((name(*x), name(*y)), Line::Solid, of(*x, *y));
-        figures.extend(path.map(|panel| ("path.svg".to_owned(), draw(&panel))));
+        figures.extend(of_pair(*x, *y).map(|panel| ("path.svg".to_owned(), draw(&panel))));
     }
     figures
 }
@@ -63,21 +90,25 @@ pub(crate) fn of_rows(scene: &Scene, rows: &[Vec<f64>]) -> Vec<(String, String)>
 pub(crate) fn of_section(scene: &Scene, crossings: &[(usize, Vec<f64>)]) -> Option<String> {
     let names = scene.system.formula().coordinates();
     let panels = names.iter().enumerate().filter_map(|(i, name)| {
+        let velocity = velocity_name(name);
+        let quantities = [Quantity::of(scene, name), Quantity::of(scene, &velocity)];
         // A row has the time, the coordinates, and their velocities.
         let of = |(_, row): &(usize, Vec<f64>)| Some((*row.get(1 + i)?, *row.get(1 + names.len() + i)?));
         let points: Vec<_> = crossings.iter().filter(|(event, _)| *event == 0).filter_map(of).collect();
-        let size = |of: fn(&(f64, f64)) -> f64| points.iter().map(|p| of(p).abs()).fold(0.0, f64::max);
+        let panel = panel(quantities, single(points.len()), points)?;
+        let all = || panel.curves.iter().flat_map(|curve| &curve.points);
+        let size = |of: fn(&(f64, f64)) -> f64| all().map(|p| of(p).abs()).fold(0.0, f64::max);
         // That the section is at one place needs no figure.
-        let shown = size(|p| p.0) > 1e-9 && size(|p| p.1) > 1e-9;
-        panel((name, &velocity_name(name)), single(points.len()), points).filter(|_| shown)
+        (size(|p| p.0) > 1e-9 && size(|p| p.1) > 1e-9).then_some(panel)
     });
     let panels: Vec<Panel> = panels.collect();
     (!panels.is_empty()).then(|| grid(&panels))
 }
 
 /// The figure of one column of the members of a sweep against the swept value.
-pub(crate) fn of_sweep(knob: &str, column: &str, points: Vec<(f64, f64)>) -> Option<String> {
-    panel((knob, column), single(points.len()), points).map(|panel| draw(&panel))
+pub(crate) fn of_sweep(scene: &Scene, knob: &str, column: &str, points: Vec<(f64, f64)>) -> Option<String> {
+    let quantities = [Quantity::plain(knob), Quantity::of(scene, column)];
+    panel(quantities, single(points.len()), points).map(|panel| draw(&panel))
 }
 
 /// How so many single points are drawn.
@@ -93,15 +124,27 @@ fn grid(panels: &[Panel]) -> String {
     }
 }
 
-/// One curve in axes that fit it.
-fn panel((x_label, y_label): (&str, &str), line: Line, points: Vec<(f64, f64)>) -> Option<Panel> {
+/// One curve in axes that fit it; angles are folded.
+fn panel([x, y]: [Quantity<'_>; 2], line: Line, points: Vec<(f64, f64)>) -> Option<Panel> {
     let label = |name: &str| match name.char_indices().nth(LABEL) {
         Some((end, _)) => format!("{}...", &name[..end]),
         None => name.to_owned(),
     };
-    let (x_label, y_label) = (label(x_label), label(y_label));
-    let (x, y) = (axis(points.iter().map(|p| p.0))?, axis(points.iter().map(|p| p.1))?);
-    let curves = vec![Curve::unnamed(line, points)];
+    let (x_label, y_label, angles) = (label(x.name), label(y.name), (x.is_angle, y.is_angle));
+    let axis_of = |is_angle: bool, of: fn(&(f64, f64)) -> f64| {
+        let fitted = axis(points.iter().map(of))?;
+        Some(if is_angle { Axis::Angle } else { fitted })
+    };
+    let (x, y) = (axis_of(angles.0, |p| p.0)?, axis_of(angles.1, |p| p.1)?);
+    let curves = match line {
+        _ if angles == (false, false) => vec![Curve::unnamed(line, points)],
+        // Single points have no line between them.
+        Line::Discs | Line::Dots => {
+            let fold_if = |is_angle: bool, x: f64| if is_angle { fold(x) } else { x };
+            vec![Curve::unnamed(line, points.iter().map(|p| (fold_if(angles.0, p.0), fold_if(angles.1, p.1))))]
+        }
+        _ => folded(&points, angles).into_iter().map(|piece| Curve::unnamed(line, piece)).collect(),
+    };
     Some(Panel { x_label, y_label, x, y, legend: (0.0, 1.0), curves, marks: Vec::new() })
 }
 
@@ -159,7 +202,7 @@ fn best_of_families(rows: &[&Work]) -> Vec<String> {
 /// The runs that can be drawn, without those that were held up: they say nothing of their integrator, and would set the axis.
 fn to_draw(comparison: &Comparison) -> Vec<&Work> {
     let shown = |row: &&Work| row.error > 0.0 && row.error.is_finite() && row.seconds > 0.0;
-    let rows: Vec<&Work> = comparison.rows.iter().filter(shown).collect();
+    let rows: Vec<&Work> = comparison.rows.iter().chain(&comparison.peers).filter(shown).collect();
     let held_up = |row: &Work| {
         rows.iter().filter(|other| other.integrator == row.integrator).any(|other| {
             other.steps > row.steps && row.seconds > HELD_UP.0 * other.seconds
@@ -169,10 +212,18 @@ fn to_draw(comparison: &Comparison) -> Vec<&Work> {
     rows.iter().copied().filter(|row| !held_up(row)).collect()
 }
 
-/// Run time against error, both in powers of ten, of the best integrators of each family.
+/// Run time against error, both in powers of ten, of the best integrators of each family and of the peers.
 pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
     let rows = to_draw(comparison);
-    let names = best_of_families(&rows);
+    let is_peer = |name: &str| comparison.peers.iter().any(|row| row.integrator == name);
+    let (peers, own): (Vec<&Work>, Vec<&Work>) = rows.iter().copied().partition(|row| is_peer(&row.integrator));
+    let mut names = best_of_families(&own);
+    let own_names = names.len();
+    for peer in peers {
+        if !names.contains(&peer.integrator) {
+            names.push(peer.integrator.clone());
+        }
+    }
     let shown = || rows.iter().copied().filter(|row| names.contains(&row.integrator));
     let range = |of: &dyn Fn(&Work) -> f64| {
         let powers = shown().map(of).map(f64::log10);
@@ -183,7 +234,8 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
     let (best, worst) = range(&|row| row.error)?;
     let curve = |(number, name): (usize, &String)| {
         let points = shown().filter(|row| row.integrator == *name).map(|row| (row.seconds, row.error));
-        Curve::new(name, Line::Coloured(number), points)
+        let line = number.checked_sub(own_names).map_or(Line::Coloured(number), Line::Grey);
+        Curve::new(name, line, points)
     };
     Some(draw(&Panel {
         x_label: "run time (s)".into(),
@@ -254,7 +306,7 @@ pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String
         .into_iter()
         .filter_map(|i| {
             let points = rows.iter().step_by(stride).chain(rows.last()).filter_map(|row| value(row, i)).collect();
-            panel(("t", &format!("{name}[{i}]")), Line::Solid, points)
+            panel([Quantity::plain("t"), Quantity::plain(&format!("{name}[{i}]"))], Line::Solid, points)
         })
         .collect();
     figures.extend((!panels.is_empty()).then(|| ("sites.svg".to_owned(), grid(&panels))));
@@ -285,15 +337,19 @@ mod tests {
         rows.push(work("midpoint_by_yoshida_4", 16, 1e-3, 1e-2));
         rows.push(work("strang", 256, 1e-5, 40.0));
         let left_out = Vec::new();
-        let comparison = Comparison { rows, reference: String::new(), reference_error: 1e-15, left_out, ended: false };
+        // A peer is drawn after all others, whatever its name.
+        let peers = (1..=3).map(|k| work("dop853", 8 << k, f64::powi(0.01, k), 1e-4 * f64::from(k))).collect();
+        let comparison =
+            Comparison { rows, peers, reference: String::new(), reference_error: 1e-15, left_out, ended: false };
         let rows = to_draw(&comparison);
-        assert_eq!(rows.len() + 1, comparison.rows.len());
+        assert_eq!(rows.len() + 1, comparison.rows.len() + 3);
         assert!(rows.iter().all(|row| row.seconds < 1.0));
-        let names = best_of_families(&rows);
+        let mut names = best_of_families(&rows[..rows.len() - 3]);
         assert_eq!(names.iter().filter(|name| name.starts_with("gauss_")).count(), 3, "{names:?}");
         for name in ["blanes_moan_6", "midpoint", "midpoint_by_yoshida_4"] {
             assert!(names.iter().any(|known| known == name), "{names:?}");
         }
+        names.push("dop853".to_owned());
         let figure = of_comparison(&comparison).unwrap_or_default();
         let places: Vec<Option<usize>> = names.iter().map(|name| figure.find(&format!(">{name}<"))).collect();
         assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{names:?} {places:?}");

@@ -2,69 +2,16 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+#[path = "program/ends.rs"]
+mod ends;
+#[path = "program/events.rs"]
+mod events;
+#[path = "program/support.rs"]
+mod support;
 
-const REPOSITORY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
-
-/// A directory of a test, empty at its beginning and removed at its end.
-struct Directory(PathBuf);
-
-impl Directory {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("herglotz_{name}_{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).unwrap();
-        Directory(path)
-    }
-
-    fn write(&self, name: &str, text: &str) -> String {
-        std::fs::write(self.0.join(name), text).unwrap();
-        self.path(name)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().unwrap().to_owned()
-    }
-
-    fn read(&self, name: &str) -> String {
-        std::fs::read_to_string(self.0.join(name)).unwrap()
-    }
-}
-
-impl Drop for Directory {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
-fn herglotz(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_herglotz")).args(arguments).output().unwrap()
-}
-
-/// Runs it, and gives what it has written to the standard output.
-fn succeed(arguments: &[&str]) -> String {
-    let output = herglotz(arguments);
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {told}");
-    String::from_utf8(output.stdout).unwrap()
-}
-
-/// Runs it, and gives how it ends with what it has written to the standard error.
-fn fail(arguments: &[&str]) -> (Option<i32>, String) {
-    let output = herglotz(arguments);
-    (output.status.code(), String::from_utf8(output.stderr).unwrap())
-}
-
-/// The numbers of a column of a table.
-fn column(csv: &str, name: &str) -> Vec<f64> {
-    let i = csv.lines().next().unwrap().split(',').position(|column| column == name).unwrap();
-    csv.lines().skip(1).map(|line| line.split(',').nth(i).unwrap().parse().unwrap()).collect()
-}
-
-fn scene(name: &str) -> String {
-    format!("{REPOSITORY}/scenes/{name}.toml")
-}
+use std::path::Path;
+use std::process::Command;
+use support::{Directory, REPOSITORY, column, fail, scene, succeed};
 
 /// x'' = -x + gamma x' in closed form: what the tables say is checked against it.
 const OSCILLATOR: &str = r#"
@@ -321,14 +268,17 @@ fn scenes_run() {
         }
         let (name, path) = (path.file_stem().unwrap().to_str().unwrap().to_owned(), path.to_str().unwrap());
         let said = succeed(&["run", path, "--out", &at.path(&name)]);
-        assert!(said.starts_with("completed: ") || said.starts_with("stopped by an event"), "{name}: {said}");
+        assert!(
+            ["completed: ", "stopped by an event", "found: "].iter().any(|ending| said.starts_with(ending)),
+            "{name}: {said}"
+        );
         let rows = at.read(&format!("{name}/rows.csv"));
         assert!(rows.lines().count() > 100 && !rows.contains("NaN"), "{name}");
         assert!(page.contains(&format!("(scenes/{name}.svg)")), "{name} is not in docs/scenes.md");
         assert!(Path::new(REPOSITORY).join(format!("docs/scenes/{name}.svg")).exists(), "{name}");
         names.push(name);
     }
-    assert_eq!(names.len(), 11, "{names:?}");
+    assert_eq!(names.len(), 13, "{names:?}");
     // What two of them are about: a momentum that decays as the conformal factor, and a factor in closed form.
     let kept = column(&at.read("kepler/rows.csv"), "exp(-gamma*t)*(x*y' - y*x')");
     assert!(kept.iter().all(|x| (x - 1.1).abs() < 1e-10));
@@ -354,7 +304,19 @@ fn comparisons_name_the_best() {
     let errors = of("midpoint,");
     assert!(errors.len() > 2 && errors[0] > 10.0 * errors[errors.len() - 1], "{errors:?}");
     // The figure has those near the best.
-    assert!(!of("gauss_8,").is_empty() && at.read("out/compare.svg").contains("gauss_"));
+    let picture = at.read("out/compare.svg");
+    assert!(!of("gauss_8,").is_empty() && picture.contains("gauss_"));
+    // A peer is measured in the same way, and is not one of those that a scene can name.
+    let errors = of("dop853,");
+    assert!(
+        picture.contains(">dop853<") && errors.len() > 5 && errors[0] > 1e3 * errors[errors.len() - 1],
+        "{errors:?}"
+    );
+    let beside = said.lines().find(|line| line.starts_with("beside them for 1e-3: dop853 by ")).unwrap();
+    assert!(beside.contains("1e-9: dop853") && !best.contains("dop853"), "{said}");
+    let told = succeed(&["compare", &file, "--out", &at.path("out"), "--json"]);
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(told["best_of_peers"][0]["integrator"], "dop853", "{told}");
 }
 
 const LATTICE: &str = r#"

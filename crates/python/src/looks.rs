@@ -74,7 +74,7 @@ type Compared = (Vec<Work>, String, Vec<(String, String)>);
 #[pyfunction]
 pub fn compare(py: Python<'_>, motion: &Motion) -> PyResult<Compared> {
     let mut go_on = |_: f64| motion.signals.look().is_continue();
-    let found = py.detach(|| motion.system.compare(&motion.motion, &mut go_on));
+    let found = py.detach(|| motion.system.compare(&motion.motion, &[], &mut go_on));
     if let Some(raised) = motion.signals.take() {
         return Err(raised);
     }

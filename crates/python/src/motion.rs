@@ -107,7 +107,7 @@ pub fn events(given: Vec<GivenEvent<'_>>, formula: &Formula) -> PyResult<Vec<Eve
                 )));
             }
         };
-        Ok(Event { function, direction, terminal })
+        Ok(Event { direction, terminal, ..Event::new(function) })
     };
     given.into_iter().map(read).collect()
 }

@@ -56,9 +56,9 @@ pub enum RuntimeError {
         /// The velocities, by name.
         velocities: String,
     },
-    /// An event has the conformal factor of a motion whose rate is not one number.
+    /// An event, or a column of one, has the conformal factor of a motion whose rate is not one number.
     #[error(
-        "an event has `sigma` or `log_factor`, which are known between the ends of steps where L_z is constant alone; take a column, or an event of time and state"
+        "an event or one of its columns has `sigma` or `log_factor`, which are known between the ends of steps where L_z is constant alone; take a column of rows, or an event of time and state"
     )]
     FactorInEvent,
     /// A parameter is in no formula.

@@ -2,7 +2,8 @@
 //!
 //! The libraries below are generic in the number of coordinates and in the Lagrangian; here is one type for all formulas of 1 to 16
 //! coordinates, behind which they are compiled once. [`System`] is a formula with its integrators, [`Motion`] what is asked of a
-//! motion, [`Ensemble`] of many. More coordinates have a [`Lattice`], by the formulas of a site and of a bond, and [`Bodies`].
+//! motion, [`Ensemble`] of many, [`BoundaryProblem`] of a path between two ends. More coordinates have a [`Lattice`], by the formulas
+//! of a site and of a bond, and [`Bodies`].
 //!
 //! ```
 //! use runtime_herglotz::{Column, Motion, Start, System, Way, When};
@@ -30,6 +31,8 @@ mod interrupt;
 mod kernel;
 mod outcome;
 mod parameters;
+mod path;
+mod peer;
 mod request;
 mod system;
 
@@ -44,12 +47,14 @@ pub use geometry::Geometry;
 pub use interrupt::Interrupt;
 pub use outcome::{Crossing, Outcome, Plan, Watch};
 pub use parameters::check_parameters;
+pub use path::{BoundaryProblem, FoundPath};
+pub use peer::{FirstOrder, Peer, PeerEnd};
 pub use request::{Direction, Event, Motion, Rate, Start, Way, When};
 pub use system::{SeenSymmetry, System};
 
 pub use contact_geom::{Statement, Structure};
 pub use discrete_herglotz::{
-    AnyIntegrator, Facts, INTERRUPTION, InputError, Interrupted, Item, Status, Steps, Suspicion, Tally,
+    AnyIntegrator, Facts, INTERRUPTION, InputError, Interrupted, Item, PathStatus, Status, Steps, Suspicion, Tally,
     UnknownIntegrator,
 };
 pub use formula_lagrangian::{Expression, Formula, FormulaError, Graph, ParseError, Symbol, Symbols, nearest_name};

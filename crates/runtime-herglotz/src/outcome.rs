@@ -44,6 +44,8 @@ pub struct Crossing {
     pub p: Vec<f64>,
     /// The action.
     pub z: f64,
+    /// The [columns](crate::Event::columns) of the event; not numbers where they are not defined.
+    pub columns: Vec<f64>,
 }
 
 /// What will be computed, and what is skipped.

@@ -90,6 +90,28 @@ pub struct Event {
     pub direction: Direction,
     /// Whether the first one ends the motion.
     pub terminal: bool,
+    /// The time from which they count, in the sense of the motion, so that transients are left out; from the start where it is `None`, as
+    /// it is of a terminal event.
+    pub from: Option<f64>,
+    /// What is evaluated at each, beside the state there. `sigma` and `log_factor` are known where `L_z` is constant.
+    pub columns: Vec<Expression>,
+}
+
+impl Event {
+    /// All changes of sign of a function, which do not end the motion, with nothing beside the state.
+    pub fn new(function: Expression) -> Self {
+        Event { function, direction: Direction::Both, terminal: false, from: None, columns: Vec::new() }
+    }
+
+    /// The function and the columns.
+    pub(crate) fn expressions(&self) -> impl Iterator<Item = &Expression> {
+        std::iter::once(&self.function).chain(&self.columns)
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn expressions_mut(&mut self) -> impl Iterator<Item = &mut Expression> {
+        std::iter::once(&mut self.function).chain(&mut self.columns)
+    }
 }
 
 /// A motion to be computed, with all that is to be recorded of it.

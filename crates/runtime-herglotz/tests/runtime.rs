@@ -156,11 +156,7 @@ fn what_fills_a_kernel_is_not_seen() {
     let system = System::parse(&whole, &["x[10]"], &[("gamma", -0.2)]).unwrap();
     let (q, v): (Vec<f64>, Vec<f64>) = (0..10).map(|i| (0.1 * f64::from(i) - 0.3, 0.4 - 0.07 * f64::from(i))).unzip();
     let start = Start::new(0.0, q.clone(), v.clone(), 0.0);
-    let event = Event {
-        function: system.formula().expression("x[8] - x'[9]").unwrap(),
-        direction: Direction::Both,
-        terminal: false,
-    };
+    let event = Event::new(system.formula().expression("x[8] - x'[9]").unwrap());
     let motion = Motion {
         nodes: true,
         resumable: true,
@@ -266,11 +262,7 @@ fn a_run_is_that_of_the_typed_formula() {
         columns: ["t", "theta", "theta'", "p_theta", "z", "energy", "exp(-gamma*t)*theta*theta'"]
             .map(|text| Column::parse(text, formula).unwrap())
             .into(),
-        events: vec![Event {
-            function: formula.expression("theta'").unwrap(),
-            direction: Direction::Rising,
-            terminal: false,
-        }],
+        events: vec![Event { direction: Direction::Rising, ..Event::new(formula.expression("theta'").unwrap()) }],
         nodes: true,
         ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 20.0, by_steps(50))
     };
@@ -298,8 +290,7 @@ fn quantities_in_columns_and_events() {
     let system = System::parse("x'^2 - x^2/2 + gamma*z", &["x"], &[("gamma", -0.2)]).unwrap();
     let formula = system.formula();
     let column = |text: &str| Column::parse(text, formula).unwrap();
-    let event =
-        |text: &str| Event { function: formula.expression(text).unwrap(), direction: Direction::Both, terminal: false };
+    let event = |text: &str| Event::new(formula.expression(text).unwrap());
     let motion = Motion {
         rows: Some(When::At(vec![1.0, 1.25, 3.0, 6.0])),
         columns: ["t", "energy/sigma", "sigma", "log_factor + 1", "p_x/2 - x'", "energy", "x'^2 + x^2/2 - gamma*z"]
@@ -360,7 +351,7 @@ fn quantities_in_columns_and_events() {
     };
     let (_, rows) = system.record(&motion).unwrap();
     assert!(rows.iter().all(|row| row[0].abs() < 1e-15 && row[1] < -1e-3), "{rows:?}");
-    let events = vec![Event { function, direction: Direction::Both, terminal: false }];
+    let events = vec![Event::new(function)];
     let error = system.run(&Motion { events, ..motion }, &mut ()).unwrap_err();
     assert!(matches!(error, RuntimeError::FactorInEvent), "{error}");
 }
@@ -368,8 +359,7 @@ fn quantities_in_columns_and_events() {
 #[test]
 fn a_terminal_event_ends_the_rows_too() {
     let system = pendulum();
-    let event =
-        Event { function: system.formula().expression("theta").unwrap(), direction: Direction::Both, terminal: true };
+    let event = Event { terminal: true, ..Event::new(system.formula().expression("theta").unwrap()) };
     let motion = Motion {
         rows: Some(When::At((0..=40).map(|k| 0.1 * f64::from(k)).collect())),
         columns: vec![Column::Time, Column::Position(0)],
@@ -494,8 +484,8 @@ fn events_of_members_are_those_of_single_runs() {
     let of = |text: &str| system.formula().expression(text).unwrap();
     for terminal in [false, true] {
         // One has a parameter of the member in it.
-        let slow = Event { function: of("theta' - gamma*theta"), direction: Direction::Both, terminal: false };
-        let down = Event { function: of("theta"), direction: Direction::Falling, terminal };
+        let slow = Event::new(of("theta' - gamma*theta"));
+        let down = Event { direction: Direction::Falling, terminal, ..Event::new(of("theta")) };
         let events = [slow, down];
         let rows = Some(When::At((0..=8).map(f64::from).collect()));
         let many = Ensemble {
@@ -538,7 +528,7 @@ fn a_comparison_ranks_integrators() {
     let system = System::new(&CatalogueEntry::find("quadratic_in_z").unwrap().formula().unwrap()).unwrap();
     let motion = Motion::new(Start::new(0.0, [1.0], [0.0], 1.0), 5.0, accurate(1e-9));
     // What comes first in the table is enough.
-    let comparison = system.compare(&motion, &mut |part| part < 0.2).unwrap();
+    let comparison = system.compare(&motion, &[], &mut |part| part < 0.2).unwrap();
     assert!(comparison.ended && comparison.reference_error < 1e-13, "{comparison:?}");
     for (name, order) in [("midpoint", 2), ("gauss_2", 4), ("gauss_3", 6)] {
         let rows: Vec<_> = comparison.rows.iter().filter(|row| row.integrator == name).collect();

@@ -4,6 +4,7 @@ use super::SceneArguments;
 use super::run::progress_bar;
 use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, short};
+use crate::peer::Dop853;
 use crate::plot;
 use clap::Args;
 use runtime_herglotz::{Comparison, Work};
@@ -29,7 +30,7 @@ impl Compare {
         let scene = self.scene.read()?;
         let directory = Directory::new(self.out.clone(), &self.scene.file);
         let bar = progress_bar(!self.json);
-        let compared = scene.system.compare(&scene.bare_motion(), &mut |part| {
+        let compared = scene.system.compare(&scene.bare_motion(), &[&Dop853], &mut |part| {
             bar.set_position((part * 1000.0) as u64);
             true
         });
@@ -38,7 +39,9 @@ impl Compare {
         directory.create()?;
         let header = ["integrator", "order", "step_size", "steps", "evaluations", "error", "seconds"];
         let mut csv = Table::new(directory.file("compare.csv"), header)?;
-        for Work { integrator, order, step_size, steps, evaluations, error, seconds } in &comparison.rows {
+        for Work { integrator, order, step_size, steps, evaluations, error, seconds } in
+            comparison.rows.iter().chain(&comparison.peers)
+        {
             let counts = [order.to_string(), exact(*step_size), steps.to_string(), evaluations.to_string()];
             csv.record([integrator.clone()].into_iter().chain(counts).chain([exact(*error), exact(*seconds)]))?;
         }
@@ -51,8 +54,8 @@ impl Compare {
 }
 
 fn of_json(comparison: &Comparison) -> serde_json::Value {
-    let best = |error: f64| {
-        let work = comparison.best(error)?;
+    let of = |error: f64, work: Option<&Work>| {
+        let work = work?;
         Some(serde_json::json!({
             "error": error,
             "integrator": work.integrator,
@@ -63,7 +66,8 @@ fn of_json(comparison: &Comparison) -> serde_json::Value {
     let left_out = comparison.left_out.iter().map(|(name, why)| serde_json::json!({ "integrator": name, "why": why }));
     serde_json::json!({
         "reference": comparison.reference,
-        "best": ERRORS.map(best),
+        "best": ERRORS.map(|error| of(error, comparison.best(error))),
+        "best_of_peers": ERRORS.map(|error| of(error, comparison.best_of_peers(error))),
         "left_out": left_out.collect::<Vec<_>>(),
     })
 }
@@ -83,5 +87,11 @@ fn in_words(comparison: &Comparison) -> String {
         lines.push(format!("left out: {}: {why}", names.join(", ")));
     }
     lines.push(format!("the best for {}", ERRORS.map(best).join("; ")));
+    // Its steps have no one length.
+    let of_peer = |error: f64| match comparison.best_of_peers(error) {
+        Some(work) => format!("{error:.0e}: {} by {} steps in {:.2e} s", work.integrator, work.steps, work.seconds),
+        None => format!("{error:.0e}: none"),
+    };
+    lines.push(format!("beside them for {}", ERRORS.map(of_peer).join("; ")));
     lines.join("\n")
 }

@@ -3,6 +3,7 @@
 mod check;
 mod checkpoint;
 mod compare;
+mod ends;
 mod lattice;
 mod list;
 mod new;
@@ -21,13 +22,14 @@ use std::path::PathBuf;
 /// What is to be done.
 #[derive(Subcommand)]
 pub(crate) enum Command {
-    /// Run the motion of a scene: rows.csv, events.csv, and where it leads.
+    /// Run the motion of a scene, or find its path between two ends: rows.csv, events.csv, and where it leads.
     Run(run::Run),
     /// Say what will be computed and what is skipped, and what is proved of the formula.
     Plan(plan::Plan),
     /// Say whether the motion is contact: sigma_d, momenta, Herglotz' equation, and the discrete theory's theorems; ends with 1 if not.
     Check(check::Check),
-    /// Measure run time against error for all integrators that apply: compare.csv, and the best dozen in compare.svg.
+    /// Measure run time against error for all integrators that apply, and for dop853 of another library: compare.csv, and the best dozen with it in
+    /// compare.svg.
     Compare(compare::Compare),
     /// Run all members of a sweep over threads: sweep.csv.
     Sweep(sweep::Sweep),

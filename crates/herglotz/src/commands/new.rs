@@ -81,7 +81,9 @@ accuracy = 1e-8  # or integrator = "gauss_8", step = 0.5; `herglotz list integra
 # energy is v L_v - L (a drag gamma*z is in it as -gamma*z), p_{first} a momentum, log_factor the integral of L_z, sigma its exponential.
 rows = {{ every = 0.5, columns = ["t", "{first}", "{first_velocity}", "z", "energy", "log_factor", "{first}^2"] }}
 # The times at which a formula changes its sign: direction = "rising", "falling" or "both"; terminal = true ends the motion.
+# columns = ["..."] are recorded at each beside the state, from = TIME leaves out what is before it.
 events = [{{ when = "{first}", direction = "rising" }}]
+# wrap = ["{first}"] would show an angle from -pi to pi in pictures.
 
 # For `herglotz sweep FILE`.
 [sweep]

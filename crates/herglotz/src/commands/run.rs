@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::output::{Directory, Table, exact, json, print, print_json, read_rows, short};
 use crate::plot;
 use clap::Args;
-use herglotz::{LatticeScene, Scene};
+use herglotz::{EndsScene, LatticeScene, Scene};
 use indicatif::{ProgressBar, ProgressStyle};
 use runtime_herglotz::{
     AnyIntegrator, Crossing, Interrupted, Outcome, Plan, RuntimeError, Status, Steps, Watch, Way, velocity_name,
@@ -47,10 +47,10 @@ pub(crate) struct Run {
 
 /// Sees a motion, and writes what it sees.
 struct Writer {
+    scene: Scene,
     rows: Table,
     /// Where the scene has events.
     events: Option<Table>,
-    names: Vec<String>,
     row_count: usize,
     event_count: usize,
     /// The rows in which each column is not finite.
@@ -98,11 +98,11 @@ impl Watch for Writer {
     }
 
     fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
-        let (Some(table), Some(name)) = (&mut self.events, self.names.get(crossing.event)) else {
+        let (Some(table), Some((name, _))) = (&mut self.events, self.scene.events.get(crossing.event)) else {
             return ControlFlow::Continue(());
         };
         self.event_count += 1;
-        let written = table.record([name.clone()].into_iter().chain(numbers_of_event(crossing)));
+        let written = table.record([name.clone()].into_iter().chain(numbers_of_event(&self.scene, crossing)));
         self.keep(written)
     }
 
@@ -128,9 +128,9 @@ impl Watch for Writer {
 }
 
 /// What follows the name of the event in a row of events.csv.
-pub(crate) fn numbers_of_event(crossing: &Crossing) -> impl Iterator<Item = String> {
-    let Crossing { t, q, v, p, z, .. } = crossing;
-    [*t].into_iter().chain(q.iter().chain(v).chain(p).copied()).chain([*z]).map(exact)
+pub(crate) fn numbers_of_event(scene: &Scene, crossing: &Crossing) -> impl Iterator<Item = String> {
+    // Another event's column is empty.
+    scene.numbers_of_event(crossing).into_iter().map(|number| number.map(exact).unwrap_or_default())
 }
 
 /// A flag that Ctrl-C sets; a second one ends the program.
@@ -161,11 +161,7 @@ pub(crate) fn progress_bar(shown: bool) -> ProgressBar {
 
 /// The columns of events.csv.
 pub(crate) fn header_of_events(scene: &Scene) -> Vec<String> {
-    let names = scene.system.formula().coordinates();
-    let velocities = names.iter().map(|name| velocity_name(name));
-    let momenta = names.iter().map(|name| format!("p_{name}"));
-    let first = ["event", "t"].map(str::to_owned).into_iter();
-    first.chain(names.iter().cloned()).chain(velocities).chain(momenta).chain(["z".to_owned()]).collect()
+    ["event".to_owned()].into_iter().chain(scene.columns_of_events()).collect()
 }
 
 impl Run {
@@ -173,6 +169,9 @@ impl Run {
         let text = self.scene.text()?;
         if LatticeScene::is_one(&text) {
             return self.run_lattice(&text);
+        }
+        if EndsScene::is_one(&text) {
+            return self.run_ends(&text);
         }
         let scene = self.scene.read()?;
         let explain = |error: RuntimeError| self.scene.explain(scene.explain(&error));
@@ -259,9 +258,9 @@ impl Run {
         let skip = saved.zip(stride).is_some_and(|(saved, stride)| saved.taken.is_multiple_of(stride));
         let before = before.unwrap_or_default();
         Ok(Writer {
+            scene: scene.clone(),
             rows,
             events,
-            names: scene.events.iter().map(|(name, _)| name.clone()).collect(),
             row_count: before.rows,
             event_count: before.events,
             not_finite: vec![0; scene.columns.len()],

@@ -24,7 +24,7 @@ pub(crate) struct Sweep {
     /// The number of threads; the results do not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Draw the columns at the end, and the coordinates at the first event, against the first swept value.
+    /// Draw the columns at the end, and the coordinates and columns of the first event, against the first swept value.
     #[arg(long)]
     plot: bool,
     /// Tell how it ended as JSON.
@@ -43,7 +43,8 @@ struct Writer<'s> {
     events: Option<Table>,
     /// The number of columns at the end.
     columns: usize,
-    /// The swept values of those that began with their columns, and those with the coordinates at the first event, where they are drawn.
+    /// The swept values of those that began with their columns, and those with the coordinates and the columns of the first event there,
+    /// where they are drawn.
     drawn: Option<[Vec<Drawn>; 2]>,
     bar: ProgressBar,
     stop: Arc<AtomicBool>,
@@ -69,7 +70,7 @@ impl Writer<'_> {
         for crossing in &member.crossings {
             let name = self.scene.events.get(crossing.event).map(|(name, _)| name.clone()).unwrap_or_default();
             let which = [member.index.to_string()].into_iter().chain(values.iter().map(|x| exact(*x)));
-            table.record(which.chain([name]).chain(numbers_of_event(crossing)))?;
+            table.record(which.chain([name]).chain(numbers_of_event(self.scene, crossing)))?;
         }
         Ok(())
     }
@@ -88,7 +89,7 @@ impl EnsembleWatch for Writer<'_> {
                 if let (Some([ends, events]), Some(value)) = (&mut self.drawn, values.first()) {
                     ends.push((*value, ending.columns.clone()));
                     let of_first = member.crossings.iter().filter(|crossing| crossing.event == 0);
-                    events.extend(of_first.map(|crossing| (*value, crossing.q.clone())));
+                    events.extend(of_first.map(|crossing| (*value, [&crossing.q[..], &crossing.columns].concat())));
                 }
             }
             Err(cause) => {
@@ -179,13 +180,13 @@ impl Sweep {
             return Err(failure);
         }
         let knob = scene.knobs.first().map(|knob| knob.name.as_str()).unwrap_or_default();
-        let coordinates = scene.system.formula().coordinates();
-        let coordinates: Vec<&str> = coordinates.iter().map(String::as_str).collect();
+        let at_first = scene.columns_of_first_event();
+        let at_first: Vec<&str> = at_first.iter().map(String::as_str).collect();
         let [ends, at_events] = drawn.unwrap_or_default();
-        for (file, names, points) in [("sweep", &names, ends), ("sweep_events", &coordinates, at_events)] {
+        for (file, names, points) in [("sweep", &names, ends), ("sweep_events", &at_first, at_events)] {
             for (i, name) in names.iter().enumerate() {
                 let of = |(value, numbers): &Drawn| Some((*value, *numbers.get(i)?)).filter(|p| p.1.is_finite());
-                if let Some(figure) = plot::of_sweep(knob, name, points.iter().filter_map(of).collect()) {
+                if let Some(figure) = plot::of_sweep(&scene, knob, name, points.iter().filter_map(of).collect()) {
                     directory.write(&format!("{file}_{i}.svg"), &figure)?;
                 }
             }

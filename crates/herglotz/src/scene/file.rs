@@ -77,6 +77,9 @@ pub(crate) struct WantTable {
     /// Functions of the state whose changes of sign are written to events.csv.
     #[serde(default)]
     pub events: Vec<EventTable>,
+    /// Columns that are angles, of rows or of events, by name: pictures show them from -pi to pi, tables as they are.
+    #[serde(default)]
+    pub wrap: Vec<At<String>>,
     /// Whether the conformal factor of the whole motion is in the summary.
     #[serde(default)]
     pub conformal_factor: bool,
@@ -113,6 +116,12 @@ pub(crate) struct EventTable {
     /// Whether the first one ends the motion.
     #[serde(default)]
     pub terminal: bool,
+    /// The time from which they count, in the sense of the motion, so that transients are left out; from the start without it.
+    pub from: Option<At<f64>>,
+    /// What events.csv has beside the state there: expressions as those of the columns of rows, with a name (`E = ...`) or without. They are
+    /// empty for other events.
+    #[serde(default)]
+    pub columns: Vec<At<String>>,
 }
 
 /// Which changes of sign count, in the sense of the motion.

@@ -2,6 +2,7 @@
 
 mod at;
 mod change;
+mod ends;
 mod error;
 mod file;
 mod lattice;
@@ -10,6 +11,7 @@ mod start;
 mod sweep;
 mod want;
 
+pub use ends::EndsScene;
 pub use error::SceneError;
 pub use lattice::LatticeScene;
 pub use members::Members;
@@ -18,11 +20,11 @@ pub use sweep::Knob;
 use at::{At, Span};
 use file::{File, RunTable, SystemTable, VERSION};
 use runtime_herglotz::{
-    AnyIntegrator, CatalogueEntry, Column, Event, Formula, FormulaError, InputError, Motion, RuntimeError, Start,
-    Steps, System, Way, check_parameters, in_words,
+    AnyIntegrator, CatalogueEntry, Column, Crossing, Event, Formula, FormulaError, InputError, Motion, RuntimeError,
+    Start, Steps, System, Way, check_parameters, in_words,
 };
 use serde::Deserialize;
-use want::RowTimes;
+use want::{EventColumns, Events, RowTimes};
 
 /// A scene that has been read and checked.
 #[derive(Clone)]
@@ -33,6 +35,10 @@ pub struct Scene {
     pub columns: Vec<(String, Column)>,
     /// The events with the texts of their functions, in their order.
     pub events: Vec<(String, Event)>,
+    event_columns: EventColumns,
+    angles: Vec<String>,
+    /// The texts of all columns and events.
+    expressions: Vec<String>,
     /// What a sweep takes through its values.
     pub knobs: Vec<Knob>,
     /// The formula's text.
@@ -97,6 +103,10 @@ impl Scene {
             let message = "a lattice is run by `herglotz run`; all else is for systems of up to 16 coordinates";
             return Err(SceneError::at(text, lattice, message));
         }
+        if let Some(ends) = ends::has_ends(text) {
+            let message = "a path between ends is run by `herglotz run`; all else is for motions from a start";
+            return Err(SceneError::at(text, ends, message));
+        }
         let mut file: File = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
         let entry = entry(text, &file.system)?;
         for text_of_change in changes {
@@ -104,7 +114,8 @@ impl Scene {
         }
         let formula = formula(text, &file.system, entry)?;
         let system = &file.system;
-        check_used(text, &formula, &file)?;
+        let texts: Vec<&str> = expressions(&file).map(String::as_str).collect();
+        check_used(text, &formula, system, &texts)?;
         let lagrangian = system.lagrangian.as_ref().map_or(system.span(), At::span);
         let runs = System::new(&formula).map_err(|error| want::of_formula(text, lagrangian, &error))?;
         let run = &file.run;
@@ -120,12 +131,23 @@ impl Scene {
             let refused = |error: InputError| SceneError::at(text, name.span(), in_words(&error));
             runs.check_integrator(by).map_err(refused)?;
         }
+        let constant_rate = runs.structure().has_constant_rate();
+        let events = Events::read(text, (&formula, constant_rate), &file.want.events, (start.t, end))?;
+        let columns = want::columns(text, &formula, file.want.rows.as_ref())?;
+        let of_state = want::state_of_event(&formula);
+        let of_rows = columns.iter().map(|(name, _)| name);
+        let named = formula.coordinates();
+        let named = named.iter().chain(of_rows).chain(if events.events.is_empty() { &[] } else { &of_state[..] });
+        let known: Vec<&str> = named.chain(&events.columns.names).map(String::as_str).collect();
         Ok(Scene {
-            columns: want::columns(text, &formula, file.want.rows.as_ref())?,
-            events: want::events(text, &formula, &file.want.events)?,
+            angles: want::angles(text, &file.want.wrap, &known)?,
+            columns,
+            events: events.events,
+            event_columns: events.columns,
             knobs: sweep::read(text, &formula, &start, &file.sweep)?,
             rows: RowTimes::read(text, file.want.rows.as_ref(), (start.t, end))?,
             system: runs,
+            expressions: expressions(&file).cloned().collect(),
             lagrangian: match (entry, &system.lagrangian) {
                 (Some(entry), _) => entry.lagrangian.to_owned(),
                 (None, own) => own.as_ref().map(|text| (**text).clone()).unwrap_or_default(),
@@ -166,6 +188,36 @@ impl Scene {
         Motion::new(self.start.clone(), self.end, self.way)
     }
 
+    /// The columns of events.csv after the name of the event: the state there, and what the events have beside it.
+    pub fn columns_of_events(&self) -> Vec<String> {
+        want::state_of_event(self.system.formula())
+            .into_iter()
+            .chain(self.event_columns.names.iter().cloned())
+            .collect()
+    }
+
+    /// The coordinates and the columns of the first event, by name.
+    pub fn columns_of_first_event(&self) -> Vec<String> {
+        let EventColumns { names, of_event } = &self.event_columns;
+        let own = of_event.first().into_iter().flatten().filter_map(|place| names.get(*place));
+        self.system.formula().coordinates().into_iter().chain(own.cloned()).collect()
+    }
+
+    /// The numbers of a crossing in these columns; `None` in those of other events.
+    pub fn numbers_of_event(&self, crossing: &Crossing) -> Vec<Option<f64>> {
+        let Crossing { t, event, q, v, p, z, columns } = crossing;
+        let of_state = [*t].into_iter().chain(q.iter().chain(v).chain(p).copied()).chain([*z]).map(Some);
+        let EventColumns { names, of_event } = &self.event_columns;
+        let own = of_event.get(*event).map(Vec::as_slice).unwrap_or_default();
+        let place = |column: usize| own.iter().position(|known| *known == column);
+        of_state.chain((0..names.len()).map(|column| columns.get(place(column)?).copied())).collect()
+    }
+
+    /// Whether a column, of rows or of events, is an angle, which pictures show from -pi to pi.
+    pub fn is_angle(&self, column: &str) -> bool {
+        self.angles.iter().any(|angle| angle == column)
+    }
+
     /// The number of steps between two rows, where rows are counted in steps.
     pub fn rows_every_step(&self) -> Option<usize> {
         match self.rows {
@@ -181,13 +233,14 @@ impl Scene {
 
     /// All that determines what is recorded, in words, for telling one scene from another.
     pub fn fingerprint(&self) -> String {
-        let columns: Vec<&str> = self.columns.iter().map(|(name, _)| name.as_str()).collect();
-        let events: Vec<_> = self.events.iter().map(|(name, e)| (name, e.direction, e.terminal)).collect();
-        let Scene { start, end, way, rows, conformal_factor, .. } = self;
+        let events = self.events.iter().map(|(name, e)| (name, e.direction, e.terminal, e.from)).collect::<Vec<_>>();
+        let Scene { start, end, way, rows, conformal_factor, expressions, event_columns, .. } = self;
         let formula = self.system.formula();
         let (names, values) = (formula.coordinates(), formula.parameters().collect::<Vec<_>>());
         let of_system = format!("{} {names:?} {values:?}", self.lagrangian);
-        format!("{of_system} {start:?} {end:?} {way:?} {rows:?} {conformal_factor} {columns:?} {events:?}")
+        format!(
+            "{of_system} {start:?} {end:?} {way:?} {rows:?} {conformal_factor} {expressions:?} {events:?} {event_columns:?}"
+        )
     }
 
     /// The place in the file that an error is about.
@@ -293,18 +346,22 @@ fn formula(
     Ok(formula)
 }
 
-/// Refuses parameters that are neither in the formula nor in a column or an event.
-fn check_used(text: &str, formula: &Formula, file: &File) -> Result<(), SceneError> {
+/// The texts of columns and events.
+fn expressions(file: &File) -> impl Iterator<Item = &String> {
     let columns = file.want.rows.iter().filter_map(|rows| rows.columns.as_ref()).flat_map(|columns| columns.iter());
-    let events = file.want.events.iter().map(|event| &event.when);
-    let texts: Vec<&str> = columns.chain(events).map(|text| text.as_str()).collect();
-    check_parameters(formula, &texts).map_err(|error| {
-        let named = |name: &str| file.system.parameters.0.iter().find(|(known, _)| **known == *name);
+    let events = file.want.events.iter().flat_map(|event| [&event.when].into_iter().chain(&event.columns));
+    columns.chain(events).map(|text| &**text)
+}
+
+/// Refuses parameters that are neither in the formula nor in the texts of columns and events.
+fn check_used(text: &str, formula: &Formula, system: &At<SystemTable>, texts: &[&str]) -> Result<(), SceneError> {
+    check_parameters(formula, texts).map_err(|error| {
+        let named = |name: &str| system.parameters.0.iter().find(|(known, _)| **known == *name);
         let span = match &error {
             RuntimeError::UnusedParameter { name, .. } => named(name).map(|(name, _)| name.span()),
             _ => None,
         };
-        SceneError::at(text, span.unwrap_or(file.system.span()), error.to_string())
+        SceneError::at(text, span.unwrap_or(system.span()), error.to_string())
     })
 }
 
@@ -371,13 +428,14 @@ fn positive(text: &str, x: &At<f64>, name: &str) -> Result<f64, SceneError> {
 
 /// The JSON schema of scene files.
 pub fn schema() -> serde_json::Value {
-    /// A motion of a Lagrangian, or of a lattice, and what is to be recorded of it.
+    /// A motion of a Lagrangian, or of a lattice, and what is to be recorded of it; or a path between two ends.
     #[derive(schemars::JsonSchema)]
     #[schemars(title = "Scene", untagged)]
     #[expect(dead_code, reason = "it stands for its variants, which are read one by one")]
     enum AnyFile {
         System(File),
         Lattice(lattice::LatticeFile),
+        Ends(ends::EndsFile),
     }
     schemars::schema_for!(AnyFile).to_value()
 }

@@ -93,14 +93,55 @@ pub(crate) fn read(
     entry: Option<&CatalogueEntry>,
     at: Span,
 ) -> Result<Start, SceneError> {
-    let (names, keys) = (formula.coordinates(), keys(formula));
-    let none = || vec![None; names.len()];
+    complete(text, given(text, keys(formula), "a start", table)?, &formula.coordinates(), entry, at)
+}
+
+/// The ends of a path: the times, the positions, and the action of the start.
+pub(crate) struct Ends {
+    pub t: [f64; 2],
+    pub q: [Vec<f64>; 2],
+    pub z0: f64,
+}
+
+impl Ends {
+    /// Those of two tables; the start is completed by that of the catalogue.
+    pub fn read(
+        text: &str,
+        formula: &Formula,
+        (start, start_at): (Option<&Named<Numbers>>, Span),
+        (end, end_at): (&Named<Numbers>, Span),
+        entry: Option<&CatalogueEntry>,
+    ) -> Result<Self, SceneError> {
+        let names = formula.coordinates();
+        let keys_of = |parts: &[Part]| {
+            let mut keys = keys(formula);
+            keys.retain(|key| parts.contains(&key.part));
+            keys
+        };
+        let of_start = given(text, keys_of(&[Part::Position, Part::Action, Part::Time]), "the start of a path", start)?;
+        let of_end = given(text, keys_of(&[Part::Position, Part::Time]), "the end of a path", Some(end))?;
+        let q0 = all(text, &names, of_start.q, entry.map(|entry| entry.q), ["coordinate", "start"], start_at, &|x| {
+            x.to_owned()
+        })?;
+        let q1 = all(text, &names, of_end.q, None, ["coordinate", "end"], end_at, &|x| x.to_owned())?;
+        let Some(t1) = of_end.t else {
+            return Err(SceneError::at(text, end_at, "the end has no time; add `t = 1.0` to [ends], or another value"));
+        };
+        let t0 = of_start.t.or(entry.map(|entry| entry.t)).unwrap_or(0.0);
+        Ok(Ends { t: [t0, t1], q: [q0, q1], z0: of_start.z.unwrap_or(0.0) })
+    }
+}
+
+/// What a table says, of these names.
+fn given(text: &str, keys: Vec<Key>, place: &str, table: Option<&Named<Numbers>>) -> Result<Given, SceneError> {
+    let count = keys.iter().map(|key| key.entries.end).max().unwrap_or(0);
+    let none = || vec![None; count];
     let mut given = Given { q: none(), v: none(), p: none(), ..Given::default() };
     for (name, numbers) in table.map(|table| table.0.as_slice()).unwrap_or_default() {
         let Some(key) = keys.iter().find(|key| key.name == **name) else {
             let known = || keys.iter().map(|key| key.name.as_str());
             let all = known().collect::<Vec<_>>().join(", ");
-            let message = format!("there is no `{}` in a start; there are {all}", **name);
+            let message = format!("there is no `{}` in {place}; there are {all}", **name);
             return Err(SceneError::unknown(text, name.span(), name, known(), message));
         };
         let wrong_count = |found: &str| {
@@ -120,7 +161,34 @@ pub(crate) fn read(
             given.set(key.part, i, super::finite(text, x, name)?);
         }
     }
-    complete(text, given, &names, entry, at)
+    Ok(given)
+}
+
+/// The numbers of all coordinates: those that are given, or else of a system of the catalogue.
+fn all(
+    text: &str,
+    names: &[String],
+    given: Vec<Option<f64>>,
+    of_entry: Option<&[f64]>,
+    [what, place]: [&str; 2],
+    at: Span,
+    name: &dyn Fn(&str) -> String,
+) -> Result<Vec<f64>, SceneError> {
+    let mut all = Vec::with_capacity(names.len());
+    for (i, coordinate) in names.iter().enumerate() {
+        let known = given.get(i).copied().flatten().or_else(|| of_entry?.get(i).copied());
+        all.push(known.ok_or_else(|| {
+            let name = name(coordinate);
+            // A key of a table may have letters, digits and _ without quotes.
+            let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+            let key = if bare { name.clone() } else { format!("\"{name}\"") };
+            let table = if place == "end" { "ends" } else { "start" };
+            let message =
+                format!("the {what} `{name}` has no {place}; add `{key} = 0.0` to [{table}], or another value");
+            SceneError::at(text, at, message)
+        })?);
+    }
+    Ok(all)
 }
 
 /// All numbers that a motion needs.
@@ -132,20 +200,7 @@ fn complete(
     at: Span,
 ) -> Result<Start, SceneError> {
     let of = |given: Vec<Option<f64>>, of_entry: Option<&[f64]>, what: &str, name: &dyn Fn(&str) -> String| {
-        let mut all = Vec::with_capacity(names.len());
-        for (i, coordinate) in names.iter().enumerate() {
-            let known = given.get(i).copied().flatten().or_else(|| of_entry?.get(i).copied());
-            all.push(known.ok_or_else(|| {
-                let name = name(coordinate);
-                // A key of a table may have letters, digits and _ without quotes.
-                let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-                let key = if bare { name.clone() } else { format!("\"{name}\"") };
-                let message =
-                    format!("the {what} `{name}` has no start; add `{key} = 0.0` to [start], or another value");
-                SceneError::at(text, at, message)
-            })?);
-        }
-        Ok(all)
+        all(text, names, given, of_entry, [what, "start"], at, name)
     };
     let q = of(given.q, entry.map(|entry| entry.q), "coordinate", &|x| x.to_owned())?;
     let by_momentum = given.p.iter().any(Option::is_some);

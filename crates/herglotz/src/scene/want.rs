@@ -3,7 +3,9 @@
 use super::SceneError;
 use super::at::{At, Span};
 use super::file::{DirectionName, EventTable, RowsTable};
-use runtime_herglotz::{Column, Direction, Event, Formula, FormulaError, RuntimeError, When, nearest_name};
+use runtime_herglotz::{
+    Column, Direction, Event, Expression, Formula, FormulaError, RuntimeError, When, nearest_name, velocity_name,
+};
 
 /// The rows of a scene that asks for none.
 const DEFAULT_ROWS: usize = 1000;
@@ -71,12 +73,7 @@ impl RowTimes {
     fn at(text: &str, times: &At<Vec<At<f64>>>, (t0, end): (f64, f64)) -> Result<Self, SceneError> {
         let mut last: Option<f64> = None;
         for time in times.iter() {
-            let t = super::finite(text, time, "a time")?;
-            if !(t0.min(end)..=t0.max(end)).contains(&t) {
-                let message =
-                    format!("the time {t} is not between {t0}, at which the motion starts, and its end, {end}");
-                return Err(SceneError::at(text, time.span(), message));
-            }
+            let t = within(text, time, "a time", (t0, end))?;
             if last.is_some_and(|last| (t - last) * (end - t0) <= 0.0) {
                 let message =
                     format!("the time {t} is not after the one before it, in the sense of the motion; sort them");
@@ -86,6 +83,16 @@ impl RowTimes {
         }
         Ok(RowTimes::At(times.iter().map(|t| **t).collect()))
     }
+}
+
+/// A time of a motion from one to another.
+fn within(text: &str, time: &At<f64>, name: &str, (t0, end): (f64, f64)) -> Result<f64, SceneError> {
+    let t = super::finite(text, time, name)?;
+    if !(t0.min(end)..=t0.max(end)).contains(&t) {
+        let message = format!("the time {t} is not between {t0}, at which the motion starts, and its end, {end}");
+        return Err(SceneError::at(text, time.span(), message));
+    }
+    Ok(t)
 }
 
 /// The columns of a row, with their names.
@@ -132,20 +139,116 @@ fn with_nearest(mut error: SceneError, formula: &Formula) -> SceneError {
     error
 }
 
-/// The events, with their names.
-pub(crate) fn events(text: &str, formula: &Formula, tables: &[EventTable]) -> Result<Vec<(String, Event)>, SceneError> {
-    let of = |table: &EventTable| {
-        let EventTable { when, direction, terminal } = table;
-        let of_expression = |error: FormulaError| with_nearest(of_formula(text, when.span(), &error.into()), formula);
-        let function = formula.expression(when).map_err(of_expression)?;
-        let direction = match direction {
-            DirectionName::Rising => Direction::Rising,
-            DirectionName::Falling => Direction::Falling,
-            DirectionName::Both => Direction::Both,
+/// The columns that every row of events.csv has after the name of the event: the time, coordinates, velocities, momenta and the action.
+pub(crate) fn state_of_event(formula: &Formula) -> Vec<String> {
+    let names = formula.coordinates();
+    let velocities = names.iter().map(|name| velocity_name(name));
+    let momenta = names.iter().map(|name| format!("p_{name}"));
+    let t = ["t".to_owned()].into_iter();
+    t.chain(names.iter().cloned()).chain(velocities).chain(momenta).chain(["z".to_owned()]).collect()
+}
+
+/// The events, with their names, and those of their columns.
+pub(crate) struct Events {
+    pub events: Vec<(String, Event)>,
+    pub columns: EventColumns,
+}
+
+/// The columns of all events beside the state: those of one name are one.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct EventColumns {
+    pub names: Vec<String>,
+    /// For each event which of them its own ones are.
+    pub of_event: Vec<Vec<usize>>,
+}
+
+impl Events {
+    /// Those of a motion from one time to another. `constant_rate` is whether `L_z` is one number.
+    pub fn read(
+        text: &str,
+        (formula, constant_rate): (&Formula, bool),
+        tables: &[EventTable],
+        span: (f64, f64),
+    ) -> Result<Self, SceneError> {
+        let expression = |source: &At<String>, named: bool| {
+            let read = if named { formula.named_expression(source) } else { formula.expression(source) };
+            let refused = |error: FormulaError| with_nearest(of_formula(text, source.span(), &error.into()), formula);
+            let read = read.map_err(refused)?;
+            if read.has_conformal_factor() && !constant_rate {
+                let message =
+                    "`sigma` and `log_factor` are known at events where L_z is constant alone; take a column of rows";
+                return Err(SceneError::at(text, source.span(), message));
+            }
+            Ok(read)
         };
-        Ok(((**when).clone(), Event { function, direction, terminal: *terminal }))
+        let mut read = Events { events: Vec::new(), columns: EventColumns::default() };
+        for table in tables {
+            let EventTable { when, direction, terminal, from, columns } = table;
+            let direction = match direction {
+                DirectionName::Rising => Direction::Rising,
+                DirectionName::Falling => Direction::Falling,
+                DirectionName::Both => Direction::Both,
+            };
+            if let (Some(from), true) = (from, terminal) {
+                let message = "a terminal event counts from the start; leave out `from` or `terminal`";
+                return Err(SceneError::at(text, from.span(), message));
+            }
+            let own = columns.iter().map(|column| expression(column, true)).collect::<Result<Vec<Expression>, _>>()?;
+            let event = Event {
+                direction,
+                terminal: *terminal,
+                from: from.as_ref().map(|from| within(text, from, "from", span)).transpose()?,
+                columns: own,
+                ..Event::new(expression(when, false)?)
+            };
+            read.events.push(((**when).clone(), event));
+            read.columns.add(text, formula, columns)?;
+        }
+        Ok(read)
+    }
+}
+
+impl EventColumns {
+    /// Adds those of one more event.
+    fn add(&mut self, text: &str, formula: &Formula, columns: &[At<String>]) -> Result<(), SceneError> {
+        let of_state = state_of_event(formula);
+        let mut own = Vec::with_capacity(columns.len());
+        for column in columns {
+            let name = name_of(column);
+            let refuse = |message: String| Err(SceneError::at(text, column.span(), message));
+            if name == "event" || of_state.iter().any(|known| known == name) {
+                return refuse(format!("every event has `{name}` already; leave it out, or name it otherwise"));
+            }
+            let place = self.names.iter().position(|known| known == name).unwrap_or(self.names.len());
+            if own.contains(&place) {
+                return refuse(format!("the event has two columns `{name}`; name one of them otherwise"));
+            }
+            if place == self.names.len() {
+                self.names.push(name.to_owned());
+            }
+            own.push(place);
+        }
+        self.of_event.push(own);
+        Ok(())
+    }
+}
+
+/// The names of columns that are angles, of those that there are.
+pub(crate) fn angles(text: &str, wrapped: &[At<String>], known: &[&str]) -> Result<Vec<String>, SceneError> {
+    let of = |name: &At<String>| {
+        if known.contains(&name.as_str()) {
+            return Ok((**name).clone());
+        }
+        let mut all: Vec<&str> = Vec::new();
+        known.iter().for_each(|name| {
+            if !all.contains(name) {
+                all.push(name)
+            }
+        });
+        let message = format!("there is no column `{}` to be folded; there are {}", **name, all.join(", "));
+        Err(SceneError::unknown(text, name.span(), name, known.iter().copied(), message))
     };
-    tables.iter().map(of).collect()
+    wrapped.iter().map(of).collect()
 }
 
 /// An error in a text of the file that is a formula.

@@ -162,7 +162,9 @@ fn place(of: &Assembled, start: &Start) -> Result<Place, RuntimeError> {
     };
     let v = match &start.rate {
         Rate::Velocity(v) => vector("v", v)?,
-        Rate::Momentum(p) | Rate::MomentumNear { p, .. } => vector("p", p)?.iter().zip(&of.masses).map(|(p, m)| p / m).collect(),
+        Rate::Momentum(p) | Rate::MomentumNear { p, .. } => {
+            vector("p", p)?.iter().zip(&of.masses).map(|(p, m)| p / m).collect()
+        }
     };
     Ok(Place { t: start.t, q: vector("q", &start.q)?, v, z: start.z })
 }

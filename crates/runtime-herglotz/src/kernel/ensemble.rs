@@ -114,7 +114,8 @@ impl<const N: usize> Block<'_, N> {
                 let all = varied.names.iter().zip(&values);
                 all.clone().try_for_each(|(name, value)| lagrangian.set(name, *value)).ok()?;
                 let mut events = events.to_vec();
-                events.iter_mut().for_each(|event| set(&mut event.function, varied.names, &values));
+                let expressions = events.iter_mut().flat_map(Event::expressions_mut);
+                expressions.for_each(|expression| set(expression, varied.names, &values));
                 Some(Own { lagrangian, events })
             };
             members.clone().map(with).collect()

@@ -2,9 +2,9 @@
 
 use super::{Sized, coordinates};
 use crate::{Geometry, RuntimeError, Start};
-use contact_geom::nalgebra::DMatrix;
+use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    ContactForm, Derivatives, Lagrangian, LagrangianForm, Regularity, Triple, herglotz_field, legendre,
+    ContactForm, Derivatives, Lagrangian, LagrangianForm, Regularity, Triple, VelocityPoint, herglotz_field, legendre,
 };
 
 /// The components of a vector on TQ x R over the first so many coordinates.
@@ -38,4 +38,16 @@ pub(super) fn at<const N: usize>(system: &Sized<N>, at: &Start) -> Result<Geomet
         volume: form.volume(&point)? / added(n, N),
         herglotz_field: components(&herglotz_field(lagrangian, t, x)?, n),
     })
+}
+
+/// The Herglotz field at `y`, which is `(q, v)`, with or without z.
+pub(super) fn rates<const N: usize>(system: &Sized<N>, t: f64, y: &[f64], to: &mut [f64]) {
+    let n = system.0.formula().dimension();
+    let part = |first: usize| {
+        SVector::<f64, N>::from_fn(|i, _| if i < n { y.get(first + i).copied().unwrap_or(f64::NAN) } else { 0.0 })
+    };
+    let x = VelocityPoint { q: part(0), v: part(n), z: y.get(2 * n).copied().unwrap_or(0.0) };
+    let Ok(field) = herglotz_field(&system.0, t, &x) else { return to.fill(f64::NAN) };
+    let all = coordinates(&field.x, n).iter().chain(coordinates(&field.y, n)).chain([&field.z]);
+    to.iter_mut().zip(all).for_each(|(to, from)| *to = *from);
 }

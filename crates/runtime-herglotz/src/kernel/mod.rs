@@ -4,6 +4,7 @@ mod check;
 mod ensemble;
 mod geometry;
 mod observed;
+pub(crate) mod path;
 mod recorder;
 mod run;
 mod theorems;
@@ -29,6 +30,7 @@ pub(crate) trait Kernel: Send + Sync {
     fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError>;
     fn run(&self, motion: &Motion, watch: &mut dyn Watch, from: Option<Interrupted>) -> Result<Outcome, RuntimeError>;
     fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleWatch) -> Result<Tally, RuntimeError>;
+    fn rates(&self, t: f64, y: &[f64], to: &mut [f64]);
     fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError>;
     fn check(&self, motion: &Motion, places: usize) -> Result<Check, RuntimeError>;
 }
@@ -165,6 +167,10 @@ impl<const N: usize> Kernel for Sized<N> {
 
     fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleWatch) -> Result<Tally, RuntimeError> {
         ensemble::run(self, ensemble, watch)
+    }
+
+    fn rates(&self, t: f64, y: &[f64], to: &mut [f64]) {
+        geometry::rates(self, t, y, to);
     }
 
     fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError> {

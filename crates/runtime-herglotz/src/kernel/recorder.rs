@@ -140,12 +140,17 @@ pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
     }
 }
 
-/// Refuses events that have the conformal factor where it is not known at all times.
+/// Refuses events that have the conformal factor where it is not known at all times, and terminal ones that count from a time.
 pub(super) fn check_events<const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
     events: &[crate::Event],
 ) -> Result<(), RuntimeError> {
-    let has_factor = events.iter().any(|event| event.function.has_conformal_factor());
+    let of_terminal = events.iter().any(|event| event.terminal && event.from.is_some());
+    if of_terminal {
+        let why = "is given for a terminal event, which counts from the start of the motion; leave one of them out";
+        return Err(RuntimeError::Argument { argument: "from", why: why.to_owned() });
+    }
+    let has_factor = events.iter().flat_map(crate::Event::expressions).any(Expression::has_conformal_factor);
     if has_factor && lagrangian.constant_rate().is_none() { Err(RuntimeError::FactorInEvent) } else { Ok(()) }
 }
 
@@ -180,11 +185,16 @@ fn at_states<'r, const N: usize>(
 /// The events of a motion, with what belongs to their states.
 pub(super) struct Crossings<'r, const N: usize> {
     events: Events<'r, N>,
+    /// What was asked of them.
+    asked: &'r [crate::Event],
+    /// `L_z`, where it is one number: known where a column needs it, see `check_events`.
+    rate: f64,
     /// Whether one of them has the action in it.
     action: bool,
     /// Whether one of them has the velocity in it.
     velocity: bool,
     beside: Rc<Beside<N>>,
+    backward: bool,
     dimension: usize,
 }
 
@@ -197,11 +207,18 @@ impl<'r, const N: usize> Crossings<'r, N> {
         };
         let v = SVector::from_fn(|i, _| numbers.get(i).copied().unwrap_or(0.0));
         let beside = Rc::new(Beside { began: Cell::new(0.0), velocity: Cell::new(v) });
-        let velocity = events.iter().any(|event| event.function.has_velocity());
-        let action = events.iter().any(|event| event.function.has_action());
+        let action = events.iter().flat_map(crate::Event::expressions).any(Expression::has_action);
         let all = || Events::new(events.iter().map(|event| of(lagrangian, event, beside.clone())));
-        let dimension = lagrangian.formula().dimension();
-        (!events.is_empty()).then(|| Crossings { events: all(), action, velocity, beside: beside.clone(), dimension })
+        (!events.is_empty()).then(|| Crossings {
+            events: all(),
+            asked: events,
+            rate: lagrangian.constant_rate().unwrap_or(f64::NAN),
+            action,
+            velocity: events.iter().any(|event| event.function.has_velocity()),
+            beside: beside.clone(),
+            backward: false,
+            dimension: lagrangian.formula().dimension(),
+        })
     }
 
     pub fn needs(&self) -> Needs {
@@ -210,6 +227,7 @@ impl<'r, const N: usize> Crossings<'r, N> {
 
     pub fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
         self.beside.began.set(course.t0);
+        self.backward = course.t_end < course.t0;
         self.events.prepare(course)
     }
 
@@ -235,11 +253,19 @@ impl<'r, const N: usize> Crossings<'r, N> {
     ) -> ControlFlow<Stop<N>> {
         let ended = self.events.step(at);
         for crossing in self.events.crossings.drain(..) {
+            let asked = self.asked.get(crossing.event);
+            let (t, from) = (crossing.t, asked.and_then(|event| event.from));
+            if from.is_some_and(|from| if self.backward { t > from } else { t < from }) {
+                continue;
+            }
             let PhasePoint { q, p, z } = crossing.state;
             // The velocity of the step's end is near enough to find it from.
             let v = at.velocity_at(crossing.t, &crossing.state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
+            let log_factor = self.rate * (t - self.beside.began.get());
+            let columns = asked.map_or(&[][..], |event| &event.columns).iter();
+            let columns = columns.map(|e| e.at_factor(t, (q.as_slice(), v.as_slice(), z), log_factor)).collect();
             let [q, v, p] = [q, v, p].map(|x| coordinates(&x, self.dimension).to_vec());
-            if hand_on(Crossing { t: crossing.t, event: crossing.event, q, v, p, z }).is_break() {
+            if hand_on(Crossing { t, event: crossing.event, q, v, p, z, columns }).is_break() {
                 return ControlFlow::Break(Stop::here("its watch"));
             }
         }

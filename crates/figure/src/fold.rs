@@ -1,0 +1,138 @@
+//! Angles on an axis of one turn: curves that leave it on one side come back on the other.
+
+use std::f64::consts::{PI, TAU};
+
+/// The turns that a line between two points may make to be drawn from edge to edge; what makes more is not resolved by its points, and
+/// would fill the picture.
+const MOST_TURNS: f64 = 3.0;
+
+/// The number of the turn that an angle is in: 0 from -pi, excluded, to pi.
+fn turn(angle: f64) -> f64 {
+    ((angle - PI) / TAU).ceil()
+}
+
+/// An angle in (-pi, pi].
+///
+/// ```
+/// use contact_figure::fold;
+/// assert_eq!(fold(1.0), 1.0);
+/// assert!((fold(7.0) - (7.0 - std::f64::consts::TAU)).abs() < 1e-15);
+/// ```
+pub fn fold(angle: f64) -> f64 {
+    let folded = angle - TAU * turn(angle);
+    // Beyond the edges by rounding alone.
+    folded.clamp(-PI, PI)
+}
+
+/// The pieces of a curve of which the coordinates that are angles are folded: it is cut where one of them leaves its turn, and each piece
+/// reaches the edge there, so that no line crosses the picture.
+pub fn folded(points: &[(f64, f64)], angles: (bool, bool)) -> Vec<Vec<(f64, f64)>> {
+    let turns_of = |(x, y): (f64, f64)| (if angles.0 { turn(x) } else { 0.0 }, if angles.1 { turn(y) } else { 0.0 });
+    let place = |(x, y): (f64, f64), turns: (f64, f64)| {
+        let edge = |x: f64, turn: f64, is_angle: bool| if is_angle { (x - TAU * turn).clamp(-PI, PI) } else { x };
+        (edge(x, turns.0, angles.0), edge(y, turns.1, angles.1))
+    };
+    let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
+    let mut last: Option<(f64, f64)> = None;
+    let mut turns = (f64::NAN, f64::NAN);
+    for &point in points {
+        let begins = last.map(turns_of);
+        let ends = turns_of(point);
+        match (last, begins) {
+            (Some(from), Some(begins))
+                if (ends.0 - begins.0).abs() <= MOST_TURNS && (ends.1 - begins.1).abs() <= MOST_TURNS =>
+            {
+                let at = |part: f64| (from.0 + part * (point.0 - from.0), from.1 + part * (point.1 - from.1));
+                let mut cuts = cuts((from.0, point.0), (begins.0, ends.0));
+                cuts.extend(self::cuts((from.1, point.1), (begins.1, ends.1)));
+                cuts.sort_by(f64::total_cmp);
+                cuts.push(1.0);
+                let mut before = 0.0;
+                for part in cuts {
+                    // At an edge itself it is in two turns: between the edges in one.
+                    let between = turns_of(at(0.5 * (before + part)));
+                    if between != turns {
+                        pieces.push(vec![place(at(before), between)]);
+                        turns = between;
+                    }
+                    let end = if part == 1.0 { point } else { at(part) };
+                    pieces.last_mut().into_iter().for_each(|piece| piece.push(place(end, between)));
+                    before = part;
+                }
+            }
+            _ => {
+                pieces.push(vec![place(point, ends)]);
+                turns = ends;
+            }
+        }
+        last = Some(point);
+    }
+    pieces
+}
+
+/// The parts of the way from an angle to another, in these turns, at which it passes from one turn to the next.
+fn cuts((from, to): (f64, f64), (first, last): (f64, f64)) -> Vec<f64> {
+    let (low, high) = (first.min(last), first.max(last));
+    let count = (high - low) as usize;
+    let part = |k: usize| ((2.0 * (low + k as f64) + 1.0) * PI - from) / (to - from);
+    (0..count).map(part).filter(|part| *part > 0.0 && *part < 1.0).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every angle is in its turn, those of one turn are as they were, and the edges belong to the one above.
+    #[test]
+    fn angles_are_folded() {
+        for k in -1000..=1000 {
+            let angle = 0.1 * f64::from(k);
+            let found = fold(angle);
+            assert!(found > -PI && found <= PI, "{angle}: {found}");
+            // To the rounding of a hundred.
+            assert!((found.sin() - angle.sin()).abs() + (found.cos() - angle.cos()).abs() < 1e-13, "{angle}: {found}");
+            assert!(angle.abs() > PI || found == angle);
+        }
+        assert_eq!((fold(PI), fold(-PI), fold(0.0), fold(-1e-300)), (PI, PI, 0.0, -1e-300));
+        assert!(fold(f64::NAN).is_nan());
+    }
+
+    /// No line of a piece is longer than the way between its two points, and the pieces meet the edges.
+    #[test]
+    fn curves_are_cut_at_the_edges() {
+        let curve =
+            |rate: f64| -> Vec<(f64, f64)> { (0..=200).map(|k| 0.1 * f64::from(k)).map(|t| (t, rate * t)).collect() };
+        for rate in [0.9, -0.9, 7.0, -7.0, 40.0, PI / 2.0, -10.0 * PI] {
+            let points = curve(rate);
+            let pieces = folded(&points, (false, true));
+            let turns = (rate.abs() * 20.0 / TAU + 0.5).floor() as usize;
+            // One more where the curve ends, or a piece begins, at an edge.
+            assert!((turns..=turns + 2).contains(&pieces.len()), "{rate}: {} for {turns}", pieces.len());
+            for piece in &pieces {
+                assert!(piece.iter().all(|(_, y)| y.abs() <= PI));
+                for w in piece.windows(2) {
+                    let (width, height) = (w[1].0 - w[0].0, w[1].1 - w[0].1);
+                    // The slope is that of the curve.
+                    assert!((height - rate * width).abs() < 1e-11 && width < 0.1 + 1e-12, "{rate}: {w:?}");
+                }
+            }
+            for w in pieces.windows(2) {
+                let (end, begin) = (w[0][w[0].len() - 1], w[1][0]);
+                assert!((end.0 - begin.0).abs() < 1e-12, "{rate}: {end:?} {begin:?}");
+                let edge = PI.copysign(rate);
+                assert!((end.1 - edge).abs() < 1e-12 && (begin.1 + edge).abs() < 1e-12, "{rate}: {end:?} {begin:?}");
+            }
+        }
+        // Both coordinates are angles: the line has the slope of the curve everywhere.
+        let torus: Vec<(f64, f64)> = curve(1.0).iter().map(|(t, _)| (3.0 * t, -1.7 * t)).collect();
+        let pieces = folded(&torus, (true, true));
+        assert!(pieces.len() > 10);
+        for w in pieces.iter().flat_map(|piece| piece.windows(2)) {
+            assert!((1.7 * (w[1].0 - w[0].0) + 3.0 * (w[1].1 - w[0].1)).abs() < 1e-12, "{w:?}");
+        }
+        // Nothing is cut, or drawn, where nothing is an angle; what its points do not resolve is not joined.
+        assert_eq!(folded(&torus, (false, false)), std::slice::from_ref(&torus));
+        assert_eq!(folded(&[(0.0, 0.0), (1.0, 1e300)], (false, true)).len(), 2);
+        assert!(folded(&[], (true, true)).is_empty());
+    }
+}

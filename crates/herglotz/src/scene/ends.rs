@@ -1,0 +1,158 @@
+//! Scenes of paths between given ends.
+
+use super::at::{At, Named, Numbers, Span};
+use super::file::SystemTable;
+use super::start::Ends;
+use super::{SceneError, check_used, check_version, entry, formula, integrator};
+use runtime_herglotz::{
+    AnyIntegrator, BoundaryProblem, Column, InputError, RuntimeError, System, in_words, velocity_name,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+/// A path between two positions over a time: critical for the discrete action of Herglotz' principle.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a scene of a path between ends")]
+#[schemars(title = "Scene of a path between ends")]
+pub(crate) struct EndsFile {
+    /// The version of the format: 1.
+    #[expect(dead_code, reason = "it is looked at before all else is read")]
+    pub version: Option<At<i64>>,
+    /// The Lagrangian: a formula of one to eight coordinates, or one of the catalogue.
+    pub system: At<SystemTable>,
+    /// Where the path starts: a number for each coordinate `x`; of the action `z` and the time `t`, which are 0 otherwise. An array of
+    /// coordinates has a list, or one number for all its entries. A system of the catalogue has a start of its own.
+    #[serde(default)]
+    pub start: Option<At<Named<Numbers>>>,
+    /// Where it ends: a number for each coordinate `x`, and the time `t`.
+    pub ends: At<Named<Numbers>>,
+    /// By what steps.
+    pub run: At<EndsRun>,
+}
+
+/// By what steps a path is found.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table with `steps` and `integrator`")]
+pub(crate) struct EndsRun {
+    /// The number of steps, of one length.
+    pub steps: At<usize>,
+    /// The integrator whose discrete Lagrangian it is: `gauss_4` without it; any of Gauss', or a rule as `midpoint`.
+    pub integrator: Option<At<String>>,
+}
+
+/// A scene of a path between ends that has been read and checked.
+pub struct EndsScene {
+    /// The system.
+    pub system: System,
+    /// The path that is searched for.
+    pub problem: BoundaryProblem,
+    /// The columns of its points with their names: the time, coordinates, velocities, momenta and the action.
+    pub columns: Vec<(String, Column)>,
+    text: String,
+    system_at: Span,
+    ends_at: Span,
+    integrator_at: Span,
+    steps_at: Span,
+}
+
+/// Whether a text is a scene of a path; what else is wrong with it is said by its reader.
+pub(crate) fn has_ends(text: &str) -> Option<Span> {
+    #[derive(Deserialize)]
+    struct Kind {
+        ends: Option<At<IgnoredAny>>,
+    }
+    toml::from_str::<Kind>(text).ok()?.ends.map(|ends| ends.span())
+}
+
+impl EndsScene {
+    /// Whether a text is a scene with `[ends]`.
+    pub fn is_one(text: &str) -> bool {
+        has_ends(text).is_some()
+    }
+
+    /// Reads a scene file with `[ends]`.
+    ///
+    /// ```
+    /// let scene = herglotz::EndsScene::read(r#"
+    ///     [system]
+    ///     coordinates = ["x"]
+    ///     lagrangian = "x'^2/2 - x^2/2 + gamma*z"
+    ///     parameters = { gamma = -0.2 }
+    ///     [start]
+    ///     x = 0.0
+    ///     [ends]
+    ///     x = 1.0
+    ///     t = 2.0
+    ///     [run]
+    ///     steps = 40
+    /// "#)?;
+    /// assert!(scene.system.path(&scene.problem)?.is_found());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`SceneError`] with the place in the text.
+    pub fn read(text: &str) -> Result<Self, SceneError> {
+        check_version(text)?;
+        let file: EndsFile = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
+        let EndsFile { system: table, start, ends, run, .. } = &file;
+        let entry = entry(text, table)?;
+        let formula = formula(text, table, entry)?;
+        check_used(text, &formula, table, &[])?;
+        let system_at = table.lagrangian.as_ref().map_or(table.span(), At::span);
+        let system = System::new(&formula).map_err(|error| super::want::of_formula(text, system_at, &error))?;
+        let start_at = start.as_ref().map_or(table.span(), At::span);
+        let given = Ends::read(text, &formula, (start.as_deref(), start_at), (ends, ends.span()), entry)?;
+        let by = match &run.integrator {
+            Some(name) => integrator(text, name)?,
+            None => AnyIntegrator::Gauss { stages: 4 },
+        };
+        let integrator_at = run.integrator.as_ref().map_or(run.span(), At::span);
+        if *run.steps < 2 {
+            let message = format!("`steps` is {}, where at least 2 are needed", *run.steps);
+            return Err(SceneError::at(text, run.steps.span(), message));
+        }
+        let [t0, t1] = given.t;
+        if t0 == t1 {
+            let message = format!("the path ends at {t1}, at which it starts; give a later `t`, or an earlier one");
+            return Err(SceneError::at(text, ends.get("t").map_or(ends.span(), At::span), message));
+        }
+        system.check_integrator(by).map_err(|error| SceneError::at(text, integrator_at, in_words(&error)))?;
+        let problem = BoundaryProblem { z0: given.z0, ..BoundaryProblem::new(given.q, (t0, t1), by, *run.steps) };
+        let names = formula.coordinates();
+        let of_kind = |name: fn(&str) -> String, column: fn(usize) -> Column| {
+            names.iter().enumerate().map(move |(i, x)| (name(x), column(i))).collect::<Vec<_>>()
+        };
+        let columns = [
+            vec![("t".to_owned(), Column::Time)],
+            of_kind(str::to_owned, Column::Position),
+            of_kind(velocity_name, Column::Velocity),
+            of_kind(|x| format!("p_{x}"), Column::Momentum),
+            vec![("z".to_owned(), Column::Action)],
+        ];
+        Ok(EndsScene {
+            columns: columns.concat(),
+            system,
+            problem,
+            text: text.to_owned(),
+            system_at,
+            ends_at: ends.span(),
+            integrator_at,
+            steps_at: run.steps.span(),
+        })
+    }
+
+    /// The place in the file that an error is about.
+    pub fn explain(&self, error: &RuntimeError) -> SceneError {
+        use InputError as E;
+        let span = match error {
+            RuntimeError::Argument { argument: "integrator", .. } => self.integrator_at,
+            RuntimeError::Argument { argument: "coordinates", .. } | RuntimeError::Formula(_) => self.system_at,
+            RuntimeError::Input(E::Step { .. } | E::Count { .. } | E::TooMany { .. }) => self.steps_at,
+            RuntimeError::Input(E::Unclaimed { .. } | E::Hypothesis { .. } | E::Stages { .. }) => self.integrator_at,
+            _ => self.ends_at,
+        };
+        SceneError::at(&self.text, span, error.to_string())
+    }
+}

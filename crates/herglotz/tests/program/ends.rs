@@ -1,0 +1,140 @@
+//! Paths between given ends from a scene.
+
+use crate::support::{Directory, column, fail, succeed};
+use herglotz::EndsScene;
+
+/// x'' = -x + gamma x' from 0 to 1.
+const OSCILLATOR: &str = r#"[system]
+coordinates = ["x"]
+lagrangian = "x'^2/2 - x^2/2 + gamma*z"
+parameters = { gamma = -0.2 }
+[start]
+x = 0.0
+t = 1.0
+z = 0.25
+[ends]
+x = 1.0
+t = 3.0
+[run]
+steps = 40
+"#;
+
+/// The position and the velocity in closed form.
+fn exact(t: f64) -> (f64, f64) {
+    let (gamma, w) = (-0.2, f64::sqrt(0.99));
+    let a = 1.0 / (f64::exp(gamma) * f64::sin(2.0 * w));
+    let s = t - 1.0;
+    let decay = a * f64::exp(0.5 * gamma * s);
+    (decay * f64::sin(w * s), decay * (0.5 * gamma * f64::sin(w * s) + w * f64::cos(w * s)))
+}
+
+/// The rows are those of the motion, the pictures are there, and it is told what the path is worth.
+#[test]
+fn a_path_between_ends_runs() {
+    let at = Directory::new("ends");
+    let file = at.write("scene.toml", OSCILLATOR);
+    let said = succeed(&["run", &file, "--out", &at.path("out"), "--plot"]);
+    assert!(said.starts_with("found: a path of 40 steps of 0.05 by gauss_4, in "), "{said}");
+    assert!(said.contains("not known by this integrator") && said.contains("the regularity of its ends is"), "{said}");
+    let rows = at.read("out/rows.csv");
+    assert!(rows.starts_with("t,x,x',p_x,z\n1.0000000000000000e0,0.0000000000000000e0,"), "{rows}");
+    let [t, x, v, p] = ["t", "x", "x'", "p_x"].map(|name| column(&rows, name));
+    assert_eq!((t.len(), t[40], x[40], column(&rows, "z")[0]), (41, 3.0, 1.0, 0.25));
+    for k in 0..=40 {
+        let (position, velocity) = exact(t[k]);
+        // Of order 8 with steps of 0.05.
+        assert!((x[k] - position).abs() < 1e-11 && (v[k] - velocity).abs() < 1e-10 && (p[k] - v[k]).abs() < 1e-14);
+    }
+    for picture in ["columns.svg", "phase.svg"] {
+        assert!(at.read(&format!("out/{picture}")).contains("<svg"), "{picture}");
+    }
+    // A rule of order two knows by how much its steps move the path.
+    let by_rule = at.write("rule.toml", &OSCILLATOR.replace("steps = 40", "steps = 40\nintegrator = \"midpoint\""));
+    let told = succeed(&["run", &by_rule, "--out", &at.path("rule"), "--json"]);
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    let rows = at.read("rule/rows.csv");
+    let error = column(&rows, "t").into_iter().zip(column(&rows, "x")).map(|(t, x)| (x - exact(t).0).abs());
+    let (error, estimate) = (error.fold(0.0, f64::max), told["estimated_error"].as_f64().unwrap());
+    // The range of x is a little above one.
+    assert!(0.5 * error < estimate && estimate < 2.0 * error, "{estimate} for {error}");
+    assert_eq!((&told["status"], &told["suspicion"]), (&"found".into(), &serde_json::Value::Null));
+    assert!(told["regularity"].as_f64().unwrap() > 1e-3 && told["rows"] == 41 && told["steps"] == 40, "{told}");
+    assert!((told["start"]["x'"].as_f64().unwrap() - exact(1.0).1).abs() < 1e-2, "{told}");
+    // The rate is one number.
+    assert!((told["log_factor"].as_f64().unwrap() + 0.4).abs() < 1e-3, "{told}");
+}
+
+/// Where there is no path the program ends with 1; one that may be far from every motion is flagged.
+#[test]
+fn what_a_path_is_worth_is_told() {
+    let at = Directory::new("ends_flagged");
+    let free = OSCILLATOR.replace("gamma = -0.2", "gamma = 0.0");
+    // Half a period apart the ends are conjugate; the steps move that time.
+    let half = free.replace("t = 3.0", "t = 4.14159265358979").replace("= 40", "= 40\nintegrator = \"midpoint\"");
+    let (code, told) = fail(&["run", &at.write("half.toml", &half), "--out", &at.path("half"), "--json"]);
+    assert!(code == Some(0) && told.starts_with("warning: ") && told.contains("does not resolve"), "{code:?} {told}");
+    // Exactly the time of 40 midpoint steps for half a turn.
+    let h = 2.0 * (std::f64::consts::PI / 80.0).tan();
+    let conjugate = half.replace("4.14159265358979", &format!("{:?}", 1.0 + 40.0 * h));
+    let (code, told) = fail(&["run", &at.write("none.toml", &conjugate), "--out", &at.path("none")]);
+    assert!(code == Some(1) && (told.contains("conjugate") || told.contains("stalled")), "{code:?} {told}");
+    assert!(at.read("none/rows.csv").lines().count() == 42);
+}
+
+/// What is wrong is said with its place.
+#[test]
+fn wrong_scenes_of_paths_are_refused() {
+    let at = Directory::new("ends_wrong");
+    for (from, to, expected) in [
+        ("x = 1.0", "y = 1.0", "line 10, column 1: there is no `y` in the end of a path; there are x, t"),
+        ("x = 1.0\n", "", "line 9, column 1: the coordinate `x` has no end; add `x = 0.0` to [ends]"),
+        ("t = 3.0\n", "", "line 9, column 1: the end has no time; add `t = 1.0` to [ends]"),
+        ("t = 3.0", "t = 1.0", "line 11, column 5: the path ends at 1, at which it starts"),
+        ("t = 3.0", "t = inf", "line 11, column 5: `t` is inf, where a finite number is needed"),
+        ("t = 3.0", "t = 3.0\nz = 1.0", "line 12, column 1: there is no `z` in the end of a path; there are x, t"),
+        (
+            "x = 0.0",
+            "x = 0.0\n\"x'\" = 1.0",
+            "line 7, column 1: there is no `x'` in the start of a path; there are x, z, t; did you mean `x`?",
+        ),
+        ("steps = 40\n", "", "line 12, column 1: missing field `steps`; add it"),
+        ("steps = 40", "steps = 1", "line 13, column 9: `steps` is 1, where at least 2 are needed"),
+        (
+            "steps = 40",
+            "accuracy = 1e-9",
+            "line 13, column 1: unknown name `accuracy`, expected `steps` or `integrator`",
+        ),
+        (
+            "steps = 40",
+            "steps = 40\nintegrator = \"strang\"",
+            "line 14, column 14: `integrator` is \"strang\", which has no discrete Lagrangian that is known from both ends of a step: take \
+             \"gauss_4\"",
+        ),
+        ("steps = 40", "steps = 40\nintegrator = \"gaus_4\"", "line 14, column 14: there is no integrator `gaus_4`"),
+        ("-0.2 }", "-0.2, k = 1.0 }", "line 4, column 30: the parameter `k` is not in the Lagrangian"),
+        (
+            "[run]",
+            "[want]\nrows = { every = 0.1 }\n[run]",
+            "line 12, column 2: unknown name `want`, expected one of `version`,",
+        ),
+    ] {
+        let text = OSCILLATOR.replacen(from, to, 1);
+        assert_ne!(text, OSCILLATOR, "{from}");
+        let (code, told) = fail(&["run", &at.write("bad.toml", &text), "--out", &at.path("out")]);
+        assert!(code == Some(2) && told.contains(&format!("bad.toml, {expected}")), "{told:?} for {expected:?}");
+    }
+    let file = at.write("scene.toml", OSCILLATOR);
+    for command in ["plan", "check", "compare", "sweep"] {
+        let (code, told) = fail(&[command, &file]);
+        assert!(code == Some(2) && told.contains("a path between ends is run by `herglotz run`"), "{command}: {told}");
+    }
+    let (code, told) = fail(&["run", &file, "--set", "gamma=-0.1"]);
+    assert!(code == Some(2) && told.contains("--set"), "{told}");
+    // A system of the catalogue has its own start, and arrays one number for all.
+    let scene =
+        EndsScene::read("[system]\ncatalogue = \"pendulum\"\n[ends]\ntheta = 0.5\nt = 2\n[run]\nsteps = 20\n").unwrap();
+    assert_eq!(scene.problem.ends[1], [0.5]);
+    let nine = "[system]\ncoordinates = [\"q[9]\"]\nlagrangian = \"sum(i, 0, 8, q'[i]^2)\"\n[start]\nq = 0\n[ends]\nq = 1\nt = 2\n[run]\nsteps = 20\n";
+    let (code, told) = fail(&["run", &at.write("nine.toml", nine), "--out", &at.path("out")]);
+    assert!(code == Some(2) && told.contains("line 3, column 14: `coordinates` are 9"), "{told}");
+}

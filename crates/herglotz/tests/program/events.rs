@@ -1,0 +1,190 @@
+//! Events in scenes: their own columns, the time from which they count, and angles that are folded in pictures.
+
+use crate::support::{Directory, column, succeed};
+use herglotz::Scene;
+
+/// A pendulum that turns over and over, in closed form where it is looked at: the energy `theta'^2/2 - a cos theta` is kept.
+const TURNING: &str = r#"[system]
+coordinates = ["theta"]
+lagrangian = "theta'^2/2 + a*cos(theta)"
+parameters = { a = 1.0 }
+[start]
+theta = 0.0
+"theta'" = 3.0
+[run]
+time = 100.0
+integrator = "gauss_8"
+step = 0.1
+[want]
+rows = { every = 0.5, columns = ["t", "theta", "theta'"] }
+wrap = ["theta", "phase"]
+[[want.events]]
+when = "sin(theta - 1)"
+direction = "rising"
+from = 30.0
+columns = ["energy", "turns = a*theta/(2*pi)", "p_theta - theta'"]
+[[want.events]]
+when = "sin(0.3*t)"
+columns = ["phase = 0.3*t", "turns = 7*a"]
+[sweep]
+a = [1.0, 0.5]
+"#;
+
+/// The lines of a table whose entry in a column is this text, with the table's header.
+fn lines_with(csv: &str, name: &str, entry: &str) -> String {
+    let i = csv.lines().next().unwrap().split(',').position(|column| column == name).unwrap();
+    let chosen = csv.lines().enumerate().filter(|(k, line)| *k == 0 || line.split(',').nth(i) == Some(entry));
+    chosen.map(|(_, line)| format!("{line}\n")).collect()
+}
+
+/// Each event has its columns, which are empty for the others, from its time on, in runs and in sweeps.
+#[test]
+fn events_have_columns_and_a_time_from_which_they_count() {
+    let at = Directory::new("events");
+    let file = at.write("scene.toml", TURNING);
+    succeed(&["run", &file, "--out", &at.path("out")]);
+    let all = at.read("out/events.csv");
+    let header = "event,t,theta,theta',p_theta,z,energy,turns,p_theta - theta',phase\n";
+    assert!(all.starts_with(header), "{all}");
+    let first = lines_with(&all, "event", "sin(theta - 1)").replace(",\n", "\n").replace(",phase\n", "\n");
+    let [t, theta, energy, turns, none] =
+        ["t", "theta", "energy", "turns", "p_theta - theta'"].map(|name| column(&first, name));
+    // A turn takes between 2 pi/3 and 2 pi/sqrt(5), so that some 25 to 34 are in what is left of the time.
+    assert!((25..=34).contains(&t.len()) && t.iter().all(|t| *t >= 30.0), "{t:?}");
+    for i in 0..t.len() {
+        // 3^2/2 - cos 0, to the rounding of a hundred steps of order 16 that resolve the motion.
+        assert!((energy[i] - 3.5).abs() < 1e-12 && none[i] == 0.0, "{first}");
+        assert!((turns[i] * std::f64::consts::TAU - theta[i]).abs() < 1e-13 * theta[i], "{first}");
+        // At one place of the circle.
+        assert!((theta[i] - 1.0).sin().abs() < 1e-12, "{first}");
+    }
+    let second = lines_with(&all, "event", "sin(0.3*t)");
+    assert_eq!(second.lines().count() - 1, (30.0 / std::f64::consts::PI) as usize);
+    assert!(second.lines().nth(1).unwrap().contains(",,7.0000000000000000e0,,3.14159265358979"), "{second}");
+
+    // The same of a member, with its own parameters.
+    let told = succeed(&["sweep", &file, "--out", &at.path("sweep"), "--plot"]);
+    assert!(told.starts_with("2 members: 2 completed"), "{told}");
+    let all = at.read("sweep/events.csv");
+    assert!(all.starts_with(&format!("index,a,{header}")), "{all}");
+    let of_first = lines_with(&lines_with(&all, "event", "sin(theta - 1)"), "index", "0");
+    let of_first: Vec<&str> = of_first.lines().skip(1).map(|line| line.split_once(",sin").unwrap().1).collect();
+    let of_run: Vec<&str> = first.lines().skip(1).map(|line| line.split_once("sin").unwrap().1).collect();
+    assert_eq!(of_first.len(), of_run.len());
+    for (member, run) in of_first.iter().zip(of_run) {
+        assert_eq!(member.trim_end_matches(','), run);
+    }
+    let of_other = lines_with(&lines_with(&all, "event", "sin(theta - 1)"), "index", "1");
+    for (theta, turns) in column(&of_other, "theta").iter().zip(column(&of_other, "turns")) {
+        assert!((turns - 0.5 * theta / std::f64::consts::TAU).abs() < 1e-13 * turns, "{of_other}");
+    }
+    // The columns of the first event are drawn as the coordinates are.
+    for i in 0..4 {
+        assert!(at.read(&format!("sweep/sweep_events_{i}.svg")).contains("<svg"), "{i}");
+    }
+    assert!(at.read("sweep/sweep_events_2.svg").contains(">turns<"));
+}
+
+/// A run that goes on from a checkpoint writes the same events; one whose events have other columns does not go on.
+#[test]
+fn columns_of_events_after_an_interruption() {
+    let at = Directory::new("events_resumed");
+    // sigma is that of the whole motion, also in what follows an interruption.
+    let damped = TURNING.replace("cos(theta)\"", "cos(theta) - 1e-3*z\"").replace("\"energy\"", "\"sigma\"");
+    let file = at.write("scene.toml", &damped);
+    succeed(&["run", &file, "--out", &at.path("whole")]);
+    let parts = ["run", &file, "--out", &at.path("parts")];
+    assert_eq!(crate::support::fail(&[&parts[..], &["--interrupt-at", "0.5"]].concat()).0, Some(1));
+    let other = at.write("other.toml", &damped.replace("7*a", "8*a"));
+    let (code, told) = crate::support::fail(&["run", &other, "--out", &at.path("parts"), "--resume"]);
+    assert!(code == Some(2) && told.contains("the scene is not the one"), "{told}");
+    succeed(&[&parts[..], &["--resume"]].concat());
+    let events = at.read("whole/events.csv");
+    assert_eq!(events, at.read("parts/events.csv"));
+    let first = lines_with(&events, "event", "sin(theta - 1)").replace(",\n", "\n").replace(",phase\n", "\n");
+    for (t, sigma) in column(&first, "t").iter().zip(column(&first, "sigma")) {
+        assert!((sigma - (-1e-3 * t).exp()).abs() < 1e-14, "{t}: {sigma}");
+    }
+}
+
+/// Backward in time those before the time count.
+#[test]
+fn events_of_a_motion_that_runs_backward() {
+    let at = Directory::new("events_backward");
+    let backward = TURNING.replace("time = 100.0", "time = -100.0").replace("from = 30.0", "from = -30.0");
+    let file = at.write("scene.toml", &backward);
+    succeed(&["run", &file, "--out", &at.path("out")]);
+    let first = lines_with(&at.read("out/events.csv"), "event", "sin(theta - 1)");
+    let t = column(&first, "t");
+    assert!((25..=34).contains(&t.len()) && t.iter().all(|t| (-100.0..=-30.0).contains(t)), "{t:?}");
+}
+
+#[test]
+fn wrong_columns_and_times_of_events_are_refused() {
+    for (from, to, expected) in [
+        ("from = 30.0", "from = nan", "line 18, column 8: `from` is NaN, where a finite number is needed"),
+        ("from = 30.0", "from = 300.0", "line 18, column 8: the time 300 is not between 0, at which the motion starts"),
+        (
+            "from = 30.0",
+            "from = 30.0\nterminal = true",
+            "line 18, column 8: a terminal event counts from the start; leave out `from` or `terminal`",
+        ),
+        ("\"energy\"", "\"enrgy\"", "line 19, column 13: unknown name `enrgy`; did you mean `energy`?"),
+        ("\"energy\"", "\"theta'\"", "line 19, column 12: every event has `theta'` already"),
+        ("\"energy\"", "\"event = theta\"", "line 19, column 12: every event has `event` already"),
+        ("\"energy\"", "\"turns = t\"", "line 19, column 25: the event has two columns `turns`"),
+        (
+            "a*cos(theta)\"",
+            "a*cos(theta) - 0.1*z^2\"|\"energy\"|\"sigma\"",
+            "line 19, column 12: `sigma` and `log_factor` are known at events where L_z is constant alone",
+        ),
+        (
+            "a*cos(theta)\"",
+            "a*cos(theta) - 0.1*z^2\"|sin(theta - 1)|log_factor + 1",
+            "line 16, column 8: `sigma` and `log_factor` are known at events where L_z is constant alone",
+        ),
+        (
+            "wrap = [\"theta\", \"phase\"]",
+            "wrap = [\"thta\"]",
+            "line 14, column 9: there is no column `thta` to be folded; there are theta, t, theta', p_theta, z, energy, turns, p_theta - theta', phase; \
+             did you mean `theta`?",
+        ),
+        ("a = 1.0 }", "a = 1.0, b = 2.0 }", "line 4, column 25: the parameter `b` is not in the Lagrangian"),
+    ] {
+        let mut to = to.split('|');
+        let mut text = TURNING.replacen(from, to.next().unwrap(), 1);
+        if let (Some(from), Some(to)) = (to.next(), to.next()) {
+            text = text.replacen(from, to, 1);
+        }
+        assert_ne!(text, TURNING);
+        let found = Scene::read(&text).err().map(|error| error.to_string());
+        assert!(found.as_ref().is_some_and(|found| found.starts_with(expected)), "{found:?} for {expected:?}");
+    }
+    // A parameter of a column alone is used.
+    assert!(Scene::read(&TURNING.replace("a = 1.0 }", "a = 1.0, b = 2.0 }").replace("7*a", "7*b")).is_ok());
+}
+
+/// What an axis of angles is drawn with.
+const HALF_TURN: &str = ">\u{2212}\u{3c0}<";
+
+/// Angles are folded in all pictures of them, and in no table.
+#[test]
+fn wrapped_columns_are_folded_in_pictures() {
+    let at = Directory::new("wrap");
+    let file = at.write("scene.toml", TURNING);
+    succeed(&["run", &file, "--out", &at.path("out"), "--plot"]);
+    succeed(&["sweep", &file, "--out", &at.path("sweep"), "--plot"]);
+    let pictures = ["out/columns.svg", "out/phase.svg", "sweep/sweep_0.svg", "sweep/sweep_events_0.svg"];
+    for picture in pictures {
+        assert!(at.read(picture).contains(HALF_TURN), "{picture}");
+    }
+    assert!(column(&at.read("out/rows.csv"), "theta").last().unwrap() > &100.0);
+    // Without it they are as wide as the motion is.
+    let free = at.write("free.toml", &TURNING.replace("wrap = [\"theta\", \"phase\"]\n", ""));
+    succeed(&["run", &free, "--out", &at.path("free"), "--plot"]);
+    succeed(&["sweep", &free, "--out", &at.path("free"), "--plot"]);
+    for picture in pictures {
+        let name = picture.split_once('/').unwrap().1;
+        assert!(!at.read(&format!("free/{name}")).contains(HALF_TURN), "{picture}");
+    }
+}

@@ -1,0 +1,65 @@
+//! What tests of the program share: a directory, and its runs.
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+pub const REPOSITORY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+
+/// A directory of a test, empty at its beginning and removed at its end.
+pub struct Directory(PathBuf);
+
+impl Directory {
+    pub fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("herglotz_{name}_{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).unwrap();
+        Directory(path)
+    }
+
+    pub fn write(&self, name: &str, text: &str) -> String {
+        std::fs::write(self.0.join(name), text).unwrap();
+        self.path(name)
+    }
+
+    pub fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().unwrap().to_owned()
+    }
+
+    pub fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.0.join(name)).unwrap()
+    }
+}
+
+impl Drop for Directory {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn herglotz(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_herglotz")).args(arguments).output().unwrap()
+}
+
+/// Runs it, and gives what it has written to the standard output.
+pub fn succeed(arguments: &[&str]) -> String {
+    let output = herglotz(arguments);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {told}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Runs it, and gives how it ends with what it has written to the standard error.
+pub fn fail(arguments: &[&str]) -> (Option<i32>, String) {
+    let output = herglotz(arguments);
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+/// The numbers of a column of a table.
+pub fn column(csv: &str, name: &str) -> Vec<f64> {
+    let i = csv.lines().next().unwrap().split(',').position(|column| column == name).unwrap();
+    csv.lines().skip(1).map(|line| line.split(',').nth(i).unwrap().parse().unwrap()).collect()
+}
+
+pub fn scene(name: &str) -> String {
+    format!("{REPOSITORY}/scenes/{name}.toml")
+}

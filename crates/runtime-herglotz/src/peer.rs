@@ -1,0 +1,73 @@
+//! The motion as a system of first order, for integrators of others.
+
+use crate::kernel::Kernel;
+use crate::{Motion, Outcome, RuntimeError, Start, System};
+use std::sync::Arc;
+
+/// An integrator of others that a [comparison](System::compare) measures beside those of the library.
+pub trait Peer {
+    /// Its name.
+    fn name(&self) -> &str;
+
+    /// Its order.
+    fn order(&self) -> u32;
+
+    /// The end of a motion to a relative tolerance of its variables; `None` where it gives up.
+    fn run(&self, motion: &FirstOrder, tolerance: f64) -> Option<PeerEnd>;
+}
+
+/// Where a peer has led a motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PeerEnd {
+    /// The variables, as those of [`FirstOrder::start`].
+    pub state: Vec<f64>,
+    /// The steps taken.
+    pub steps: usize,
+    /// The evaluations of the field.
+    pub evaluations: u64,
+}
+
+/// A motion as a system `y' = f(t, y)` of first order: `y` is `(q, v)`, and the action `z` where accelerations depend on it.
+pub struct FirstOrder {
+    kernel: Arc<dyn Kernel>,
+    /// The variables at the start.
+    pub start: Vec<f64>,
+    /// The time of the start.
+    pub t0: f64,
+    /// The time of the end.
+    pub end: f64,
+    /// The size of `(q, v)` at the end, to which the error there is relative: absolute tolerances are in units of it.
+    pub size: f64,
+}
+
+impl FirstOrder {
+    /// Of a motion, and where it leads.
+    ///
+    /// # Errors
+    /// Those of [`System::geometry`] at the start.
+    pub(crate) fn new(system: &System, motion: &Motion, end: &Outcome) -> Result<Self, RuntimeError> {
+        let (start, n) = (&motion.start, system.dimension());
+        // The velocity of a momentum, too.
+        let field = system.geometry(start)?.herglotz_field;
+        let mut y = [start.q.as_slice(), field.get(..n).unwrap_or_default()].concat();
+        if !system.structure().has_constant_rate() {
+            y.push(start.z);
+        }
+        let at_end = end.q.iter().chain(end.v.iter().flatten());
+        let size = at_end.map(|x| x * x).sum::<f64>().sqrt();
+        Ok(FirstOrder { kernel: system.kernel.clone(), start: y, t0: start.t, end: motion.end, size })
+    }
+
+    /// The rates `f(t, y)`; not numbers where L is not defined or not regular.
+    pub fn rates(&self, t: f64, y: &[f64], to: &mut [f64]) {
+        self.kernel.rates(t, y, to);
+    }
+
+    /// Position and momentum of a state at the end.
+    pub(crate) fn end_of(&self, system: &System, y: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+        let n = system.dimension();
+        let (q, v) = (y.get(..n)?, y.get(n..2 * n)?);
+        let z = y.get(2 * n).copied().unwrap_or(0.0);
+        Some((q.to_vec(), system.geometry(&Start::new(self.end, q, v, z)).ok()?.momentum))
+    }
+}
