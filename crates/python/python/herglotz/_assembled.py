@@ -74,7 +74,7 @@ class AssembledSolution:
         AssembledSolution
             From the end of this motion on.
         """
-        at, q, p, z = self._end
+        at, q, p, z, _ = self._end
         _, asked, every, (integrator, step, steps), conformal_factor = self._request
         asked = np.atleast_1d(np.asarray(asked, dtype=float))
         start = asked[0] if len(asked) > 1 else 0.0
