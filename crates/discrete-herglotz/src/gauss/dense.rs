@@ -9,6 +9,7 @@ use crate::run::saved::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint, legendre_polynomials, linear};
 use std::array::from_fn;
+use std::sync::OnceLock;
 
 /// The state at the start of a step as a route holds it: momenta, or velocities in the condensed routes.
 #[derive(Clone, Copy, Debug)]
@@ -151,9 +152,30 @@ impl<const N: usize> DenseStep<N> {
         self.h
     }
 
-    /// The number of stages.
-    pub(crate) fn stages(&self) -> usize {
-        self.s
+    /// The parts in which [`sketch`](Self::sketch) divides the step.
+    pub(crate) fn parts(&self) -> usize {
+        self.s + 2
+    }
+
+    /// The states between the parts of the step, all at once.
+    pub(crate) fn sketch(&self, to: &mut Vec<PhasePoint<N>>) {
+        let table = integrals_to_parts(self.s);
+        let along = |series: &Series| {
+            let mut sums = [0.0; BETWEEN_PARTS];
+            for (row, c) in table.iter().zip(&series.0).take(self.s) {
+                for (sum, integral) in sums.iter_mut().zip(row) {
+                    *sum += self.h * c * integral;
+                }
+            }
+            sums
+        };
+        let (moved, pushed) = (self.v.each_ref().map(along), self.force.each_ref().map(along));
+        let (rate, action) = (along(&self.rate), along(&self.l));
+        to.extend((0..self.parts() - 1).map(|i| PhasePoint {
+            q: SVector::from_fn(|d, _| self.start.q[d] + moved[d][i]),
+            p: SVector::from_fn(|d, _| (self.start.p[d] + pushed[d][i]) / (1.0 - rate[i])),
+            z: self.start.z + action[i],
+        }));
     }
 
     /// The state at a fraction of the step.
@@ -178,6 +200,25 @@ fn integrals(s: usize, p: &[f64; POLYNOMIALS], fraction: f64) -> [f64; POLYNOMIA
         integrals[k] = (p[k + 1] - p[k - 1]) * HALF_OF_ODD[k];
     }
     integrals
+}
+
+/// The most states between the parts of a step.
+const BETWEEN_PARTS: usize = MOST + 1;
+
+/// The integrals of the Legendre polynomials to the ends of the parts of a step, of which there are s + 2: `[k][i]` to the end of part i.
+fn integrals_to_parts(s: usize) -> &'static [[f64; BETWEEN_PARTS]; MOST] {
+    static TABLES: [OnceLock<Box<[[f64; BETWEEN_PARTS]; MOST]>>; MOST] = [const { OnceLock::new() }; MOST];
+    TABLES[s.clamp(1, MOST) - 1].get_or_init(|| {
+        let mut table = Box::new([[0.0; BETWEEN_PARTS]; MOST]);
+        for i in 0..=s {
+            let fraction = (i + 1) as f64 / (s + 2) as f64;
+            let p = legendre_polynomials::<_, POLYNOMIALS>(s, 2.0 * fraction - 1.0);
+            for (row, integral) in table.iter_mut().zip(integrals(s, &p, fraction)) {
+                row[i] = integral;
+            }
+        }
+        table
+    })
 }
 
 /// `1 / (2 (2k + 1))`.

@@ -136,13 +136,8 @@ impl<'f, const N: usize> Events<'f, N> {
     /// The crossings in a step, in the order of the run, and why there are no more.
     fn in_step(&mut self, step: &mut LastStep<'_, N>, way: Way<'_, N>) -> (Vec<Crossing<N>>, Option<StepError>) {
         let (mut found, mut cause) = (Vec::new(), None);
-        let parts = step.parts();
-        self.sketch.clear();
-        for k in 1..parts {
-            match step.about(k as f64 / parts as f64) {
-                Ok(x) => self.sketch.push(x),
-                Err(cause) => return (found, Some(cause)),
-            }
+        if let Err(cause) = step.sketch(&mut self.sketch) {
+            return (found, Some(cause));
         }
         let backward = step.span().1 < step.span().0;
         let before = |a: f64, b: f64| if backward { a > b } else { a < b };

@@ -254,8 +254,22 @@ impl<const N: usize> LastStep<'_, N> {
     }
 
     /// The parts in which a search along the step looks at it.
-    pub(super) fn parts(&mut self) -> usize {
-        self.curve().map_or(4, |curve| curve.stages() + 2)
+    fn parts(&mut self) -> usize {
+        self.curve().map_or(4, DenseStep::parts)
+    }
+
+    /// About the states between these parts, at no cost of a step.
+    pub(super) fn sketch(&mut self, to: &mut Vec<PhasePoint<N>>) -> Result<(), StepError> {
+        to.clear();
+        if let Some(curve) = self.curve() {
+            curve.sketch(to);
+            return Ok(());
+        }
+        let parts = self.parts();
+        for k in 1..parts {
+            to.push(self.about(k as f64 / parts as f64)?);
+        }
+        Ok(())
     }
 
     fn curve(&mut self) -> Option<&DenseStep<N>> {

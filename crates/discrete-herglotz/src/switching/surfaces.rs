@@ -95,7 +95,7 @@ pub(super) struct StepCurve<const N: usize> {
 
 impl<const N: usize> StepCurve<N> {
     fn parts(&self) -> usize {
-        self.dense.as_ref().map_or(PARTS, |dense| dense.stages() + 2)
+        self.dense.as_ref().map_or(PARTS, DenseStep::parts)
     }
 
     pub fn span(&self) -> f64 {
