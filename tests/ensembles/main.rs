@@ -393,7 +393,8 @@ fn bad_input_is_refused_before_work_begins() {
         Err(EnsembleError::Member { index: 0, cause }) => cause,
         other => unreachable!("{other:?}"),
     };
-    assert_eq!(refused(of(9).run(Until::Time(0.0), fold)), InputError::Span { span: 0.0 });
+    let endless = refused(of(9).run(Until::Time(f64::INFINITY), fold));
+    assert_eq!(endless, InputError::Span { span: f64::INFINITY });
     assert!(matches!(refused(of(9).steps(Steps::Size(-1.0)).run(until, fold)), InputError::Step { .. }));
     let none = Ensemble::new(&pendulum, 0.0, 9, pendulum_start);
     assert_eq!(refused(none.run(until, fold)), InputError::NoIntegrator);
@@ -403,6 +404,24 @@ fn bad_input_is_refused_before_work_begins() {
     let nowhere = Ensemble::new(&pendulum, 0.0, 9, |_| VelocityPoint::new([f64::NAN], [0.0], 0.0)).by(by);
     assert!(matches!(refused(nowhere.steps(Steps::Count(4)).run(until, fold)), InputError::Geometry(_)));
     assert!(Integrator::<Pendulum, 1>::in_lanes(&by).is_some());
+}
+
+/// To the time at which they start all members are their starts, in lanes and by themselves.
+#[test]
+fn an_ensemble_to_its_start_is_the_starts() {
+    let pendulum = Pendulum { gamma: -0.1 };
+    for by in integrators() {
+        for steps in [Steps::Count(4), Steps::Size(0.1)] {
+            let ensemble = Ensemble::new(&pendulum, 0.5, 9, pendulum_start).by(by).steps(steps);
+            for member in members(&ensemble, Until::Time(0.5)) {
+                let ending = member.ending.unwrap();
+                assert_eq!((ending.status, ending.suspicion), (Status::Completed, None), "{by:?}, {steps:?}");
+                assert_eq!((ending.steps, ending.t), (0, 0.5), "{by:?}, {steps:?}");
+                let (start, found) = (pendulum_start(member.index), ending.state);
+                assert_eq!((found.q, found.p, found.z), (start.q, start.v, start.z), "{by:?}, {steps:?}");
+            }
+        }
+    }
 }
 
 #[test]
