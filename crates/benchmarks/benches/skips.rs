@@ -7,7 +7,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::{
-    AnyIntegrator, InputError, Outcome, Problem, Rows, Run, SplittingScheme, Status, Steps, Until,
+    AnyIntegrator, Event, Events, InputError, Outcome, Problem, Rows, Run, SplittingScheme, Status, Steps, Until,
 };
 use std::hint::black_box;
 use std::io::Write;
@@ -107,6 +107,17 @@ fn lines() -> Result<Vec<Line>, InputError> {
         swing.by(nystrom).steps(Steps::Size(0.2)).without_action().observe(&mut rows).run(late)
     };
     let unrecorded = || swing.by(nystrom).steps(Steps::Size(0.2)).without_action().run(late);
+    // A row in each step, between its ends, and some three hundred crossings.
+    let by_eight = || swing.by(eight).steps(Steps::Size(1.0)).without_action();
+    let times: Vec<f64> = (0..1000).map(|k| f64::from(k) + 0.37).collect();
+    let between = || {
+        let mut rows = Rows::at(times.iter().copied())?.without_action();
+        by_eight().observe(&mut rows).run(late)
+    };
+    let crossing = |at: f64| {
+        let mut lowest = Events::new([Event::new(move |_, x| x.q[0] - at)]);
+        by_eight().observe(&mut lowest).run(late)
+    };
 
     let oscillator = HarmonicOscillator { gamma: -0.05 };
     let unquadratic = Claiming(oscillator, Structure { quadratic: false, ..oscillator.structure() });
@@ -144,6 +155,13 @@ fn lines() -> Result<Vec<Line>, InputError> {
             by(AnyIntegrator::Gauss { stages: 3 }),
         )?,
         line(("rows", "pendulum, blanes_moan_6"), whole(recorded), whole(unrecorded))?,
+        line(("rows between steps", "pendulum, gauss_8"), whole(between), whole(|| by_eight().run(late)))?,
+        line(
+            ("event without a crossing", "pendulum, gauss_8"),
+            whole(|| crossing(9.0)),
+            whole(|| by_eight().run(late)),
+        )?,
+        line(("an event", "pendulum, gauss_8"), whole(|| crossing(0.0)), whole(|| crossing(9.0)))?,
         line(
             ("conformal factor", "quadratic in z, gauss_8"),
             whole(|| with_factor.run()),
