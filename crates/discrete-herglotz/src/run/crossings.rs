@@ -226,6 +226,17 @@ impl<const N: usize> Event<'_, N> {
             if change.abs() <= 0.5 * ROUNDINGS {
                 return Ok(Some(at));
             }
+            // So near to two states the motion is a line to round-off, and another correction would change nothing.
+            if let Some((before, _, (_, from))) = last
+                && let gap = tau - before
+                && (change * gap).abs() <= f64::EPSILON / 16.0
+                && change * change < 0.5 * ROUNDINGS * gap.abs()
+            {
+                let part = -change / gap;
+                let (q, p) = (at.1.q + (at.1.q - from.q) * part, at.1.p + (at.1.p - from.p) * part);
+                let state = PhasePoint { q, p, z: at.1.z + (at.1.z - from.z) * part };
+                return Ok(Some((step.time(tau - change), state)));
+            }
             // Of two that only rounding tells from each other that which is nearer.
             if let Some((_, g_before, before)) = last
                 && g.abs() > 0.25 * g_before.abs()
