@@ -15,6 +15,7 @@ mod motions {
     mod rest;
     mod round_off;
     mod unresolved;
+    mod velocity;
     mod watch;
 }
 

@@ -26,6 +26,14 @@ pub enum InputError {
         /// The error that was asked for.
         wanted: f64,
     },
+    /// A scale of a coordinate is not a positive finite number.
+    #[error("the scale of coordinate {index} is {scale}; scales are sizes of the coordinates, positive and finite")]
+    Scale {
+        /// The coordinate, counted from 0.
+        index: usize,
+        /// The scale that was passed.
+        scale: f64,
+    },
     /// A wanted accuracy is not reached.
     #[error("the wanted relative error {wanted:e} is not {}: {cause}", how_near(*wanted, *reached))]
     Accuracy {
@@ -228,8 +236,8 @@ pub enum StepError {
     },
     /// A step is divided as long as its parts do not resolve the motion, and not even the shortest does, or they are too many.
     #[error(
-        "the step cannot be divided into parts that resolve the motion near t = {t}: its misfit there is round-off, or that of a kink that \
-         the Lagrangian does not tell; allow a larger misfit, take shorter steps, or end the run before"
+        "the step cannot be divided into parts that resolve the motion near t = {t}: the defect of its curve there is that of \
+         round-off, or of a kink that the Lagrangian does not tell; allow a larger one, take shorter steps, or end the run before"
     )]
     Undivided {
         /// The time.

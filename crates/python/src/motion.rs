@@ -126,6 +126,7 @@ impl Motion {
         columns: Vec<String>,
         conformal_factor: bool,
         estimate: bool,
+        scales: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let formula = system.inner.formula();
         let (q, rate, is_momentum, z, near) = start;
@@ -170,6 +171,7 @@ impl Motion {
         }
         let events = self::events(events, formula)?;
         let start = Start { t: first, q, rate, z: number("z0", &z)? };
+        let scales = scales.map(|scales| numbers("scales", &scales)).transpose()?;
         let signals = Signals::new();
         let motion = runtime_herglotz::Motion {
             rows,
@@ -177,6 +179,7 @@ impl Motion {
             events,
             conformal_factor,
             estimate,
+            scales,
             interrupt: Some(signals.interrupt()),
             ..runtime_herglotz::Motion::new(start, end, way)
         };

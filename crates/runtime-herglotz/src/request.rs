@@ -148,6 +148,8 @@ pub struct Motion {
     pub conformal_factor: bool,
     /// Whether the outcome has an estimate of its error: of given steps by a run with half of them, which costs twice as much.
     pub estimate: bool,
+    /// The scale of each coordinate that errors are measured by; without it they are relative to the size of the whole state.
+    pub scales: Option<Vec<f64>>,
     /// Whether every step is handed to [`Watch::node`](crate::Watch::node).
     pub nodes: bool,
     /// Whether it is refused where it could not be interrupted and [resumed](crate::System::resume).
@@ -169,6 +171,7 @@ impl Motion {
             action: true,
             conformal_factor: false,
             estimate: false,
+            scales: None,
             nodes: false,
             resumable: false,
             interrupt: None,

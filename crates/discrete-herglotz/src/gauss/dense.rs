@@ -251,3 +251,30 @@ impl Series {
         (0..s).fold(0.0, |sum, k| sum + self.0[k] * p[k])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contact_geom::larger;
+
+    /// The states between the parts are those of the curve, to some roundings of each of its terms.
+    #[test]
+    fn a_sketch_is_on_the_curve() {
+        for s in 1..=MOST {
+            let value = |i: usize, seed: f64| (1.3 * i as f64 + seed).sin();
+            let stages = |seed: f64| from_fn(|i| if i < s { value(i, seed) } else { 0.0 });
+            let mut solved = Solved::<2>::ZERO;
+            (solved.v, solved.force) = ([stages(0.1), stages(0.7)], [stages(1.9), stages(2.3)]);
+            (solved.rate, solved.l) = (stages(3.1), stages(0.4));
+            let curve = DenseStep::new(s, 0.5, 0.3, PhasePoint::new([1.0, -2.0], [0.4, 0.9], 0.2), &solved);
+            let mut sketch = Vec::new();
+            curve.sketch(&mut sketch);
+            assert_eq!(sketch.len() + 1, curve.parts());
+            for (i, found) in sketch.iter().enumerate() {
+                let at = curve.at_fraction((i + 1) as f64 / curve.parts() as f64);
+                let off = larger((found.q - at.q).amax(), larger((found.p - at.p).amax(), (found.z - at.z).abs()));
+                assert!(off <= 16.0 * s as f64 * f64::EPSILON, "{s} stages, part {i}: {off:e}");
+            }
+        }
+    }
+}

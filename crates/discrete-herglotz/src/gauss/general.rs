@@ -79,8 +79,8 @@ pub(super) struct General<'a, L, P, const N: usize> {
     parked: Option<Box<StageNewton<N>>>,
     /// Whether the stages of the next step are solved: v, l and falling are theirs.
     pub(super) solved: bool,
-    /// Whether these are a guess of it.
-    foretold: bool,
+    /// Whether these are a prediction of it.
+    predicted: bool,
     /// A velocity of the motion at the end of the last step, or before it: an iteration that fails leaves none in the stages.
     pub(super) known: [f64; N],
     pub evaluations: u64,
@@ -126,15 +126,14 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             misfit: 0.0,
             parked: None,
             solved: false,
-            foretold: false,
-            known: [0.0; N],
+            predicted: false,
+            known: (*v).into(),
             evaluations: 0,
         };
         general.q = from_fn(|i| state.q[i].into());
         general.p = from_fn(|i| state.p[i].into());
         general.z = state.z.into();
         general.guess(v);
-        general.known = (*v).into();
         general
     }
 
@@ -164,12 +163,12 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
 
     /// Has the next step taken from stages that are solved: their velocities, actions' rates and factors.
     pub fn accept(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, f64, f64)>) {
-        self.foretell(stages);
-        (self.foretold, self.solved) = (false, true);
+        self.predict(stages);
+        (self.predicted, self.solved) = (false, true);
     }
 
-    /// Has the next step guessed from the same of stages that are near.
-    pub fn foretell(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, f64, f64)>) {
+    /// Has the iteration of the next step begin from the same of stages that are near.
+    pub fn predict(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, f64, f64)>) {
         self.l = Stages::ZERO;
         for (i, (v, l, rho)) in stages.enumerate() {
             // Beyond the last stage it is repeated.
@@ -179,7 +178,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             self.l.0[i] = self.table.weights.0[i] * l;
             self.falling.0[i..].fill(1.0 - rho);
         }
-        (self.warm, self.foretold) = (false, true);
+        (self.warm, self.predicted) = (false, true);
     }
 
     /// Takes Newton's Jacobian anew, at the middle stage of the last step.
@@ -289,7 +288,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
     pub fn step<S: Simd>(&mut self, t: f64) -> AfterSweep {
-        let (solved, foretold) = (std::mem::take(&mut self.solved), std::mem::take(&mut self.foretold));
+        let (solved, predicted) = (std::mem::take(&mut self.solved), std::mem::take(&mut self.predicted));
         // Without a step before, from a motion of constant velocity.
         let mut cold = !self.warm || self.newton.is_some();
         if self.warm && !solved {
@@ -297,7 +296,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             if self.newton.is_some() {
                 self.table.m.apply(&self.rate, self.table.s, &mut self.falling, |_| Lanes::<S>::splat(0.0));
             }
-        } else if !solved && !foretold {
+        } else if !solved && !predicted {
             self.l = Stages::ZERO;
             self.falling = Stages::ZERO;
             if !P::PHYSICAL {

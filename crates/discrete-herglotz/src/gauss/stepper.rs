@@ -509,7 +509,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             let part = h / longer.length();
             // An action with a pole has no polynomial.
             let stages = Coefficients::of(s).c.iter().take(s).map(|c| longer.stage(part * c.0));
-            run.foretell(stages.map(|(v, l, rho)| (v, if l.is_finite() { l } else { 0.0 }, rho)));
+            run.predict(stages.map(|(v, l, rho)| (v, if l.is_finite() { l } else { 0.0 }, rho)));
         }
     }
 

@@ -110,13 +110,31 @@ pub(super) fn choose<'p, L: Lagrangian<N>, const N: usize>(
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Err(InputError::Tolerance { wanted });
     }
+    let choose = |request: &Request<'p, L, N>| {
+        choose_with(&mut Pilots::new(request, wanted)).map_err(|refused| request.by_rounding_of_velocity(refused))
+    };
     let Some(t_end) = terminal.and_then(|terminal| request.time_of_end(terminal)) else {
-        return choose_with(&mut Pilots::new(request, wanted));
+        return choose(request);
     };
     // What lies beyond the end is not followed.
     let span = t_end - request.problem.t0;
     let part = Request { t_end, span, integrator: request.integrator.clone(), ..*request };
-    Ok(choose_with(&mut Pilots::new(&part, wanted))?.going_on(request.span / span))
+    Ok(choose(&part)?.going_on(request.span / span))
+}
+
+impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
+    /// An accuracy that is refused, for the rounding of the velocity where that alone is larger: a momentum `p = v + A(q)` determines v up to the
+    /// rounding of A.
+    fn by_rounding_of_velocity(&self, refused: InputError) -> InputError {
+        let Problem { lagrangian, start, state, t0, .. } = self.problem;
+        let InputError::Accuracy { wanted, .. } = refused else { return refused };
+        let rounding = inverted(&lagrangian.hessian(*t0, start).vv)
+            .map_or(0.0, |inverse| (inverse.abs() * state.p.abs()).norm() * f64::EPSILON / start.v.norm());
+        if rounding > wanted && rounding.is_finite() {
+            return InputError::Accuracy { wanted, reached: rounding, cause: Obstacle::RoundOff };
+        }
+        refused
+    }
 }
 
 /// The same with a budget.

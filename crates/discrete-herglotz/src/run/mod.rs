@@ -32,6 +32,7 @@ pub(crate) mod rows;
 pub(crate) mod saved;
 mod stepper;
 mod track;
+mod velocities;
 pub(crate) mod verified;
 pub(crate) mod watch;
 
@@ -121,6 +122,8 @@ struct Request<'p, L, const N: usize> {
     span: f64,
     integrator: Option<Shared<'p, L, N>>,
     needs: Needs,
+    /// What the errors of the coordinates are measured by, where that is given.
+    scales: Option<SVector<f64, N>>,
 }
 
 /// A [`Problem`] with an integrator, steps and observers.
@@ -145,6 +148,7 @@ pub struct Run<'p, 'o, L, const N: usize> {
     integrator: Option<Shared<'p, L, N>>,
     length: Option<Length<'p, L, N>>,
     needs: Needs,
+    scales: Option<SVector<f64, N>>,
     estimated: bool,
     observers: Vec<Box<dyn Observer<N> + 'o>>,
     from: Option<Interrupted>,
@@ -157,6 +161,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
             integrator: None,
             length: None,
             needs: Needs::ACTION,
+            scales: None,
             estimated: false,
             observers: Vec::new(),
             from: None,
@@ -174,9 +179,9 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     }
 
     /// The same by steps of one length for the whole run, of time or of the time of the Lagrangian's clock, chosen by pilot runs so that the
-    /// error of (q, p), relative to its size at the time or at the end, is at most this at every tenth of the span. The pilot runs cost
-    /// a small multiple of the run; what is narrower than the distance of their nodes, about the step divided by four times the stages, may
-    /// go unseen.
+    /// error of (q, p), relative to its size at the time or at the end, is at most this at every tenth of the span, and that of v, relative to the
+    /// largest speed of the motion. The pilot runs cost a small multiple of the run; what is narrower than the distance of their nodes, about the
+    /// step divided by four times the stages, may go unseen.
     ///
     /// Where an observer's event ends the run, the trial runs end there too.
     ///
@@ -186,7 +191,14 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
         Run { length: Some(Length::For(wanted, accuracy::choose)), ..self }
     }
 
-    /// The same under the eyes of one more observer, which sees what those before it have seen.
+    /// The same with a scale for each coordinate, where coordinates differ in size or unit: errors are those of `q_i / scales_i`, and of
+    /// `v_i / scales_i` relative to the largest such speed of the motion. It holds for an [`accuracy`](Self::accuracy) and for an
+    /// [estimate](Self::with_error_estimate).
+    pub fn scales(self, scales: [f64; N]) -> Self {
+        Run { scales: Some(scales.into()), ..self }
+    }
+
+    /// The same with one more observer, which sees what those before it have seen.
     pub fn observe(mut self, observer: &'o mut impl Observer<N>) -> Self {
         self.observers.push(Box::new(observer::Borrowed(observer)));
         self
@@ -240,7 +252,12 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
                 });
             }
         };
-        let request = Request { problem, t_end, span, integrator: self.integrator.clone(), needs };
+        if let Some(scales) = self.scales
+            && let Some(index) = scales.iter().position(|scale| !(*scale > 0.0 && scale.is_finite()))
+        {
+            return Err(InputError::Scale { index, scale: scales[index] });
+        }
+        let request = Request { problem, t_end, span, integrator: self.integrator.clone(), needs, scales: self.scales };
         let terminal = if let Length::For(..) = length { self.observers.terminal() } else { None };
         let mut plan = request.plan(length, terminal)?;
         plan.estimated = self.estimated;

@@ -196,6 +196,9 @@ impl<'r, const N: usize> Moment<'r, N> {
     }
 }
 
+/// The parts in which a step without a curve of its own is looked at.
+const PARTS: usize = 4;
+
 /// A step, with the motion between its ends.
 pub struct LastStep<'r, const N: usize> {
     from: (f64, PhasePoint<N>),
@@ -253,21 +256,15 @@ impl<const N: usize> LastStep<'_, N> {
         self.rates[1]
     }
 
-    /// The parts in which a search along the step looks at it.
-    fn parts(&mut self) -> usize {
-        self.curve().map_or(4, DenseStep::parts)
-    }
-
-    /// About the states between these parts, at no cost of a step.
+    /// About the states between the parts in which a search along the step looks at it, at no cost of a step.
     pub(super) fn sketch(&mut self, to: &mut Vec<PhasePoint<N>>) -> Result<(), StepError> {
         to.clear();
         if let Some(curve) = self.curve() {
             curve.sketch(to);
             return Ok(());
         }
-        let parts = self.parts();
-        for k in 1..parts {
-            to.push(self.about(k as f64 / parts as f64)?);
+        for k in 1..PARTS {
+            to.push(self.about(k as f64 / PARTS as f64)?);
         }
         Ok(())
     }

@@ -3,6 +3,7 @@
 use super::accuracy::Choice;
 use super::noise::{DECAYED, all_together};
 use super::track::{Track, norm};
+use super::velocities::Velocities;
 use super::{Interrupt, Plan, Problem, Request, Shared, Wants};
 use crate::gauss::{Look, SETS, UNDERFLOWN};
 use crate::run::verified::refuted;
@@ -358,6 +359,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
         let (mut states, mut noise, mut taken, mut spent) =
             (Vec::with_capacity(PARTS), Vec::with_capacity(PARTS), 0, 0);
         let mut reach = norm(&[problem.state.q, problem.state.p]);
+        let (mut velocities, mut seen) = (Vec::with_capacity(PARTS), Velocities::new(problem, self.request.scales));
         let (mut ending, mut looks) = (None, 0_usize);
         while ending.is_none()
             && let Some((steps, time)) = marks.stop(states.len(), count, t0, span)
@@ -369,17 +371,26 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
                 break;
             }
             looks += 1;
-            let (done, cause) = match run.advance_until(stride.min(steps - taken), time) {
+            // Few steps at first, so that the velocity is seen at more than one phase of an oscillation.
+            let chunk = stride.min(taken.max(1)).min(steps - taken);
+            let (done, cause) = match run.advance_until(chunk, time) {
                 Ok(done) => (done, None),
                 Err(Halt { taken, cause }) => (taken, Some(cause)),
             };
             taken += done;
             let part = (run.time() - t0) / span;
-            let seen;
-            (seen, spent) = look(run, part);
-            ending = cause.map(|cause| PilotEnd::Halted { part, cause }).or(seen);
-            if taken == steps || (run.time() - time) * span >= 0.0 {
-                let x = run.state();
+            let by_look;
+            (by_look, spent) = look(run, part);
+            ending = cause.map(|cause| PilotEnd::Halted { part, cause }).or(by_look);
+            let marked = taken == steps || (run.time() - time) * span >= 0.0;
+            let x = run.state();
+            if marked || stride > 1 {
+                let v = seen.at(run.time(), &x, run.last_velocity());
+                velocities.extend(marked.then_some(v));
+            } else {
+                seen.pass(run.time(), &x.q);
+            }
+            if marked {
                 let state = [x.q, x.p];
                 let size = norm(&state);
                 reach = larger(reach, size);
@@ -395,7 +406,9 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> Pilots<'t, 'p, L, N> {
         }
         self.left = self.left.saturating_sub(spent);
         self.reserve = self.reserve.saturating_sub(spent);
-        ending.unwrap_or(PilotEnd::Followed(Track { states, noise, misfit: 0.0, cost: spent, tau: span }))
+        let (speed, scales) = (seen.speed(taken), self.request.scales);
+        let track = Track { states, noise, velocities, speed, scales, misfit: 0.0, cost: spent, tau: span };
+        ending.unwrap_or(PilotEnd::Followed(track))
     }
 }
 

@@ -85,6 +85,8 @@ pub struct Plan<'p, L, const N: usize> {
     integrator: Shared<'p, L, N>,
     pub(super) facts: Facts,
     pub(super) needs: Needs,
+    /// What errors of the coordinates are measured by, where that is given.
+    pub(super) scales: Option<SVector<f64, N>>,
     /// What its steps compute and skip, as the stepper says.
     pub(super) account: Vec<Item>,
     /// Whether `sigma_d` is the same in all steps.
@@ -100,7 +102,7 @@ pub struct Plan<'p, L, const N: usize> {
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// Finds the route of a request.
     pub(super) fn new(request: &Request<'p, L, N>, choice: &Choice<'p, L, N>) -> Result<Self, InputError> {
-        let Request { problem, t_end, needs, .. } = *request;
+        let Request { problem, t_end, needs, scales, .. } = *request;
         let Choice { integrator, count, h, error, ended } = choice.clone();
         let switches = has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?;
         let facts = integrator.facts();
@@ -118,6 +120,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             error,
             facts,
             needs,
+            scales,
             account: stepper.account(),
             constant_rate: stepper.has_constant_rate(),
             switches,
@@ -328,8 +331,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             }
         }
         let (mut t, mut state) = (stepper.time(), stepper.state());
-        let error_estimate =
-            self.estimated.then(|| self.error.unwrap_or_else(|| self.distance_from_halves(taken, t, &state)));
+        let error_estimate = self.estimated.then(|| {
+            self.error.unwrap_or_else(|| self.distance_from_halves(taken, t, (&state, stepper.last_velocity())))
+        });
         if let Some(Stop { by, cause, at }) = stop {
             (t, state) = at.unwrap_or((t, state));
             status = match cause {

@@ -98,7 +98,8 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
             return false;
         }
         let span = self.t_end - self.problem.t0;
-        let request = Request { problem: self.problem, t_end: self.t_end, span, integrator: None, needs: self.needs };
+        let Self { problem, t_end, needs, scales, .. } = *self;
+        let request = Request { problem, t_end, span, integrator: None, needs, scales };
         request.is_at_rest(t, state)
     }
 }

@@ -1,5 +1,6 @@
 //! Splitting schemes as integrators.
 
+use super::separable::SeparableForm;
 use super::{ActionSplitting, Splitting, SplittingScheme};
 use crate::{Facts, InLanes, InputError, Integrator, Problem, Stepper, Wants};
 use contact_geom::Lagrangian;
@@ -46,7 +47,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
             let splitting = ActionSplitting::new(lagrangian, self, h, t0, state)?.compensated_where_tiny();
             return Ok(Box::new(if watched { splitting.doubting() } else { splitting }));
         }
-        let splitting = Splitting::verified(lagrangian, self, h, t0, state)?.compensated_where_tiny();
+        // The problem has verified what its Lagrangian claims.
+        let form = SeparableForm::read_of(lagrangian, h, t0, &state, true)?;
+        let splitting = Splitting::of(form, self, h, t0, state)?.compensated_where_tiny();
         let splitting = if watched { splitting.watched() } else { splitting };
         Ok(Box::new(if action { splitting } else { splitting.without_action() }))
     }

@@ -83,18 +83,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         Self::of(SeparableForm::read(lagrangian, h, t0, &state)?, scheme, h, t0, state)
     }
 
-    /// The same of a Lagrangian that a problem has verified.
-    pub(crate) fn verified(
-        lagrangian: &'a L,
-        scheme: &SplittingScheme,
-        h: f64,
-        t0: f64,
-        state: PhasePoint<N>,
-    ) -> Result<Self, InputError> {
-        Self::of(SeparableForm::read_of(lagrangian, h, t0, &state, true)?, scheme, h, t0, state)
-    }
-
-    fn of(
+    /// The same of a form that was read.
+    pub(crate) fn of(
         form: SeparableForm<&'a L, N>,
         scheme: &SplittingScheme,
         h: f64,

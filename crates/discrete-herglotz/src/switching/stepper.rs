@@ -336,7 +336,8 @@ where
             at = self.through(to, change.index, span)?;
             (longest, switches) = (span.abs(), true);
         }
-        Err(if switches { StepError::Switching { t: at.t } } else { StepError::Undivided { t: at.t } })
+        let divides = self.most_misfit < f64::INFINITY && !switches;
+        Err(if divides { StepError::Undivided { t: at.t } } else { StepError::Switching { t: at.t } })
     }
 
     fn keep(&mut self, stepper: S) {

@@ -1,7 +1,7 @@
 //! Scenes of paths between given ends.
 
 use super::at::{At, Named, Numbers, Span};
-use super::file::SystemTable;
+use super::file::{SystemTable, place_of_table};
 use super::start::Ends;
 use super::{SceneError, check_used, check_version, entry, formula, integrator};
 use runtime_herglotz::{
@@ -9,7 +9,6 @@ use runtime_herglotz::{
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 
 /// A path between two positions over a time: critical for the discrete action of Herglotz' principle.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -56,19 +55,10 @@ pub struct EndsScene {
     steps_at: Span,
 }
 
-/// Whether a text is a scene of a path; what else is wrong with it is said by its reader.
-pub(crate) fn has_ends(text: &str) -> Option<Span> {
-    #[derive(Deserialize)]
-    struct Kind {
-        ends: Option<At<IgnoredAny>>,
-    }
-    toml::from_str::<Kind>(text).ok()?.ends.map(|ends| ends.span())
-}
-
 impl EndsScene {
     /// Whether a text is a scene with `[ends]`.
     pub fn is_one(text: &str) -> bool {
-        has_ends(text).is_some()
+        place_of_table(text, "ends").is_some()
     }
 
     /// Reads a scene file with `[ends]`.

@@ -1,15 +1,21 @@
 //! The scene file as it is written. The documentation of these types is that of the schema, which editors show.
 
-use super::at::{At, Named, Numbers};
+use super::at::{At, Named, Numbers, Span};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fmt::Formatter;
 
 /// The version of scene files that this program reads.
 pub(crate) const VERSION: i64 = 1;
+
+/// Where a text has a table of this name, which tells the kind of a scene; what is wrong with the scene is said by its reader.
+pub(crate) fn place_of_table(text: &str, name: &str) -> Option<Span> {
+    toml::from_str::<BTreeMap<String, At<IgnoredAny>>>(text).ok()?.get(name).map(At::span)
+}
 
 /// A motion of a Lagrangian, and what is to be recorded of it.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -66,6 +72,9 @@ pub(crate) struct RunTable {
     pub step: Option<At<f64>>,
     /// The number of steps, instead of their length.
     pub steps: Option<At<usize>>,
+    /// The size of each coordinate, in the order of the coordinates, where they differ much: errors are those of each coordinate and velocity in
+    /// units of its own.
+    pub scales: Option<At<Vec<f64>>>,
 }
 
 /// What is recorded.

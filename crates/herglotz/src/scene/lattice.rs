@@ -1,7 +1,7 @@
 //! Scenes of lattices: any number of equal sites.
 
 use super::at::{At, Named, Span};
-use super::file::{RowsTable, RunTable};
+use super::file::{RowsTable, RunTable, place_of_table};
 use super::want::{RowTimes, of_formula};
 use super::{SceneError, check_version, finite, way};
 use runtime_herglotz::{
@@ -10,7 +10,6 @@ use runtime_herglotz::{
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 
 /// A motion of a lattice of equal sites with bonds between neighbours.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -116,19 +115,10 @@ pub struct LatticeScene {
 /// The most sites of a scene.
 const MOST_SITES: usize = 1_000_000;
 
-/// Whether a text is a scene of a lattice; what else is wrong with it is said by its reader.
-pub(crate) fn is_lattice(text: &str) -> Option<Span> {
-    #[derive(Deserialize)]
-    struct Kind {
-        lattice: Option<At<IgnoredAny>>,
-    }
-    toml::from_str::<Kind>(text).ok()?.lattice.map(|lattice| lattice.span())
-}
-
 impl LatticeScene {
     /// Whether a text is a scene with `[lattice]`.
     pub fn is_one(text: &str) -> bool {
-        is_lattice(text).is_some()
+        place_of_table(text, "lattice").is_some()
     }
 
     /// Reads a scene file with `[lattice]`.
@@ -263,6 +253,11 @@ fn explain(text: &str, places: &[(&'static str, Span)], otherwise: Span, error: 
 
 /// The integrator and its steps.
 fn steps(text: &str, run: &At<RunTable>) -> Result<(AnyIntegrator, Steps), SceneError> {
+    if let Some(scales) = &run.scales {
+        let message =
+            "`scales` are for an accuracy, or an estimate of the error, and a lattice has neither; remove them";
+        return Err(SceneError::at(text, scales.span(), message));
+    }
     if let Some(accuracy) = &run.accuracy {
         let message = "a lattice is run by given steps; name an `integrator` and a `step` instead of an accuracy";
         return Err(SceneError::at(text, accuracy.span(), message));

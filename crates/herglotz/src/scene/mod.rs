@@ -49,6 +49,7 @@ pub struct Scene {
     rows: RowTimes,
     conformal_factor: bool,
     estimate: bool,
+    scales: Option<Vec<f64>>,
     text: String,
     places: Places,
 }
@@ -61,6 +62,7 @@ struct Places {
     run: Span,
     time: Span,
     accuracy: Span,
+    scales: Span,
     integrator: Span,
     step: Span,
     rows: Span,
@@ -99,11 +101,11 @@ impl Scene {
     /// [`SceneError`] with the place in the text, or in the change.
     pub fn read_with(text: &str, changes: &[String]) -> Result<Self, SceneError> {
         check_version(text)?;
-        if let Some(lattice) = lattice::is_lattice(text) {
+        if let Some(lattice) = file::place_of_table(text, "lattice") {
             let message = "a lattice is run by `herglotz run`; all else is for systems of up to 16 coordinates";
             return Err(SceneError::at(text, lattice, message));
         }
-        if let Some(ends) = ends::has_ends(text) {
+        if let Some(ends) = file::place_of_table(text, "ends") {
             let message = "a path between ends is run by `herglotz run`; all else is for motions from a start";
             return Err(SceneError::at(text, ends, message));
         }
@@ -157,6 +159,7 @@ impl Scene {
             way,
             conformal_factor: file.want.conformal_factor,
             estimate: file.want.estimate,
+            scales: run.scales.as_deref().cloned(),
             text: text.to_owned(),
             places: Places {
                 lagrangian,
@@ -164,6 +167,7 @@ impl Scene {
                 run: run.span(),
                 time: run.time.span(),
                 accuracy: run.accuracy.as_ref().map_or(run.span(), At::span),
+                scales: run.scales.as_ref().map_or(run.span(), At::span),
                 integrator: run.integrator.as_ref().map_or(run.span(), At::span),
                 step: run.step.as_ref().map(At::span).or(run.steps.as_ref().map(At::span)).unwrap_or(run.span()),
                 rows: file.want.rows.as_ref().map_or(run.span(), At::span),
@@ -185,7 +189,7 @@ impl Scene {
 
     /// The motion with nothing recorded but its end.
     pub fn bare_motion(&self) -> Motion {
-        Motion::new(self.start.clone(), self.end, self.way)
+        Motion { scales: self.scales.clone(), ..Motion::new(self.start.clone(), self.end, self.way) }
     }
 
     /// The columns of events.csv after the name of the event: the state there, and what the events have beside it.
@@ -253,12 +257,14 @@ impl Scene {
                 E::Step { .. } | E::NoSteps | E::TooMany { .. } | E::Count { .. } => places.step,
                 E::Span { .. } => places.time,
                 E::Tolerance { .. } | E::Accuracy { .. } => places.accuracy,
+                E::Scale { .. } => places.scales,
                 E::NoIntegrator | E::Unclaimed { .. } | E::Hypothesis { .. } | E::Stages { .. } => places.integrator,
                 E::FalseClaim { .. } => places.lagrangian,
                 E::Times { .. } => places.rows,
                 E::Undefined | E::FirstStep(_) | E::Sigma { .. } | E::Clock { .. } | E::EqualPoints => places.start,
                 _ => places.run,
             },
+            RuntimeError::Length { what: "scales", .. } => places.scales,
             RuntimeError::Length { .. } | RuntimeError::NotFinite { .. } | RuntimeError::Geometry(_) => places.start,
             _ => places.run,
         };

@@ -63,3 +63,18 @@ pub fn column(csv: &str, name: &str) -> Vec<f64> {
 pub fn scene(name: &str) -> String {
     format!("{REPOSITORY}/scenes/{name}.toml")
 }
+
+/// Each change of a scene, one or several as `from|to` pairs after the first, is refused with a message that begins so. `told` is what is said of a
+/// text.
+pub fn refuses_each(scene: &str, changes: &[(&str, &str, &str)], told: impl Fn(&str) -> Option<String>) {
+    for (from, to, expected) in changes {
+        let mut to = to.split('|');
+        let mut text = scene.replacen(from, to.next().unwrap(), 1);
+        if let (Some(from), Some(to)) = (to.next(), to.next()) {
+            text = text.replacen(from, to, 1);
+        }
+        assert_ne!(text, scene, "{from}");
+        let found = told(&text);
+        assert!(found.as_ref().is_some_and(|found| found.starts_with(expected)), "{found:?} for {expected:?}");
+    }
+}

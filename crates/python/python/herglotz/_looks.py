@@ -132,7 +132,7 @@ def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters):
     start = (q0, v0, False, z0, None) if p0 is None else (q0, p0, True, z0, None)
     if t is None:
         raise ValueError("`t` is not given: the end of the motion")
-    return _core.Motion(L, start, t, None, way, [], [], False, False)
+    return _core.Motion(L, start, t, None, way, [], [], False, False, None)
 
 
 def check(

@@ -75,7 +75,8 @@ class Solution:
     suspicion : str or None
         The first step that was seen not to resolve the motion.
     error_estimate : float or None
-        The error of (q, p) at the end, relative to its size, where `estimate` was asked for; infinite where half steps fail.
+        The error at the end, where `estimate` was asked for: of (q, p) relative to its size, or of v relative to the largest
+        speed, whichever is larger; infinite where half steps fail.
     steps, evaluations : int
         The steps taken, and the evaluations of forces or gradients.
     t_end : float
@@ -182,11 +183,11 @@ class Solution:
         times = np.array(t, dtype=float, ndmin=1)
         if len(times) == 0 or times[0] != at:
             times = np.concatenate([[at], times])
-        _, _, every, way, events, columns, conformal_factor, estimate = self._request
+        _, _, every, way, events, columns, conformal_factor, estimate, scales = self._request
         if way[3] is not None:
             # So many steps were of another span.
             way = (None, way[1], self.plan.step, None)
-        request = (q, p, True, z, v), times, every, way, events, columns, conformal_factor, estimate
+        request = (q, p, True, z, v), times, every, way, events, columns, conformal_factor, estimate, scales
         return run(self.system, request, self._event_names, self._observed)
 
     @property

@@ -22,6 +22,7 @@ def solve(
     observe=None,
     conformal_factor=False,
     estimate=False,
+    scales=None,
     coordinates=None,
     parameters=None,
 ):
@@ -42,8 +43,8 @@ def solve(
     z0 : float
         The action of the start.
     accuracy : float, optional
-        The relative error of (q, p) that is wanted, 1e-9 if nothing is said. The step is chosen for it, and the
-        integrator where none is named.
+        The error that is wanted, 1e-9 if nothing is said: of (q, p) relative to its size, and of v relative to the largest
+        speed. The step is chosen for it, and the integrator where none is named.
     integrator : str, optional
         One of `integrators`.
     step, steps : float, int, optional
@@ -59,6 +60,9 @@ def solve(
     estimate : bool
         Whether `Solution.error_estimate` is computed: of given steps by a second run with steps of half their length,
         which costs twice as much as the first.
+    scales : array of shape (n,), optional
+        The size of each coordinate, where they differ much or have different units: `accuracy` and `estimate` are then
+        about each coordinate, and its velocity, in units of its own.
     coordinates, parameters
         As of `system`.
 
@@ -89,6 +93,7 @@ def solve(
         columns_of(observe, L),
         conformal_factor,
         estimate,
+        copied(scales),
     )
     if parameters:
         check_parameters(L, parameters, given, [*(event[0] for event in request[4]), *request[5]])

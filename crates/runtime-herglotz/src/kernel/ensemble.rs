@@ -213,6 +213,7 @@ fn is_common(cause: &InputError) -> bool {
         E::Step { .. }
             | E::Span { .. }
             | E::Tolerance { .. }
+            | E::Scale { .. }
             | E::TooMany { .. }
             | E::NoSteps
             | E::NoIntegrator

@@ -7,10 +7,14 @@ use discrete_herglotz::{Interrupted, Problem, Run, Until};
 use formula_lagrangian::FormulaLagrangian;
 
 /// The run of a motion, without its observer.
+///
+/// # Errors
+/// [`RuntimeError::Length`] where there are not as many scales as coordinates.
 fn of<'p, 'o, const N: usize>(
+    system: &Sized<N>,
     problem: &'p Problem<'p, FormulaLagrangian<N>, N>,
     motion: &Motion,
-) -> Run<'p, 'o, FormulaLagrangian<N>, N> {
+) -> Result<Run<'p, 'o, FormulaLagrangian<N>, N>, RuntimeError> {
     let run = match motion.way {
         Way::Accuracy { wanted, by: None } => problem.accuracy(wanted),
         Way::Accuracy { wanted, by: Some(by) } => problem.by(by).accuracy(wanted),
@@ -18,14 +22,18 @@ fn of<'p, 'o, const N: usize>(
     };
     let run = if motion.action { run } else { run.without_action() };
     let run = if motion.conformal_factor { run.with_conformal_factor() } else { run };
-    if motion.estimate { run.with_error_estimate() } else { run }
+    let run = if motion.estimate { run.with_error_estimate() } else { run };
+    Ok(match &motion.scales {
+        Some(scales) => run.scales(system.vector("scales", scales)?.into()),
+        None => run,
+    })
 }
 
 pub(super) fn plan<const N: usize>(system: &Sized<N>, motion: &Motion) -> Result<Plan, RuntimeError> {
     let problem = system.problem_of(motion)?;
     let mut unwatched = ();
     let mut recorder = Recorder::new(&system.0, motion, &mut unwatched)?;
-    let run = of(&problem, motion).observe(&mut recorder);
+    let run = of(system, &problem, motion)?.observe(&mut recorder);
     let plan = run.plan(Until::Time(motion.end))?;
     Ok(Plan {
         text: plan.to_string(),
@@ -45,7 +53,7 @@ pub(super) fn run<const N: usize>(
 ) -> Result<Outcome, RuntimeError> {
     let problem = system.problem_of(motion)?;
     let mut recorder = Recorder::new(&system.0, motion, watch)?;
-    let run = of(&problem, motion).observe(&mut recorder);
+    let run = of(system, &problem, motion)?.observe(&mut recorder);
     let run = match from {
         Some(from) => run.resume(from),
         None => run,

@@ -18,7 +18,7 @@ fn search<L: Lagrangian<N>, const N: usize>(
     wanted: f64,
 ) -> (Cow<'static, str>, usize, u64) {
     let integrator = integrator.map(|by| Arc::new(by) as Shared<'_, L, N>);
-    let request = Request { problem, t_end: span, span, integrator, needs: Needs::default() };
+    let request = Request { problem, t_end: span, span, integrator, needs: Needs::default(), scales: None };
     let mut pilots = Pilots::new(&request, wanted);
     let choice = choose_with(&mut pilots).unwrap();
     (choice.integrator.facts().name, choice.count, BUDGET - pilots.left)
