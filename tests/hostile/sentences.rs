@@ -222,7 +222,7 @@ fn input_errors() {
             run.plan(Until::Time(5.5)).err().unwrap()
         }, ["1e-17", "ask for less"];
         InputError::Tolerance { .. } => problem.accuracy(-0.5).plan(Until::Time(5.5)).err().unwrap(), ["-0.5", "positive and finite"];
-        InputError::Scale { .. } => problem.accuracy(0.5).scales([1.0, -2.5]).plan(Until::Time(5.5)).err().unwrap(), ["coordinate 1", "-2.5", "positive and finite"];
+        InputError::Scale { .. } => problem.accuracy(0.5).scales([-2.5]).plan(Until::Time(5.5)).err().unwrap(), ["coordinate 0", "-2.5", "positive and finite"];
         InputError::TooMany { .. } => in_steps(Steps::Size(1e-300)), ["the number of steps", "e300", "longer steps"];
         InputError::NoSteps => problem.by(AnyIntegrator::Gauss { stages: 8 }).plan(Until::Time(5.5)).err().unwrap(), ["`steps`", "`accuracy`"];
         InputError::NoIntegrator => problem.accuracy(0.5).steps(Steps::Count(1)).plan(Until::Time(5.5)).err().unwrap(), ["`by`", "`accuracy`"];

@@ -115,7 +115,7 @@ fn lines() -> Result<Vec<Line>, InputError> {
         by_eight().observe(&mut rows).run(late)
     };
     let crossing = |at: f64| {
-        let mut lowest = Events::new([Event::new(move |_, x| x.q[0] - at)]);
+        let mut lowest = Events::new([Event::new(move |_, x| x.q[0] - at)]).without_action();
         by_eight().observe(&mut lowest).run(late)
     };
 

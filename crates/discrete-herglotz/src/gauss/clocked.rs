@@ -7,7 +7,6 @@ use super::general::General;
 use super::instructions::Instructions;
 use super::look::{Compare, Curve, Look};
 use super::mass::Mass;
-use super::stage_equations::Products;
 use super::sweeps::AfterSweep;
 use super::table::StageTable;
 use super::time_transformation::{Extension, Fictitious, Values};
@@ -68,14 +67,13 @@ pub struct ClockedStepper<'a, L, C, const N: usize> {
 impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C, N> {
     pub(super) fn new(
         lagrangian: &'a L,
-        products: Products,
+        (s, h): (usize, f64),
         clock: C,
         probed: Option<Structure>,
         t0: f64,
         state: PhasePoint<N>,
         guess: SVector<f64, N>,
     ) -> Result<Self, InputError> {
-        let Products { s, h, .. } = products;
         let Beginning { start, structure, inverse, .. } = Beginning::of(lagrangian, probed, t0, &state, guess)?;
         if !structure.autonomous {
             return Err(InputError::Unclaimed { claim: "autonomous" });

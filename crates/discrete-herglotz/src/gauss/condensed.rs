@@ -8,13 +8,16 @@ use super::compensated::{Twofold, exact_sum};
 use super::double_double::{ExactRow, solve_exactly};
 use super::instructions::Instructions;
 use super::stages::{Exact, StageMap, Stages, Weights, padded};
+use crate::gauss::lanes::Lanes;
 use crate::{InputError, StepError};
+use contact_geom::linear;
+use contact_geom::nalgebra::{SMatrix, SVector};
 use num_traits::{One, Zero};
 use pulp::{Simd, WithSimd};
 use qd::Quad;
 use std::array::from_fn;
 use std::cell::RefCell;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// The step of `L = v.Mv/2 - V(t, q) + gamma z` in the accelerations `a_i = M^-1 L_q(t_i, Q_i)` alone: with the stages
 /// `rho_i` of the integrating factor, which depend on `gamma h` only,
@@ -44,6 +47,14 @@ pub(crate) struct Condensed {
     pub end_v: Weights,
     /// From the stages of one step to those of the next.
     pub ahead: StageMap,
+    /// See [`actions`](Self::actions).
+    actions: OnceLock<Box<Actions>>,
+}
+
+/// What `gamma Z` of the stages is, `from_start z0 + from_values (L - gamma z)`, by columns; not finite at the pole of the collocation polynomial of z.
+pub(crate) struct Actions {
+    pub from_start: [f64; MOST],
+    pub from_values: [[f64; MOST]; MOST],
 }
 
 /// The coefficients of a [`Condensed`] step that its linear case takes in double-double precision.
@@ -134,6 +145,28 @@ impl Condensed {
             end_v: Weights::new(&exact.end_v),
             ahead: StageMap::new(&g.ahead, s),
             exact: Box::new(exact),
+            actions: OnceLock::new(),
+        })
+    }
+
+    /// The actions of the stages, `Z = z0 + hA (L - gamma z) + gamma hA Z`, solved for. Made when it is asked for.
+    pub fn actions(&self) -> &Actions {
+        self.actions.get_or_init(|| {
+            let (s, g) = (self.s, Coefficients::of(self.s));
+            let entry = |i: usize, j: usize| if i < s && j < s { self.gamma * self.h * g.a[i][j].0 } else { 0.0 };
+            let left = SMatrix::<f64, MOST, MOST>::from_fn(|i, j| f64::from(u8::from(i == j)) - entry(i, j));
+            let solved = |column: &dyn Fn(usize) -> f64| {
+                let mut column = SVector::<f64, MOST>::from_fn(|i, _| if i < s { column(i) } else { 0.0 });
+                // Where there is no solution the step has an end, and nothing between.
+                match linear::solve(&mut left.clone_owned().view_mut((0, 0), (s, s)), &mut column.rows_mut(0, s)) {
+                    Ok(_) => column.into(),
+                    Err(_) => [f64::NAN; MOST],
+                }
+            };
+            Box::new(Actions {
+                from_start: solved(&|_| self.gamma),
+                from_values: from_fn(|j| if j < s { solved(&|i| entry(i, j)) } else { [0.0; MOST] }),
+            })
         })
     }
 
@@ -291,6 +324,12 @@ impl Left {
     fn new(rows: &LeftRows, s: usize) -> Self {
         let column = |j: usize| Stages(from_fn(|i| rows[i.min(s - 1)][j]));
         Left { q: column(MOST), u: column(MOST + 1), b: StageMap(from_fn(column)) }
+    }
+
+    /// What comes of the state, of the stages in the r-th register.
+    #[inline(always)]
+    pub fn of_state<S: Simd>(&self, q: Lanes<S>, v: Lanes<S>, r: usize) -> Lanes<S> {
+        self.u.block::<S>(r).mul_add(v, self.q.block::<S>(r) * q)
     }
 }
 

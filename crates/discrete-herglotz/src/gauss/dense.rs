@@ -7,7 +7,7 @@ use super::coefficients::{Coefficients, MOST, POLYNOMIALS};
 use super::condensed::Condensed;
 use crate::run::saved::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, PhasePoint, legendre_polynomials, linear};
+use contact_geom::{Lagrangian, PhasePoint};
 use std::array::from_fn;
 use std::sync::OnceLock;
 
@@ -36,18 +36,16 @@ pub(super) struct Solved<const N: usize> {
 impl<const N: usize> Solved<N> {
     pub const ZERO: Self = Solved { v: [[0.0; MOST]; N], force: [[0.0; MOST]; N], rate: [0.0; MOST], l: [0.0; MOST] };
 
-    /// From the accelerations of a condensed step.
+    /// From the accelerations and the positions of a condensed step.
     pub fn from_accelerations(
         lagrangian: &impl Lagrangian<N>,
         table: &Condensed,
         mass: &SMatrix<f64, N, N>,
-        t: f64,
-        start: &StepStart<N>,
-        a: &[[f64; MOST]; N],
+        (t, start): (f64, &StepStart<N>),
+        [a, x]: [&[[f64; MOST]; N]; 2],
         wants_z: bool,
     ) -> Self {
-        let (s, exact, mut solved) = (table.s, &table.exact, Self::ZERO);
-        let sum = |row: &[qd::Quad; MOST], a: &[f64; MOST]| (0..s).fold(0.0, |sum, j| sum + row[j].0 * a[j]);
+        let (s, mut solved) = (table.s, Self::ZERO);
         for d in 0..N {
             let v = &mut solved.v[d];
             v.iter_mut().zip(&table.inverse_rho.0).for_each(|(v, inverse)| *v = inverse * start.y[d]);
@@ -57,30 +55,25 @@ impl<const N: usize> Solved<N> {
             v[s..].fill(0.0);
         }
         for i in 0..s {
-            let rho = 1.0 / exact.inverse_rho[i].0;
+            let rho = 1.0 / table.inverse_rho.0[i];
             let force = mass * SVector::from_fn(|d, _| rho * a[d][i]);
             for d in 0..N {
                 solved.force[d][i] = force[d];
             }
             solved.rate[i] = rho * table.gamma;
             if wants_z {
-                let q = SVector::from_fn(|d, _| start.q[d] + table.u[i].0 * start.y[d] + sum(&table.b[i], &a[d]));
-                let v = SVector::from_fn(|d, _| solved.v[d][i]);
-                solved.l[i] = lagrangian.value(t + table.times.0[i], &q, &v, 0.0);
+                let at = |of: &[[f64; MOST]; N]| SVector::from_fn(|d, _| of[d][i]);
+                solved.l[i] = lagrangian.value(t + table.times.0[i], &at(x), &at(&solved.v), 0.0);
             }
         }
         if wants_z && table.gamma != 0.0 {
-            // The actions of the stages: Z = z0 + hA (L - gamma z) + gamma hA Z.
-            let g = Coefficients::of(s);
-            let entry = |i: usize, j: usize| if i < s && j < s { table.h * g.a[i][j].0 } else { 0.0 };
-            let mut left =
-                SMatrix::<f64, MOST, MOST>::from_fn(|i, j| f64::from(u8::from(i == j)) - table.gamma * entry(i, j));
-            let mut z =
-                SVector::<f64, MOST>::from_fn(|i, _| start.z + (0..s).fold(0.0, |z, j| z + entry(i, j) * solved.l[j]));
-            match linear::solve(&mut left.view_mut((0, 0), (s, s)), &mut z.rows_mut(0, s)) {
-                Ok(_) => (0..s).for_each(|i| solved.l[i] += table.gamma * z[i]),
-                // The pole of the collocation polynomial of z: the step has an end, and nothing between.
-                Err(_) => solved.l = [f64::NAN; MOST],
+            // L itself, of which the values are `L - gamma z`.
+            let (actions, values) = (table.actions(), solved.l);
+            for i in 0..s {
+                solved.l[i] += actions.from_start[i] * start.z;
+            }
+            for (column, value) in actions.from_values.iter().zip(&values).take(s) {
+                solved.l.iter_mut().zip(column).for_each(|(l, entry)| *l += entry * value);
             }
         }
         solved
@@ -135,13 +128,13 @@ impl<const N: usize> DenseStep<N> {
 
     /// The velocity `dq/dt` of the curve at a time: a polynomial of degree `s - 1`, the stages' velocities at their times.
     pub fn velocity(&self, t: f64) -> SVector<f64, N> {
-        let p = legendre_polynomials::<_, POLYNOMIALS>(self.s, 2.0 * ((t - self.t) / self.h) - 1.0);
+        let p = polynomials(self.s, (t - self.t) / self.h);
         SVector::from_fn(|d, _| self.v[d].value(&p, self.s))
     }
 
     /// Velocity, value of L and rho at a fraction of the step.
     pub(super) fn stage(&self, fraction: f64) -> (SVector<f64, N>, f64, f64) {
-        let p = legendre_polynomials::<_, POLYNOMIALS>(self.s, 2.0 * fraction - 1.0);
+        let p = polynomials(self.s, fraction);
         let v = SVector::from_fn(|d, _| self.v[d].value(&p, self.s));
         let rho = 1.0 - self.h * self.rate.value(&integrals(self.s, &p, fraction), self.s);
         (v, self.l.value(&p, self.s), rho)
@@ -180,7 +173,7 @@ impl<const N: usize> DenseStep<N> {
 
     /// The state at a fraction of the step.
     pub(crate) fn at_fraction(&self, fraction: f64) -> PhasePoint<N> {
-        let p = legendre_polynomials::<_, POLYNOMIALS>(self.s, 2.0 * fraction - 1.0);
+        let p = polynomials(self.s, fraction);
         let integrals = integrals(self.s, &p, fraction);
         let integral = |series: &Series| self.h * series.value(&integrals, self.s);
         let rho = 1.0 - integral(&self.rate);
@@ -190,6 +183,28 @@ impl<const N: usize> DenseStep<N> {
             z: self.start.z + integral(&self.l),
         }
     }
+}
+
+/// The factors of the recurrence `P_(k+1) = (2k + 1)/(k + 1) x P_k - k/(k + 1) P_(k-1)`.
+const RECURRENCE: [[f64; 2]; MOST] = {
+    let (mut factors, mut k) = ([[0.0; 2]; MOST], 0);
+    while k < MOST {
+        factors[k] = [(2 * k + 1) as f64 / (k + 1) as f64, k as f64 / (k + 1) as f64];
+        k += 1;
+    }
+    factors
+};
+
+/// The Legendre polynomials `P_0` to `P_s` of `2 x - 1`, without divisions.
+fn polynomials(s: usize, fraction: f64) -> [f64; POLYNOMIALS] {
+    let x = 2.0 * fraction - 1.0;
+    let mut p = [1.0; POLYNOMIALS];
+    p[1] = x;
+    for k in 1..s.min(MOST) {
+        let [first, second] = RECURRENCE[k];
+        p[k + 1] = first * x * p[k] - second * p[k - 1];
+    }
+    p
 }
 
 /// The integrals of the Legendre polynomials from 0 to a fraction of `[0, 1]`: `(2k + 1) P_k` is the derivative of `P_(k+1) - P_(k-1)`.
@@ -212,7 +227,7 @@ fn integrals_to_parts(s: usize) -> &'static [[f64; BETWEEN_PARTS]; MOST] {
         let mut table = Box::new([[0.0; BETWEEN_PARTS]; MOST]);
         for i in 0..=s {
             let fraction = (i + 1) as f64 / (s + 2) as f64;
-            let p = legendre_polynomials::<_, POLYNOMIALS>(s, 2.0 * fraction - 1.0);
+            let p = polynomials(s, fraction);
             for (row, integral) in table.iter_mut().zip(integrals(s, &p, fraction)) {
                 row[i] = integral;
             }

@@ -23,11 +23,8 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
     pub(super) fn judge<S: Simd>(&mut self, first: f64) {
         self.misfit = 0.0;
         if first > FORETOLD {
-            let rates = |d: usize, r| {
-                let v = self.v[d].block::<S>(r);
-                if P::PHYSICAL { v } else { v * self.extension.g.block(r) }
-            };
-            self.misfit = self.tail.misfit(rates, &self.x, self.table.h);
+            let clock = if const { P::PHYSICAL } { None } else { Some(&self.extension.g) };
+            self.misfit = self.tail.misfit::<S, N>(&self.v, clock, &self.x, self.table.h);
         }
         if first > FORETOLD || self.one_minus_rho.abs() > STRONG {
             let one = Lanes::<S>::splat(1.0);

@@ -23,6 +23,13 @@ impl<S: Simd> Changes<S> {
         self.change[kind] = self.change[kind].max(change.abs());
         self.size[kind] = self.size[kind].max(value.abs());
     }
+
+    /// The largest change of a kind, in units of the largest value.
+    #[inline(always)]
+    fn relative(&self, kind: usize) -> f64 {
+        let change = self.change[kind].largest();
+        if change > 0.0 { change / self.size[kind].largest() } else { change }
+    }
 }
 
 impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, P, N> {
@@ -37,12 +44,8 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
         let mut seen = Changes { change: [zero; 3], size: [zero, one, zero] };
         over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.push::<S, K>(r, &mut seen));
         over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.move_stages::<S, K>(r, &mut seen));
-        let relative = |kind: usize| {
-            let change = seen.change[kind].largest();
-            if change > 0.0 { change / seen.size[kind].largest() } else { change }
-        };
-        let change = relative(0).max(relative(1));
-        let of_action = relative(2);
+        let change = seen.relative(0).max(seen.relative(1));
+        let of_action = seen.relative(2);
         // `f64::max` would hide a NaN.
         if of_action > change || of_action.is_nan() { of_action } else { change }
     }

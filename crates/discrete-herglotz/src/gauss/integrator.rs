@@ -1,7 +1,6 @@
 //! Contact Gauss collocation as an integrator.
 
 use super::clocked::OwnClock;
-use super::stage_equations::Products;
 use super::{ClockedStepper, GaussStepper, MOST};
 use crate::{Facts, InLanes, InputError, Integrator, Problem, Stepper, Wants};
 use contact_geom::Lagrangian;
@@ -43,9 +42,9 @@ fn check_stages(stages: usize) -> Result<(), InputError> {
     if (1..=MOST).contains(&stages) { Ok(()) } else { Err(InputError::Stages { found: stages }) }
 }
 
-fn products(stages: usize, h: f64) -> Result<Products, InputError> {
+fn check_step(stages: usize, h: f64) -> Result<(), InputError> {
     check_stages(stages)?;
-    if h != 0.0 && h.is_finite() { Ok(Products::new(stages, h)) } else { Err(InputError::Step { h }) }
+    if h != 0.0 && h.is_finite() { Ok(()) } else { Err(InputError::Step { h }) }
 }
 
 impl GaussCollocation {
@@ -57,8 +56,8 @@ impl GaussCollocation {
         Wants { action, watched }: Wants,
     ) -> Result<GaussStepper<'a, L, N>, InputError> {
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
-        let products = products(self.stages, h)?;
-        let run = GaussStepper::new(lagrangian, products, Some(structure), t0, state, start.v, action)?;
+        check_step(self.stages, h)?;
+        let run = GaussStepper::new(lagrangian, (self.stages, h), Some(structure), t0, state, start.v, action)?;
         Ok(if watched { run.doubting() } else { run })
     }
 }
@@ -71,8 +70,8 @@ impl ClockedGauss {
         h: f64,
     ) -> Result<ClockedStepper<'a, L, OwnClock<'a, L>, N>, InputError> {
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
-        let (products, clock) = (products(self.stages, h)?, OwnClock(lagrangian));
-        ClockedStepper::new(lagrangian, products, clock, Some(structure), t0, state, start.v)
+        check_step(self.stages, h)?;
+        ClockedStepper::new(lagrangian, (self.stages, h), OwnClock(lagrangian), Some(structure), t0, state, start.v)
     }
 }
 

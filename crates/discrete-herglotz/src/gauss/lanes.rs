@@ -123,7 +123,7 @@ impl<S: Simd> Register for Lanes<S> {
     fn turned(self, of: Self) -> Self {
         let set = token::<S>();
         let last = set.and_u64s(set.transmute_u64s_f64s(of.0), set.splat_u64s(1));
-        Lanes(set.select_f64s(set.equal_u64s(last, set.splat_u64s(0)), self.0, set.neg_f64s(self.0)))
+        Lanes(set.select_f64s(set.equal_u64s(last, set.splat_u64s(0)), self.0, (-self).0))
     }
 }
 
@@ -155,7 +155,9 @@ impl<S: Simd> Neg for Lanes<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Lanes(token::<S>().neg_f64s(self.0))
+        // Not by the set's own, which is a call in some of them.
+        let set = token::<S>();
+        Lanes(set.xor_f64s(self.0, set.splat_f64s(-0.0)))
     }
 }
 

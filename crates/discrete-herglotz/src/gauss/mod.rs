@@ -124,7 +124,7 @@ impl<L> Gauss<L> {
     where
         L: Lagrangian<N>,
     {
-        GaussStepper::new(&self.lagrangian, self.forward.clone(), None, t0, state, guess, true)
+        GaussStepper::new(&self.lagrangian, (self.forward.s, self.forward.h), None, t0, state, guess, true)
     }
 
     /// Like [`stepper`](Self::stepper) for a run whose action is not requested: where z decouples it is not computed.
@@ -140,7 +140,7 @@ impl<L> Gauss<L> {
     where
         L: Lagrangian<N>,
     {
-        GaussStepper::new(&self.lagrangian, self.forward.clone(), None, t0, state, guess, false)
+        GaussStepper::new(&self.lagrangian, (self.forward.s, self.forward.h), None, t0, state, guess, false)
     }
 
     /// A stepper of variable steps from a state at a time, for autonomous Lagrangians: the method's step is one of the time tau
@@ -160,7 +160,7 @@ impl<L> Gauss<L> {
         L: Lagrangian<N>,
         C: Clock<N>,
     {
-        ClockedStepper::new(&self.lagrangian, self.forward.clone(), clock, None, t0, state, guess)
+        ClockedStepper::new(&self.lagrangian, (self.forward.s, self.forward.h), clock, None, t0, state, guess)
     }
 
     /// The stage equations of a step forward or backward in time.

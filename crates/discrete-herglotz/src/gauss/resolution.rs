@@ -42,13 +42,14 @@ impl Tail {
         Tail { s, weights: Stages(Coefficients::of(s).last[0]) }
     }
 
-    /// The misfit of a step by the values at its stages, by coordinate and register: above one where they are not those of a
+    /// The misfit of a step by the values at its stages, times a factor where one is given: above one where they are not those of a
     /// polynomial. `time` turns them to lengths that are compared with the positions. Up to two stages do not tell: a step is then no
     /// worse than its order. All must be finite.
     #[inline(always)]
     pub fn misfit<S: Simd, const N: usize>(
         &self,
-        values: impl Fn(usize, usize) -> Lanes<S>,
+        values: &[Stages; N],
+        factor: Option<&Stages>,
         positions: &[Stages; N],
         time: f64,
     ) -> f64 {
@@ -60,7 +61,10 @@ impl Tail {
         for (d, x) in positions.iter().enumerate() {
             let mut last = zero;
             for r in 0..blocks::<S>(self.s) {
-                let value = values(d, r);
+                let mut value = values[d].block::<S>(r);
+                if let Some(factor) = factor {
+                    value *= factor.block(r);
+                }
                 last = self.weights.block(r).mul_add(value, last);
                 size = size.max(value.abs());
                 width = width.max(x.block(r).abs());

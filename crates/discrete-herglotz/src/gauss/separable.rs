@@ -331,7 +331,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         }
         let foretold = sweeps.first() <= FORETOLD && !solved;
         let h = self.table.h;
-        self.misfit = if foretold { 0.0 } else { self.tail.misfit(|d, r| self.a[d].block::<S>(r), &self.x, h * h) };
+        self.misfit = if foretold { 0.0 } else { self.tail.misfit::<S, N>(&self.a, None, &self.x, h * h) };
         if self.newton.is_some() {
             self.age = self.age.saturating_add(1);
             if sweeps.count() > SLOW && self.age > AGE {
@@ -390,23 +390,26 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             let base = &mut self.base[d];
             let Some(weight) = small else {
                 for r in 0..blocks::<S>(s) {
-                    base.set(r, head.u.block::<S>(r).mul_add(v, head.q.block::<S>(r) * q));
+                    base.set(r, head.of_state(q, v, r));
                 }
                 continue;
             };
             let (q_rest, v_rest) = (Lanes::<S>::splat(self.q[d].rest), Lanes::<S>::splat(self.v[d].rest));
-            let rests = |r| head.u.block::<S>(r).mul_add(v_rest, head.q.block::<S>(r) * q_rest);
-            // The small terms first: a sum that has been rounded would not know them.
-            let sum = |r, small| head.q.block::<S>(r).mul_add(q, head.u.block::<S>(r).mul_add(v, small));
             let tail = self.left.tail.as_ref().filter(|_| weight > 0.0);
             if let Some(tail) = tail {
-                let of_state = |r| tail.u.block(r).mul_add(v, tail.q.block(r) * q);
-                tail.b.apply::<S>(&self.rest[d], s, base, of_state);
+                for r in 0..blocks::<S>(s) {
+                    base.set(r, tail.of_state(q, v, r));
+                }
+                tail.b.add::<S>(&self.rest[d], s, base);
             }
             let weight = Lanes::<S>::splat(weight);
             for r in 0..blocks::<S>(s) {
-                let small = if tail.is_some() { weight.mul_add(base.block(r), rests(r)) } else { rests(r) };
-                base.set(r, sum(r, small));
+                let mut small = head.of_state(q_rest, v_rest, r);
+                if tail.is_some() {
+                    small = weight.mul_add(base.block(r), small);
+                }
+                // The small terms first: a sum that has been rounded would not know them.
+                base.set(r, head.q.block::<S>(r).mul_add(q, head.u.block::<S>(r).mul_add(v, small)));
             }
         }
     }

@@ -118,6 +118,16 @@ macro_rules! over_groups {
 }
 pub(super) use over_groups;
 
+/// K registers from the r-th on. A loop: what `from_fn` calls may be compiled by itself, for no vector instructions.
+#[inline(always)]
+fn group<S: Simd, const K: usize>(of: &impl Fn(usize) -> Lanes<S>, r: usize) -> [Lanes<S>; K] {
+    let mut group = [Lanes::splat(0.0); K];
+    for (i, lanes) in group.iter_mut().enumerate() {
+        *lanes = of(r + i);
+    }
+    group
+}
+
 /// A linear map between stage values, by columns.
 #[derive(Clone, Debug)]
 pub(crate) struct StageMap(pub [Stages; MOST]);
@@ -136,12 +146,25 @@ impl StageMap {
     #[inline(always)]
     pub fn apply<S: Simd>(&self, x: &Stages, s: usize, y: &mut Stages, start: impl Fn(usize) -> Lanes<S>) {
         over_groups!(S, blocks::<S>(s), r, K => {
-            let [sums] = self.rows::<S, K, 1>([x], s, [from_fn(|i| start(r + i))], r);
+            let [sums] = self.rows::<S, K, 1>([x], s, [group(&start, r)], r);
             y.set_group(r, sums);
         });
     }
 
-    /// The same of N vectors, `y_d = start_d + M x_d`: two at a time, so that the matrix is loaded half as often. The same bits.
+    /// `y += M x`.
+    #[inline(always)]
+    pub fn add<S: Simd>(&self, x: &Stages, s: usize, y: &mut Stages) {
+        over_groups!(S, blocks::<S>(s), r, K => {
+            let mut start = [Lanes::<S>::splat(0.0); K];
+            for (i, lanes) in start.iter_mut().enumerate() {
+                *lanes = y.block(r + i);
+            }
+            let [sums] = self.rows::<S, K, 1>([x], s, [start], r);
+            y.set_group(r, sums);
+        });
+    }
+
+    /// `y_d = start_d + M x_d` of N vectors: two at a time, so that the matrix is loaded half as often. The same bits.
     #[inline(always)]
     pub fn apply_to_each<S: Simd, const N: usize>(
         &self,
@@ -151,15 +174,14 @@ impl StageMap {
         start: impl Fn(usize, usize) -> Lanes<S>,
     ) {
         for (i, (x, y)) in x.chunks(2).zip(y.chunks_mut(2)).enumerate() {
-            let start = |d: usize, r| start(2 * i + d, r);
             match (x, y) {
                 ([a, b], [c, d]) => over_groups!(S, blocks::<S>(s), r, K at most 2 => {
-                    let starts = [from_fn(|i| start(0, r + i)), from_fn(|i| start(1, r + i))];
+                    let starts = [group(&|r| start(2 * i, r), r), group(&|r| start(2 * i + 1, r), r)];
                     let [first, second] = self.rows::<S, K, 2>([a, b], s, starts, r);
                     c.set_group(r, first);
                     d.set_group(r, second);
                 }),
-                ([a], [c]) => self.apply(a, s, c, |r| start(0, r)),
+                ([a], [c]) => self.apply(a, s, c, |r| start(2 * i, r)),
                 _ => {}
             }
         }
@@ -187,7 +209,12 @@ impl StageMap {
                 }
             }
         }
-        from_fn(|d| from_fn(|i| even[d][i] + odd[d][i]))
+        for d in 0..D {
+            for i in 0..K {
+                even[d][i] += odd[d][i];
+            }
+        }
+        even
     }
 }
 

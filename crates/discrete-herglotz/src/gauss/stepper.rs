@@ -5,7 +5,7 @@ mod words;
 
 use super::account::account;
 use super::beginning::Beginning;
-use super::coefficients::Coefficients;
+use super::coefficients::{Coefficients, MOST};
 use super::condensed::Condensed;
 use super::dense::{DenseStep, Solved, StepStart};
 use super::general::General;
@@ -71,7 +71,8 @@ enum Solution {
 /// method, in the positions of the stages alone where mass and rate are constant. A step of which no correction helps is given up.
 pub struct GaussStepper<'a, L, const N: usize> {
     lagrangian: &'a L,
-    products: Products,
+    s: usize,
+    h: f64,
     route: Box<Route<'a, L, N>>,
     mass: Option<Box<SMatrix<f64, N, N>>>,
     arch: Instructions,
@@ -87,7 +88,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     pause: usize,
     pauses: usize,
     /// Of Newton's method by the general routes, made for the first step that the sweeps do not solve.
-    workspace: Option<Box<Workspace<N>>>,
+    by_newton: Option<Box<(Products, Workspace<N>)>>,
     newton_steps: u64,
     /// The misfit of a constant conformal factor.
     of_sigma: f64,
@@ -99,14 +100,13 @@ pub struct GaussStepper<'a, L, const N: usize> {
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     pub(super) fn new(
         lagrangian: &'a L,
-        products: Products,
+        (s, h): (usize, f64),
         probed: Option<Structure>,
         t0: f64,
         state: PhasePoint<N>,
         guess: SVector<f64, N>,
         wants_z: bool,
     ) -> Result<Self, InputError> {
-        let Products { s, h, .. } = products;
         let Beginning { start, structure, w, inverse } = Beginning::of(lagrangian, probed, t0, &state, guess)?;
         let condensed = structure.separable && structure.has_constant_rate();
         let (mut mass, mut of_sigma) = (None, 0.0);
@@ -137,7 +137,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let from = StepStart { q: [0.0; N], y: [0.0; N], z: 0.0 };
         Ok(GaussStepper {
             lagrangian,
-            products,
+            s,
+            h,
             route: Box::new(route),
             mass,
             arch: Instructions::new(),
@@ -149,7 +150,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             solution: Solution::Sweeps,
             pause: 0,
             pauses: PAUSE,
-            workspace: None,
+            by_newton: None,
             newton_steps: 0,
             of_sigma,
             sequence: (s <= FEW).then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
@@ -188,11 +189,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
 
     /// The last step as a curve.
     fn curve(&self) -> Option<DenseStep<N>> {
-        let (s, h) = (self.products.s, self.products.h);
+        let (s, h) = (self.s, self.h);
         let t = self.t0 + self.k.checked_sub(1)? as f64 * h;
-        let condensed = |table: &Condensed, a, wants_z| {
+        let condensed = |table: &Condensed, stages: [&[[f64; MOST]; N]; 2], wants_z| {
             let mass = self.mass.as_deref().copied().unwrap_or_else(SMatrix::identity);
-            Solved::from_accelerations(self.lagrangian, table, &mass, t, &self.from, a, wants_z)
+            Solved::from_accelerations(self.lagrangian, table, &mass, (t, &self.from), stages, wants_z)
         };
         if !self.solved {
             return None;
@@ -200,9 +201,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         let start = self.phase(&self.from);
         let solved = match &*self.route {
             Route::Linear(run, table) => {
-                condensed(table, &run.accelerations(&self.from.q, &self.from.y), run.wants_z())
+                let a = run.accelerations(&self.from.q, &self.from.y);
+                condensed(table, [&a, &table.positions(&self.from.q, &self.from.y, &a)], run.wants_z())
             }
-            Route::Condensed(run) => condensed(&run.table, &run.a.map(|a| a.0), run.wants_z),
+            Route::Condensed(run) => condensed(&run.table, [&run.a.map(|a| a.0), &run.x.map(|x| x.0)], run.wants_z),
             Route::General(run) => run.solved(),
         };
         Some(DenseStep::new(s, t, h, start, &solved))
@@ -260,12 +262,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         // With that of the simplified iteration, so that later steps allocate nothing.
         match &mut *self.route {
             Route::Condensed(run) => run.reserve(),
-            _ if self.workspace.is_none() => {
-                let equations =
-                    StageEquations { lagrangian: self.lagrangian, products: &self.products, t: self.time() };
-                self.workspace = Some(Box::new(equations.workspace(&Given::Start(self.state()))));
-            }
-            _ => {}
+            _ => self.make_newton(),
         }
         if !tried.simplified {
             tried.simplified = true;
@@ -281,6 +278,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         }
         self.pause_for(Solution::Newton);
         Ok(())
+    }
+
+    /// Makes what Newton's method works with, for the first step that asks for it.
+    fn make_newton(&mut self) {
+        if self.by_newton.is_none() {
+            let products = Products::new(self.s, self.h);
+            let equations = StageEquations { lagrangian: self.lagrangian, products: &products, t: self.time() };
+            let work = equations.workspace(&Given::Start(self.state()));
+            self.by_newton = Some(Box::new((products, work)));
+        }
     }
 
     /// Goes over to another solution, for twice as long as the last time.
@@ -312,18 +319,20 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     fn solve_stages(&mut self) -> Result<(), StepError> {
         self.solved = false;
         let (t, from) = (self.time(), self.state());
+        if let Route::General(_) = &*self.route {
+            self.make_newton();
+        }
         let run = match &mut *self.route {
             Route::Linear(..) => return Ok(()),
             Route::Condensed(run) => return run.solve(t),
             Route::General(run) => run,
         };
-        let equations = StageEquations { lagrangian: self.lagrangian, products: &self.products, t };
-        let given = Given::Start(from);
+        let Some((products, work)) = self.by_newton.as_deref_mut() else { return Ok(()) };
+        let equations = StageEquations { lagrangian: self.lagrangian, products, t };
         let VelocityPoint { v, .. } = legendre_inverse(self.lagrangian, t, &from, &run.last_velocity())?;
-        let work = self.workspace.get_or_insert_with(|| Box::new(equations.workspace(&given)));
-        equations.solve(&given, &v, &from.p, work)?;
-        let Workspace { x, l, .. } = &**work;
-        run.accept((0..self.products.s).map(|i| (x.v[i], l[i].re, x.rho[i])));
+        equations.solve(&Given::Start(from), &v, &from.p, work)?;
+        let Workspace { x, l, .. } = work;
+        run.accept((0..self.s).map(|i| (x.v[i], l[i].re, x.rho[i])));
         Ok(())
     }
 
@@ -386,7 +395,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let AdvanceGauss { run, steps } = self;
         forget_branches();
-        let (t0, h) = (run.t0, run.products.h);
+        let (t0, h) = (run.t0, run.h);
         if let Route::Linear(linear, _) = &mut *run.route {
             let (taken, from) = linear.advance(steps);
             run.k += taken;
@@ -463,7 +472,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     }
 
     fn time(&self) -> f64 {
-        self.t0 + self.k as f64 * self.products.h
+        self.t0 + self.k as f64 * self.h
     }
 
     fn sigma(&self) -> f64 {
@@ -504,7 +513,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
     }
 
     fn guess(&mut self, longer: &DenseStep<N>) {
-        let Products { s, h, .. } = self.products;
+        let (s, h) = (self.s, self.h);
         if let Route::General(run) = &mut *self.route {
             let part = h / longer.length();
             // An action with a pole has no polynomial.

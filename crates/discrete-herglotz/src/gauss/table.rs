@@ -1,7 +1,7 @@
 //! Coefficients of the general step of contact Gauss collocation.
 
 use super::coefficients::{Coefficients, MOST};
-use super::stages::{StageMap, Stages, padded};
+use super::stages::{StageMap, Stages};
 use qd::Quad;
 use std::array::from_fn;
 use std::cmp::Ordering;
@@ -72,15 +72,10 @@ impl StageTable {
             weights[0] = (Quad::from(0.5) * (step - inner)).0;
             weights[s - 1] = weights[0];
         }
+        // Beyond the last stage it is repeated.
+        let mut times = [(step * g.c[s - 1]).0; MOST];
+        times.iter_mut().zip(&g.c).take(s).for_each(|(time, c)| *time = (step * *c).0);
         let Maps { m, ahead, ahead_weighted } = Maps::of(s);
-        StageTable {
-            s,
-            h,
-            m,
-            weights: Stages(weights),
-            times: padded(&g.c.map(|c| step * c), s),
-            ahead,
-            ahead_weighted,
-        }
+        StageTable { s, h, m, weights: Stages(weights), times: Stages(times), ahead, ahead_weighted }
     }
 }

@@ -1,6 +1,7 @@
 //! The changes of sign of the function of an event, step by step.
 
 use super::events::{Crossing, Event};
+use super::observer::Beside;
 use super::roots::{bracketed_root, bracketed_root_within};
 use super::{Course, LastStep, Motion, Near};
 use crate::StepError;
@@ -226,6 +227,11 @@ impl<const N: usize> Event<'_, N> {
             if change.abs() <= 0.5 * ROUNDINGS {
                 return Ok(Some(at));
             }
+            if change.abs() <= Beside::<N>::REACH
+                && let Some(found) = self.root_beside(step, (tau, &at.1), slope, change)?
+            {
+                return Ok(Some(found));
+            }
             // So near to two states the motion is a line to round-off, and another correction would change nothing.
             if let Some((before, _, (_, from))) = last
                 && let gap = tau - before
@@ -247,6 +253,32 @@ impl<const N: usize> Event<'_, N> {
             last = Some((tau, g, at));
             tau -= change;
             if !(a - aside..=b + aside).contains(&tau) || !(0.0..=1.0).contains(&tau) {
+                return Ok(None);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The root beside a state of the motion, where that of the sketch leads so near to it that a second state is not needed.
+    fn root_beside(
+        &mut self,
+        step: &mut LastStep<'_, N>,
+        (tau, state): (f64, &PhasePoint<N>),
+        slope: f64,
+        mut ahead: f64,
+    ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
+        let Some(beside) = step.beside(tau, state)? else { return Ok(None) };
+        ahead = -ahead;
+        for _ in 0..CORRECTIONS {
+            let (t, there) = (step.time(tau + ahead), beside.at(ahead));
+            let change = self.value(t, &there) / slope;
+            if change.abs() <= 0.5 * ROUNDINGS {
+                return Ok(Some((t, there)));
+            }
+            ahead -= change;
+            // A NaN is within nothing.
+            let within = ahead.abs() <= 2.0 * Beside::<N>::REACH && (0.0..=1.0).contains(&(tau + ahead));
+            if !within {
                 return Ok(None);
             }
         }

@@ -1,7 +1,7 @@
 //! Events: where functions of the state change sign along a run.
 
 use super::crossings::{LastSign, Pace, Way};
-use super::{Course, LastStep, Moment, Observer, Stop, Terminal};
+use super::{Course, LastStep, Moment, Needs, Observer, Stop, Terminal};
 use crate::{InputError, StepError};
 use contact_geom::PhasePoint;
 use std::cell::RefCell;
@@ -117,6 +117,7 @@ pub struct Events<'f, const N: usize> {
     /// The changes of sign so far, in the order of the run.
     pub crossings: Vec<Crossing<N>>,
     events: Vec<Event<'f, N>>,
+    needs: Needs,
     seen: Vec<LastSign<N>>,
     pace: Pace,
     /// About the states inside of the last step.
@@ -130,7 +131,12 @@ impl<'f, const N: usize> Events<'f, N> {
     pub fn new(events: impl IntoIterator<Item = Event<'f, N>>) -> Self {
         let events = events.into_iter().collect();
         let (crossings, seen, sketch) = (Vec::new(), Vec::new(), Vec::new());
-        Events { crossings, events, seen, pace: Pace::of(&Course::NONE), sketch, rates: None }
+        Events { crossings, events, needs: Needs::ACTION, seen, pace: Pace::of(&Course::NONE), sketch, rates: None }
+    }
+
+    /// The same for functions that do not depend on the action: where no one else asks for it, it is not computed.
+    pub fn without_action(self) -> Self {
+        Events { needs: Needs { action: false, ..self.needs }, ..self }
     }
 
     /// The crossings in a step, in the order of the run, and why there are no more.
@@ -176,6 +182,10 @@ impl<'f, const N: usize> Events<'f, N> {
 }
 
 impl<const N: usize> Observer<N> for Events<'_, N> {
+    fn needs(&self) -> Needs {
+        self.needs
+    }
+
     fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
         self.pace = Pace::of(course);
         self.seen.clear();
@@ -230,6 +240,6 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
 
     fn terminal(&self) -> Option<Terminal<'_, N>> {
         let events: Vec<_> = self.events.iter().filter(|event| event.terminal).map(Event::borrowed).collect();
-        (!events.is_empty()).then(|| Box::new(Events::new(events)) as Terminal<'_, N>)
+        (!events.is_empty()).then(|| Box::new(Events { needs: self.needs, ..Events::new(events) }) as Terminal<'_, N>)
     }
 }

@@ -199,6 +199,34 @@ impl<'r, const N: usize> Moment<'r, N> {
 /// The parts in which a step without a curve of its own is looked at.
 const PARTS: usize = 4;
 
+/// The fraction of a step aside by which the curvature of a sketch is taken, and the relative difference of its slope from the motion's up to
+/// which it is used.
+const ASIDE: f64 = 1e-3;
+const AGREEING: f64 = 1e-4;
+
+/// A motion beside one of its states, to second order in the fraction of a step.
+pub(super) struct Beside<const N: usize> {
+    state: PhasePoint<N>,
+    slope: PhasePoint<N>,
+    curvature: PhasePoint<N>,
+}
+
+impl<const N: usize> Beside<N> {
+    /// The fraction of a step up to which the third order is below rounding, where the step resolves the motion.
+    pub(super) const REACH: f64 = 1e-6;
+
+    /// The state so much further, in fractions of the step.
+    pub(super) fn at(&self, ahead: f64) -> PhasePoint<N> {
+        let Beside { state, slope, curvature } = self;
+        let half = 0.5 * ahead;
+        PhasePoint {
+            q: state.q + (slope.q + curvature.q * half) * ahead,
+            p: state.p + (slope.p + curvature.p * half) * ahead,
+            z: state.z + (slope.z + curvature.z * half) * ahead,
+        }
+    }
+}
+
 /// A step, with the motion between its ends.
 pub struct LastStep<'r, const N: usize> {
     from: (f64, PhasePoint<N>),
@@ -267,6 +295,29 @@ impl<const N: usize> LastStep<'_, N> {
             to.push(self.about(k as f64 / PARTS as f64)?);
         }
         Ok(())
+    }
+
+    /// The motion beside a state of it, at a fraction of the step: by its rates there, and by the curvature of the sketch. `None` where the
+    /// slope of the sketch is another, so that its curvature may be.
+    pub(super) fn beside(&mut self, fraction: f64, state: &PhasePoint<N>) -> Result<Option<Beside<N>>, StepError> {
+        let (t0, t1) = self.span();
+        let rates = self.motion.rates(self.time(fraction), state, self.stepper.last_velocity())?;
+        let aside = ASIDE.min(fraction).min(1.0 - fraction);
+        let (below, here, above) =
+            (self.about(fraction - aside)?, self.about(fraction)?, self.about(fraction + aside)?);
+        let part = |of: fn(&PhasePoint<N>) -> SVector<f64, N>| {
+            let slope = of(&rates) * (t1 - t0);
+            let [below, here, above] = [&below, &here, &above].map(of);
+            let agrees = ((above - below) / (2.0 * aside) - slope).amax() <= AGREEING * slope.amax();
+            (agrees, slope, (above - here * 2.0 + below) / (aside * aside))
+        };
+        let ((q_agrees, q_slope, q_curvature), (p_agrees, p_slope, p_curvature)) = (part(|x| x.q), part(|x| x.p));
+        let z_curvature = (above.z - 2.0 * here.z + below.z) / (aside * aside);
+        Ok((q_agrees && p_agrees).then(|| Beside {
+            state: *state,
+            slope: PhasePoint { q: q_slope, p: p_slope, z: rates.z * (t1 - t0) },
+            curvature: PhasePoint { q: q_curvature, p: p_curvature, z: z_curvature },
+        }))
     }
 
     fn curve(&mut self) -> Option<&DenseStep<N>> {

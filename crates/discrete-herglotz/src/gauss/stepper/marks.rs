@@ -49,7 +49,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// doubts.
     #[inline(never)]
     pub(super) fn follow(&mut self) {
-        let (end, h) = (self.values(), self.products.h);
+        let (end, h) = (self.values(), self.h);
         let q = SVector::from(end.q);
         let Some(Sequence { velocities, q: before, ends }) = self.sequence.as_deref_mut() else { return };
         let [from, last] = *ends;
@@ -66,7 +66,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         }
         let [a, b, c, d] = &*velocities;
         let sharper = sharper([&(d - c * 2.0 + b), c, &q], h, self.watch.floor, self.watch.sharpest);
-        let few = self.products.s <= FEW;
+        let few = self.s <= FEW;
         if few && let Some(misfit) = misfit([a, b, c, d], &q, h, self.watch.floor) {
             // Like those of a rule, seen one step late.
             self.watch.note(self.k.saturating_sub(1), misfit);
@@ -88,7 +88,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
             let sets = if let Route::Linear(..) = &*self.route { SETS } else { 1 };
             let Look { misfit, of_momenta, of_action, size, size_z, .. } = self.look(sets)?;
             // A step of fewer stages is no polynomial between its nodes to speak of.
-            let allowed = if self.products.s > FEW { UNRESOLVED } else { 1.0 };
+            let allowed = if self.s > FEW { UNRESOLVED } else { 1.0 };
             // A NaN is a misfit too.
             if misfit <= allowed {
                 return None;
@@ -108,7 +108,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let state = self.state();
         let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return false };
         let (force, rounding) = (self.lagrangian.gradient(t, &x), gradient_rounding(self.lagrangian, t, &x).1);
-        size(&x.v) * self.products.h.abs() <= self.watch.floor
+        size(&x.v) * self.h.abs() <= self.watch.floor
             && size(&(force.x + state.p * force.z)) <= ROUNDINGS * size(&rounding.x)
     }
 
@@ -121,7 +121,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let near = self.last_velocity().unwrap_or_else(SVector::zeros);
         let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &near) else { return [0.0; 2] };
         let (l, g) = gradient_rounding(self.lagrangian, t, &x);
-        let (of, h) = (|part: &SVector<f64, N>| largest(part.iter().copied()), self.products.h.abs());
+        let (of, h) = (|part: &SVector<f64, N>| largest(part.iter().copied()), self.h.abs());
         // No bound where the derivatives have none. What is below the normal numbers has lost its digits.
         [larger(of(&g.x) * h, of(&g.y)), value_rounding(l, &g.x, &x.q) * h]
             .map(|once| if once.is_finite() { ROUNDINGS * once + f64::MIN_POSITIVE } else { 0.0 })
@@ -138,13 +138,13 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for LookAtStages<'_, '_, L, N> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Option<Curve<N>> {
-        let GaussStepper { products, route, solved, from, k, t0, .. } = self.run;
+        let GaussStepper { s, h, route, solved, from, k, t0, .. } = self.run;
         if !solved {
             return None;
         }
         let start = self.run.phase(from);
-        let t = t0 + k.checked_sub(1)? as f64 * products.h;
-        let mut curve = Curve::new(products.s, t, products.h, &start);
+        let t = t0 + k.checked_sub(1)? as f64 * h;
+        let mut curve = Curve::new(*s, t, *h, &start);
         match &**route {
             Route::Linear(run, table) => {
                 let a = run.accelerations(&from.q, &from.y);
