@@ -4,8 +4,8 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, UniformField};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
-    AnyIntegrator, Checkpoint, Crossing, Event, Events, Interrupted, Method, Moment, Problem, Start, Status, Steps,
-    Stop, Until,
+    AnyIntegrator, Checkpoint, Crossing, Event, Events, Interrupted, Method, Moment, Problem, Rows, Start, Status,
+    Steps, Stop, Until,
 };
 use proptest::prelude::*;
 use std::f64::consts::PI;
@@ -329,6 +329,46 @@ proptest! {
             // 400 steps of a motion of size 5, over the rate, and the rounding of the time.
             let bound = f64::EPSILON * (400.0 * 5.0 / rate(a).abs() + 16.0 * a.t.abs());
             prop_assert!((a.t - b.t).abs() <= bound, "{} and {}, not {}", a.t, b.t, bound);
+        }
+    }
+}
+
+/// What is told of a crossing is the motion: a row at its time has the same state, to the rounding of the time and of a step, however the crossing was found; and
+/// where no function depends on the action, it is the same without.
+#[test]
+fn a_crossing_is_a_state_of_the_motion() {
+    let pendulum = contact_geom::systems::Pendulum { gamma: -0.02 };
+    let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.2], 0.3)).unwrap();
+    let until = Until::Time(40.0);
+    for (by, h) in [
+        ("gauss_2", 0.1),
+        ("gauss_4", 0.5),
+        ("gauss_8", 1.0),
+        ("gauss_16", 2.5),
+        ("midpoint", 0.02),
+        ("strang", 0.02),
+        ("blanes_moan_6", 0.2),
+    ] {
+        let by: AnyIntegrator = by.parse().unwrap();
+        for at in [0.0, 0.4, -0.7] {
+            let run = || problem.by(by).steps(Steps::Size(h));
+            let of = || Event::new(move |_, x: &PhasePoint<1>| x.q[0] - at);
+            let (mut whole, mut bare) = (Events::new([of()]), Events::new([of()]).without_action());
+            run().observe(&mut whole).run(until).unwrap();
+            run().without_action().observe(&mut bare).run(until).unwrap();
+            let mut rows = Rows::at(whole.crossings.iter().map(|crossing| crossing.t)).unwrap();
+            run().observe(&mut rows).run(until).unwrap();
+            assert!(whole.crossings.len() >= 8 && whole.crossings.len() == bare.crossings.len(), "{by}");
+            for ((crossing, other), row) in whole.crossings.iter().zip(&bare.crossings).zip(&rows.rows) {
+                let (state, bare) = (&crossing.state, &other.state);
+                // 16 roundings of a time of 40 at speeds up to 2, and of states of size one.
+                let off = [(state.q - row.q).norm(), (state.p - row.p).norm(), (state.z - row.z.unwrap()).abs()];
+                let most = 16.0 * f64::EPSILON * (40.0 + 1.0);
+                assert!(off.iter().all(|off| *off <= most), "{by}, {at}, t = {}: {off:?}", crossing.t);
+                assert!((state.q[0] - at).abs() <= 2.0 * most, "{by}, {at}: {:e}", state.q[0] - at);
+                let apart = [(crossing.t - other.t).abs(), (state.q - bare.q).norm(), (state.p - bare.p).norm()];
+                assert!(apart.iter().all(|apart| *apart <= most), "{by}, {at}: {apart:?}");
+            }
         }
     }
 }

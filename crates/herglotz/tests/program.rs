@@ -406,3 +406,42 @@ fn wrong_lattices_are_refused() {
         Ok(scene) => scene.system.run(&scene.motion, &mut ()).err().map(|error| scene.explain(&error).to_string()),
     });
 }
+
+/// A coordinate that is small and becomes fast counts where the scene gives its size.
+#[test]
+fn coordinates_have_scales() {
+    const SCENE: &str = r#"[system]
+coordinates = ["x", "y"]
+lagrangian = "(x'^2 + y'^2 - x^2 - (1 + 900*x^2)*y^2)/2"
+[start]
+x = 0.0
+"x'" = 1.0
+y = 1e-8
+"y'" = 0.0
+[run]
+time = 5.0
+accuracy = 1e-6
+scales = [1.0, 1e-8]
+[want]
+rows = { at = [5.0], columns = ["y"] }
+"#;
+    let at = Directory::new("scales");
+    let end = |name: &str, text: &str| {
+        let file = at.write(name, text);
+        succeed(&["run", &file, "--out", &at.path("out")]);
+        column(&at.read("out/rows.csv"), "y")[0]
+    };
+    let exact = end("exact.toml", &SCENE.replace("accuracy = 1e-6", "integrator = \"gauss_16\"\nstep = 0.01"));
+    let off = |y: f64| (y - exact).abs() / 1e-8;
+    let (with, without) = (end("with.toml", SCENE), end("without.toml", &SCENE.replace("scales = [1.0, 1e-8]\n", "")));
+    assert!(off(with) <= 1e-6 && off(without) > 1e-6, "{with:e}, {without:e}, {exact:e}");
+    let changes = [
+        ("[1.0, 1e-8]", "[1.0]", "11:10: `scales` has 1 numbers"),
+        ("[1.0, 1e-8]", "[1.0, 0.0]", "11:10: the scale of coordinate 1 is 0"),
+    ];
+    for (from, to, expected) in changes {
+        let file = at.write("refused.toml", &SCENE.replacen(from, to, 1));
+        let (code, told) = fail(&["run", &file, "--out", &at.path("refused")]);
+        assert!(code == Some(2) && told.contains(expected), "{code:?}: {told}");
+    }
+}

@@ -27,7 +27,17 @@ pub const ATTACKS: &[Attack] = &[
         run: rows,
     },
     Attack { on: &["Progress::new", "Quotient::new", "Quotient::largest_change"], run: told },
-    Attack { on: &["Event::new", "Event::rising", "Event::falling", "Event::terminal", "Events::new"], run: events },
+    Attack {
+        on: &[
+            "Event::new",
+            "Event::rising",
+            "Event::falling",
+            "Event::terminal",
+            "Events::new",
+            "Events::without_action",
+        ],
+        run: events,
+    },
     Attack { on: &["Run::observe", "Stop::here", "Stop::failed", "Needs::and"], run: odd_observers },
     Attack {
         on: &[
@@ -136,7 +146,8 @@ fn events(report: &mut Report) {
         };
         report.check(good && events.crossings.is_empty(), || format!("an event {value}: {:?}", outcome.status));
         // A jump, from anything to anything of another sign, is found where it is.
-        let mut jump = Events::new([Event::new(|t, _: &PhasePoint<1>| if t < 0.25 { value } else { -value })]);
+        let mut jump =
+            Events::new([Event::new(|t, _: &PhasePoint<1>| if t < 0.25 { value } else { -value })]).without_action();
         let outcome = with_events(&mut jump, Until::Steps(5)).unwrap();
         let there = jump.crossings.len() == 1 && (jump.crossings[0].t - 0.25).abs() < 1e-15;
         let good = if value == 0.0 || !value.is_finite() { jump.crossings.is_empty() } else { there };

@@ -34,6 +34,7 @@ pub const ATTACKS: &[Attack] = &[
             "Run::without_action",
             "Run::with_conformal_factor",
             "Run::with_error_estimate",
+            "Run::scales",
             "Run::plan",
             "Run::run",
             "Plan::step_size",
@@ -182,6 +183,12 @@ fn runs(report: &mut Report) {
             report.check(kept, || format!("{:?} where {error} is asked for", plan.error()));
         }
         report.door(&error, ended);
+    }
+    for scale in HOSTILE {
+        let ended = problem.accuracy(1e-3).scales([scale]).with_error_estimate().run(Until::Time(0.5)).map(numbers);
+        let refused = !(scale > 0.0 && scale.is_finite());
+        report.check(refused == matches!(ended, Err(InputError::Scale { .. })), || format!("a scale of {scale}"));
+        report.door(&scale, ended);
     }
     report.check(by_steps(Steps::Count(0)).is_err(), || "no step".into());
     let unsized_steps = problem.steps(Steps::Count(7)).run(Until::Steps(7));
