@@ -436,8 +436,8 @@ rows = { at = [5.0], columns = ["y"] }
     let (with, without) = (end("with.toml", SCENE), end("without.toml", &SCENE.replace("scales = [1.0, 1e-8]\n", "")));
     assert!(off(with) <= 1e-6 && off(without) > 1e-6, "{with:e}, {without:e}, {exact:e}");
     let changes = [
-        ("[1.0, 1e-8]", "[1.0]", "11:10: `scales` has 1 numbers"),
-        ("[1.0, 1e-8]", "[1.0, 0.0]", "11:10: the scale of coordinate 1 is 0"),
+        ("[1.0, 1e-8]", "[1.0]", "line 12, column 10: `scales` has 1 numbers"),
+        ("[1.0, 1e-8]", "[1.0, 0.0]", "line 12, column 10: the scale of coordinate 1 is 0"),
     ];
     for (from, to, expected) in changes {
         let file = at.write("refused.toml", &SCENE.replacen(from, to, 1));

@@ -7,13 +7,15 @@ use super::dense::StepStart;
 use super::double_double::solve_exactly;
 use crate::run::saved::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Hessian, Lagrangian, VelocityPoint};
+use contact_geom::{Derivatives, Hessian, Lagrangian, VelocityPoint, linear};
 use num_traits::{One, Zero};
 use qd::Quad;
 use std::array::from_fn;
 
-/// The change of the action, a polynomial of degree two in (q, v), beside `grow z`.
+/// The change of the action, a polynomial of degree two in the velocity and the position from a place, beside `grow z`. The place is the equilibrium, if
+/// there is one: elsewhere the terms of a motion that comes to rest would cancel, and leave their rounding.
 struct Action<const N: usize> {
+    place: SVector<f64, N>,
     qq: SMatrix<f64, N, N>,
     qv: SMatrix<f64, N, N>,
     vv: SMatrix<f64, N, N>,
@@ -39,6 +41,16 @@ pub(super) struct Linear<const N: usize> {
     pub z: Compensated,
 }
 
+/// Where a force that is linear in the positions vanishes, from its slope and its value at the origin; the origin where there is no such place, or more than one.
+fn equilibrium<const N: usize>(slope: &SMatrix<f64, N, N>, at_origin: &SVector<f64, N>) -> SVector<f64, N> {
+    let mut place = -at_origin;
+    if place.iter().all(|x| *x == 0.0) {
+        return SVector::zeros();
+    }
+    let solved = linear::solve(&mut slope.clone(), &mut place).is_ok() && place.iter().all(|x| x.is_finite());
+    if solved { place } else { SVector::zeros() }
+}
+
 impl<const N: usize> Linear<N> {
     /// For `a = M^-1 L_q = -K q + f`; `None` where the stage equations have no solution.
     #[inline(never)]
@@ -56,9 +68,14 @@ impl<const N: usize> Linear<N> {
         let at_origin = lagrangian.gradient(t, &origin);
         let (slope, constant) = (inverse_mass * qq, inverse_mass * at_origin.x);
         let unit = |d: usize, e: usize, x: Quad| if d == e { x } else { zero };
+        let place = equilibrium(&qq, &at_origin.x);
+        let there = VelocityPoint { q: place, v: SVector::zeros(), z: 0.0 };
+        let at_place = lagrangian.gradient(t, &there);
+        let constant_at_place = inverse_mass * at_place.x;
         // The stages' accelerations: rows (i, d), a_id - sum slope B a = slope (q0 + u v0) + f; as right-hand sides the unit
-        // vectors of q0 and v0, and f.
-        let sides = 2 * N + 1;
+        // vectors of q0 and v0, and f, at the origin and for positions from the place.
+        let [last, from_place] = [2 * N, 2 * N + 1];
+        let sides = 2 * N + 2;
         let mut rows: Vec<Vec<Quad>> = (0..s * N)
             .map(|row| {
                 let (i, d) = (row / N, row % N);
@@ -69,7 +86,8 @@ impl<const N: usize> Linear<N> {
                 let right = (0..sides).map(|side| match side {
                     side if side < N => Quad::from(slope[(d, side)]),
                     side if side < 2 * N => Quad::from(slope[(d, side - N)]) * table.u[i],
-                    _ => Quad::from(constant[d]),
+                    side if side == last => Quad::from(constant[d]),
+                    _ => Quad::from(constant_at_place[d]),
                 });
                 left.chain(right).collect()
             })
@@ -81,33 +99,34 @@ impl<const N: usize> Linear<N> {
         let exact = &table.exact;
         let sum = |w: &[Quad], d: usize, side: usize| (0..s).fold(zero, |sum, j| sum + w[j] * a(j, d, side));
         let action = wants_z.then(|| {
-            // The stages as affine functions of (q0, v0, 1), and the sum of L over them.
+            // The stages as affine functions of (q0, v0, 1), with positions from the place, and the sum of L over them.
             let position = |i: usize, d: usize, side: usize| {
                 unit(side, d, one) + unit(side, N + d, table.u[i]) + sum(&table.b[i], d, side)
             };
             let velocity =
                 |i: usize, d: usize, side: usize| unit(side, N + d, exact.inverse_rho[i]) + sum(&exact.d[i], d, side);
-            let rest = lagrangian.value(t, &origin.q, &origin.v, 0.0);
+            let rest = lagrangian.value(t, &place, &origin.v, 0.0);
             let form = |a: usize, b: usize| {
                 (0..s).fold(0.0, |total, i| {
                     let x = |side: usize| SVector::<f64, N>::from_fn(|d, _| position(i, d, side).0);
                     let y = |side: usize| SVector::<f64, N>::from_fn(|d, _| velocity(i, d, side).0);
                     let (xa, xb, ya, yb) = (x(a), x(b), y(a), y(b));
                     let second = xa.dot(&(qq * xb)) + ya.dot(&(vv * yb)) + xa.dot(&(qv * yb)) + xb.dot(&(qv * ya));
-                    let first = |side: usize| at_origin.x.dot(&x(side)) + at_origin.y.dot(&y(side));
-                    let last = 2 * N;
-                    let linear = if b == last { first(a) } else { 0.0 };
-                    let (half, once) = if a == last { (0.5, rest) } else { (if b == last { 1.0 } else { 0.5 }, 0.0) };
+                    let first = |side: usize| at_place.x.dot(&x(side)) + at_place.y.dot(&y(side));
+                    let linear = if b == from_place { first(a) } else { 0.0 };
+                    let (half, once) =
+                        if a == from_place { (0.5, rest) } else { (if b == from_place { 1.0 } else { 0.5 }, 0.0) };
                     total + exact.end_v[i].0 * (half * second + linear + once)
                 })
             };
             Action {
+                place,
                 qq: SMatrix::from_fn(&form),
                 qv: SMatrix::from_fn(|a, b| 2.0 * form(a, N + b)),
                 vv: SMatrix::from_fn(|a, b| form(N + a, N + b)),
-                q: SVector::from_fn(|a, _| form(a, 2 * N)),
-                v: SVector::from_fn(|a, _| form(N + a, 2 * N)),
-                constant: form(2 * N, 2 * N),
+                q: SVector::from_fn(|a, _| form(a, from_place)),
+                v: SVector::from_fn(|a, _| form(N + a, from_place)),
+                constant: form(from_place, from_place),
             }
         });
         let entries = |f: &dyn Fn(usize, usize) -> Quad| from_fn(|d| from_fn(|e| f(d, e).into()));
@@ -116,11 +135,11 @@ impl<const N: usize> Linear<N> {
             qv: entries(&|d, e| unit(d, e, exact.end_u) + sum(&exact.end_b, d, N + e)),
             vq: entries(&|d, e| sum(&exact.end_v, d, e)),
             vv: entries(&|d, e| unit(d, e, exact.grow) + sum(&exact.end_v, d, N + e)),
-            shift_q: from_fn(|d| sum(&exact.end_b, d, 2 * N).into()),
-            shift_v: from_fn(|d| sum(&exact.end_v, d, 2 * N).into()),
+            shift_q: from_fn(|d| sum(&exact.end_b, d, last).into()),
+            shift_v: from_fn(|d| sum(&exact.end_v, d, last).into()),
             grow: table.grow,
             action,
-            stages: rows.iter().map(|row| row[s * N..].iter().map(|e| e.0).collect()).collect(),
+            stages: rows.iter().map(|row| row[s * N..=s * N + last].iter().map(|e| e.0).collect()).collect(),
             q: from_fn(|i| start.q[i].into()),
             v: from_fn(|i| start.v[i].into()),
             z: start.z.into(),
@@ -165,7 +184,7 @@ impl<const N: usize> Linear<N> {
     fn step(&mut self) {
         let (q, v) = (self.q, self.v);
         if let Some(action) = &self.action {
-            let (q, v) = (q.map(|q| q.value), v.map(|v| v.value));
+            let (q, v) = (SVector::from(q.map(|q| q.value)) - action.place, v.map(|v| v.value));
             let mut change = action.constant;
             for i in 0..N {
                 let (mut of_q, mut of_v) = (action.q[i], action.v[i]);

@@ -121,10 +121,12 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let near = self.last_velocity().unwrap_or_else(SVector::zeros);
         let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &near) else { return [0.0; 2] };
         let (l, g) = gradient_rounding(self.lagrangian, t, &x);
+        // The stages of the integrating factor carry roundings the further, the more it changes in the step.
         let (of, h) = (|part: &SVector<f64, N>| largest(part.iter().copied()), self.h.abs());
+        let carried = ROUNDINGS * (1.0 + self.sigma().ln().abs());
         // No bound where the derivatives have none. What is below the normal numbers has lost its digits.
         [larger(of(&g.x) * h, of(&g.y)), value_rounding(l, &g.x, &x.q) * h]
-            .map(|once| if once.is_finite() { ROUNDINGS * once + f64::MIN_POSITIVE } else { 0.0 })
+            .map(|once| if (carried * once).is_finite() { carried * once + f64::MIN_POSITIVE } else { 0.0 })
     }
 }
 
