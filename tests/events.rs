@@ -239,7 +239,7 @@ fn a_step_that_cannot_be_taken_may_end_in_an_event() {
     let times: Vec<f64> = (0..64).map(|k| 0.01 * f64::from(k)).collect();
     for count in [20, 30, 50] {
         let mut events = Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0] - 1e-3).terminal()]);
-        let mut rows = discrete_herglotz::Rows::at(times.iter().copied()).unwrap();
+        let mut rows = Rows::at(times.iter().copied()).unwrap();
         let run = problem.by(AnyIntegrator::Gauss { stages: 8 }).steps(Steps::Count(count));
         let ended = run.observe(&mut rows).observe(&mut events).run(Until::Time(3.0)).unwrap();
         assert!(matches!(ended.status, Status::Stopped { by: "an event", .. }), "{count}: {ended:?}");

@@ -7,7 +7,7 @@ use super::general::General;
 use super::pair::{Registers, over_registers};
 use super::stages::blocks;
 use super::time_transformation::TimeTransformation;
-use crate::gauss::lanes::Lanes;
+use crate::gauss::lanes::{Lanes, vector};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, KernelDual, Lagrangian, Triple, VelocityPoint};
 use pulp::Simd;
@@ -18,8 +18,8 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
     #[inline(always)]
     pub(super) fn point<S: Simd>(&self, r: usize) -> VelocityPoint<N, Lanes<S>> {
         VelocityPoint {
-            q: SVector::from_fn(|d, _| self.x[d].block(r)),
-            v: SVector::from_fn(|d, _| self.v[d].block(r)),
+            q: vector(|d| self.x[d].block(r)),
+            v: vector(|d| self.v[d].block(r)),
             z: self.z_stages.block(r),
         }
     }
@@ -42,7 +42,7 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
             let (re, d) = self.lagrangian.with_gradient(at, &self.point::<S>(r));
             let (mut weight, falling) = (self.table.weights.block::<S>(r), -self.falling.block::<S>(r));
             let point = self.point::<S>(r);
-            let q = SVector::<_, N>::from_fn(|i, _| {
+            let q = vector::<_, N>(|i| {
                 let mut q = KernelDual::<Lanes<S>, SVector<Lanes<S>, N>>::constant(point.q[i]);
                 q.d[i] = Lanes::splat(1.0);
                 q
@@ -70,13 +70,13 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
     #[inline(always)]
     fn take_gradients<S: Simd, T: Registers<S>>(&mut self, t: f64, r: usize) -> usize {
         let point = VelocityPoint {
-            q: SVector::from_fn(|d, _| T::of(&self.x[d], r)),
-            v: SVector::from_fn(|d, _| T::of(&self.v[d], r)),
+            q: vector(|d| T::of(&self.x[d], r)),
+            v: vector(|d| T::of(&self.v[d], r)),
             z: T::of(&self.z_stages, r),
         };
         let (l, d) = self.lagrangian.with_gradient(T::of(&self.table.times, r) + t, &point);
         for i in 0..T::COUNT {
-            let of = |x: &SVector<T, N>| SVector::from_fn(|d, _| x[d].register(i));
+            let of = |x: &SVector<T, N>| vector(|d| x[d].register(i));
             self.weigh(r + i, l.register(i), &Triple { x: of(&d.x), y: of(&d.y), z: d.z.register(i) });
         }
         r + T::COUNT

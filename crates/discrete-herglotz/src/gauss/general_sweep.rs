@@ -6,8 +6,7 @@
 use super::general::General;
 use super::stages::{blocks, over_groups};
 use super::time_transformation::TimeTransformation;
-use crate::gauss::lanes::Lanes;
-use contact_geom::nalgebra::SVector;
+use crate::gauss::lanes::{Lanes, vector};
 use contact_geom::{Lagrangian, Scalar};
 use pulp::Simd;
 
@@ -72,8 +71,7 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
             seen.see(1, falling - before, rho);
             self.falling.set(r, falling);
             let inverse = rho.recip();
-            let excess =
-                SVector::<Lanes<S>, N>::from_fn(|d, _| self.l_v[d].block::<S>(r).mul_add(falling, pushed[d][k]));
+            let excess = vector::<Lanes<S>, N>(|d| self.l_v[d].block::<S>(r).mul_add(falling, pushed[d][k]));
             let mut weight = self.table.weights.block::<S>(r);
             if const { !P::PHYSICAL } {
                 weight *= self.extension.g.block(r);

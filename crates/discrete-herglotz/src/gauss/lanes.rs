@@ -1,6 +1,7 @@
 //! Lanes of a vector register as numbers that a Lagrangian can be written over.
 
 use super::sine::{REDUCIBLE, Register, cosine, sine};
+use contact_geom::nalgebra::SVector;
 use contact_geom::{Scalar, scalar_operators};
 use pulp::{Simd, WithSimd, bytemuck};
 use std::cell::Cell;
@@ -46,6 +47,16 @@ pub(crate) fn note_branch() {
 #[inline(always)]
 pub(crate) fn forget_branches() {
     ASKED.set(false);
+}
+
+/// A vector of registers, by a loop: nalgebra's `from_fn` may be compiled by itself, and for no vector instructions.
+#[inline(always)]
+pub(crate) fn vector<T: Scalar, const N: usize>(of: impl Fn(usize) -> T) -> SVector<T, N> {
+    let mut x = [T::from(0.0); N];
+    for (d, x) in x.iter_mut().enumerate() {
+        *x = of(d);
+    }
+    x.into()
 }
 
 impl<S: Simd> Lanes<S> {
@@ -387,7 +398,7 @@ mod tests {
 
     /// The slopes of powers and of a choice by x.
     fn slopes<T: Scalar>(x: T) -> [T; 5] {
-        let x = contact_geom::KernelDual { re: x, d: contact_geom::nalgebra::SVector::<T, 1>::new(T::one()) };
+        let x = contact_geom::KernelDual { re: x, d: SVector::<T, 1>::new(T::one()) };
         let zero = num_traits::Zero::zero();
         let chosen = x.if_less(zero, zero, x.powf(2.5) + x.sqrt());
         [Scalar::abs(x).powf(2.5), (x * x).powf(1.5), (x * x).powf(0.5), x.sqrt(), chosen].map(|y| y.d[0])

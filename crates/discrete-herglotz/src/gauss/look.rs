@@ -10,8 +10,8 @@ use super::pair::{Registers, Two, by_two};
 use super::stage_values::StageValues;
 use super::stages::{StageMap, Stages, blocks};
 use super::time_transformation::TimeTransformation;
-use crate::gauss::lanes::Lanes;
-use contact_geom::nalgebra::{SMatrix, SVector};
+use crate::gauss::lanes::{Lanes, vector};
+use contact_geom::nalgebra::SMatrix;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, largest};
 use pulp::{Simd, WithSimd};
 use std::array::from_fn;
@@ -275,8 +275,8 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
         let mut other: Option<(Lanes<S>, Triple<N, Lanes<S>>)> = None;
         for r in 0..blocks::<S>(s) {
             let mut x = VelocityPoint {
-                q: SVector::from_fn(|d, _| q[d].block::<S>(r)),
-                v: SVector::from_fn(|d, _| v[d].block::<S>(r)),
+                q: vector(|d| q[d].block::<S>(r)),
+                v: vector(|d| v[d].block::<S>(r)),
                 z: z.block::<S>(r),
             };
             // From the clock's time to t.
@@ -290,8 +290,8 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
                 Some(other) => other,
                 None if const { L::INTERPRETED && P::PHYSICAL && by_two::<S>() } && r + 1 < blocks::<S>(s) => {
                     let pair = VelocityPoint {
-                        q: SVector::from_fn(|d, _| Two::<S>::of(&q[d], r)),
-                        v: SVector::from_fn(|d, _| Two::of(&v[d], r)),
+                        q: vector(|d| Two::<S>::of(&q[d], r)),
+                        v: vector(|d| Two::of(&v[d], r)),
                         z: Two::of(&z, r),
                     };
                     let (l, g) = lagrangian.with_gradient(Two::of(&between.points, r) * h + t, &pair);

@@ -4,9 +4,9 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::stages::Stages;
-use crate::gauss::lanes::Lanes;
+use crate::gauss::lanes::{Lanes, vector};
 use crate::run::saved::Saved;
-use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::nalgebra::SMatrix;
 use contact_geom::{Structure, linear};
 use pulp::Simd;
 
@@ -33,7 +33,7 @@ impl<const N: usize> Mass<N> {
     pub fn invert<S: Simd>(&mut self, r: usize, w: &SMatrix<Lanes<S>, N, N>) -> bool {
         let Mass::Stages(stored) = self else { return true };
         for j in 0..N {
-            let mut column = SVector::<Lanes<S>, N>::from_fn(|i, _| Lanes::splat(if i == j { 1.0 } else { 0.0 }));
+            let mut column = vector::<Lanes<S>, N>(|i| Lanes::splat(if i == j { 1.0 } else { 0.0 }));
             if linear::solve_in_kernel(&mut w.clone(), &mut column).is_err() {
                 return false;
             }

@@ -14,7 +14,7 @@ use super::stage_values::StageValues;
 use super::stages::{Stages, blocks};
 use super::sweeps::{AGE, AfterSweep, SLOW, Sweeps};
 use crate::StepError;
-use crate::gauss::lanes::{Lanes, branched};
+use crate::gauss::lanes::{Lanes, branched, vector};
 use crate::run::saved::{Saved, load_option, save_option, saved};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, gradient_rounding, largest};
@@ -201,14 +201,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
     /// Takes the forces at the positions of the blocks of stages that T holds, from the r-th on.
     #[inline(always)]
     fn take_forces<S: Simd, T: Registers<S>>(&mut self, t: f64, r: usize, most: &mut [Lanes<S>; 2]) -> usize {
-        let x = VelocityPoint {
-            q: SVector::from_fn(|d, _| T::of(&self.x[d], r)),
-            v: SVector::from_fn(|_, _| T::zero()),
-            z: T::zero(),
-        };
+        let x = VelocityPoint { q: vector(|d| T::of(&self.x[d], r)), v: vector(|_| T::zero()), z: T::zero() };
         let force = self.lagrangian.force(T::of(&self.table.times, r) + t, &x);
         for i in 0..T::COUNT {
-            self.take(r + i, SVector::from_fn(|d, _| force[d].register(i)), most);
+            self.take(r + i, vector(|d| force[d].register(i)), most);
         }
         r + T::COUNT
     }
@@ -220,7 +216,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         match &self.inverse_mass {
             None => force,
             Some(inverse) => {
-                let mut accelerations = SVector::from_fn(|_, _| zero);
+                let mut accelerations = vector(|_| zero);
                 for i in 0..N {
                     for j in 0..N {
                         accelerations[i] += force[j] * inverse[(i, j)];

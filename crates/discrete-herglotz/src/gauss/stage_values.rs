@@ -2,8 +2,8 @@
 
 use super::pair::{Registers, over_registers};
 use super::stages::{Stages, blocks};
+use crate::gauss::lanes::vector;
 use contact_geom::Lagrangian;
-use contact_geom::nalgebra::SVector;
 use pulp::Simd;
 
 /// `L(t, q, v, 0)` at the stages of a step that begins at the time t.
@@ -29,7 +29,7 @@ impl<L: Lagrangian<N>, const N: usize> StageValues<'_, L, N> {
     /// At the blocks of stages that T holds, from the r-th on.
     #[inline(always)]
     fn take<S: Simd, T: Registers<S>>(&self, r: usize, values: &mut Stages) -> usize {
-        let (q, v) = (SVector::from_fn(|d, _| T::of(&self.x[d], r)), SVector::from_fn(|d, _| T::of(&self.v[d], r)));
+        let (q, v) = (vector(|d| T::of(&self.x[d], r)), vector(|d| T::of(&self.v[d], r)));
         let l = self.lagrangian.value(T::of(self.times, r) + self.t, &q, &v, T::zero());
         for i in 0..T::COUNT {
             values.set(r + i, l.register(i));
