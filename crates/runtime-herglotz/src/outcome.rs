@@ -23,7 +23,7 @@ pub struct Outcome {
     pub z: Option<f64>,
     /// The logarithm of the conformal factor, where it was asked for.
     pub log_factor: Option<f64>,
-    /// The error of (q, p), relative to its size, where it was asked for.
+    /// The error of (q, p) relative to its size, or of v relative to the largest speed, where it was asked for.
     pub error_estimate: Option<f64>,
     /// The evaluations of forces or gradients.
     pub evaluations: u64,

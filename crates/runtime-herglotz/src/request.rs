@@ -44,7 +44,7 @@ impl Start {
 /// How a motion is advanced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Way {
-    /// To a relative error of (q, p), by this integrator, or by one that is chosen for it.
+    /// To a relative error of (q, p) and v, by this integrator, or by one that is chosen for it.
     Accuracy {
         /// The error.
         wanted: f64,

@@ -90,7 +90,7 @@ fn stages_along<L: Lagrangian<N>, const N: usize>(request: &Request<'_, L, N>, w
     if condensed && first_guess(request, STAGES, wanted) >= MANY { MOST } else { STAGES }
 }
 
-/// Chooses the steps, and the integrator where the run names none, so that the error of (q, p), relative to their size, is at most
+/// Chooses the steps, and the integrator where the run names none, so that the error of (q, p) relative to their size, and of v, is at most
 /// `wanted` at ten times along the motion.
 ///
 /// By the clock that the motion states, where steps that are equal in its time are much fewer: the first run with equal steps sees

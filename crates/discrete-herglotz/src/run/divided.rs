@@ -21,7 +21,7 @@ const MISFITS: [f64; 2] = [0.02, 1e-11];
 /// The searches that may follow each other, each with a finer division.
 const ATTEMPTS: usize = 8;
 
-/// Chooses steps that are divided where the motion is fast, so that the error of (q, p) relative to their size is at most that wanted: a division and one
+/// Chooses steps that are divided where the motion is fast, so that the errors of (q, p) and v are at most that wanted: a division and one
 /// of half the length must agree. The error of a part is about the square of its misfit, and the misfit of the half smaller by `2^s`.
 pub(super) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
     pilots: &mut Pilots<'_, 'p, L, N>,

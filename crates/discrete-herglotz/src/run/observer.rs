@@ -298,10 +298,11 @@ impl<const N: usize> LastStep<'_, N> {
     }
 
     /// The motion beside a state of it, at a fraction of the step: by its rates there, and by the curvature of the sketch. `None` where the
-    /// slope of the sketch is another, so that its curvature may be.
+    /// slope of the sketch is another, so that its curvature may be, and where there are no rates.
     pub(super) fn beside(&mut self, fraction: f64, state: &PhasePoint<N>) -> Result<Option<Beside<N>>, StepError> {
         let (t0, t1) = self.span();
-        let rates = self.motion.rates(self.time(fraction), state, self.stepper.last_velocity())?;
+        let near = self.stepper.last_velocity();
+        let Ok(rates) = self.motion.rates(self.time(fraction), state, near) else { return Ok(None) };
         let aside = ASIDE.min(fraction).min(1.0 - fraction);
         let (below, here, above) =
             (self.about(fraction - aside)?, self.about(fraction)?, self.about(fraction + aside)?);

@@ -26,7 +26,7 @@ pub struct Outcome<const N: usize> {
     pub z: Option<f64>,
     /// The logarithm of the conformal factor of the motion, where someone asked for it.
     pub log_factor: Option<f64>,
-    /// The error of (q, p), relative to its size, where someone asked for it; see
+    /// The error of (q, p) relative to its size, or of v relative to the largest speed, whichever is larger, where someone asked for it; see
     /// [`Run::with_error_estimate`](super::Run::with_error_estimate). Where an observer ended the run within a step, that at the step's end.
     pub error_estimate: Option<f64>,
     /// The evaluations of forces or gradients.

@@ -151,7 +151,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         &self.facts
     }
 
-    /// The error of (q, p) that the pilot runs found, or predict; `None` where no accuracy was asked for.
+    /// The error of (q, p) and v that the pilot runs found, or predict; `None` where no accuracy was asked for.
     pub fn error(&self) -> Option<f64> {
         self.error
     }

@@ -127,7 +127,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
         self.by(GaussCollocation { stages: 8 }).steps(steps)
     }
 
-    /// A run of it to a relative error of (q, p), by an integrator that is chosen for it; see [`Run::accuracy`].
+    /// A run of it to a relative error of (q, p) and v, by an integrator that is chosen for it; see [`Run::accuracy`].
     pub fn accuracy<'o>(&self, wanted: f64) -> Run<'_, 'o, L, N> {
         Run::of(self).accuracy(wanted)
     }

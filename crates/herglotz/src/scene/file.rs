@@ -64,7 +64,7 @@ pub(crate) struct SystemTable {
 pub(crate) struct RunTable {
     /// The time at which the motion ends; before that of the start it goes back.
     pub time: At<f64>,
-    /// The relative error of (q, p) at the end; the step is chosen for it, and the integrator unless one is named.
+    /// The relative error of (q, p) and v; the step is chosen for it, and the integrator unless one is named.
     pub accuracy: Option<At<f64>>,
     /// The integrator; see `herglotz list integrators`.
     pub integrator: Option<At<String>>,
