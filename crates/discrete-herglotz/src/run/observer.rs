@@ -314,7 +314,7 @@ impl<const N: usize> LastStep<'_, N> {
         };
         let ((q_agrees, q_slope, q_curvature), (p_agrees, p_slope, p_curvature)) = (part(|x| x.q), part(|x| x.p));
         let z_curvature = (above.z - 2.0 * here.z + below.z) / (aside * aside);
-        Ok((q_agrees && p_agrees).then(|| Beside {
+        Ok((q_agrees && p_agrees).then_some(Beside {
             state: *state,
             slope: PhasePoint { q: q_slope, p: p_slope, z: rates.z * (t1 - t0) },
             curvature: PhasePoint { q: q_curvature, p: p_curvature, z: z_curvature },
