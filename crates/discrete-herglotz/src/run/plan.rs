@@ -225,9 +225,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes, and are compared
         // with halves in doubt alone.
         let doubts = self.error.is_none() && !by_clock;
-        // Those of other methods than Gauss' were compared with a reference that was looked at; of a linear motion a transient that ends within a step is
-        // nothing that the order does not show.
-        let linear = self.problem.structure.quadratic;
+        // Those of other methods than Gauss' were compared with a reference that was looked at; where a motion is proved to be linear a transient that
+        // ends within a step is nothing that the order does not show.
+        let linear = const { L::PROVED } && self.problem.structure.quadratic;
         let judged = self.error.is_some() && (self.facts.collocation.is_none() || linear);
         let seen_by = |stepper: &dyn Stepper<N>| if judged { None } else { stepper.suspicion() };
         let halves = doubts && !self.many_stages();
