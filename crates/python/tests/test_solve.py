@@ -169,7 +169,8 @@ def test_the_error_of_given_steps_is_estimated():
 def test_the_velocity_is_as_accurate_as_the_state():
     # A charge in a field: v turns by B t, and p = v + A(q) is 1e5 times as large.
     B, t = 1e5, 40e-5
-    sol = hz.solve("(x'^2 + y'^2)/2 + B*(x*y' - y*x')/2", [1.0, 0.0], [0.6, 0.8], t, accuracy=1e-6, parameters={"B": B})
+    formula, plane = "(x'^2 + y'^2)/2 + B*(x*y' - y*x')/2", dict(coordinates=["x", "y"], parameters={"B": B})
+    sol = hz.solve(formula, [1.0, 0.0], [0.6, 0.8], t, accuracy=1e-6, **plane)
     turn = 0.6 - 0.8j
     expected = turn * np.exp(1j * B * t)
     assert abs(complex(sol.v[-1, 0], -sol.v[-1, 1]) - expected) < 1e-6
@@ -177,10 +178,11 @@ def test_the_velocity_is_as_accurate_as_the_state():
 
 def test_coordinates_of_different_size_have_their_own_scales():
     formula, start = "(x'^2 + y'^2 - x^2 - (1 + 900*x^2)*y^2)/2", ([0.0, 1e-8], [1.0, 0.0])
-    exact = hz.solve(formula, *start, 5.0, integrator="gauss_16", step=0.01)
+    plane = dict(coordinates=["x", "y"])
+    exact = hz.solve(formula, *start, 5.0, integrator="gauss_16", step=0.01, **plane)
 
     def error(**options):
-        sol = hz.solve(formula, *start, 5.0, accuracy=1e-6, **options)
+        sol = hz.solve(formula, *start, 5.0, accuracy=1e-6, **plane, **options)
         return abs(sol.q[-1, 1] - exact.q[-1, 1]) / 1e-8
 
     assert error(scales=[1.0, 1e-8]) < 1e-6 < error()
