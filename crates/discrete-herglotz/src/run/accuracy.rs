@@ -1,19 +1,18 @@
 //! The integrator and the number of steps for a wanted error.
 
+mod first_guess;
 mod reference;
 
+pub(in crate::run) use first_guess::first_guess;
 use reference::by_reference;
 
 use super::divided::divided_steps;
 use super::pilot::{Elsewhere, Marks, PilotEnd, Pilots};
 use super::track::Track;
-use super::{MOST_STEPS, Problem, Request, Shared, Terminal};
+use super::{MOST_STEPS, Request, Shared, Terminal};
 use crate::gauss::MOST;
-use crate::rules::step_equations::inverted;
 use crate::{ClockedGauss, GaussCollocation, InputError, Obstacle};
-use contact_geom::nalgebra::SMatrix;
-use contact_geom::{Derivatives, Lagrangian, larger};
-use std::f64::consts::PI;
+use contact_geom::{Lagrangian, larger};
 use std::sync::Arc;
 
 /// The searches that may follow each other: each makes the steps shorter, or ends.
@@ -120,21 +119,6 @@ pub(super) fn choose<'p, L: Lagrangian<N>, const N: usize>(
     let span = t_end - request.problem.t0;
     let part = Request { t_end, span, integrator: request.integrator.clone(), ..*request };
     Ok(choose(&part)?.going_on(request.span / span))
-}
-
-impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
-    /// An accuracy that is refused, for the rounding of the velocity where that alone is larger: a momentum `p = v + A(q)` determines v up to the
-    /// rounding of A.
-    fn by_rounding_of_velocity(&self, refused: InputError) -> InputError {
-        let Problem { lagrangian, start, state, t0, .. } = self.problem;
-        let InputError::Accuracy { wanted, .. } = refused else { return refused };
-        let rounding = inverted(&lagrangian.hessian(*t0, start).vv)
-            .map_or(0.0, |inverse| (inverse.abs() * state.p.abs()).norm() * f64::EPSILON / start.v.norm());
-        if rounding > wanted && rounding.is_finite() {
-            return InputError::Accuracy { wanted, reached: rounding, cause: Obstacle::RoundOff };
-        }
-        refused
-    }
 }
 
 /// The same with a budget.
@@ -273,47 +257,6 @@ fn chosen<'p, L: Lagrangian<N>, const N: usize>(
         return Choice { integrator, count: count as usize, h: found.truth.tau / (count - 0.5), error, ended: None };
     }
     Choice { integrator, count, h, error, ended: None }
-}
-
-/// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.
-pub(super) fn first_guess<L: Lagrangian<N>, const N: usize>(
-    request: &Request<'_, L, N>,
-    stages: usize,
-    goal: f64,
-) -> usize {
-    let Request { problem: Problem { lagrangian, start, t0, .. }, span, .. } = request;
-    let h = lagrangian.hessian(*t0, start);
-    // Of forces of position, and of those that turn the velocity as a magnetic field does.
-    let [of_position, turning] = inverted(&h.vv).map_or([0.0; 2], |inverse| {
-        [spectral_radius(*inverse * h.qq).sqrt(), spectral_radius(*inverse * (h.qv - h.qv.transpose()))]
-    });
-    // The error of a step of x radians is about x^(2s+1) s!^4 / (2s)!^3.
-    let s = stages as f64;
-    let logarithm = |n: usize| (1..=n).map(|i| (i as f64).ln()).sum::<f64>();
-    let constant = 4.0 * logarithm(stages) - 3.0 * logarithm(2 * stages);
-    let radians = ((goal.ln() - constant) / (2.0 * s + 1.0)).exp();
-    // Beyond half a period sweeps do not contract.
-    let radians = 0.5 * radians;
-    // Sweeps for the velocity contract by the angle that it turns.
-    let count = span.abs() * larger(of_position / radians.min(s / 3.0).min(PI), turning / radians.min(1.0));
-    // What is stiff at its start need not be resolved, and what is free there may be anything later.
-    if count.is_finite() { (count.ceil() as usize).clamp(1, 1 << 20) } else { 1 }
-}
-
-/// The largest absolute eigenvalue, by the norm of the eighth power: at most `N^(1/16)` times too large for a symmetric matrix. Not finite where
-/// the matrix is not.
-fn spectral_radius<const N: usize>(matrix: SMatrix<f64, N, N>) -> f64 {
-    let (mut power, mut logarithm) = (matrix, 0.0);
-    for squared in 0..=3 {
-        let norm = power.norm();
-        if norm == 0.0 || !norm.is_finite() {
-            return norm;
-        }
-        logarithm += norm.ln() / f64::from(1 << squared);
-        power /= norm;
-        power *= power;
-    }
-    logarithm.exp()
 }
 
 /// Finds the runs that agree.

@@ -2,10 +2,11 @@
 
 use super::noise::all_together;
 use super::track::{in_units, norm};
-use super::{Near, Problem};
-use crate::legendre_inverse;
+use super::{Near, Problem, Request};
+use crate::rules::step_equations::inverted;
+use crate::{InputError, Obstacle, legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, larger};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, larger};
 
 /// The velocities of one run, and what their errors are relative to.
 pub(super) struct Velocities<'r, 'p, L, const N: usize> {
@@ -53,5 +54,20 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
     pub fn speed(&self, steps: usize) -> f64 {
         let moved = self.speed * (self.before.0 - self.problem.t0).abs();
         if moved <= all_together(steps) * f64::EPSILON * self.reach { f64::INFINITY } else { self.speed }
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
+    /// An accuracy that is refused, for the rounding of the velocity where that alone is larger: a momentum `p = v + A(q)` determines v up to the
+    /// rounding of A.
+    pub(super) fn by_rounding_of_velocity(&self, refused: InputError) -> InputError {
+        let Problem { lagrangian, start, state, t0, .. } = self.problem;
+        let InputError::Accuracy { wanted, .. } = refused else { return refused };
+        let rounding = inverted(&lagrangian.hessian(*t0, start).vv)
+            .map_or(0.0, |inverse| (inverse.abs() * state.p.abs()).norm() * f64::EPSILON / start.v.norm());
+        if rounding > wanted && rounding.is_finite() {
+            return InputError::Accuracy { wanted, reached: rounding, cause: Obstacle::RoundOff };
+        }
+        refused
     }
 }

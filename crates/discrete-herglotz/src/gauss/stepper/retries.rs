@@ -1,0 +1,125 @@
+//! What is tried on a step that the sweeps do not solve.
+
+use super::{GaussStepper, Route, Solution};
+use crate::gauss::stage_equations::{Given, Products, StageEquations, Workspace};
+use crate::{StepError, Stepper, legendre_inverse};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint};
+
+/// What has been tried on a step.
+#[derive(Default)]
+pub(super) struct Tried {
+    /// Simplified Newton iteration with the Jacobian at its start.
+    pub simplified: bool,
+    pub newton: bool,
+    /// Why it was refused at first.
+    pub refused: Option<StepError>,
+}
+
+/// The steps of Newton's method after which cheaper sweeps are tried again for the first time.
+pub(super) const PAUSE: usize = 8;
+
+impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
+    /// Has the refused step tried again: by simplified Newton iteration, with the Jacobian at its start if that is not so
+    /// already, then by Newton's method. `refused` where all have been tried.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn try_again(&mut self, tried: &mut Tried, refused: StepError) -> Result<(), StepError> {
+        if !self.newton {
+            return Err(refused);
+        }
+        tried.refused.get_or_insert(refused);
+        // With that of the simplified iteration, so that later steps allocate nothing.
+        match &mut *self.route {
+            Route::Condensed(run) => run.reserve(),
+            _ => self.make_newton(),
+        }
+        if !tried.simplified {
+            tried.simplified = true;
+            if self.solution != Solution::Simplified {
+                self.pause_for(Solution::Simplified);
+            }
+            if self.linearise() {
+                return Ok(());
+            }
+        }
+        if tried.newton {
+            return Err(refused);
+        }
+        self.pause_for(Solution::Newton);
+        Ok(())
+    }
+
+    /// Makes what Newton's method works with, for the first step that asks for it.
+    fn make_newton(&mut self) {
+        if self.by_newton.is_none() {
+            let products = Products::new(self.s, self.h);
+            let equations = StageEquations { lagrangian: self.lagrangian, products: &products, t: self.time() };
+            let work = equations.workspace(&Given::Start(self.state()));
+            self.by_newton = Some(Box::new((products, work)));
+        }
+    }
+
+    /// Goes over to another solution, for twice as long as the last time.
+    fn pause_for(&mut self, solution: Solution) {
+        self.solution = solution;
+        self.pause = self.pauses;
+        self.pauses = self.pauses.saturating_mul(2);
+    }
+
+    /// Has the sweeps of the next steps corrected by Newton's method, with the Jacobian at the state; `false` where it is
+    /// singular there, or not finite.
+    fn linearise(&mut self) -> bool {
+        let (t, state) = (self.time(), self.state());
+        match &mut *self.route {
+            Route::Linear(..) => false,
+            Route::Condensed(run) => {
+                run.forget();
+                run.linearise(t, state.q)
+            }
+            Route::General(run) => {
+                let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &run.last_velocity()) else { return false };
+                run.guess(&x.v);
+                run.linearise(&self.lagrangian.gradient(t, &x), &self.lagrangian.hessian(t, &x))
+            }
+        }
+    }
+
+    /// Solves the stages of the next step by Newton's method, from a motion without forces or of constant velocity.
+    pub(super) fn solve_stages(&mut self) -> Result<(), StepError> {
+        self.solved = false;
+        let (t, from) = (self.time(), self.state());
+        if let Route::General(_) = &*self.route {
+            self.make_newton();
+        }
+        let run = match &mut *self.route {
+            Route::Linear(..) => return Ok(()),
+            Route::Condensed(run) => return run.solve(t),
+            Route::General(run) => run,
+        };
+        let Some((products, work)) = self.by_newton.as_deref_mut() else { return Ok(()) };
+        let equations = StageEquations { lagrangian: self.lagrangian, products, t };
+        let VelocityPoint { v, .. } = legendre_inverse(self.lagrangian, t, &from, &run.last_velocity())?;
+        equations.solve(&Given::Start(from), &v, &from.p, work)?;
+        let Workspace { x, l, .. } = work;
+        run.accept((0..self.s).map(|i| (x.v[i], l[i].re, x.rho[i])));
+        Ok(())
+    }
+
+    /// Tries the next cheaper solution once its pause is over.
+    pub(super) fn resume(&mut self) {
+        if self.solution != Solution::Sweeps && self.pause == 0 {
+            self.solution = match self.solution {
+                Solution::Newton => Solution::Simplified,
+                _ => Solution::Sweeps,
+            };
+            self.pause = self.pauses;
+            if self.solution == Solution::Sweeps {
+                match &mut *self.route {
+                    Route::Linear(..) => {}
+                    Route::Condensed(run) => run.park_newton(),
+                    Route::General(run) => run.park_newton(),
+                }
+            }
+        }
+    }
+}
