@@ -2,7 +2,9 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, legendre};
-use discrete_herglotz::{AnyIntegrator, InputError, Obstacle, Problem, Rows, Run, Status, StepError, Steps, Until};
+use discrete_herglotz::{
+    AnyIntegrator, InputError, Problem, Rows, Run, SelectionFailure, Status, StepError, Steps, Until,
+};
 use exact_lagrangian::herglotz_flow;
 
 /// One type for all systems of this file, since each is compiled with every integrator: a mechanical system, and others that claim more
@@ -107,7 +109,7 @@ fn problem(system: &Bench, start: VelocityPoint<1>) -> Problem<'_, Bench, 1> {
 /// The error in (q, p) of a run up to a time, relative to their size.
 fn error(run: Run<'_, '_, Bench, 1>, t: f64, truth: [f64; 2]) -> Result<f64, InputError> {
     let outcome = run.run(Until::Time(t))?;
-    assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
+    assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None));
     let size = truth[0].hypot(truth[1]);
     Ok(if size == 0.0 {
         outcome.q[0].hypot(outcome.p[0])
@@ -217,7 +219,7 @@ fn causes() {
     };
     let chaotic = Bench { gamma: -0.1, force: 0.35, omega: 1.4, ..DUFFING };
     let cause = refused(&chaotic, start, 500.0);
-    let Some(InputError::Accuracy { cause: Obstacle::Chaos { t }, .. }) = cause else { panic!("{cause:?}") };
+    let Some(InputError::Accuracy { cause: SelectionFailure::Chaos { t }, .. }) = cause else { panic!("{cause:?}") };
     assert!(t < 500.0);
     // Up to that time it is not refused, and right: the exact flow's own round-off grows there to no more than 1e-7.
     let trusted = 0.5 * t;
@@ -227,7 +229,9 @@ fn causes() {
     // Blow-up of z in a finite time.
     let pole = Bench { c: -1.0, ..FREE };
     let cause = refused(&pole, VelocityPoint::new([0.0], [1.0], 1.0), 3.0);
-    let Some(InputError::Accuracy { cause: Obstacle::Halted { t, .. }, .. }) = cause else { panic!("{cause:?}") };
+    let Some(InputError::Accuracy { cause: SelectionFailure::Halted { t, .. }, .. }) = cause else {
+        panic!("{cause:?}")
+    };
     // v' = 2 z v and z' = v^2/2 + z^2: with w = z + v/sqrt(2) and u = z - v/sqrt(2), w' = w^2 and u' = u^2, so w has its pole at 1/w0.
     let pole = 1.0 / (1.0 + 0.5f64.sqrt());
     assert!((t - pole).abs() < 1e-3, "{t}, not {pole}");

@@ -10,13 +10,13 @@ use contact_geom::systems::{
     Relativistic, System,
 };
 use contact_geom::{
-    DiscretePoint, GeometryError, Lagrangian, Largest, PhasePoint, Scalar, VelocityPoint, largest, legendre,
+    DiscretePoint, GeometryError, Lagrangian, MaxAbsOrNan, PhasePoint, Scalar, VelocityPoint, legendre, max_abs_or_nan,
+};
+use discrete_herglotz::{
+    AnyDiscreteLagrangian, DiscreteLagrangian, DiscretePath, Gauss, InputError, Method, Midpoint, StepError,
+    discrete_action, discrete_flow, legendre_minus, legendre_plus,
 };
 use discrete_herglotz::{BoundaryPath, CriticalPath, End, PathStatus, continuation};
-use discrete_herglotz::{
-    DiscreteLagrangian, DiscretePath, Discretised, Gauss, InputError, Method, Midpoint, StepError, discrete_action,
-    discrete_flow, legendre_minus, legendre_plus,
-};
 use proptest::prelude::*;
 use std::f64::consts::PI;
 
@@ -27,7 +27,7 @@ fn at<const N: usize>(q: [f64; N]) -> End<N> {
 }
 
 fn largest_of<const N: usize>(v: &[SVector<f64, N>]) -> f64 {
-    largest(v.iter().map(Largest::largest))
+    max_abs_or_nan(v.iter().map(MaxAbsOrNan::max_abs_or_nan))
 }
 
 /// The size of the terms of the discrete Herglotz equations along a path: momenta, and what rounding moves of them through the
@@ -36,9 +36,11 @@ fn size<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, t0: f64, path: &Critic
     let of = |k: usize| {
         let x = DiscretePoint { q0: path.points[k], q1: path.points[k + 1], z0: path.actions[k] };
         let jet = ld.second_jet(t0 + k as f64 * ld.step_size(), &x).unwrap();
-        jet.first.d1.largest() + jet.first.d2.largest() + jet.d12.largest() * N as f64 * largest_of(&path.points)
+        jet.first.d1.max_abs_or_nan()
+            + jet.first.d2.max_abs_or_nan()
+            + jet.d12.max_abs_or_nan() * N as f64 * largest_of(&path.points)
     };
-    largest((0..path.points.len() - 1).map(of))
+    max_abs_or_nan((0..path.points.len() - 1).map(of))
 }
 
 /// What holds for each path that is found: the discrete Herglotz equations, `dA_d`, the action, the flow.
@@ -57,7 +59,10 @@ fn check<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, (t0, z0): (f64, f64),
     assert!(largest_of(&differential[1..steps]) <= bound.max(bound * (-found.log_factor).exp()));
     // The action is its own recursion, to the last bit but for another order of rounding.
     let action = discrete_action(ld, t0, path.points(), z0).unwrap();
-    assert!((action - found.action()).abs() <= 16.0 * EPS * units * largest(found.actions.iter().copied()), "{action}");
+    assert!(
+        (action - found.action()).abs() <= 16.0 * EPS * units * max_abs_or_nan(found.actions.iter().copied()),
+        "{action}"
+    );
     // The flow from the first two points: an error in the second one grows as the motion's neighbours separate.
     let h = ld.step_size();
     let mut x = DiscretePoint { q0: found.points[0], q1: found.points[1], z0 };
@@ -72,7 +77,7 @@ fn check<D: DiscreteLagrangian<N>, const N: usize>(ld: &D, (t0, z0): (f64, f64),
     assert!(worst <= 64.0 * units * EPS * largest_of(&found.points).max(1.0) * growth, "flow {worst:e}");
 }
 
-fn by<L: Lagrangian<N>, const N: usize>(method: Method, system: L, h: f64) -> Discretised<L, N> {
+fn by<L: Lagrangian<N>, const N: usize>(method: Method, system: L, h: f64) -> AnyDiscreteLagrangian<L, N> {
     let origin = PhasePoint { q: SVector::repeat(0.1), p: SVector::repeat(0.1), z: 0.0 };
     method.discretise(system, h, 0.0, &origin).unwrap()
 }
@@ -125,7 +130,7 @@ fn the_damped_oscillator_in_closed_form() {
     let found = BoundaryPath::new(&ld, steps, [at([first]), at([last])]).unwrap().search();
     check(&ld, (0.0, 0.0), &found, 1.0);
     let exact = |k: usize| decay(k) * (first * (k as f64 * theta).cos() + other * (k as f64 * theta).sin());
-    let off = largest((0..=steps).map(|k| found.points[k][0] - exact(k)));
+    let off = max_abs_or_nan((0..=steps).map(|k| found.points[k][0] - exact(k)));
     // theta comes from an arc cosine near 1: its rounding is eps / theta, times k; and the ends are 1/sin(n) from conjugate.
     let bound = 8.0 * EPS * (steps as f64 / theta) / n.sin().abs() * largest_of(&found.points);
     assert!(off <= bound, "{off:e} of {bound:e}");
@@ -144,7 +149,7 @@ fn the_order_of_convergence() {
         let ld = Midpoint::new(&system, 0.1 / every as f64).unwrap();
         let found = BoundaryPath::new(&ld, 10 * every, ends).unwrap().search();
         assert!(found.is_found());
-        largest((0..=10).map(|k| (found.points[k * every] - truth.points[k]).amax()))
+        max_abs_or_nan((0..=10).map(|k| (found.points[k * every] - truth.points[k]).amax()))
     };
     let errors = [4, 8, 16, 32].map(error);
     for pair in errors.windows(2) {
@@ -278,7 +283,7 @@ fn several_paths_of_a_pendulum_by_deflation() {
         assert_eq!(path.status, PathStatus::Found);
         assert!(path.residual <= 16.0 * EPS * size(&ld, 0.0, path));
         for other in &found[..i] {
-            let apart = largest(path.points.iter().zip(&other.points).map(|(a, b)| (a - b).amax()));
+            let apart = max_abs_or_nan(path.points.iter().zip(&other.points).map(|(a, b)| (a - b).amax()));
             assert!(apart > 0.1, "{apart}");
         }
     }
@@ -485,7 +490,7 @@ fn the_path_that_the_user_starts_from() {
     let problem = BoundaryPath::new(&ld, steps, [at([motion[0][0]]), at([motion[steps][0]])]).unwrap();
     let found = problem.from_path(DiscretePath::new(disturbed).unwrap()).unwrap().search();
     check(&ld, (0.0, 0.0), &found, 1.0);
-    let off = largest((0..=steps).map(|k| (found.points[k] - motion[k]).amax()));
+    let off = max_abs_or_nan((0..=steps).map(|k| (found.points[k] - motion[k]).amax()));
     // The flow's own round-off, eps/h a step, over the span.
     assert!(off <= 64.0 * EPS / h * steps as f64, "{off:e}");
 }
@@ -531,18 +536,19 @@ fn conjugate_ends_are_flagged() {
                 };
                 let conjugate = path(PI / omega);
                 let what = format!("{method}, gamma = {gamma}, {steps} steps: {:?}", conjugate.error_estimate);
-                assert!(conjugate.suspicion.is_some_and(|s| s.misfit > 1.0 && s.step < steps), "{what}");
+                assert!(conjugate.unresolved.is_some_and(|s| s.defect > 1.0 && s.step < steps), "{what}");
                 assert!(conjugate.error_estimate.is_some_and(|e| e > 0.9), "{what}");
                 for span in [1.5, 2.8, 3.6] {
                     let found = path(span);
-                    assert_eq!(found.suspicion, None, "{method}, gamma = {gamma}, {steps} steps, span {span}");
+                    assert_eq!(found.unresolved, None, "{method}, gamma = {gamma}, {steps} steps, span {span}");
                     if *method != Method::Midpoint || gamma != 0.0 {
                         continue;
                     }
                     let exact = |k: usize| (span * k as f64 / steps as f64).sin() / span.sin();
-                    let off = largest((0..=steps).map(|k| (found.points[k][0] - exact(k)).abs()));
+                    let off = max_abs_or_nan((0..=steps).map(|k| (found.points[k][0] - exact(k)).abs()));
                     // The points reach the turning point to within the square of half a step.
-                    let range = if span > PI { 1.0 / span.sin().abs() + 1.0 } else { largest((0..=steps).map(exact)) };
+                    let range =
+                        if span > PI { 1.0 / span.sin().abs() + 1.0 } else { max_abs_or_nan((0..=steps).map(exact)) };
                     let estimate = found.error_estimate.unwrap();
                     // To first order, with third differences at the ends of the path that are those of the points within: a fifth of it. Beyond 1e-9
                     // of the range the rounding of 5000 positions in third differences of momenta is below that.
@@ -576,13 +582,13 @@ fn paths_that_jump_a_centre_are_flagged() {
             let energy = |p: &[SVector<f64, 2>]| 0.5 * ((p[1] - p[0]) / h).norm_squared() - 2.0 / (p[0] + p[1]).norm();
             let energies: Vec<f64> = path.points.windows(2).map(energy).collect();
             let mean = energies.iter().sum::<f64>() / energies.len() as f64;
-            let spread = largest(energies.iter().map(|e| (e - mean).abs()));
-            let what = format!("{steps} steps: {spread:e}, {:?}, {:?}", path.suspicion, path.error_estimate);
+            let spread = max_abs_or_nan(energies.iter().map(|e| (e - mean).abs()));
+            let what = format!("{steps} steps: {spread:e}, {:?}, {:?}", path.unresolved, path.error_estimate);
             if spread > 0.5 {
-                assert!(path.suspicion.is_some(), "{what}");
+                assert!(path.unresolved.is_some(), "{what}");
                 jumped += 1;
             } else if spread < 0.02 {
-                assert_eq!(path.suspicion, None, "{what}");
+                assert_eq!(path.unresolved, None, "{what}");
                 steady += 1;
             }
             known.push(path);

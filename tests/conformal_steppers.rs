@@ -4,7 +4,9 @@
 use crate::common::{bounded, on_some, step_from};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{Darboux, Derivatives, Larger, Largest, PhasePoint, Triple, conformality_with_jacobian, legendre};
+use contact_geom::{
+    ChartVector, Darboux, Derivatives, MaxAbsOrNan, MaxOrNan, PhasePoint, conformality_with_jacobian, legendre,
+};
 use discrete_herglotz::{Composition, InputError, Midpoint, Splitting, SplittingScheme, Stepper};
 
 /// The random cases for each system and scheme.
@@ -26,12 +28,12 @@ fn jacobian<const N: usize>(
     at: &PhasePoint<N>,
 ) -> Result<DMatrix<f64>, String> {
     const LEVELS: usize = 4;
-    let n = Triple::<N>::DIMENSION;
+    let n = ChartVector::<N>::DIMENSION;
     let mut jacobian = DMatrix::zeros(n, n);
     for j in 0..n {
         let moved = |by: f64| {
-            let shift = Triple::<N>::from_fn(|i| if i == j { by } else { 0.0 });
-            map(Triple::from(*at).plus(shift).into()).map(Triple::from)
+            let shift = ChartVector::<N>::from_fn(|i| if i == j { by } else { 0.0 });
+            map(ChartVector::from(*at).plus(shift).into()).map(ChartVector::from)
         };
         let mut differences = Vec::new();
         for level in 0..LEVELS {
@@ -59,8 +61,11 @@ fn defect<const N: usize>(
     let jacobian = jacobian(|x| Ok(map(x)?.0), from)?;
     let measured = conformality_with_jacobian(&Darboux, &Darboux, &(*from).into(), &to.into(), &jacobian)
         .map_err(|e| e.to_string())?;
-    let size = (1.0 + to.p.largest()) * jacobian.largest();
-    Ok(((measured.defect * measured.pullback.largest()).larger((measured.sigma - sigma).abs()) / size, sigma))
+    let size = (1.0 + to.p.max_abs_or_nan()) * jacobian.max_abs_or_nan();
+    Ok((
+        (measured.defect * measured.pullback.max_abs_or_nan()).max_or_nan((measured.sigma - sigma).abs()) / size,
+        sigma,
+    ))
 }
 
 /// Every scheme, on every separable system with a linear drag, contracts the contact form, by `e^(gamma h)` where the rate is

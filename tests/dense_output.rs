@@ -2,7 +2,7 @@
 
 use crate::gauss::{Claims, cut};
 use contact_geom::systems::{HarmonicOscillator, OneCoordinate, Pendulum, QuadraticInZ};
-use contact_geom::{Lagrangian, Larger, Largest, PhasePoint, Triple, VelocityPoint, legendre};
+use contact_geom::{ChartVector, Lagrangian, MaxAbsOrNan, MaxOrNan, PhasePoint, VelocityPoint, legendre};
 use discrete_herglotz::{
     AnyIntegrator, Crossing, Event, Events, Gauss, GaussRoute, InputError, Outcome, Problem, Status, StepError,
     Stepper, Steps, Until,
@@ -33,8 +33,8 @@ fn curves_have_the_order_of_the_stages() {
                         let t = h * (f64::from(step) + f64::from(k) / 20.0);
                         let (a, b) = (curve.at(t), exact(t));
                         all.push(a);
-                        let off = [(a.q - b.q).largest(), (a.p - b.p).largest(), (a.z - b.z).abs()];
-                        worst = std::array::from_fn(|i| worst[i].larger(off[i]));
+                        let off = [(a.q - b.q).max_abs_or_nan(), (a.p - b.p).max_abs_or_nan(), (a.z - b.z).abs()];
+                        worst = std::array::from_fn(|i| worst[i].max_or_nan(off[i]));
                     }
                 }
                 worst
@@ -46,7 +46,7 @@ fn curves_have_the_order_of_the_stages() {
         }
         let count = all.len() / 4;
         for (k, x) in all.iter().enumerate() {
-            let off = Triple::from(*x).minus(all[k % count].into()).largest();
+            let off = ChartVector::from(*x).minus(all[k % count].into()).max_abs_or_nan();
             assert!(off <= 1e-14, "s = {s}: routes differ by {off:e}");
         }
     }
@@ -85,7 +85,7 @@ fn crossings_are_those_of_the_closed_form() {
     for (k, c) in of(0).iter().enumerate() {
         assert!((c.t - expected(k)).abs() <= 1e-13 * expected(k), "{k}: {} {}", c.t, expected(k));
         let there = legendre(&system, c.t, &oscillator.solution(c.t, &x));
-        let off = Triple::from(c.state).minus(there.into()).largest();
+        let off = ChartVector::from(c.state).minus(there.into()).max_abs_or_nan();
         assert!(off <= 1e-13, "{k}: {off:e}");
         // Falling first.
         assert_eq!(c.t, of(if k % 2 == 0 { 2 } else { 1 })[k / 2].t);

@@ -4,8 +4,8 @@ use crate::common::{on_random, within};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Pendulum, System, SystemVisitor, visit_catalogue};
 use contact_geom::{
-    Derivatives, Dual, Hessian, Lagrangian, Larger, Largest, Scalar, Triple, ValueOnly, VelocityPoint,
-    check_closed_derivatives,
+    ChartVector, Derivatives, Dual, Hessian, Lagrangian, MaxAbsOrNan, MaxOrNan, Scalar, VelocityPoint,
+    WithoutClosedDerivatives, check_closed_derivatives,
 };
 use num_dual::HyperDual64;
 
@@ -18,7 +18,11 @@ fn against_num_dual() {
             on_random(system.name(), 2 * N + 2, |u| {
                 let (t, x) = system.sample(u);
                 let (g, h) = (system.gradient(t, &x), system.hessian(t, &x));
-                let size = 1.0 + g.largest().larger(h.qq.largest()).larger(h.qv.largest()).larger(h.vv.largest());
+                let size = 1.0
+                    + g.max_abs_or_nan()
+                        .max_or_nan(h.qq.max_abs_or_nan())
+                        .max_or_nan(h.qv.max_abs_or_nan())
+                        .max_or_nan(h.vv.max_abs_or_nan());
                 for i in 0..=2 * N {
                     for j in i..=2 * N {
                         let along = |k: usize, re: f64| {
@@ -39,7 +43,7 @@ fn against_num_dual() {
                             _ if i < 2 * N => h.vz[i - N],
                             _ => h.zz,
                         };
-                        let defect = (l.eps1 - g.component(i)).abs().larger((l.eps1eps2 - second).abs()) / size;
+                        let defect = (l.eps1 - g.component(i)).abs().max_or_nan((l.eps1eps2 - second).abs()) / size;
                         within(defect).map_err(|e| format!("{i}, {j}: {e}"))?;
                     }
                 }
@@ -75,7 +79,7 @@ fn elementary_functions() {
             (x.powi(0), one),
         ];
         for (k, (a, b)) in pairs.iter().enumerate() {
-            let size = |x: &Second| x.re.re.abs().larger(x.re.d[0].abs()).larger(x.d[0].d[0].abs());
+            let size = |x: &Second| x.re.re.abs().max_or_nan(x.re.d[0].abs()).max_or_nan(x.d[0].d[0].abs());
             let defect = size(&(*a - *b)) / (1.0 + size(b));
             if defect > 64.0 * f64::EPSILON {
                 return Err(format!("{k}: {defect:e}"));
@@ -95,8 +99,8 @@ fn closed_derivatives() {
         fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
             v[0] * v[0] * 0.5 + q[0].cos() - z * z * 0.1
         }
-        fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<Triple<1, T>> {
-            Some(Triple { x: -x.q.map(T::sin), y: x.v * T::from(1.0 + self.error), z: x.z * -0.2 })
+        fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<ChartVector<1, T>> {
+            Some(ChartVector { x: -x.q.map(T::sin), y: x.v * T::from(1.0 + self.error), z: x.z * -0.2 })
         }
         fn closed_hessian<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<Hessian<1, T>> {
             let zero = T::zero();
@@ -115,7 +119,7 @@ fn closed_derivatives() {
     assert!(matches!(right, (Some(g), Some(h)) if g < 1e-15 && h < 1e-15), "{right:?}");
     let wrong = check_closed_derivatives(&Closed { error: 1e-3 }, 0.0, &x);
     assert!(matches!(wrong, (Some(g), Some(h)) if g > 1e-4 && h > 1e-4), "{wrong:?}");
-    let value_only = ValueOnly(Pendulum::default());
+    let value_only = WithoutClosedDerivatives(Pendulum::default());
     assert_eq!(check_closed_derivatives(&value_only, 0.0, &x), (None, None));
     assert_eq!(value_only.gradient(0.0, &x), Pendulum::default().gradient(0.0, &x));
 }

@@ -4,7 +4,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, UniformField};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::{
-    AnyIntegrator, Checkpoint, Crossing, Event, Events, Interrupted, Method, Moment, Problem, Rows, Start, Status,
+    AnyIntegrator, Checkpoint, Crossing, Event, Events, Method, Problem, ResumeState, Rows, Start, Status, StepView,
     Steps, Stop, Until,
 };
 use proptest::prelude::*;
@@ -137,12 +137,12 @@ fn a_seam_on_a_surface_belongs_to_the_run_that_ends() {
     let problem = Problem::new(&system, 0.0, start).unwrap();
     let run = || problem.by(way.0).steps(Steps::Count(16));
     let mut saved = Checkpoint::every(8, &path).unwrap();
-    let mut enough = |at: &Moment<'_, 1>| {
+    let mut enough = |at: &StepView<'_, 1>| {
         if at.k == 8 { ControlFlow::Break(Stop::here("a test")) } else { ControlFlow::Continue(()) }
     };
     let (mut first, mut second) = (Events::new([at_one()]), Events::new([at_one()]));
     let cut = run().observe(&mut first).observe(&mut saved).observe(&mut enough).run(Until::Time(2.0)).unwrap();
-    let resumed = run().observe(&mut second).resume(Interrupted::read(&path).unwrap()).run(Until::Time(2.0)).unwrap();
+    let resumed = run().observe(&mut second).resume(ResumeState::read(&path).unwrap()).run(Until::Time(2.0)).unwrap();
     std::fs::remove_file(path).unwrap();
     assert_eq!((cut.t, resumed.status), (1.0, Status::Completed));
     assert_eq!((first.crossings.len(), second.crossings.len()), (1, 0));
@@ -206,7 +206,7 @@ fn a_run_for_an_accuracy_may_end_in_an_event_before_its_domain_does() {
                 let ended =
                     run.observe(&mut events).run(Until::Time(to)).unwrap_or_else(|error| panic!("{name}: {error}"));
                 assert!(matches!(ended.status, Status::Stopped { by: "an event", .. }), "{name}: {ended:?}");
-                assert_eq!((events.crossings.len(), ended.suspicion), (1, None), "{name}: {ended:?}");
+                assert_eq!((events.crossings.len(), ended.unresolved), (1, None), "{name}: {ended:?}");
                 // Of the position to the rounding of a step of size one, of the momentum to the accuracy.
                 let expected = -(v * v + 2.0 - 2.0 * at.powf(2.5)).sqrt();
                 assert!((ended.q[0] - at).abs() <= 8.0 * f64::EPSILON, "{name}: {ended:?}");

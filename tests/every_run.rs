@@ -1,10 +1,10 @@
 //! What a run gives, by integrators that are in no table of names: the exact flow, and a discrete Lagrangian of a user's own.
 
 use contact_geom::systems::{OneCoordinate, Pendulum, QuadraticInZ, System};
-use contact_geom::{DiscretePoint, Lagrangian, Scalar, VelocityPoint, largest};
+use contact_geom::{DiscretePoint, Lagrangian, Scalar, VelocityPoint, max_abs_or_nan};
 use discrete_herglotz::{
-    Checkpoint, Discrete, DiscreteLagrangian, Event, Events, Integrator, Interrupted, Moment, Outcome, Problem, Rows,
-    Run, Status, StepError, Steps, Stop, Until,
+    Checkpoint, CustomMethod, DiscreteLagrangian, Event, Events, Integrator, Outcome, Problem, ResumeState, Rows, Run,
+    Status, StepError, StepView, Steps, Stop, Until,
 };
 use exact_lagrangian::ExactFlow;
 use std::ops::ControlFlow;
@@ -31,7 +31,7 @@ impl<L: Lagrangian<1>> DiscreteLagrangian<1> for Own<L> {
 
 /// The cells of the table, for one integrator on one system: none is empty.
 fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, L, 1> + Clone, order: i32) {
-    let name = integrator.facts().name;
+    let name = integrator.info().name;
     let problem = Problem::new(system, 0.25, system.initial()).unwrap();
     let of = |problem: &Problem<'_, L, 1>, until: f64| -> Outcome<1> {
         problem.by(integrator.clone()).steps(Steps::Size(0.05)).run(Until::Time(until)).unwrap()
@@ -49,7 +49,7 @@ fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, 
     let observed = problem.by(integrator.clone()).steps(Steps::Size(0.05)).observe(&mut rows).with_conformal_factor();
     assert_eq!(observed.run(Until::Time(3.25)).unwrap().state(), whole.state(), "{name}");
     let kept = |row: &discrete_herglotz::Row<1>| row.energy.unwrap() / row.log_factor.unwrap().exp();
-    let off = largest(rows.rows.iter().map(|row| kept(row) / kept(&rows.rows[0]) - 1.0));
+    let off = max_abs_or_nan(rows.rows.iter().map(|row| kept(row) / kept(&rows.rows[0]) - 1.0));
     assert!(rows.rows.len() == 5 && off <= error(order), "{name}: {off:e}");
 
     // Events, and the end of a run by one of them.
@@ -64,14 +64,14 @@ fn everything<L: System<1>>(system: &L, integrator: impl for<'a> Integrator<'a, 
     let path = std::env::temp_dir().join(format!("every_run_{name}_{}.checkpoint", system.name()));
     let mut saved = Checkpoint::every(7, &path).unwrap();
     let mut seen = 0;
-    let mut enough = |at: &Moment<'_, 1>| {
+    let mut enough = |at: &StepView<'_, 1>| {
         seen = at.k;
         if at.k == 30 { ControlFlow::Break(Stop::here("the user")) } else { ControlFlow::Continue(()) }
     };
     let run = || -> Run<'_, '_, L, 1> { problem.by(integrator.clone()).steps(Steps::Size(0.05)) };
     let cut = run().observe(&mut saved).observe(&mut enough).run(Until::Time(3.25)).unwrap();
     assert_eq!((cut.status, seen), (Status::Stopped { step: 30, t: cut.t, by: "the user" }, 30), "{name}");
-    let resumed = run().resume(Interrupted::read(&path).unwrap()).run(Until::Time(3.25)).unwrap();
+    let resumed = run().resume(ResumeState::read(&path).unwrap()).run(Until::Time(3.25)).unwrap();
     assert_eq!(resumed, whole, "{name}");
     std::fs::remove_file(path).unwrap();
 }
@@ -86,7 +86,7 @@ fn by_the_exact_flow() {
 fn by_a_discrete_lagrangian_of_ones_own() {
     fn of<L: System<1> + Copy + 'static>(system: &L) {
         let lagrangian = *system;
-        everything(system, Discrete::new("own", 2, move |h| Ok(Own { lagrangian, h })), 2);
+        everything(system, CustomMethod::new("own", 2, move |h| Ok(Own { lagrangian, h })), 2);
     }
     of(&OneCoordinate::from(Pendulum { gamma: -0.1 }));
     of(&OneCoordinate::from(QuadraticInZ::default()));

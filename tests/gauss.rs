@@ -8,8 +8,10 @@ use contact_geom::systems::{
     CoupledInZ, CoupledPlane, DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ,
     Relativistic, System, TwoCoordinates,
 };
-use contact_geom::{Lagrangian, Larger, Largest, PhasePoint, Scalar, Structure, Triple, VelocityPoint, legendre};
-use discrete_herglotz::{DiscreteLagrangian, Gauss, GaussRoute, Halt, InputError, StepError, Stepper};
+use contact_geom::{
+    ChartVector, Lagrangian, MaxAbsOrNan, MaxOrNan, PhasePoint, Scalar, Structure, VelocityPoint, legendre,
+};
+use discrete_herglotz::{DiscreteLagrangian, Gauss, GaussRoute, InputError, StepError, StepFailure, Stepper};
 
 /// A Lagrangian that claims less than it could.
 pub struct Claims<L>(pub L, pub Structure);
@@ -93,7 +95,7 @@ fn momenta_that_are_polynomials_leave_the_order() {
             .map(|steps| {
                 let h = 4.0 / f64::from(*steps);
                 let (e, ..) = run(&system, (0.0, start), s, h, *steps as usize);
-                (h, (e.q - truth.q).largest())
+                (h, (e.q - truth.q).max_abs_or_nan())
             })
             .collect();
         let observed = slope(&points);
@@ -119,7 +121,7 @@ fn orders_are_twice_the_stages() {
                 .map(|steps| {
                     let h = 1.0 / *steps as f64;
                     let (e, ..) = run(system, start, s, h, *steps);
-                    (h, [(e.q - truth.q).largest(), (e.p - truth.p).largest(), (e.z - truth.z).abs()])
+                    (h, [(e.q - truth.q).max_abs_or_nan(), (e.p - truth.p).max_abs_or_nan(), (e.z - truth.z).abs()])
                 })
                 .collect();
             for (component, name) in ["q", "p", "z"].iter().enumerate() {
@@ -169,7 +171,8 @@ fn orders_are_twice_the_stages() {
 
 /// The difference of two states relative to the larger.
 pub fn distance<const N: usize>(a: PhasePoint<N>, b: PhasePoint<N>) -> f64 {
-    Triple::from(a).minus(b.into()).largest() / Triple::from(a).largest().larger(Triple::from(b).largest())
+    ChartVector::from(a).minus(b.into()).max_abs_or_nan()
+        / ChartVector::from(a).max_abs_or_nan().max_or_nan(ChartVector::from(b).max_abs_or_nan())
 }
 
 /// A decayed oscillation keeps its relative accuracy, after t = 1000 in units of the amplitude `e^(gamma t/2) = 1e-11`. By the
@@ -193,7 +196,7 @@ fn decayed_states_keep_their_accuracy() {
         for (route, bound) in [(GaussRoute::Linear, 4.0), (GaussRoute::Condensed, 400.0)] {
             let claims = Claims(system, cut(&system, route));
             let (end, _, taken) = run(&claims, (0.0, x), stages, h, (t / h) as usize);
-            let error = (end.q[0] - q).abs().larger((end.p[0] - v).abs()) / (amplitude * f64::EPSILON);
+            let error = (end.q[0] - q).abs().max_or_nan((end.p[0] - v).abs()) / (amplitude * f64::EPSILON);
             assert_eq!(taken, route);
             assert!(error <= bound, "s = {stages} {route:?}: {error} eps");
         }
@@ -287,7 +290,7 @@ fn newton_takes_over() {
         let mut without = without.without_newton();
         let halt = without.advance(3);
         assert!(
-            matches!(halt, Err(Halt { taken: 0, cause: StepError::NotConverged { .. } | StepError::NonFinite })),
+            matches!(halt, Err(StepFailure { taken: 0, cause: StepError::NotConverged { .. } | StepError::NonFinite })),
             "{halt:?}"
         );
         assert_eq!((without.state(), without.time(), without.sigma()), (start, 0.0, 1.0));
@@ -320,8 +323,8 @@ fn newton_takes_over() {
     let mut stepper = gauss.stepper(0.0, PhasePoint::new([1.0], [1.0], 0.0), [1.0].into()).unwrap();
     let halt = stepper.advance(1);
     let refused = match halt {
-        Err(Halt { taken: 0, cause: StepError::StageFactor { rho } }) => rho < 0.0,
-        Err(Halt { taken: 0, cause: StepError::NotConverged { .. } }) => true,
+        Err(StepFailure { taken: 0, cause: StepError::StageFactor { rho } }) => rho < 0.0,
+        Err(StepFailure { taken: 0, cause: StepError::NotConverged { .. } }) => true,
         _ => false,
     };
     assert!(refused, "{halt:?}");
@@ -351,8 +354,10 @@ fn bad_input_is_refused() {
         let general = Gauss::new(Claims(OneCoordinate::from(Pendulum { gamma }), Structure::default()), 1, 0.1);
         let halt = general.map(|gauss| gauss.stepper(0.0, start, [0.0].into()).map(|mut s| s.advance(1)));
         let same = match halt {
-            Ok(Ok(Err(Halt { taken: 0, cause: StepError::StageFactor { rho } }))) => gamma < 0.0 && rho < 0.0,
-            Ok(Ok(Err(Halt { taken: 0, cause: StepError::SigmaVanished { sigma } }))) => gamma > 0.0 && sigma < 0.0,
+            Ok(Ok(Err(StepFailure { taken: 0, cause: StepError::StageFactor { rho } }))) => gamma < 0.0 && rho < 0.0,
+            Ok(Ok(Err(StepFailure { taken: 0, cause: StepError::SigmaVanished { sigma } }))) => {
+                gamma > 0.0 && sigma < 0.0
+            }
             _ => false,
         };
         assert!(same, "{halt:?}");
@@ -385,14 +390,14 @@ fn what_is_not_finite_is_refused() {
         let stepper = gauss.as_ref().map(|g| g.stepper(0.0, start, [2.5, 0.0].into()));
         let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
         let halt = stepper.advance(1000);
-        assert!(matches!(halt, Err(Halt { taken: 10..100, .. })), "{halt:?}");
-        assert!(Triple::from(stepper.state()).is_finite() && stepper.state().q[0] < 2.0);
+        assert!(matches!(halt, Err(StepFailure { taken: 10..100, .. })), "{halt:?}");
+        assert!(ChartVector::from(stepper.state()).is_finite() && stepper.state().q[0] < 2.0);
     }
     let gauss = Gauss::new(OneCoordinate::from(HarmonicOscillator { gamma: 1.0 }), 4, 0.5);
     let stepper = gauss.as_ref().map(|g| g.stepper(0.0, PhasePoint::new([1.0], [0.0], 0.0), [0.0].into()));
     let Ok(Ok(mut stepper)) = stepper else { panic!("no stepper") };
     let halt = stepper.advance(10_000);
     // The action grows as e^t, and is infinite from e^709 on.
-    assert!(matches!(halt, Err(Halt { taken: 1380..1440, cause: StepError::NonFinite })), "{halt:?}");
-    assert!(Triple::from(stepper.state()).is_finite());
+    assert!(matches!(halt, Err(StepFailure { taken: 1380..1440, cause: StepError::NonFinite })), "{halt:?}");
+    assert!(ChartVector::from(stepper.state()).is_finite());
 }

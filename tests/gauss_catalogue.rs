@@ -4,7 +4,9 @@
 use crate::common::{TOLERANCE, around, bounded, on_some, step_from, visit_kinds};
 use crate::gauss::distance;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{Derivatives, Lagrangian, Larger, Largest, PhasePoint, Statement, Triple, VelocityPoint, legendre};
+use contact_geom::{
+    ChartVector, Derivatives, Lagrangian, MaxAbsOrNan, MaxOrNan, PhasePoint, Statement, VelocityPoint, legendre,
+};
 use discrete_herglotz::{DiscreteLagrangian, Gauss, Stepper, derived_jet, statements};
 
 /// The stepper agrees with Newton's steps at random points of every system, and so does its `sigma_d`: to 1e-12, round-off times
@@ -69,10 +71,13 @@ fn the_flow_is_conformal_on_every_system() {
                         let said = gauss.jet(t, &point).map_err(|e| e.to_string())?;
                         let derived = derived_jet(&gauss, t, &point).map_err(|e| e.to_string())?;
                         let off = (said.d1 - derived.d1)
-                            .largest()
-                            .larger((said.d2 - derived.d2).largest())
-                            .larger((said.dz - derived.dz).abs());
-                        bounded(off / (1.0 + derived.d1.largest().larger(derived.d2.largest())), 1e-12)
+                            .max_abs_or_nan()
+                            .max_or_nan((said.d2 - derived.d2).max_abs_or_nan())
+                            .max_or_nan((said.dz - derived.dz).abs());
+                        bounded(
+                            off / (1.0 + derived.d1.max_abs_or_nan().max_or_nan(derived.d2.max_abs_or_nan())),
+                            1e-12,
+                        )
                     },
                 );
             }
@@ -132,8 +137,9 @@ fn curves_meet_the_states() {
                     let Some(curve) = stepper.dense() else { panic!("{}: no curve", system.name()) };
                     assert_eq!(curve.span(), (t, t + 0.02));
                     let off = |t: f64, x: PhasePoint<N>| {
-                        let size = Triple::from(x).largest().larger(Triple::from(from).largest());
-                        Triple::from(curve.at(t)).minus(x.into()).largest() / (size * f64::EPSILON)
+                        let size =
+                            ChartVector::from(x).max_abs_or_nan().max_or_nan(ChartVector::from(from).max_abs_or_nan());
+                        ChartVector::from(curve.at(t)).minus(x.into()).max_abs_or_nan() / (size * f64::EPSILON)
                     };
                     let (there, here) = (off(t, from), off(stepper.time(), stepper.state()));
                     assert!(there <= 100.0 && here <= 100.0, "{} s = {s}: {there}, {here} eps", system.name());
@@ -141,7 +147,8 @@ fn curves_meet_the_states() {
                         let middle = t + 0.01;
                         let at = curve.at(middle);
                         let v = VelocityPoint { q: at.q, v: curve.velocity(middle), z: at.z };
-                        let off = (system.gradient(middle, &v).y - at.p).largest() / (1.0 + at.p.largest());
+                        let off =
+                            (system.gradient(middle, &v).y - at.p).max_abs_or_nan() / (1.0 + at.p.max_abs_or_nan());
                         assert!(off <= 1e-12, "{} s = {s}: momentum off by {off:e}", system.name());
                     }
                 }

@@ -11,7 +11,6 @@
 mod common;
 
 mod accuracy;
-mod clocked;
 mod conformal_steppers;
 mod dense_output;
 mod events;
@@ -21,3 +20,4 @@ mod gauss_catalogue;
 mod gauss_stress;
 mod round_off;
 mod runs;
+mod transformed_time;

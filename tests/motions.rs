@@ -12,11 +12,11 @@ mod motions {
     mod coarse;
     mod many_coordinates;
     mod observed;
+    mod resolution;
     mod rest;
     mod round_off;
     mod unresolved;
     mod velocity;
-    mod watch;
 }
 
 use contact_geom::{Lagrangian, VelocityPoint};

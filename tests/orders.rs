@@ -6,7 +6,7 @@
 use crate::common::discretise;
 use crate::common::oracle::motion;
 use contact_geom::systems::{CoupledInZ, CoupledPlane, DoublePendulum, QuadraticInZ, Relativistic, System};
-use contact_geom::{Largest, PhasePoint, legendre};
+use contact_geom::{MaxAbsOrNan, PhasePoint, legendre};
 use discrete_herglotz::{Flow, Method, Stepper};
 
 /// The time over which the error is taken.
@@ -26,7 +26,9 @@ fn errors<const N: usize, S: System<N>>(method: Method, system: &S, steps: usize
         Ok(*flow.state())
     });
     assert!(end.is_ok(), "{}: {end:?}", system.name());
-    end.map_or([f64::NAN; 3], |e| [(e.q - truth.q).largest(), (e.p - truth.p).largest(), (e.z - truth.z).abs()])
+    end.map_or([f64::NAN; 3], |e| {
+        [(e.q - truth.q).max_abs_or_nan(), (e.p - truth.p).max_abs_or_nan(), (e.z - truth.z).abs()]
+    })
 }
 
 /// The least-squares slope of log error against log step.

@@ -2,7 +2,7 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum};
-use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint, legendre};
+use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
 use discrete_herglotz::{Gauss, Stepper};
 
 /// A Lagrangian under other claims.
@@ -14,7 +14,7 @@ impl<L: Lagrangian<N>, const N: usize> Lagrangian<N> for Claims<L> {
         self.0.value(t, q, v, z)
     }
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
         self.0.closed_gradient(t, x)
     }
     fn structure(&self) -> Structure {
@@ -93,9 +93,9 @@ fn the_energy_does_not_drift() {
             let make = |x: VelocityPoint<2>| gauss.stepper(0.0, legendre(&kepler, 0.0, &x), x.v).unwrap();
             check("kepler", start, |x| runner(make(x)), energy);
             let clocked = |x: VelocityPoint<2>| {
-                gauss.clocked_stepper(kepler.clock(), 0.0, legendre(&kepler, 0.0, &x), x.v).unwrap()
+                gauss.transformed_stepper(kepler.time_transformation(), 0.0, legendre(&kepler, 0.0, &x), x.v).unwrap()
             };
-            check("kepler with a clock", start, |x| runner(clocked(x)), energy);
+            check("kepler with a time transformation", start, |x| runner(clocked(x)), energy);
         }
     }
 }

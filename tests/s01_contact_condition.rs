@@ -2,7 +2,7 @@
 //! a regular L_d.
 
 use crate::common::{over_catalogue, over_discretisations, pairs, systems};
-use contact_geom::{Darboux, Form, GeometryError, Scalar, Smooth, Statement, Triple, generic};
+use contact_geom::{ChartVector, Darboux, Form, GeometryError, Scalar, Smooth, Statement, generic};
 
 /// On every system of the catalogue.
 #[test]
@@ -21,11 +21,11 @@ fn with_every_discretisation() {
 fn a_closed_form_is_not_contact() {
     struct Closed;
     impl<const N: usize> Smooth<N> for Closed {
-        fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
-            Ok(Triple { x: x.x.map(|_| T::zero()), y: x.y.map(|_| T::zero()), z: T::one() })
+        fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
+            Ok(ChartVector { x: x.x.map(|_| T::zero()), y: x.y.map(|_| T::zero()), z: T::one() })
         }
     }
-    let x = Triple::<2>::from_fn(|i| i as f64);
+    let x = ChartVector::<2>::from_fn(|i| i as f64);
     assert_eq!(generic::volume(&Form(Closed), &x), Ok(0.0));
     assert!(matches!(generic::reeb(&Form(Closed), &x), Err(GeometryError::Singular { .. })));
 }
@@ -34,9 +34,9 @@ fn a_closed_form_is_not_contact() {
 #[test]
 fn the_canonical_volume_has_its_sign() {
     let volumes = (
-        generic::volume(&Darboux, &Triple::<1>::from_fn(|i| i as f64)),
-        generic::volume(&Darboux, &Triple::<2>::from_fn(|i| i as f64)),
-        generic::volume(&Darboux, &Triple::<3>::from_fn(|i| i as f64)),
+        generic::volume(&Darboux, &ChartVector::<1>::from_fn(|i| i as f64)),
+        generic::volume(&Darboux, &ChartVector::<2>::from_fn(|i| i as f64)),
+        generic::volume(&Darboux, &ChartVector::<3>::from_fn(|i| i as f64)),
     );
     assert_eq!(volumes, (Ok(1.0), Ok(-2.0), Ok(-6.0)));
 }

@@ -2,7 +2,7 @@
 //! The Jacobi bracket: `X_{f,g} = [X_f, X_g]`.
 
 use crate::common::{over_catalogue, systems};
-use contact_geom::{Darboux, GeometryError, Scalar, Smooth, Statement, Triple, infinitesimal_conformality};
+use contact_geom::{ChartVector, Darboux, GeometryError, Scalar, Smooth, Statement, infinitesimal_conformality};
 
 /// On every system of the catalogue.
 #[test]
@@ -15,11 +15,11 @@ fn on_the_catalogue() {
 fn another_field_is_not_conformal() {
     struct Shear;
     impl<const N: usize> Smooth<N> for Shear {
-        fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
-            Ok(Triple { x: x.y, y: x.x, z: x.x[0] * x.x[0] })
+        fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
+            Ok(ChartVector { x: x.y, y: x.x, z: x.x[0] * x.x[0] })
         }
     }
-    let x = Triple::<2>::from_fn(|i| 0.3 + i as f64);
+    let x = ChartVector::<2>::from_fn(|i| 0.3 + i as f64);
     let measured = infinitesimal_conformality(&Darboux, &Shear, &x);
     assert!(measured.is_ok_and(|m| m.defect > 0.1), "{measured:?}");
 }

@@ -4,7 +4,7 @@ use crate::common::oracle::motion_with_derivative;
 use crate::common::{on_random, within};
 use contact_geom::statements::{ActionSquared, ClosedFlow, conformal_flow};
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, System, SystemVisitor, visit_catalogue};
-use contact_geom::{LagrangianForm, Triple, conformality_with_jacobian};
+use contact_geom::{ChartVector, LagrangianForm, conformality_with_jacobian};
 
 /// What the oracle's own error allows: its relative tolerance of 3e-14 a step, over some tens of steps and through the
 /// growth of the variational equation (up to 1e2 on the samples).
@@ -24,7 +24,7 @@ pub fn gauss(t: f64) -> Vec<(f64, f64)> {
 
 fn along_closed_flow(flow: &impl ClosedFlow) {
     on_random(flow.name(), 4, |u| {
-        let x = Triple::from_fn(|i| 2.0 * u[i] - 1.0);
+        let x = ChartVector::from_fn(|i| 2.0 * u[i] - 1.0);
         let t = 0.1 + u[3];
         let residual = conformal_flow(flow, t, &x, &gauss(t)).map_err(|e| e.to_string())?;
         within(residual)

@@ -4,7 +4,7 @@
 use crate::common::oracle::motion_with_derivative;
 use crate::common::{over_catalogue, systems};
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{Energy, NoetherMomentum, SmoothFunction, Statement, Triple};
+use contact_geom::{ChartVector, Energy, NoetherMomentum, SmoothFunction, Statement};
 
 /// Infinitesimally, on every system.
 #[test]
@@ -21,7 +21,7 @@ fn along_the_motion() {
         fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
             let (t, start) = (system.initial_time(), system.initial());
             let (end, _, sigma) = motion_with_derivative(system, t, &start, 0.5);
-            let at = |f: &dyn Fn(f64, &Triple<N>) -> f64| (f(t, &start.into()), f(t + 0.5, &end.into()));
+            let at = |f: &dyn Fn(f64, &ChartVector<N>) -> f64| (f(t, &start.into()), f(t + 0.5, &end.into()));
             let mut quantities = Vec::new();
             let energy = Energy(system);
             if system.structure().autonomous {

@@ -4,7 +4,7 @@
 use crate::common::{around, on_random, step_from, within};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{System, SystemVisitor, visit_catalogue};
-use contact_geom::{DiscretePoint, Larger, Largest};
+use contact_geom::{DiscretePoint, MaxAbsOrNan, MaxOrNan};
 use discrete_herglotz::{
     DiscreteLagrangian, DiscretePath, Method, Quadrature, Rule, RuleVisitor, legendre_minus, legendre_plus,
 };
@@ -22,8 +22,8 @@ fn with_rule<R: Rule, const N: usize, S: System<N>>(system: &S) {
         let (p0, p1) = (s.s1 / -(1.0 + s.z0), s.s2 / (1.0 - s.z1));
         let minus = legendre_minus(&ld, t, &x).map_err(|e| e.to_string())?;
         let plus = legendre_plus(&ld, t, &x).map_err(|e| e.to_string())?;
-        let size = minus.p.largest().larger(plus.p.largest());
-        let momenta = (p0 - minus.p).largest().larger((p1 - plus.p).largest()) / size;
+        let size = minus.p.max_abs_or_nan().max_or_nan(plus.p.max_abs_or_nan());
+        let momenta = (p0 - minus.p).max_abs_or_nan().max_or_nan((p1 - plus.p).max_abs_or_nan()) / size;
         let action = (s.value - jet.value).abs() / (1.0 + jet.value.abs());
 
         // 16: the two residuals on a path that is no solution.
@@ -33,12 +33,14 @@ fn with_rule<R: Rule, const N: usize, S: System<N>>(system: &S) {
         let herglotz = path.herglotz_residuals(&ld, t, x.z0).map_err(|e| e.to_string())?;
         let extended = path.extended_residuals(&ld, t, x.z0).map_err(|e| e.to_string())?;
         let z = path.actions(&ld, t, x.z0).map_err(|e| e.to_string())?;
-        let mut worst = momenta.larger(action);
+        let mut worst = momenta.max_or_nan(action);
         for k in 0..4 {
             // The two differ by the factor 1 - S_z1 of the later step, which is no zero.
             let at = DiscretePoint { q0: path.points()[k + 1], q1: path.points()[k + 2], z0: z[k + 1] };
             let factor = 1.0 - ld.extended_jet(t + (k + 1) as f64 * h, &at, z[k + 2]).z1;
-            worst = worst.larger((extended[k] / factor - herglotz[k]).largest() / size.larger(herglotz[k].largest()));
+            worst = worst.max_or_nan(
+                (extended[k] / factor - herglotz[k]).max_abs_or_nan() / size.max_or_nan(herglotz[k].max_abs_or_nan()),
+            );
         }
         within(worst)
     });

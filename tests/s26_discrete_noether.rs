@@ -3,7 +3,7 @@
 
 use crate::common::{over_discretisations, pairs};
 use contact_geom::systems::{Kepler, SphericalPendulum, System};
-use contact_geom::{DiscretePoint, Statement, larger};
+use contact_geom::{DiscretePoint, Statement, max_or_nan};
 use discrete_herglotz::{
     AnyIntegrator, LeftMidpoint, Method, MomentumDecay, Problem, Status, Steps, Until, discrete_symmetry_defect,
 };
@@ -39,7 +39,7 @@ fn along_a_run() {
                     system.name()
                 );
                 assert_eq!(decay.rows.len(), 1001);
-                let scale = decay.rows.iter().map(|row| row.momentum.abs()).fold(1e-3, larger);
+                let scale = decay.rows.iter().map(|row| row.momentum.abs()).fold(1e-3, max_or_nan);
                 for (k, row) in decay.rows.iter().enumerate() {
                     let defect = (row.momentum - row.predicted).abs() / scale;
                     let allowed = 64.0 * f64::EPSILON * (k + 1) as f64;

@@ -3,7 +3,7 @@
 use crate::common::over_motions;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{ChargedParticle, HarmonicOscillator, Pendulum};
-use contact_geom::{Lagrangian, Largest, Scalar, Statement, VelocityPoint};
+use contact_geom::{Lagrangian, MaxAbsOrNan, Scalar, Statement, VelocityPoint};
 use exact_lagrangian::{ContactExponential, ExactError};
 
 /// Along random motions of every system.
@@ -108,7 +108,7 @@ fn branches_are_different() {
     let found = exp.branches(0.0, &y, &guesses).unwrap_or_default();
     for (i, one) in found.iter().enumerate() {
         for other in &found[..i] {
-            assert!((one.start.v - other.start.v).largest() > 1e-6, "{one:?} and {other:?}");
+            assert!((one.start.v - other.start.v).max_abs_or_nan() > 1e-6, "{one:?} and {other:?}");
         }
     }
 }

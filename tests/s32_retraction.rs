@@ -3,7 +3,7 @@
 use crate::common::{AlongMotion, OverMotions, over_motions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Pendulum, System, visit_catalogue};
-use contact_geom::{DiscretePoint, Lagrangian, Larger, Largest, Scalar, Statement, VelocityPoint};
+use contact_geom::{DiscretePoint, Lagrangian, MaxAbsOrNan, MaxOrNan, Scalar, Statement, VelocityPoint};
 use exact_lagrangian::{ContactExponential, ExactError, RetractionRoute, herglotz_flow, statements};
 
 /// Along random motions of every system, from a guess on their branch.
@@ -33,8 +33,8 @@ fn without_a_guess() {
                 found => found?,
             };
             let reached = exp.at(t, &found.start)?.q1;
-            let condition = -(-statements::condition(system, t, &found.start, h)?).larger(-1e3);
-            Ok((reached - y.q1).largest() / (condition * (1.0 + y.q1.largest())))
+            let condition = -(-statements::condition(system, t, &found.start, h)?).max_or_nan(-1e3);
+            Ok((reached - y.q1).max_abs_or_nan() / (condition * (1.0 + y.q1.max_abs_or_nan())))
         }
     }
     visit_catalogue(&mut OverMotions(Unguided));
@@ -115,8 +115,8 @@ fn the_end_belongs_to_the_start() {
         found_from += 1;
         let motion = herglotz_flow(&pendulum, 0.0, &found.start, 8.0);
         let apart = motion.map_or(f64::NAN, |m| {
-            let end = (m.end.v - found.end.v).largest().larger((m.end.z - found.end.z).abs());
-            end.larger((m.action - found.action).abs()).larger((m.b - found.b).abs())
+            let end = (m.end.v - found.end.v).max_abs_or_nan().max_or_nan((m.end.z - found.end.z).abs());
+            end.max_or_nan((m.action - found.action).abs()).max_or_nan((m.b - found.b).abs())
         });
         assert!(apart < 1e-13, "guess {k}: {apart:e}");
     }

@@ -3,7 +3,7 @@
 use crate::common::over_motions;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, QuadraticInZ, System};
-use contact_geom::{DiscretePoint, Lagrangian, Largest, Scalar, Statement, Triple, VelocityPoint, legendre};
+use contact_geom::{ChartVector, DiscretePoint, Lagrangian, MaxAbsOrNan, Scalar, Statement, VelocityPoint, legendre};
 use discrete_herglotz::{DiscreteLagrangian, Midpoint, Solver};
 use exact_lagrangian::{ContactExponential, ExactLagrangian, error_orders, statements as exact};
 
@@ -23,8 +23,8 @@ fn by_differences<const N: usize>(system: &impl System<N>, x: &VelocityPoint<N>,
     let Ok(jet) = ld.jet(t, &y) else { return f64::NAN };
     let slope = |i: usize, d: f64| {
         let value = |by: f64| {
-            let unit = Triple::<N>::from_fn(|j| if i == j { by } else { 0.0 });
-            let moved: DiscretePoint<N> = Triple::from(y).plus(unit).into();
+            let unit = ChartVector::<N>::from_fn(|j| if i == j { by } else { 0.0 });
+            let moved: DiscretePoint<N> = ChartVector::from(y).plus(unit).into();
             ld.value(t, &moved).unwrap_or(f64::NAN)
         };
         (value(d) - value(-d)) / (2.0 * d)
@@ -34,8 +34,8 @@ fn by_differences<const N: usize>(system: &impl System<N>, x: &VelocityPoint<N>,
         let (once, again) = ((4.0 * b - a) / 3.0, (4.0 * c - b) / 3.0);
         (16.0 * again - once) / 15.0
     };
-    let (formula, found) = (Triple { x: jet.d1, y: jet.d2, z: jet.dz }, Triple::<N>::from_fn(extrapolated));
-    formula.minus(found).largest() / formula.largest()
+    let (formula, found) = (ChartVector { x: jet.d1, y: jet.d2, z: jet.dz }, ChartVector::<N>::from_fn(extrapolated));
+    formula.minus(found).max_abs_or_nan() / formula.max_abs_or_nan()
 }
 
 /// The formulas against differences, to 1e-9.
@@ -115,8 +115,8 @@ fn forward_and_backward() {
     let (start, mut solver) = (legendre(&Swelling, t, &x), Solver::default());
     let forward = ld.forward(t, &start, &x.v, &mut solver).unwrap();
     let back = ld.backward(t, &forward.end, &forward.velocity, &mut solver).unwrap();
-    let apart = Triple::from(back.end).minus(start.into()).largest();
-    assert!(apart < 1e-14 && (back.velocity - forward.velocity).largest() < 1e-14, "{apart:e}");
+    let apart = ChartVector::from(back.end).minus(start.into()).max_abs_or_nan();
+    assert!(apart < 1e-14 && (back.velocity - forward.velocity).max_abs_or_nan() < 1e-14, "{apart:e}");
     assert!((back.sigma / forward.sigma - 1.0).abs() < 1e-14, "{} and {}", forward.sigma, back.sigma);
 }
 

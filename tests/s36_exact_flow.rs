@@ -4,7 +4,7 @@
 use crate::common::oracle::hamiltonian_motion;
 use crate::common::{AlongMotion, OverMotions, over_motions};
 use contact_geom::systems::{System, SystemVisitor, catalogue_size, visit_catalogue};
-use contact_geom::{Largest, Statement, Triple, VelocityPoint};
+use contact_geom::{ChartVector, MaxAbsOrNan, Statement, VelocityPoint};
 use discrete_herglotz::{Flow, Stepper, legendre_minus, legendre_plus};
 use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow, statements};
 use std::collections::BTreeSet;
@@ -42,8 +42,8 @@ fn against_the_contact_hamiltonian_flow() {
                 return Ok(0.0);
             };
             self.compared.insert(system.name());
-            let apart = Triple::from(end).minus(plus.into()).largest();
-            Ok(apart / Triple::from(plus).largest())
+            let apart = ChartVector::from(end).minus(plus.into()).max_abs_or_nan();
+            Ok(apart / ChartVector::from(plus).max_abs_or_nan())
         }
     }
     let mut by_oracle = OverMotions(ByOracle::default());
@@ -81,7 +81,9 @@ fn a_run() {
             });
             let truth = herglotz_flow(system, t, &x, 2.0).map(|m| contact_geom::legendre(system, t + 2.0, &m.end));
             let apart = match (end, truth) {
-                (Ok(a), Ok(b)) => Triple::from(a).minus(b.into()).largest() / Triple::from(b).largest(),
+                (Ok(a), Ok(b)) => {
+                    ChartVector::from(a).minus(b.into()).max_abs_or_nan() / ChartVector::from(b).max_abs_or_nan()
+                }
                 _ => f64::NAN,
             };
             // Twenty roundings of the state, grown by the motion (a few tens for the double pendulum and Kepler).

@@ -3,7 +3,7 @@
 
 use crate::common::{on_random, within};
 use contact_geom::systems::FreeParticle;
-use contact_geom::{DiscretePoint, Larger, Scalar, VelocityPoint};
+use contact_geom::{DiscretePoint, MaxOrNan, Scalar, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, LeftMidpoint, Rectangle, StepError, discrete_flow, legendre_minus};
 use exact_lagrangian::QuadraticExact;
 
@@ -42,11 +42,11 @@ fn explicit_step() {
         let q2 = (h * gamma + 2.0) * q1 - (h * gamma + 1.0) * q0;
         let z1 = (q1 - q0).powi(2) / (2.0 * h) + (h * gamma + 1.0) * x.z0;
         let of = |next: Result<DiscretePoint<1>, StepError>| {
-            next.map_or(f64::NAN, |n| (n.q1[0] - q2).abs().larger((n.z0 - z1).abs()) / (1.0 + q2.abs() + z1.abs()))
+            next.map_or(f64::NAN, |n| (n.q1[0] - q2).abs().max_or_nan((n.z0 - z1).abs()) / (1.0 + q2.abs() + z1.abs()))
         };
         let rectangle = Rectangle::new(system, h).map_or(f64::NAN, |ld| of(discrete_flow(&ld, 0.0, x)));
         let midpoint = LeftMidpoint::new(system, h).map_or(f64::NAN, |ld| of(discrete_flow(&ld, 0.0, x)));
-        if rectangle.is_nan() || midpoint.is_nan() { f64::NAN } else { rectangle.larger(midpoint) }
+        if rectangle.is_nan() || midpoint.is_nan() { f64::NAN } else { rectangle.max_or_nan(midpoint) }
     });
 }
 
@@ -64,8 +64,8 @@ fn exact_discrete_lagrangian() {
         let growth = (gamma * h).exp_m1();
         let closed = gamma * (x.q1[0] - x.q0[0]).powi(2) * (growth + 1.0) / (2.0 * growth) + x.z0 * growth;
         let size = 1.0 + at(2.0 * h).q[0].abs() + at(h).z.abs() + closed.abs();
-        let flow = (next.q1[0] - at(2.0 * h).q[0]).abs().larger((next.z0 - at(h).z).abs()) / size;
-        flow.larger((jet.dz - growth).abs()).larger((jet.value - closed).abs() / size)
+        let flow = (next.q1[0] - at(2.0 * h).q[0]).abs().max_or_nan((next.z0 - at(h).z).abs()) / size;
+        flow.max_or_nan((jet.dz - growth).abs()).max_or_nan((jet.value - closed).abs() / size)
     });
 }
 

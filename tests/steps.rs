@@ -3,17 +3,17 @@
 
 use crate::common::{around, discretise, on_random, step_from};
 use contact_geom::systems::{Chain, Pendulum, System, SystemVisitor, visit_catalogue};
-use contact_geom::{DiscretePoint, Larger, Largest, PhasePoint, Scalar, Triple, legendre};
+use contact_geom::{ChartVector, DiscretePoint, MaxAbsOrNan, MaxOrNan, PhasePoint, Scalar, legendre};
 use discrete_herglotz::{
-    AnyIntegrator, DiscreteLagrangian, Flow, Method, Midpoint, Moment, Problem, Rows, Solver, Status, StepError,
+    AnyIntegrator, DiscreteLagrangian, Flow, Method, Midpoint, Problem, Rows, Solver, Status, StepError, StepView,
     Stepper, Steps, Stop, Until, legendre_minus,
 };
 use std::ops::ControlFlow;
 
 /// A discrete Lagrangian of which only the value is taken: the slow route of a user's own.
-struct ValueOnly<D>(D);
+struct WithoutClosedDerivatives<D>(D);
 
-impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for ValueOnly<D> {
+impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for WithoutClosedDerivatives<D> {
     fn step_size(&self) -> f64 {
         self.0.step_size()
     }
@@ -44,14 +44,15 @@ fn forward_and_backward() {
         let mut solver = Solver::default();
         let from = legendre_minus(ld, t, x).map_err(say)?;
         let guess = (x.q1 - x.q0) / ld.step_size();
-        let slow = ValueOnly(ld);
+        let slow = WithoutClosedDerivatives(ld);
         let forward = ld.forward(t, &from, &guess, &mut solver).map_err(say)?;
         let forward_slow = slow.forward(t, &from, &guess, &mut solver).map_err(say)?;
         let back = ld.backward(t, &forward.end, &guess, &mut solver).map_err(say)?;
         let back_slow = slow.backward(t, &forward.end, &guess, &mut solver).map_err(say)?;
         let sigma = ld.jet(t, x).map_err(say)?.sigma();
-        let size = Triple::from(from).largest().larger(Triple::from(forward.end).largest());
-        let distance = |a: PhasePoint<N>, b: PhasePoint<N>| Triple::from(a).minus(b.into()).largest() / size;
+        let size = ChartVector::from(from).max_abs_or_nan().max_or_nan(ChartVector::from(forward.end).max_abs_or_nan());
+        let distance =
+            |a: PhasePoint<N>, b: PhasePoint<N>| ChartVector::from(a).minus(b.into()).max_abs_or_nan() / size;
         let worst = [
             distance(forward.end, forward_slow.end),
             distance(back.end, from),
@@ -79,7 +80,7 @@ fn small_steps_keep_their_digits() {
         for _ in 0..steps {
             assert_eq!(flow.step_back(), Ok(()));
         }
-        let error = Triple::from(*flow.state()).minus(start.into()).largest();
+        let error = ChartVector::from(*flow.state()).minus(start.into()).max_abs_or_nan();
         assert!(error <= 4.0 * f64::EPSILON * steps as f64, "{steps} steps: {error:e}");
     }
 }
@@ -113,7 +114,7 @@ fn records() {
     let pendulum = Pendulum::default();
     let problem = Problem::new(&pendulum, 2.0, PhasePoint::new([1.0], [0.5], 0.2)).unwrap();
     let by_rule = AnyIntegrator::Discrete(Method::LeftMidpoint);
-    let counter = |at: &Moment<'_, 1>| match at.k {
+    let counter = |at: &StepView<'_, 1>| match at.k {
         25 => ControlFlow::Break(Stop::here("the counter")),
         _ => ControlFlow::Continue(()),
     };
@@ -146,6 +147,6 @@ fn records() {
     let end = stepper.state();
     assert_eq!((end.q, end.p, Some(end.z)), (rows[30].q, rows[30].p, rows[30].z));
     // A new start has no velocities before it to guess the next from, which rounding tells.
-    let off = Triple::from(ended.state()).minus(end.into()).largest();
+    let off = ChartVector::from(ended.state()).minus(end.into()).max_abs_or_nan();
     assert!(off <= 64.0 * f64::EPSILON, "{off:e}");
 }

@@ -4,7 +4,7 @@
 
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::systems::Pendulum;
-use contact_geom::{DiscretePoint, PhasePoint, Regularity, Symmetry, VelocityPoint, larger, largest};
+use contact_geom::{DiscretePoint, PhasePoint, Regularity, Symmetry, VelocityPoint, max_or_nan, max_abs_or_nan};
 use discrete_herglotz::{DiscretePath, Midpoint, Solver};
 use exact_lagrangian::{Curve, SplineCurve};
 use libfuzzer_sys::fuzz_target;
@@ -24,8 +24,8 @@ fuzz_target!(|data: &[u8]| {
     assert_eq!(DiscretePoint::<2>::from_slices(a, b, z).is_ok(), fits);
 
     let any_nan = numbers.iter().any(|x| x.is_nan());
-    assert_eq!(largest(numbers.iter().copied()).is_nan(), any_nan);
-    assert_eq!(numbers.iter().copied().fold(0.0, larger).is_nan(), any_nan);
+    assert_eq!(max_abs_or_nan(numbers.iter().copied()).is_nan(), any_nan);
+    assert_eq!(numbers.iter().copied().fold(0.0, max_or_nan).is_nan(), any_nan);
 
     if let [x, y, z, ..] = numbers[..] {
         if let Ok(Symmetry::Axis(unit)) = Symmetry::<3>::axis([x, y, z]) {

@@ -7,7 +7,7 @@ use contact_geom::systems::{
     visit_catalogue,
 };
 use contact_geom::{DiscretePoint, Statement, VelocityPoint, legendre, statements as continuous};
-use discrete_herglotz::{Discretised, InputError, Method, statements as discrete};
+use discrete_herglotz::{AnyDiscreteLagrangian, InputError, Method, statements as discrete};
 use exact_lagrangian::{ExactError, statements as exact};
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
 
@@ -95,7 +95,7 @@ pub fn discretise<'a, const N: usize, S: System<N>>(
     h: f64,
     t: f64,
     x: &VelocityPoint<N>,
-) -> Result<Discretised<&'a S, N>, InputError> {
+) -> Result<AnyDiscreteLagrangian<&'a S, N>, InputError> {
     method.discretise(system, h, t, &legendre(system, t, x))
 }
 

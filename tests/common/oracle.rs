@@ -3,7 +3,7 @@
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::systems::System;
 use contact_geom::{
-    DarbouxField, Derivatives, HerglotzField, Lagrangian, PhasePoint, Scalar, Smooth, SmoothFunction, Triple,
+    ChartVector, DarbouxField, Derivatives, HerglotzField, Lagrangian, PhasePoint, Scalar, Smooth, SmoothFunction,
     VelocityPoint,
 };
 use differential_equations::prelude::{ExplicitRungeKutta, IVP, ODE};
@@ -18,7 +18,7 @@ struct Variational<'a, L, const N: usize> {
 impl<L: Lagrangian<N>, const N: usize> ODE<f64, Vec<f64>> for Variational<'_, L, N> {
     fn diff(&self, t: f64, y: &Vec<f64>, d: &mut Vec<f64>) {
         let m = 2 * N + 1;
-        let x = Triple::<N>::from_fn(|i| y[i]);
+        let x = ChartVector::<N>::from_fn(|i| y[i]);
         let field = HerglotzField { lagrangian: self.lagrangian, t };
         if !self.derivative {
             match field.at(&x) {
@@ -47,7 +47,7 @@ fn integrate<const N: usize>(
     derivative: bool,
 ) -> Vec<f64> {
     let m = 2 * N + 1;
-    let mut y = Triple::from(*start).to_vector().as_slice().to_vec();
+    let mut y = ChartVector::from(*start).to_vector().as_slice().to_vec();
     if derivative {
         y.extend_from_slice(DMatrix::<f64>::identity(m, m).as_slice());
         y.push(0.0);
@@ -68,7 +68,7 @@ pub fn motion<const N: usize>(
     duration: f64,
 ) -> VelocityPoint<N> {
     let y = integrate(lagrangian, t0, start, duration, false);
-    Triple::from_fn(|i| y[i]).into()
+    ChartVector::from_fn(|i| y[i]).into()
 }
 
 /// The state of the motion after a time, the derivative of the flow, and `exp int L_z`.
@@ -81,14 +81,14 @@ pub fn motion_with_derivative<const N: usize>(
     let m = 2 * N + 1;
     let y = integrate(lagrangian, t0, start, duration, true);
     let derivative = DMatrix::from_column_slice(m, m, &y[m..m + m * m]);
-    (Triple::from_fn(|i| y[i]).into(), derivative, y[m + m * m].exp())
+    (ChartVector::from_fn(|i| y[i]).into(), derivative, y[m + m * m].exp())
 }
 
 /// A system's Hamiltonian as a function.
 struct Known<'a, S>(&'a S);
 
 impl<const N: usize, S: System<N>> SmoothFunction<N> for Known<'_, S> {
-    fn value<T: Scalar>(&self, t: T, x: &Triple<N, T>) -> T {
+    fn value<T: Scalar>(&self, t: T, x: &ChartVector<N, T>) -> T {
         self.0.hamiltonian(t, &(*x).into()).unwrap_or(T::from(f64::NAN))
     }
 }
@@ -98,7 +98,7 @@ struct HamiltonianOde<'a, S, const N: usize>(&'a S);
 
 impl<const N: usize, S: System<N>> ODE<f64, Vec<f64>> for HamiltonianOde<'_, S, N> {
     fn diff(&self, t: f64, y: &Vec<f64>, d: &mut Vec<f64>) {
-        let x = Triple::<N>::from_fn(|i| y[i]);
+        let x = ChartVector::<N>::from_fn(|i| y[i]);
         match (DarbouxField { hamiltonian: &Known(self.0), t }).at(&x) {
             Ok(f) => (0..2 * N + 1).for_each(|i| d[i] = f.component(i)),
             Err(_) => d.fill(f64::NAN),
@@ -114,11 +114,11 @@ pub fn hamiltonian_motion<const N: usize>(
     duration: f64,
 ) -> Option<PhasePoint<N>> {
     system.hamiltonian(t0, start)?;
-    let y = Triple::from(*start).to_vector().as_slice().to_vec();
+    let y = ChartVector::from(*start).to_vector().as_slice().to_vec();
     let ode = HamiltonianOde::<_, N>(system);
     let method = ExplicitRungeKutta::dop853().rtol(3e-14).atol(1e-15).max_steps(1_000_000);
     let solution = IVP::ode(&ode, t0, t0 + duration, y).method(method).solve();
     let end = solution.ok().and_then(|s| s.y.last().cloned());
     assert!(end.is_some(), "the oracle did not reach the end");
-    Some(Triple::from_fn(|i| end.as_ref().map_or(f64::NAN, |y| y[i])).into())
+    Some(ChartVector::from_fn(|i| end.as_ref().map_or(f64::NAN, |y| y[i])).into())
 }

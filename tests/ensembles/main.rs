@@ -11,9 +11,9 @@ use contact_geom::systems::{Duffing, HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::rules::MidpointRule;
 use discrete_herglotz::{
-    ByRule, CheckpointError, Ending, Ensemble, EnsembleError, Event, Events, Facts, GaussCollocation, InLanes,
-    InputError, Integrator, Member, Problem, Row, Rows, SplittingScheme, Status, StepError, Stepper, Steps, Until,
-    Wants,
+    BatchKernel, CheckpointError, Ending, Ensemble, EnsembleError, Event, Events, GaussCollocation, InputError,
+    Integrator, Member, MethodInfo, Problem, QuadratureMethod, Row, Rows, SplittingScheme, Status, StepError, Stepper,
+    StepperOptions, Steps, Until,
 };
 use proptest::prelude::*;
 
@@ -97,7 +97,7 @@ fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy +
     integrator: I,
     steps: usize,
 ) -> f64 {
-    let (count, end, name) = (70, Until::Time(5.0), integrator.facts().name);
+    let (count, end, name) = (70, Until::Time(5.0), integrator.info().name);
     let ensemble = Ensemble::new(lagrangian, 0.0, count, start).by(integrator).steps(Steps::Count(steps)).threads(1);
     let mut farthest = 0.0f64;
     let tally = ensemble
@@ -107,7 +107,7 @@ fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy +
             }
             let problem = Problem::new(lagrangian, 0.0, start(member.index)).unwrap();
             let h = 5.0 / steps as f64;
-            let mut own = integrator.stepper(&problem, h, Wants { action: true, watched: false }).unwrap();
+            let mut own = integrator.stepper(&problem, h, StepperOptions { action: true, watched: false }).unwrap();
             own.advance(steps).unwrap();
             let ending = member.ending.unwrap();
             assert_eq!((ending.status, ending.steps, ending.t), (Status::Completed, steps, own.time()), "{name}");
@@ -119,7 +119,7 @@ fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy +
             }
         })
         .unwrap();
-    assert_eq!((tally.in_lanes, tally.completed), (count, count), "{name}");
+    assert_eq!((tally.batch_kernel, tally.completed), (count, count), "{name}");
     farthest
 }
 
@@ -166,32 +166,37 @@ fn by_collocation_members_are_single_runs_but_for_rounding() {
 enum By {
     Splitting(SplittingScheme),
     Gauss(GaussCollocation),
-    Rule(ByRule<MidpointRule>),
+    Rule(QuadratureMethod<MidpointRule>),
 }
 
 impl<'a, L: Lagrangian<1> + 'a> Integrator<'a, L, 1> for By {
-    fn facts(&self) -> Facts {
+    fn info(&self) -> MethodInfo {
         match self {
-            By::Splitting(by) => Integrator::<'a, L, 1>::facts(by),
-            By::Gauss(by) => Integrator::<'a, L, 1>::facts(by),
-            By::Rule(by) => Integrator::<'a, L, 1>::facts(by),
+            By::Splitting(by) => Integrator::<'a, L, 1>::info(by),
+            By::Gauss(by) => Integrator::<'a, L, 1>::info(by),
+            By::Rule(by) => Integrator::<'a, L, 1>::info(by),
         }
     }
     fn check(&self, _: &L) -> Result<(), InputError> {
         Ok(())
     }
-    fn stepper(&self, of: &Problem<'a, L, 1>, h: f64, wants: Wants) -> Result<Box<dyn Stepper<1> + 'a>, InputError> {
+    fn stepper(
+        &self,
+        of: &Problem<'a, L, 1>,
+        h: f64,
+        wants: StepperOptions,
+    ) -> Result<Box<dyn Stepper<1> + 'a>, InputError> {
         match self {
             By::Splitting(by) => by.stepper(of, h, wants),
             By::Gauss(by) => by.stepper(of, h, wants),
             By::Rule(by) => by.stepper(of, h, wants),
         }
     }
-    fn in_lanes(&self) -> Option<InLanes> {
+    fn batch_kernel(&self) -> Option<BatchKernel> {
         match self {
-            By::Splitting(by) => Integrator::<'a, L, 1>::in_lanes(by),
-            By::Gauss(by) => Integrator::<'a, L, 1>::in_lanes(by),
-            By::Rule(by) => Integrator::<'a, L, 1>::in_lanes(by),
+            By::Splitting(by) => Integrator::<'a, L, 1>::batch_kernel(by),
+            By::Gauss(by) => Integrator::<'a, L, 1>::batch_kernel(by),
+            By::Rule(by) => Integrator::<'a, L, 1>::batch_kernel(by),
         }
     }
 }
@@ -205,7 +210,7 @@ fn gauss(stages: usize) -> By {
 }
 
 fn integrators() -> [By; 3] {
-    [splitting(SplittingScheme::BLANES_MOAN_6), gauss(5), By::Rule(ByRule::default())]
+    [splitting(SplittingScheme::BLANES_MOAN_6), gauss(5), By::Rule(QuadratureMethod::default())]
 }
 
 #[test]
@@ -287,7 +292,7 @@ fn a_member_that_fails_says_why_and_the_others_go_on() {
         _ => VelocityPoint::new([0.001 * i as f64], [0.1], 0.0),
     };
     let good = |i: usize| VelocityPoint::new([0.001 * i as f64], [0.1], 0.0);
-    for by in [splitting(SplittingScheme::KAHAN_LI_6), gauss(4), By::Rule(ByRule::default())] {
+    for by in [splitting(SplittingScheme::KAHAN_LI_6), gauss(4), By::Rule(QuadratureMethod::default())] {
         let all = |start: &(dyn Fn(usize) -> VelocityPoint<1> + Sync)| {
             let ensemble = Ensemble::new(&Bowl, 0.0, 40, start).by(by).steps(Steps::Count(20)).threads(1);
             let mut all = Vec::new();
@@ -313,10 +318,10 @@ fn a_formula_that_branches_is_run_one_by_one() {
         let ensemble = Ensemble::new(&Branching, 0.0, 20, start).by(by).steps(Steps::Count(10));
         let mut ends = Vec::new();
         let tally = ensemble.run(Until::Time(1.0), |member| ends.push(numbers(member)[0])).unwrap();
-        (tally.in_lanes, ends)
+        (tally.batch_kernel, ends)
     };
-    let (in_lanes, ends) = run(SplittingScheme::KAHAN_LI_8);
-    assert_eq!(in_lanes, 0);
+    let (batch_kernel, ends) = run(SplittingScheme::KAHAN_LI_8);
+    assert_eq!(batch_kernel, 0);
     for (i, end) in ends.into_iter().enumerate() {
         let frequency = if i % 2 == 0 { 1.5f64.sqrt() } else { 1.0 };
         // The closed form, to the error of order 8 with ten steps; no motion changes sides until t = 1.
@@ -359,7 +364,7 @@ fn orders_are_those_of_the_schemes() {
         };
         // Three halvings; the order is the mean slope, off by the next term of the error, which is below a tenth of the first.
         let slope = (error(steps) - error(8 * steps)) / 3.0;
-        assert!((slope - f64::from(Integrator::<Pendulum, 1>::facts(&by).order)).abs() < 0.15, "{by:?}: {slope}");
+        assert!((slope - f64::from(Integrator::<Pendulum, 1>::info(&by).order)).abs() < 0.15, "{by:?}: {slope}");
     }
 }
 
@@ -403,7 +408,7 @@ fn bad_input_is_refused_before_work_begins() {
     // A start that is none, where all are.
     let nowhere = Ensemble::new(&pendulum, 0.0, 9, |_| VelocityPoint::new([f64::NAN], [0.0], 0.0)).by(by);
     assert!(matches!(refused(nowhere.steps(Steps::Count(4)).run(until, fold)), InputError::Geometry(_)));
-    assert!(Integrator::<Pendulum, 1>::in_lanes(&by).is_some());
+    assert!(Integrator::<Pendulum, 1>::batch_kernel(&by).is_some());
 }
 
 /// To the time at which they start all members are their starts, in lanes and by themselves.
@@ -415,7 +420,7 @@ fn an_ensemble_to_its_start_is_the_starts() {
             let ensemble = Ensemble::new(&pendulum, 0.5, 9, pendulum_start).by(by).steps(steps);
             for member in members(&ensemble, Until::Time(0.5)) {
                 let ending = member.ending.unwrap();
-                assert_eq!((ending.status, ending.suspicion), (Status::Completed, None), "{by:?}, {steps:?}");
+                assert_eq!((ending.status, ending.unresolved), (Status::Completed, None), "{by:?}, {steps:?}");
                 assert_eq!((ending.steps, ending.t), (0, 0.5), "{by:?}, {steps:?}");
                 let (start, found) = (pendulum_start(member.index), ending.state);
                 assert_eq!((found.q, found.p, found.z), (start.q, start.v, start.z), "{by:?}, {steps:?}");

@@ -1,7 +1,7 @@
 //! Steps that do not resolve the motion of a member, and steps for an accuracy.
 
 use super::*;
-use discrete_herglotz::Suspicion;
+use discrete_herglotz::UnresolvedStep;
 
 /// `v^2/2 - k (q^2/2 + q^4/16) - z/50`: an oscillator as stiff as its parameter.
 struct Spring {
@@ -35,12 +35,12 @@ fn members_that_the_steps_do_not_resolve_are_marked_as_by_a_single_run() {
             let problem = Problem::new(&springs[i], 0.0, start(i)).unwrap();
             let own = problem.by(by).steps(Steps::Count(30)).run(until).unwrap();
             let ending = member.ending.unwrap();
-            let bits = |s: Option<Suspicion>| s.map(|s| (s.step, s.misfit.to_bits()));
-            if bits(ending.suspicion) != bits(own.suspicion) {
-                missed.push((Integrator::<'_, Spring, 1>::facts(&by).name, i, own.suspicion));
+            let bits = |s: Option<UnresolvedStep>| s.map(|s| (s.step, s.defect.to_bits()));
+            if bits(ending.unresolved) != bits(own.unresolved) {
+                missed.push((Integrator::<'_, Spring, 1>::info(&by).name, i, own.unresolved));
             }
-            marked += usize::from(ending.suspicion.is_some());
-            unmarked += usize::from(ending.suspicion.is_none());
+            marked += usize::from(ending.unresolved.is_some());
+            unmarked += usize::from(ending.unresolved.is_none());
             // The marks change no bit. A run by itself takes other sweeps, and ends where numbers have grown beyond all bounds.
             let plain = unwatched[i].ending.unwrap();
             if own.status == Status::Completed {
@@ -58,7 +58,7 @@ fn members_that_the_steps_do_not_resolve_are_marked_as_by_a_single_run() {
 
 #[test]
 fn an_accuracy_holds_for_every_member() {
-    // One is stiffer than all that pilot runs look at.
+    // One is stiffer than all that trial runs look at.
     let (soft, stiff) = (Spring { k: 1.0 }, Spring { k: 30.0 });
     let spring = |i: usize| if i == 50 { &stiff } else { &soft };
     let start = |i: usize| VelocityPoint::new([0.5], [0.02 * i as f64], 0.0);
@@ -83,13 +83,13 @@ fn an_accuracy_holds_for_every_member() {
         };
         let mut all = Vec::new();
         let tally = of().accuracy(wanted).rows_every(1).run(until, |member| all.push(member.clone())).unwrap();
-        assert_eq!((tally.completed, tally.in_lanes, tally.suspicious), (count, count - 1, 0), "{by:?}");
+        assert_eq!((tally.completed, tally.batch_kernel, tally.unresolved), (count, count - 1, 0), "{by:?}");
         for member in &all {
             let error = beyond(member, wanted);
             assert!(error <= most, "{by:?}, {}: {error}", member.index);
         }
         let steps = all[0].ending.unwrap().steps;
-        // It takes its own, as many as its pilot runs find: at least half as many again, and how many more depends on the order.
+        // It takes its own, as many as its trial runs find: at least half as many again, and how many more depends on the order.
         let own = all[50].ending.unwrap().steps;
         assert!(2 * own > 3 * steps, "{by:?}: {own} beside {steps}");
         // Otherwise they are those of so many steps.
@@ -107,7 +107,7 @@ fn an_accuracy_holds_for_every_member() {
 #[test]
 fn an_accuracy_without_lanes_is_that_of_each_member() {
     let pendulum = Pendulum { gamma: -0.1 };
-    let by = By::Rule(ByRule::default());
+    let by = By::Rule(QuadratureMethod::default());
     let ensemble = Ensemble::new(&pendulum, 0.0, 20, pendulum_start).by(by).accuracy(1e-3);
     for member in members(&ensemble, Until::Time(2.0)).iter().step_by(5) {
         let problem = Problem::new(&pendulum, 0.0, pendulum_start(member.index)).unwrap();

@@ -135,7 +135,7 @@ fn observers_of_members_see_what_those_of_single_runs_do() {
             let told = std::cell::Cell::new(0.0);
             let ensemble = ensemble.progress(|part| told.set(part)).observe(observer, seen);
             let tally = ensemble.run(Until::Time(6.0), |member, seen| all.push((member.clone(), seen))).unwrap();
-            assert_eq!((tally.members, tally.completed, tally.in_lanes, told.get()), (40, 38, 0, 1.0), "{by:?}");
+            assert_eq!((tally.members, tally.completed, tally.batch_kernel, told.get()), (40, 38, 0, 1.0), "{by:?}");
             all
         };
         let all = run(1);

@@ -67,7 +67,7 @@ enum Within {
     /// The inherent functions of a type.
     Type(String),
     Trait(String),
-    Module(String),
+    TangentVector(String),
     /// The implementation of a trait, a private type: nothing of its own.
     Other,
 }
@@ -86,13 +86,13 @@ fn read(text: &str, module: Option<&str>, exported: &dyn Fn(&str) -> bool, entri
             let name = identifier(header);
             within = if is_public(&name) { Within::Trait(name) } else { Within::Other };
         } else if let Some(header) = line.strip_prefix("pub mod ").filter(|h| h.ends_with('{')) {
-            within = Within::Module(identifier(header));
+            within = Within::TangentVector(identifier(header));
         } else if line.starts_with('}') {
             within = Within::File;
         } else if let Some(function) = function(code, matches!(within, Within::Trait(_))) {
             let qualified = match (&within, module) {
                 (Within::Type(of) | Within::Trait(of), _) => format!("{of}::{function}"),
-                (Within::Module(of), _) => format!("{of}::{function}"),
+                (Within::TangentVector(of), _) => format!("{of}::{function}"),
                 (Within::File, _) if deep != 0 || !exported(&function) => continue,
                 (Within::File, Some(of)) => format!("{of}::{function}"),
                 (Within::File, None) => function,

@@ -27,7 +27,7 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Structure::has_constant_rate", "takes no number"),
     ("Structure::is_affine_in_z", "takes no number"),
     ("Statement::*", "takes no number but its own, of which its test tries all"),
-    ("Triple::from_fn", "the caller's function"),
+    ("ChartVector::from_fn", "the caller's function"),
     ("$name::new", "holds what it is given; check() and every start look at it"),
 ];
 

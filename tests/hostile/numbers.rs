@@ -2,7 +2,7 @@
 
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
-use contact_geom::{DiscretePoint, Dual, PhasePoint, Scalar, Structure, Triple, VelocityPoint};
+use contact_geom::{ChartVector, DiscretePoint, Dual, PhasePoint, Scalar, Structure, VelocityPoint};
 
 /// What stands in for a coordinate, a time, a step.
 pub const HOSTILE: [f64; 16] = [
@@ -28,8 +28,8 @@ pub const HOSTILE: [f64; 16] = [
 pub const BASE: [f64; 3] = [0.3, 0.7, 0.2];
 
 /// Triples with one coordinate, or all, of a hostile value.
-pub fn triples() -> Vec<Triple<1>> {
-    let of = |c: [f64; 3]| Triple { x: [c[0]].into(), y: [c[1]].into(), z: c[2] };
+pub fn triples() -> Vec<ChartVector<1>> {
+    let of = |c: [f64; 3]| ChartVector { x: [c[0]].into(), y: [c[1]].into(), z: c[2] };
     let mut all = vec![of(BASE)];
     for value in HOSTILE {
         all.extend((0..3).map(|i| of(std::array::from_fn(|j| if i == j { value } else { BASE[j] }))));
@@ -39,7 +39,7 @@ pub fn triples() -> Vec<Triple<1>> {
 }
 
 /// Times with triples: one of both tame.
-pub fn places() -> Vec<(f64, Triple<1>)> {
+pub fn places() -> Vec<(f64, ChartVector<1>)> {
     let tame = triples()[0];
     HOSTILE.iter().map(|t| (*t, tame)).chain(triples().into_iter().map(|x| (0.4, x))).collect()
 }
@@ -163,7 +163,7 @@ impl Numbers for DMatrix<f64> {
     }
 }
 
-impl<const N: usize> Numbers for Triple<N> {
+impl<const N: usize> Numbers for ChartVector<N> {
     fn numbers(&self) -> Vec<f64> {
         (0..2 * N + 1).map(|i| self.component(i)).collect()
     }
@@ -171,19 +171,19 @@ impl<const N: usize> Numbers for Triple<N> {
 
 impl<const N: usize> Numbers for VelocityPoint<N> {
     fn numbers(&self) -> Vec<f64> {
-        Triple::from(*self).numbers()
+        ChartVector::from(*self).numbers()
     }
 }
 
 impl<const N: usize> Numbers for PhasePoint<N> {
     fn numbers(&self) -> Vec<f64> {
-        Triple::from(*self).numbers()
+        ChartVector::from(*self).numbers()
     }
 }
 
 impl<const N: usize> Numbers for DiscretePoint<N> {
     fn numbers(&self) -> Vec<f64> {
-        Triple::from(*self).numbers()
+        ChartVector::from(*self).numbers()
     }
 }
 

@@ -3,14 +3,14 @@
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{
-    Clock, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, Statement, Structure, Symmetry, VelocityPoint,
-    herglotz_field, linear,
+    DiscretePoint, GeometryError, Lagrangian, PhasePoint, Scalar, Statement, Structure, Symmetry, TimeTransformation,
+    VelocityPoint, herglotz_field, linear,
 };
 use discrete_herglotz::{
     AnyIntegrator, BoundaryPath, Checkpoint, Composition, DiscreteLagrangian, DiscretePath, DividedGauss, End, Event,
-    Events, Facts, Flow, Gauss, Halt, InputError, Integrator, Interrupt, Interrupted, LeftMidpoint, Method, Midpoint,
-    Moment, Obstacle, Problem, Rectangle, Rows, Solver, SplittingScheme, Status, StepError, Stepper, Steps, Stop,
-    Strang, Suspicion, UnknownIntegrator, UnknownMethod, Until, Wants,
+    Events, Flow, Gauss, InputError, Integrator, Interrupt, LeftMidpoint, Method, MethodInfo, Midpoint, Problem,
+    Rectangle, ResumeState, Rows, SelectionFailure, Solver, SplittingScheme, Status, StepError, StepFailure, StepView,
+    Stepper, StepperOptions, Steps, Stop, Strang, UnknownIntegrator, UnknownMethod, UnresolvedStep, Until,
 };
 use exact_lagrangian::{ContactExponential, ExactError, ExactLagrangian, herglotz_flow};
 use std::ops::ControlFlow;
@@ -140,7 +140,7 @@ impl Lagrangian<1> for Later {
 
 struct Stopped;
 
-impl Clock<2> for Stopped {
+impl TimeTransformation<2> for Stopped {
     fn rate<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
         q[0] * 0.0
     }
@@ -173,8 +173,8 @@ struct Forgetful;
 struct Bare<'a>(Box<dyn Stepper<1> + 'a>);
 
 impl<'a> Integrator<'a, Pendulum, 1> for Forgetful {
-    fn facts(&self) -> Facts {
-        Facts::of_discrete::<1>("forgetful", 2)
+    fn info(&self) -> MethodInfo {
+        MethodInfo::of_discrete::<1>("forgetful", 2)
     }
     fn check(&self, _: &Pendulum) -> Result<(), InputError> {
         Ok(())
@@ -183,14 +183,14 @@ impl<'a> Integrator<'a, Pendulum, 1> for Forgetful {
         &self,
         problem: &Problem<'a, Pendulum, 1>,
         h: f64,
-        wants: Wants,
+        wants: StepperOptions,
     ) -> Result<Box<dyn Stepper<1> + 'a>, InputError> {
         Ok(Box::new(Bare(Method::Midpoint.stepper(problem, h, wants)?)))
     }
 }
 
 impl Stepper<1> for Bare<'_> {
-    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         self.0.advance(steps)
     }
     fn state(&self) -> PhasePoint<1> {
@@ -235,7 +235,7 @@ fn input_errors() {
             let path = std::env::temp_dir().join(format!("another_run_{}", std::process::id()));
             let mut saved = Checkpoint::every(1, &path).unwrap();
             problem.steps(Steps::Count(1)).observe(&mut saved).run(Until::Time(5.5)).unwrap();
-            let interrupted = Interrupted::read(&path).unwrap();
+            let interrupted = ResumeState::read(&path).unwrap();
             std::fs::remove_file(path).unwrap();
             problem.steps(Steps::Count(2)).resume(interrupted).run(Until::Time(5.5)).unwrap_err()
         }, ["not the one that was interrupted", "same problem"];
@@ -249,9 +249,9 @@ fn input_errors() {
         }, ["t = 7.25", "row 1", "outside of the run's span", "in the order of the run"];
         InputError::Undefined => Problem::new(&Odd::Kicked, 0.0, VelocityPoint::new([f64::MAX], [0.0], 0.0)).err().unwrap(), ["not finite at the start", "inside its domain"];
         InputError::Stages { .. } => Gauss::new(pendulum, 17, 0.1).err().unwrap(), ["17", "from 1 to 16"];
-        InputError::Clock { .. } => {
+        InputError::TimeTransformation { .. } => {
             let gauss = Gauss::new(kepler, 3, 0.1).unwrap();
-            gauss.clocked_stepper(Stopped, 0.0, circle, circle.p).err().unwrap()
+            gauss.transformed_stepper(Stopped, 0.0, circle, circle.p).err().unwrap()
         }, ["is 0", "positive and finite"];
         InputError::Dimension => Midpoint::new(Nothing, 0.1).err().unwrap(), ["dimension 0", "at least one"];
         InputError::Count { .. } => Rows::<1>::every(0).err().unwrap(), ["the steps between two rows", "= 0", "at least 1"];
@@ -299,7 +299,7 @@ enum Odd {
     /// A potential with a step at q = 3.
     Stepped,
     /// A force that begins at t = 1.
-    Beginning,
+    ConsistentStart,
 }
 
 impl Lagrangian<1> for Odd {
@@ -311,12 +311,12 @@ impl Lagrangian<1> for Odd {
             Odd::Kicked => kinetic - square * square + (t * 1e12).sin() * q[0] * 1e12,
             Odd::Explosive => kinetic + z * z,
             Odd::Stepped => kinetic + q[0] - ((q[0] - 3.0) * 1e10).tanh() * 0.0015,
-            Odd::Beginning => kinetic + T::from(1.0).if_less(t, q[0] * (t - 1.0) * 100.0, T::from(0.0)),
+            Odd::ConsistentStart => kinetic + T::from(1.0).if_less(t, q[0] * (t - 1.0) * 100.0, T::from(0.0)),
             Odd::Chaotic => kinetic + square * 0.5 - square * square * 0.25 + (t * 1.4).cos() * q[0] * 0.35 - z * 0.1,
         }
     }
     fn structure(&self) -> Structure {
-        let Odd::Beginning = self else { return Structure::default() };
+        let Odd::ConsistentStart = self else { return Structure::default() };
         Structure {
             z_free: true,
             z_affine: true,
@@ -340,15 +340,15 @@ fn obstacles() {
             other => panic!("{other:?}"),
         }
     };
-    every!(Obstacle {
-        Obstacle::RoundOff => obstacle(&Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "ask for less"];
-        Obstacle::Chaos { .. } => obstacle(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "ask for less"];
-        Obstacle::Order { .. } => obstacle(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "ask for less"];
-        Obstacle::Misfit { .. } => obstacle(&Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
-        Obstacle::Hidden { .. } => obstacle(&Odd::Beginning, "gauss_8", 2.0, 1e-9), ["one step more", "at the ends of their steps", "end the span beside it"];
-        Obstacle::Halted { .. } => obstacle(&Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
-        Obstacle::Unresolved { .. } => obstacle(&Odd::Kicked, "gauss_8", 1.0, 1e-6), ["near t = ", "shorter span"];
-        Obstacle::Budget => obstacle(&Odd::Chaotic, "rectangle", 10.0, 1e-12), ["too many", "higher order", "give a step"];
+    every!(SelectionFailure {
+        SelectionFailure::RoundOff => obstacle(&Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "ask for less"];
+        SelectionFailure::Chaos { .. } => obstacle(&Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "ask for less"];
+        SelectionFailure::Order { .. } => obstacle(&Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "ask for less"];
+        SelectionFailure::Misfit { .. } => obstacle(&Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
+        SelectionFailure::Hidden { .. } => obstacle(&Odd::ConsistentStart, "gauss_8", 2.0, 1e-9), ["one step more", "at the ends of their steps", "end the span beside it"];
+        SelectionFailure::Halted { .. } => obstacle(&Odd::Explosive, "gauss_8", 2.0, 1e-6), ["beyond t = 0.99", "end the span"];
+        SelectionFailure::Unresolved { .. } => obstacle(&Odd::Kicked, "gauss_8", 1.0, 1e-6), ["near t = ", "shorter span"];
+        SelectionFailure::Budget => obstacle(&Odd::Chaotic, "rectangle", 10.0, 1e-12), ["too many", "higher order", "give a step"];
     });
 }
 
@@ -430,7 +430,7 @@ fn statuses() {
     every!(Status {
         Status::Completed => run().run(Until::Steps(3)).unwrap().status, ["completed"];
         Status::Stopped { .. } => {
-            let mut fourth = |at: &Moment<'_, 1>| match at.k {
+            let mut fourth = |at: &StepView<'_, 1>| match at.k {
                 4 => ControlFlow::Break(Stop::here("a weary observer")),
                 _ => ControlFlow::Continue(()),
             };
@@ -525,7 +525,7 @@ fn names_that_are_none() {
     let UnknownIntegrator { name } = "gauss_17".parse::<AnyIntegrator>().unwrap_err();
     let sentence = UnknownIntegrator { name }.to_string();
     assert!(sentence.contains("\"gauss_17\"") && sentence.contains("gauss_16"), "{sentence}");
-    let sentence = Suspicion { step: 7, misfit: 12.5 }.to_string();
+    let sentence = UnresolvedStep { step: 7, defect: 12.5 }.to_string();
     assert!(
         sentence.contains("step 7") && sentence.contains("1.2e1") && sentence.contains("smaller step"),
         "{sentence}"

@@ -1,8 +1,8 @@
 //! The choice of steps for a wanted accuracy: what is refused, and what comes to rest.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint, larger};
-use discrete_herglotz::{AnyIntegrator, InputError, Obstacle, Outcome, Problem, Status, Until};
+use contact_geom::{Derivatives, Lagrangian, Scalar, Structure, VelocityPoint, max_or_nan};
+use discrete_herglotz::{AnyIntegrator, InputError, Outcome, Problem, SelectionFailure, Status, Until};
 use std::time::Instant;
 
 /// A whole run from t = 0 by an integrator and steps for an accuracy.
@@ -74,7 +74,10 @@ fn jumps_of_the_potential_are_refused() {
             Err(InputError::Accuracy { cause, .. }) => cause,
             other => panic!("{place}, {height}: {:?}", other.map(|plan| plan.count())),
         };
-        let told = matches!(cause, Obstacle::Order { .. } | Obstacle::Misfit { .. } | Obstacle::Unresolved { .. });
+        let told = matches!(
+            cause,
+            SelectionFailure::Order { .. } | SelectionFailure::Misfit { .. } | SelectionFailure::Unresolved { .. }
+        );
         assert!(told, "{place}, {height}: {cause:?}");
     }
 }
@@ -94,7 +97,7 @@ fn kinks_are_met_or_refused() {
                 let Ok(outcome) = run_to(&line, start, span, wanted) else { continue };
                 met += 1;
                 let s = 2.0 - first;
-                let off = larger((outcome.q[0] + s - 0.5 * s * s).abs(), (outcome.p[0] + 1.0 - s).abs());
+                let off = max_or_nan((outcome.q[0] + s - 0.5 * s * s).abs(), (outcome.p[0] + 1.0 - s).abs());
                 assert!(off <= wanted, "{wanted:e}, {first}, {span}: off by {off:e}");
             }
         }
@@ -140,7 +143,10 @@ fn singularities_end_the_search_soon() {
         assert!(
             matches!(
                 refused,
-                Some(InputError::Accuracy { cause: Obstacle::Halted { .. } | Obstacle::Unresolved { .. }, .. })
+                Some(InputError::Accuracy {
+                    cause: SelectionFailure::Halted { .. } | SelectionFailure::Unresolved { .. },
+                    ..
+                })
             ),
             "{refused:?}"
         );
@@ -155,5 +161,5 @@ fn what_decays_below_the_numbers_is_rounded() {
     let system = contact_geom::systems::HarmonicOscillator { gamma: -0.1 };
     let start = VelocityPoint::new([1e-300], [5e-301], 0.0);
     let refused = run_to(&system, start, 1e3, 1e-9).err();
-    assert!(matches!(refused, Some(InputError::Accuracy { cause: Obstacle::RoundOff, .. })), "{refused:?}");
+    assert!(matches!(refused, Some(InputError::Accuracy { cause: SelectionFailure::RoundOff, .. })), "{refused:?}");
 }

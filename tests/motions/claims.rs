@@ -84,7 +84,7 @@ fn what_is_false_beyond_the_start_is_seen_where_the_motion_goes() {
         match run.run(Until::Time(span)) {
             Ok(end) => match end.status {
                 Status::FalseClaim { .. } => seen += 1,
-                Status::Completed if end.q[0] > 11.0 && end.suspicion.is_none() => {
+                Status::Completed if end.q[0] > 11.0 && end.unresolved.is_none() => {
                     silent.push((case, bump, integrator.to_string(), end.steps, end.q[0]))
                 }
                 _ => other += 1,

@@ -2,10 +2,10 @@
 
 use crate::run_of;
 use contact_geom::systems::{Kepler, OneCoordinate, Pendulum, QuadraticInZ, System};
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
 use discrete_herglotz::{
-    AnyIntegrator, Checkpoint, CheckpointError, Event, Events, Interrupted, Moment, Problem, Progress, Quotient, Rows,
-    Run, Steps, Stop, Until,
+    AnyIntegrator, Checkpoint, CheckpointError, Event, Events, Problem, Progress, Quotient, ResumeState, Rows, Run,
+    StepView, Steps, Stop, Until,
 };
 use discrete_herglotz::{Gauss, InputError, Method, Outcome, Status};
 use std::ops::ControlFlow;
@@ -15,10 +15,10 @@ fn takers<L: Lagrangian<N>, const N: usize>(system: &L) -> impl Iterator<Item = 
     AnyIntegrator::all().into_iter().filter(|integrator| integrator.check(system).is_ok())
 }
 
-/// So many steps up to a time; by a clock, whose rate is about one, of the same size.
+/// So many steps up to a time; in transformed time, whose rate is about one, of the same size.
 fn steps(integrator: AnyIntegrator, count: usize, span: f64) -> Steps {
     match integrator {
-        AnyIntegrator::Clocked { .. } => Steps::Size(span.abs() / count as f64),
+        AnyIntegrator::TransformedGauss { .. } => Steps::Size(span.abs() / count as f64),
         _ => Steps::Count(count),
     }
 }
@@ -41,7 +41,7 @@ fn symmetric(integrator: AnyIntegrator) -> bool {
 }
 
 fn distance<const N: usize>(a: &PhasePoint<N>, b: &PhasePoint<N>) -> f64 {
-    larger(largest((a.q - b.q).iter().chain((a.p - b.p).iter()).copied()), (a.z - b.z).abs())
+    max_or_nan(max_abs_or_nan((a.q - b.q).iter().chain((a.p - b.p).iter()).copied()), (a.z - b.z).abs())
 }
 
 /// There and back again: symmetric integrators return to round-off, others up to the error of their order.
@@ -57,10 +57,10 @@ fn there_and_back() {
             let there = by(&problem, 0.5, 2.5);
             assert_eq!((there.status, there.t), (Status::Completed, 2.5), "{integrator}");
             let back = by(&Problem::new(system, there.t, &there).unwrap(), 2.5, 0.5);
-            assert_eq!((back.status, back.suspicion), (Status::Completed, None), "{integrator}");
+            assert_eq!((back.status, back.unresolved), (Status::Completed, None), "{integrator}");
             assert!((back.t - 0.5).abs() <= 4.0 * f64::EPSILON, "{integrator}: {}", back.t);
-            // Of 80 steps; by a clock the last step of either way is another, so that the error of the method is left.
-            let clocked = matches!(integrator, AnyIntegrator::Clocked { .. });
+            // Of 80 steps; in transformed time the last step of either way is another, so that the error of the method is left.
+            let clocked = matches!(integrator, AnyIntegrator::TransformedGauss { .. });
             let rounded = symmetric(integrator) && !clocked;
             let bound = if rounded { 1e-13 } else { 0.5 * f64::powi(0.3, integrator.order().min(24) as i32) + 1e-13 };
             let off = distance(&back.state(), problem.state());
@@ -96,7 +96,7 @@ fn rows_at_times() {
             truth.map_or(0.0, |truth| distance(&state, &truth))
         };
         let errors: Vec<f64> = rows.rows.iter().zip(&truth).map(|(row, truth)| error(row, truth)).collect();
-        let (at_end, worst) = (errors[13], largest(errors.iter().copied()));
+        let (at_end, worst) = (errors[13], max_abs_or_nan(errors.iter().copied()));
         assert!(worst <= 10.0 * at_end + 1e-13, "{integrator}: {worst:e}, at the end {at_end:e}");
     }
 }
@@ -143,13 +143,13 @@ fn what_rows_hold() {
     }
 }
 
-/// A hundred times at the most, from 0 to 1; by a clock too, which counts its steps itself.
+/// A hundred times at the most, from 0 to 1; in transformed time too, which counts its steps itself.
 #[test]
 fn progress_is_told() {
     let kepler = Kepler::<2>::default();
     let problem = Problem::new(&kepler, 0.0, kepler.initial()).unwrap();
-    // By a clock the number of steps is not known, and it is told after so many steps.
-    let (gauss, clocked) = (AnyIntegrator::Gauss { stages: 2 }, AnyIntegrator::Clocked { stages: 2 });
+    // In transformed time the number of steps is not known, and it is told after so many steps.
+    let (gauss, clocked) = (AnyIntegrator::Gauss { stages: 2 }, AnyIntegrator::TransformedGauss { stages: 2 });
     for (integrator, count, least) in [(gauss, 777, 98), (clocked, 7000, 6)] {
         let mut parts = Vec::new();
         let mut progress = Progress::new(|part| parts.push(part));
@@ -275,7 +275,7 @@ fn observers_ask_and_stop() {
         let plain = run_in(&problem, integrator, 20, 1.0).without_action().run(Until::Time(1.0)).unwrap();
         assert_eq!((plain.z, plain.log_factor), (None, None));
         let mut seen = Vec::new();
-        let mut watch = |at: &Moment<'_, 2>| {
+        let mut watch = |at: &StepView<'_, 2>| {
             seen.push((at.k, at.t, at.energy().unwrap()));
             ControlFlow::Continue(())
         };
@@ -283,7 +283,7 @@ fn observers_ask_and_stop() {
             run_in(&problem, integrator, 20, 1.0).without_action().observe(&mut watch).run(Until::Time(1.0)).unwrap();
         assert_eq!((plain.q, plain.p, plain.steps), (watched.q, watched.p, watched.steps), "{integrator}");
         assert!(watched.z.is_some() && seen.len() == watched.steps, "{integrator}");
-        let mut stops = |at: &Moment<'_, 2>| match at.k {
+        let mut stops = |at: &StepView<'_, 2>| match at.k {
             5 => ControlFlow::Break(Stop::here("the fifth step")),
             _ => ControlFlow::Continue(()),
         };
@@ -339,7 +339,7 @@ fn interrupted_runs_go_on() {
             // Places without a period.
             for place in [1, 2 + whole.steps * 5 / 13, whole.steps - 1] {
                 let mut saved = Checkpoint::every(place, &path).unwrap();
-                let mut killed = |at: &Moment<'_, N>| match at.k {
+                let mut killed = |at: &StepView<'_, N>| match at.k {
                     k if k == place => ControlFlow::Break(Stop::here("a test")),
                     _ => ControlFlow::Continue(()),
                 };
@@ -347,14 +347,14 @@ fn interrupted_runs_go_on() {
                 let stopped = run.observe(&mut saved).observe(&mut killed).run(Until::Time(6.0)).unwrap();
                 assert_eq!((stopped.steps, saved.error.is_none()), (place, true), "{integrator}");
                 let run = run_in(&problem, integrator, 60, 6.0).with_conformal_factor();
-                let resumed = run.resume(Interrupted::read(&path).unwrap()).run(Until::Time(6.0)).unwrap();
+                let resumed = run.resume(ResumeState::read(&path).unwrap()).run(Until::Time(6.0)).unwrap();
                 assert_eq!(resumed, whole, "{integrator} from {place}");
                 places += 1;
             }
         }
         // Another run is refused.
         let other = run_in(&problem, AnyIntegrator::Discrete(Method::Midpoint), 61, 6.0);
-        let refused = other.resume(Interrupted::read(&path).unwrap()).run(Until::Time(6.0));
+        let refused = other.resume(ResumeState::read(&path).unwrap()).run(Until::Time(6.0));
         assert_eq!(refused, Err(InputError::AnotherRun));
         std::fs::remove_file(path).unwrap();
         places
@@ -382,15 +382,15 @@ fn marks_are_resumed() {
             let run = || run_in(&problem, integrator, 40, std::f64::consts::TAU).with_conformal_factor();
             let until = Until::Time(std::f64::consts::TAU);
             let whole = run().run(until).unwrap();
-            marked += usize::from(whole.suspicion.is_some());
+            marked += usize::from(whole.unresolved.is_some());
             for place in [1, 8, 16, 17, 32, whole.steps].into_iter().filter(|k| (1..=whole.steps).contains(k)) {
                 let mut saved = Checkpoint::every(place, &path).unwrap();
-                let mut killed = |at: &Moment<'_, 2>| match at.k {
+                let mut killed = |at: &StepView<'_, 2>| match at.k {
                     k if k == place => ControlFlow::Break(Stop::here("a test")),
                     _ => ControlFlow::Continue(()),
                 };
                 let stopped = run().observe(&mut saved).observe(&mut killed).run(until).unwrap();
-                let resumed = run().resume(Interrupted::read(&path).unwrap()).run(until).unwrap();
+                let resumed = run().resume(ResumeState::read(&path).unwrap()).run(until).unwrap();
                 // In words, since a misfit may be no number.
                 assert_eq!(format!("{resumed:?}"), format!("{whole:?}"), "{integrator} from {place}: {stopped:?}");
             }
@@ -406,13 +406,13 @@ fn damaged_checkpoints_are_refused() {
     let pendulum = OneCoordinate::from(Pendulum { gamma: -0.1 });
     let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.3], 0.2)).unwrap();
     let path = std::env::temp_dir().join(format!("damaged_{}", std::process::id()));
-    assert!(matches!(Interrupted::read(&path), Err(CheckpointError::Unreadable(_))));
+    assert!(matches!(ResumeState::read(&path), Err(CheckpointError::Unreadable(_))));
     let mut saved = Checkpoint::every(5, &path).unwrap();
     run_in(&problem, AnyIntegrator::Gauss { stages: 8 }, 10, 1.0).observe(&mut saved).run(Until::Time(1.0)).unwrap();
     let whole = std::fs::read(&path).unwrap();
     let read = |bytes: &[u8]| {
         std::fs::write(&path, bytes).unwrap();
-        Interrupted::read(&path)
+        ResumeState::read(&path)
     };
     assert!(read(&whole).is_ok());
     for cut in [0, 7, 8, 15, 16, whole.len() / 2, whole.len() - 8, whole.len() - 1] {

@@ -2,7 +2,7 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Pendulum;
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, larger};
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Problem, Rows, SplittingScheme, Status, Steps, Until};
 
 /// Systems of one coordinate that come to rest away from 0, with a drag.
@@ -106,7 +106,7 @@ fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
         | Resting::Morse { gamma }) = system;
         let integrator = integrators[(draws.next() * integrators.len() as f64) as usize];
         // Until e^(gamma t/2) is between 1e-3 and 1e-40; where the drag is above critical it takes longer.
-        let span = draws.between(14.0, 180.0) / -larger(-gamma.abs(), -2.0 / gamma.abs());
+        let span = draws.between(14.0, 180.0) / -max_or_nan(-gamma.abs(), -2.0 / gamma.abs());
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let by_accuracy = draws.next() < 0.25;
         // A type only claims to be linear: a transient that ends within one step is marked, since a false claim looks the same.
@@ -127,7 +127,7 @@ fn what_comes_to_rest_away_from_the_origin_is_not_flagged() {
         match run.run(Until::Time(span)) {
             Ok(end) if end.status == Status::Completed => {
                 done += 1;
-                if end.suspicion.is_some() {
+                if end.unresolved.is_some() {
                     flagged.push(format!("{case}: {system:?} from {start:?} by {integrator}: {end:?}"));
                 }
             }
@@ -149,7 +149,7 @@ fn a_motion_that_is_left_with_the_rounding_of_its_forces_is_right() {
         let system = Resting::Morse { gamma };
         let start = VelocityPoint::new([drawn.between(-0.5, 1.0)], [drawn.between(-1.0, 1.0)], 0.0);
         // Until its oscillation, or what is slower beyond the critical drag, is between 1e-9 and 1e-43 of the start.
-        let span = drawn.between(20.0, 100.0) / -larger(0.5 * gamma, 2.0 / gamma);
+        let span = drawn.between(20.0, 100.0) / -max_or_nan(0.5 * gamma, 2.0 / gamma);
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let integrator: AnyIntegrator = integrators[case % integrators.len()].parse().unwrap();
         let wanted = f64::powf(10.0, -drawn.between(4.0, 9.0));
@@ -162,7 +162,7 @@ fn a_motion_that_is_left_with_the_rounding_of_its_forces_is_right() {
             _ => (problem.by(integrator).steps(Steps::Size(0.1)), format!("{integrator}, h = 0.1")),
         };
         let end = run.run(Until::Time(span));
-        let right = matches!(&end, Ok(end) if end.status == Status::Completed && end.suspicion.is_none());
+        let right = matches!(&end, Ok(end) if end.status == Status::Completed && end.unresolved.is_none());
         // Some hundred roundings of the force, added up.
         if !(right && end.as_ref().is_ok_and(|end| end.q[0].abs() < 1e-8)) {
             wrong.push(format!("{case}: {system:?} from {start:?} to {span} by {what}: {end:?}"));
@@ -188,15 +188,15 @@ fn general_steps_are_solved_to_the_rounding_of_forces() {
         let start = VelocityPoint::new([0.4], [-0.3], 0.0);
         let problem = Problem::new(&system, 0.0, start).unwrap();
         // Until the oscillation is below 1e-25 of the start.
-        let until = Until::Time(60.0 / -larger(0.5 * gamma, 2.0 / gamma));
+        let until = Until::Time(60.0 / -max_or_nan(0.5 * gamma, 2.0 / gamma));
         for stages in [1, 2, 4, 8, 12, 16] {
             let run = problem.by(AnyIntegrator::Gauss { stages }).steps(Steps::Size(0.1 * stages as f64));
             let end = run.run(until).unwrap();
-            assert_eq!((end.status, end.suspicion), (Status::Completed, None), "{gamma}, {stages} stages: {end:?}");
+            assert_eq!((end.status, end.unresolved), (Status::Completed, None), "{gamma}, {stages} stages: {end:?}");
             // Some hundred roundings of the force, added up.
             assert!(end.q[0].abs() < 1e-13, "{gamma}, {stages} stages: {end:?}");
         }
-        assert!(problem.accuracy(1e-8).run(until).is_ok_and(|end| end.suspicion.is_none()), "{gamma}");
+        assert!(problem.accuracy(1e-8).run(until).is_ok_and(|end| end.unresolved.is_none()), "{gamma}");
     }
 }
 
@@ -216,7 +216,7 @@ fn what_is_at_rest_ends_and_says_so() {
         for end in [by_accuracy, by_steps, strang] {
             assert!(matches!(end.status, Status::Stopped { by: "rest", t, .. } if t < 1e5), "{gamma}: {end:?}");
             assert!(end.q[0].abs() < 1e-279 && end.p[0].abs() < 1e-279, "{gamma}: {end:?}");
-            assert_eq!(end.suspicion, None);
+            assert_eq!(end.unresolved, None);
             // Where z' = cos q - 1 + gamma z vanishes.
             assert!(end.z.unwrap().abs() < 1e-13, "{gamma}: {end:?}");
         }
@@ -269,7 +269,7 @@ fn the_action_of_a_spring_does_not_know_its_place() {
         let spring = Resting::Spring { stiffness: 1.7, place, gamma: -0.3 };
         let problem = Problem::new(&spring, 0.0, VelocityPoint::new([place + 0.75], [0.5], 0.0)).unwrap();
         let outcome = problem.by(by).steps(Steps::Size(0.25)).run(Until::Time(100.0)).unwrap();
-        assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None), "{by}, {place}");
+        assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None), "{by}, {place}");
         (outcome.q[0] - place, outcome.z.unwrap())
     };
     for by in [4, 8, 16].map(|stages| AnyIntegrator::Gauss { stages }) {

@@ -3,7 +3,7 @@
 use super::rest::Draws;
 use crate::run_of;
 use contact_geom::systems::Kepler;
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, larger};
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Problem, Status, Steps, Until};
 
 /// Forces of a centre, and others.
@@ -70,7 +70,7 @@ fn an_energy_that_should_be_kept_is_watched() {
         let truth = Problem::new(&kepler, 0.0, start).unwrap().accuracy(1e-8).run(Until::Time(100.0)).unwrap();
         let off = (end.q - truth.q).norm() / truth.q.norm();
         all += 1;
-        if (end.status, end.suspicion) == (Status::Completed, None) {
+        if (end.status, end.unresolved) == (Status::Completed, None) {
             silent.push(format!("gauss_{stages}, h = {h}: off by {off}"));
         }
     }
@@ -82,7 +82,7 @@ fn an_energy_that_should_be_kept_is_watched() {
             let energy = |x: f64, v: f64| 0.5 * v * v + 1.0 / x + x;
             let off = (energy(end.q[0], end.p[0]) / energy(x, 0.3) - 1.0).abs();
             all += 1;
-            if off > 0.5 && (end.status, end.suspicion) == (Status::Completed, None) {
+            if off > 0.5 && (end.status, end.unresolved) == (Status::Completed, None) {
                 silent.push(format!("{name}, x = {x}: off by {off}"));
             }
         }
@@ -122,7 +122,7 @@ fn steps_of_random_size_are_right_or_flagged() {
         let integrator = integrators[(draws.next() * integrators.len() as f64) as usize];
         let count = f64::exp(draws.between(f64::ln(10.0), f64::ln(3000.0))) as usize;
         let parts =
-            if let AnyIntegrator::Gauss { stages } = integrator { larger(0.5 * stages as f64, 1.0) } else { 1.0 };
+            if let AnyIntegrator::Gauss { stages } = integrator { max_or_nan(0.5 * stages as f64, 1.0) } else { 1.0 };
         let h = parts * f64::exp(draws.between(f64::ln(0.01), f64::ln(4.0)));
         let span = h * count as f64;
         if span > 3000.0 {
@@ -147,17 +147,17 @@ fn steps_of_random_size_are_right_or_flagged() {
         let sigma = (gamma * span).exp();
         let expected = energy(start.q.into(), start.v.into(), start.z) * sigma;
         let off = (energy(end.q.into(), end.p.into(), end.z.unwrap()) - expected).abs();
-        let kinetic = larger(truth.p.norm_squared(), end.p.norm_squared());
+        let kinetic = max_or_nan(truth.p.norm_squared(), end.p.norm_squared());
         // A motion that falls to rest may forget what its first steps have done.
         let forgets = gamma * span < -1.0;
         if error <= 0.005 && !forgets {
             right += 1;
-            if let Some(s) = end.suspicion {
+            if let Some(s) = end.unresolved {
                 false_flags.push((case, field, gamma, integrator.to_string(), h, count, error, s));
             }
         } else if off > 0.5 * kinetic && error > 0.5 && !forgets {
             wrong += 1;
-            if end.suspicion.is_none() {
+            if end.unresolved.is_none() {
                 silent.push((case, field, gamma, integrator.to_string(), h, count, error, off));
             } else {
                 flagged += 1;
@@ -178,7 +178,7 @@ fn the_error_of_given_steps_is_estimated() {
     let truth = problem.accuracy(1e-12).run(Until::Time(40.0)).unwrap();
     for integrator in AnyIntegrator::all().into_iter().filter(|i| i.check::<2, _>(&system).is_ok() && i.order() > 1) {
         let parts =
-            if let AnyIntegrator::Gauss { stages } = integrator { larger(0.3 * stages as f64, 1.0) } else { 0.3 };
+            if let AnyIntegrator::Gauss { stages } = integrator { max_or_nan(0.3 * stages as f64, 1.0) } else { 0.3 };
         for h in [0.1, 0.4] {
             let run = problem.by(integrator).steps(Steps::Size(h * parts)).with_error_estimate();
             let end = run.run(Until::Time(40.0)).unwrap();

@@ -1,8 +1,8 @@
 //! The accuracy of velocities: where momenta determine them badly, and where coordinates differ in size.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, larger};
-use discrete_herglotz::{AnyIntegrator, InputError, Obstacle, Problem, Run, Status, Steps, Until};
+use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, max_or_nan};
+use discrete_herglotz::{AnyIntegrator, InputError, Problem, Run, SelectionFailure, Status, Steps, Until};
 
 /// A charge in a field: `v.v/2 + B (x v_y - y v_x)/2`. Its velocity turns by the angle `B t`, and `p = v + B (-y, x)/2` is large beside it.
 struct Charge {
@@ -57,7 +57,7 @@ fn a_strong_magnetic_field() {
                     let run = problem.accuracy(1e-6);
                     let run = stages.map(|stages| AnyIntegrator::Gauss { stages }).into_iter().fold(run, Run::by);
                     let outcome = run.run(Until::Time(t)).unwrap();
-                    assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None), "B = {b:e}");
+                    assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None), "B = {b:e}");
                     let off = off(&charge, t, outcome.v);
                     assert!(off <= 1e-6, "B = {b:e}, {turns} radians, {stages:?}: {off:e}");
                 }
@@ -73,7 +73,7 @@ fn a_velocity_that_no_momentum_tells() {
     let problem = Problem::new(&charge, 0.0, far_away()).unwrap();
     let refused = problem.accuracy(1e-6).plan(Until::Time(40.0 / charge.b)).err();
     assert!(
-        matches!(refused, Some(InputError::Accuracy { cause: Obstacle::RoundOff, reached, .. }) if reached > 1e-4),
+        matches!(refused, Some(InputError::Accuracy { cause: SelectionFailure::RoundOff, reached, .. }) if reached > 1e-4),
         "{refused:?}"
     );
 }
@@ -104,7 +104,7 @@ fn an_end_at_rest_is_no_error_of_the_velocity() {
     // The next term is about h^2/20 of it, and the distance from half steps 1 - 2^-8.
     assert!((estimate / phase - 1.0).abs() <= 0.05, "{estimate:e}, {phase:e}");
     let chosen = problem.accuracy(1e-9).run(Until::Time(t)).unwrap();
-    assert_eq!((chosen.status, chosen.suspicion), (Status::Completed, None));
+    assert_eq!((chosen.status, chosen.unresolved), (Status::Completed, None));
 }
 
 /// Two oscillators, the second the faster the further the first is from its centre: `v.v/2 - x^2/2 - (1 + c x^2) y^2/2`.
@@ -144,7 +144,7 @@ fn each_coordinate_by_its_own_scale() {
             let of_q = (outcome.q - exact.q).component_div(&SVector::from([1.0, SMALL]));
             // The small one is 30 times as fast.
             let of_v = (outcome.v.unwrap() - exact.v.unwrap()).component_div(&SVector::from([30.0, 30.0 * SMALL]));
-            larger(of_q.norm(), of_v.norm())
+            max_or_nan(of_q.norm(), of_v.norm())
         };
         let (with, without) = (off(Some([1.0, SMALL])), off(None));
         assert!(with <= 1e-6, "t = {t}: {with:e}");

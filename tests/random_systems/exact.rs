@@ -5,7 +5,7 @@ use super::flows::is_conformal;
 use super::problem::Problem;
 use super::truth::{NoTruth, truth};
 use super::verdict::{Checked, Kind, Verdict, Wrong, ensure, exact as named};
-use contact_geom::{Triple, larger, legendre};
+use contact_geom::{ChartVector, legendre, max_or_nan};
 use discrete_herglotz::{DiscreteLagrangian, derived_jet, legendre_plus};
 use exact_lagrangian::{ExactLagrangian, herglotz_flow};
 
@@ -20,7 +20,7 @@ pub fn motion<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked 
         Ok(motion) => motion,
         Err(error) => return Ok(named(&error)),
     };
-    let end = Triple::from(motion.end);
+    let end = ChartVector::from(motion.end);
     ensure(end.is_finite() && motion.sigma() >= 0.0, Kind::NotFinite, || format!("{motion:?}"))?;
     let truth = match truth(system, *t0, start, *span) {
         Ok(truth) if truth.condition < CHAOTIC => truth,
@@ -34,7 +34,7 @@ pub fn motion<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked 
     let at = legendre(system, t0 + span, &motion.end);
     let error = truth.error(&at.q, &at.p, Some(at.z));
     // Some units of round-off a panel; the pieces have as many in all.
-    let bound = truth.rounding(*t0, larger(100.0, f64::from(motion.panels)) as usize);
+    let bound = truth.rounding(*t0, max_or_nan(100.0, f64::from(motion.panels)) as usize);
     ensure(error <= bound, Kind::RoutesDiffer, || {
         format!(
             "herglotz_flow over {span:.2e}: {error:.1e} from the motion in pieces, condition {:.1e}",
@@ -45,7 +45,7 @@ pub fn motion<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked 
     if dice.chance(0.2)
         && let Ok(back) = herglotz_flow(system, t0 + span, &motion.end, -span)
     {
-        ensure(Triple::from(back.end).is_finite(), Kind::NotFinite, || format!("back to {back:?}"))?;
+        ensure(ChartVector::from(back.end).is_finite(), Kind::NotFinite, || format!("back to {back:?}"))?;
     }
     Ok(Verdict::Right)
 }
@@ -75,7 +75,7 @@ pub fn between_points<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> 
         }
     };
     let missed = (again.q1 - x.q1).amax();
-    let size = larger(x.q0.amax(), x.q1.amax()) + h * found.start.v.amax();
+    let size = max_or_nan(x.q0.amax(), x.q1.amax()) + h * found.start.v.amax();
     // Far from t = 0 a force in time is known to the rounding of the time, in units of its period.
     ensure(missed <= (1e-11 + 1e2 * f64::EPSILON * t0.abs()) * size, Kind::Residual, || {
         format!("h = {h:.1e}: the motion found misses by {missed:.1e}")
@@ -89,8 +89,8 @@ pub fn between_points<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> 
     if dice.chance(0.2)
         && let Ok(derived) = derived_jet(&ld, *t0, &x)
     {
-        let apart = larger((derived.d1 - jet.d1).amax(), (derived.d2 - jet.d2).amax());
-        let size = larger(jet.d1.amax(), jet.d2.amax());
+        let apart = max_or_nan((derived.d1 - jet.d1).amax(), (derived.d2 - jet.d2).amax());
+        let size = max_or_nan(jet.d1.amax(), jet.d2.amax());
         // Positions lose eps/h of the velocity between them.
         ensure(apart <= 1e-9 / h * size, Kind::RoutesDiffer, || {
             format!("h = {h:.1e}: the jet {jet:?}, by automatic differentiation {derived:?}")

@@ -5,7 +5,7 @@ use super::problem::{Problem, integrators};
 use super::system::RandomSystem;
 use super::truth::{NoTruth, truth};
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
-use contact_geom::{OneParameterGroup, Symmetry, Triple, VelocityPoint, legendre};
+use contact_geom::{ChartVector, OneParameterGroup, Symmetry, VelocityPoint, legendre};
 use discrete_herglotz::{DiscreteLagrangian, Outcome, Plan, Row, Rows, Run, Solver, Status, Steps};
 use exact_lagrangian::ExactLagrangian;
 
@@ -105,7 +105,7 @@ pub fn fixed<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
         let apart = larger_of(&(bare.q - q), &(bare.p - p));
         format!("{integrator}: {apart:e} between a run with {asked:?} and one without, {halted:?}")
     })?;
-    if outcome.suspicion.is_some() {
+    if outcome.unresolved.is_some() {
         return Ok(Verdict::Marked);
     }
 
@@ -172,7 +172,7 @@ fn larger_of<const N: usize>(
     a: &contact_geom::nalgebra::SVector<f64, N>,
     b: &contact_geom::nalgebra::SVector<f64, N>,
 ) -> f64 {
-    contact_geom::largest(a.iter().chain(b).copied())
+    contact_geom::max_abs_or_nan(a.iter().chain(b).copied())
 }
 
 /// Refuses an outcome with a number that is not finite; a factor may be too small or too large for a number in one step.
@@ -211,10 +211,10 @@ fn worst_step<const N: usize>(
         let error = match exact.forward(t, &from, &guess, &mut Solver::default()) {
             Ok(motion) => {
                 guess = motion.velocity;
-                let apart = Triple::from(motion.end).minus(to.into());
-                contact_geom::larger(
-                    contact_geom::largest(apart.x.iter().copied()) / size_q,
-                    contact_geom::largest(apart.y.iter().copied()) / size_p,
+                let apart = ChartVector::from(motion.end).minus(to.into());
+                contact_geom::max_or_nan(
+                    contact_geom::max_abs_or_nan(apart.x.iter().copied()) / size_q,
+                    contact_geom::max_abs_or_nan(apart.y.iter().copied()) / size_p,
                 )
             }
             Err(_) => {

@@ -4,9 +4,9 @@ use super::dice::Dice;
 use super::problem::Problem;
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{DiscreteJet, DiscretePoint, PhasePoint, Triple, larger, largest, legendre};
+use contact_geom::{ChartVector, DiscreteJet, DiscretePoint, PhasePoint, legendre, max_abs_or_nan, max_or_nan};
 use discrete_herglotz::{
-    DiscreteLagrangian, DiscretePath, Flow, Method, Solver, Transition, legendre_minus, legendre_plus,
+    DiscreteLagrangian, DiscretePath, DiscreteStep, Flow, Method, Solver, legendre_minus, legendre_plus,
 };
 
 pub fn flow<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
@@ -74,7 +74,7 @@ pub fn step_solves_its_equations<const N: usize>(
     else {
         return Ok(());
     };
-    let max = |m: &[f64]| largest(m.iter().copied());
+    let max = |m: &[f64]| max_abs_or_nan(m.iter().copied());
     let slope = max(jet.d11.as_slice()) + max(jet.d12.as_slice()) + max(jet.d22.as_slice());
     let by_action = max(jet.d1z.as_slice()) + max(jet.d2z.as_slice()) + jet.dzz.abs();
     let DiscreteJet { value, d1, d2, dz, .. } = jet.first;
@@ -84,7 +84,7 @@ pub fn step_solves_its_equations<const N: usize>(
     let sizes = momenta * (1.0 + dz.abs()) + slope * places + by_action * actions * (1.0 + momenta);
     // 1e3 roundings of each term: Newton's method ends some units above round-off, and L sums up to a dozen terms. Rounding of
     // one equation moves the solution by its inverse, and the other by the slope.
-    let condition = larger(1.0, slope / jet.regularity().smallest) * larger(1.0, 1.0 / sigma);
+    let condition = max_or_nan(1.0, slope / jet.regularity().smallest) * max_or_nan(1.0, 1.0 / sigma);
     // And what the equations change by in the rounding of the time, far from t = 0.
     let later = t + 16.0 * f64::EPSILON * t.abs();
     let (Ok(minus_later), Ok(plus_later)) = (legendre_minus(ld, later, &x), legendre_plus(ld, later, &x)) else {
@@ -93,7 +93,7 @@ pub fn step_solves_its_equations<const N: usize>(
     let of_time = max((minus_later.p - minus.p).as_slice()) + max((plus_later.p - plus.p).as_slice());
     let bound = (1e3 * f64::EPSILON * sizes + of_time) * condition + f64::MIN_POSITIVE;
     let of_time = (plus_later.z - plus.z).abs() + of_time * places;
-    let bound_z = (1e3 * f64::EPSILON * (actions + momenta * places) + of_time) * condition * larger(1.0, sigma)
+    let bound_z = (1e3 * f64::EPSILON * (actions + momenta * places) + of_time) * condition * max_or_nan(1.0, sigma)
         + f64::MIN_POSITIVE;
     let (at_start, at_end) = (max((minus.p - from.p).as_slice()), max((plus.p - to.p).as_slice()));
     let action = (plus.z - to.z).abs();
@@ -118,26 +118,27 @@ pub fn is_conformal<const N: usize>(
     guess: &SVector<f64, N>,
 ) -> Result<(), Wrong> {
     let take = |from: &PhasePoint<N>| ld.forward(t, from, guess, &mut Solver::default());
-    let Ok(Transition { end, sigma, .. }) = take(from) else { return Ok(()) };
-    let start = Triple::from(*from);
+    let Ok(DiscreteStep { end, sigma, .. }) = take(from) else { return Ok(()) };
+    let start = ChartVector::from(*from);
     let mut worst = 0.0f64;
-    let end_at = Triple::from(end);
-    for i in 0..Triple::<N>::DIMENSION {
+    let end_at = ChartVector::from(end);
+    for i in 0..ChartVector::<N>::DIMENSION {
         // The third root of round-off is the best for differences of the third order; in units of what is like the coordinate.
-        let like = |x: &Triple<N>| match i / N {
-            0 => largest(x.x.iter().copied()),
-            1 => largest(x.y.iter().copied()),
+        let like = |x: &ChartVector<N>| match i / N {
+            0 => max_abs_or_nan(x.x.iter().copied()),
+            1 => max_abs_or_nan(x.y.iter().copied()),
             _ => x.z.abs(),
         };
-        let unit = larger(start.component(i).abs(), 1e-2 * larger(like(&start), like(&end_at)));
+        let unit = max_or_nan(start.component(i).abs(), 1e-2 * max_or_nan(like(&start), like(&end_at)));
         let step = 6e-6 * if unit == 0.0 { 1e-2 } else { unit };
-        let aside = |s: f64| take(&start.plus(Triple::from_fn(|j| if i == j { s } else { 0.0 })).into());
+        let aside = |s: f64| take(&start.plus(ChartVector::from_fn(|j| if i == j { s } else { 0.0 })).into());
         let (Ok(up), Ok(down), Ok(up_2), Ok(down_2)) =
             (aside(step), aside(-step), aside(2.0 * step), aside(-2.0 * step))
         else {
             return Ok(());
         };
-        let difference = |a: &PhasePoint<N>, b: &PhasePoint<N>| Triple::from(*a).minus((*b).into()).scale(0.5 / step);
+        let difference =
+            |a: &PhasePoint<N>, b: &PhasePoint<N>| ChartVector::from(*a).minus((*b).into()).scale(0.5 / step);
         let (narrow, wide) = (difference(&up.end, &down.end), difference(&up_2.end, &down_2.end).scale(0.5));
         // Where two differences do not agree the step is not smooth at this scale: nothing can be said.
         let off = narrow.minus(wide);
@@ -145,7 +146,7 @@ pub fn is_conformal<const N: usize>(
             return Ok(());
         }
         let unit = |j: usize| f64::from(u8::from(i == j));
-        let direction = Triple::<N>::from_fn(unit);
+        let direction = ChartVector::<N>::from_fn(unit);
         let at_end = narrow.z - end.p.dot(&narrow.x);
         let at_start = sigma * (direction.z - from.p.dot(&direction.x));
         // And the noise of the differences, as large as that by which two of them differ, or as the rounding of the ends; which the
@@ -154,7 +155,7 @@ pub fn is_conformal<const N: usize>(
         let noise = off.z.abs() + end.p.abs().dot(&off.x.abs()) + rounding;
         let size = narrow.z.abs() + end.p.abs().dot(&narrow.x.abs()) + at_start.abs();
         let defect = ((at_end - at_start).abs() - 4.0 * noise) / size;
-        worst = larger(worst, if size == 0.0 { 0.0 } else { defect });
+        worst = max_or_nan(worst, if size == 0.0 { 0.0 } else { defect });
     }
     ensure(worst <= 1e-3, Kind::NotConformal, || format!("defect {worst:.1e}, sigma_d = {sigma:e} at {from:?}"))
 }

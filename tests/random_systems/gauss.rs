@@ -4,8 +4,8 @@ use super::dice::Dice;
 use super::flows::{is_conformal, step_solves_its_equations};
 use super::problem::Problem;
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
-use contact_geom::{PhasePoint, Triple, larger, largest, legendre};
-use discrete_herglotz::{AnyIntegrator, Event, Events, Gauss, Halt, Start, Status, Stepper, Steps, Until};
+use contact_geom::{ChartVector, PhasePoint, legendre, max_abs_or_nan, max_or_nan};
+use discrete_herglotz::{AnyIntegrator, Event, Events, Gauss, Start, Status, StepFailure, Stepper, Steps, Until};
 
 pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let Problem { system, t0, start, .. } = problem;
@@ -22,7 +22,7 @@ pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     };
     let all = whole.advance(steps);
     let end = whole.state();
-    ensure(Triple::from(end).is_finite(), Kind::NotFinite, || format!("gauss_{stages}: {end:?}"))?;
+    ensure(ChartVector::from(end).is_finite(), Kind::NotFinite, || format!("gauss_{stages}: {end:?}"))?;
 
     // The same in chunks, looked at between them.
     let Ok(mut parts) = stepper() else { return Ok(Verdict::NoReference) };
@@ -30,7 +30,7 @@ pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let mut last = (*t0, state);
     while taken < steps && halted.is_ok() {
         let chunk = (1 + dice.below(4)).min(steps - taken);
-        halted = parts.advance(chunk).map_err(|halt| Halt { taken: taken + halt.taken, ..halt });
+        halted = parts.advance(chunk).map_err(|halt| StepFailure { taken: taken + halt.taken, ..halt });
         taken += chunk;
         if halted.is_ok() {
             looked_at(&parts, stages, dice)?;
@@ -60,7 +60,7 @@ pub fn gauss<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
 
     with_events(problem, (stages, h, steps), dice)?;
     Ok(match all {
-        _ if whole.suspicion().is_some() => Verdict::Marked,
+        _ if whole.unresolved().is_some() => Verdict::Marked,
         Ok(()) => Verdict::Right,
         Err(halt) => ended(&halt.cause),
     })
@@ -102,7 +102,10 @@ fn with_events<const N: usize>(
     for crossing in &events.crossings {
         let off = (crossing.state.q[0] - level).abs();
         // The rounding of a step's sums over up to 16 terms, and what the motion does in the spacing of the time.
-        let size = Triple::from(crossing.state).amax() + Triple::from(end).amax() + Triple::from(*at).amax() + 1.0;
+        let size = ChartVector::from(crossing.state).amax()
+            + ChartVector::from(end).amax()
+            + ChartVector::from(*at).amax()
+            + 1.0;
         let from_there = discrete_herglotz::Problem::new(system, crossing.t, Start::Momentum(crossing.state, start.v));
         let speed = from_there.map_or(f64::INFINITY, |from_there| from_there.start().v[0].abs());
         let bound = f64::EPSILON * (1e3 * size + 4.0 * crossing.t.abs() * speed);
@@ -121,7 +124,7 @@ fn with_events<const N: usize>(
         }
         // Of the run itself it is the same failure; before that one there may be a part of a step that cannot be taken.
         Status::Failed { step, cause, .. } => {
-            let same = without == Err(Halt { taken: step, cause });
+            let same = without == Err(StepFailure { taken: step, cause });
             let before = without.map_or_else(|halt| halt.taken, |()| steps) >= step && step > 0;
             ensure((same || before) && state.check().is_ok(), Kind::ObservedDiffers, || {
                 format!("gauss_{stages}: {outcome:?} with events, {without:?} without")
@@ -144,24 +147,25 @@ fn looked_at<const N: usize>(
     let (from, to) = curve.span();
     let within = curve.at(from + (to - from) * dice.between(0.0, 1.0));
     let (end, state) = (curve.at(to), stepper.state());
-    let apart = Triple::from(end).minus(state.into());
+    let apart = ChartVector::from(end).minus(state.into());
     // The times are `t0 + k h`, from a start that may be ten units away.
     let spacing = 64.0 * f64::EPSILON * (1.0 + to.abs());
-    ensure(Triple::from(within).is_finite() && (to - stepper.time()).abs() <= spacing, Kind::NotFinite, || {
+    ensure(ChartVector::from(within).is_finite() && (to - stepper.time()).abs() <= spacing, Kind::NotFinite, || {
         format!("gauss_{stages}: {within:?} between {from} and {to}")
     })?;
     // Of a step that is too long, which is marked, the stages are so large that their sums have no digits left.
-    if stepper.suspicion().is_some() {
+    if stepper.unresolved().is_some() {
         return Ok(());
     }
     // Sums of up to 16 terms with weights to 33, of what is largest on the way; and what the motion does in the spacing of the time.
-    let places: Vec<_> = (0..=16).map(|i| Triple::from(curve.at(from + (to - from) * f64::from(i) / 16.0))).collect();
+    let places: Vec<_> =
+        (0..=16).map(|i| ChartVector::from(curve.at(from + (to - from) * f64::from(i) / 16.0))).collect();
     let fastest = (0..=16)
-        .map(|i| largest(curve.velocity(from + (to - from) * f64::from(i) / 16.0).iter().copied()))
-        .fold(0.0, larger);
-    let changes = places.windows(2).map(|p| p[1].minus(p[0]).amax()).fold(0.0, larger) * 16.0;
-    let size = places.iter().map(Triple::amax).fold((to - from) * fastest, larger);
-    let bound = 1e4 * f64::EPSILON * size + spacing * larger(fastest, changes / (to - from));
+        .map(|i| max_abs_or_nan(curve.velocity(from + (to - from) * f64::from(i) / 16.0).iter().copied()))
+        .fold(0.0, max_or_nan);
+    let changes = places.windows(2).map(|p| p[1].minus(p[0]).amax()).fold(0.0, max_or_nan) * 16.0;
+    let size = places.iter().map(ChartVector::amax).fold((to - from) * fastest, max_or_nan);
+    let bound = 1e4 * f64::EPSILON * size + spacing * max_or_nan(fastest, changes / (to - from));
     ensure(apart.amax() <= bound, Kind::RoutesDiffer, || {
         format!(
             "gauss_{stages}, {:?}, h = {:.1e}: the curve ends {apart:?} from the state {state:?}, sigma {:e}, bound {bound:.1e}",

@@ -3,8 +3,8 @@
 use super::dice::Dice;
 use super::problem::Problem;
 use super::verdict::{Checked, Kind, Verdict, Wrong, ended, ensure, refused};
-use contact_geom::{PhasePoint, Triple, legendre};
-use discrete_herglotz::{ActionSplitting, Halt, InputError, Splitting, SplittingScheme, Stepper};
+use contact_geom::{ChartVector, PhasePoint, legendre};
+use discrete_herglotz::{ActionSplitting, InputError, Splitting, SplittingScheme, StepFailure, Stepper};
 
 pub fn splitting<const N: usize>(problem: &Problem<N>, dice: &mut Dice) -> Checked {
     let Problem { system, t0, start, .. } = problem;
@@ -45,7 +45,7 @@ fn judge<S: Stepper<N>, const N: usize>(mut four: [S; 4], steps: usize, chunks: 
     for chunk in chunks {
         let chunk = (*chunk).min(steps - taken);
         if chunk > 0 && halted.is_ok() {
-            halted = four[1].advance(chunk).map_err(|halt| Halt { taken: taken + halt.taken, ..halt });
+            halted = four[1].advance(chunk).map_err(|halt| StepFailure { taken: taken + halt.taken, ..halt });
             taken += chunk;
         }
     }
@@ -65,15 +65,15 @@ fn judge<S: Stepper<N>, const N: usize>(mut four: [S; 4], steps: usize, chunks: 
     };
     ensure(same, Kind::ObservedDiffers, || format!("without the action {bare:?}, {:?} and {:?}", ends[0], ends[3]))?;
     if let (Ok(()), Ok(())) = (all, compensated) {
-        let apart = Triple::from(ends[0]).minus(ends[2].into()).amax();
-        let size = Triple::from(start).amax() + Triple::from(ends[0]).amax();
+        let apart = ChartVector::from(ends[0]).minus(ends[2].into()).amax();
+        let size = ChartVector::from(start).amax() + ChartVector::from(ends[0]).amax();
         // What rounding is grown by is not known here: only that it stays rounding.
         ensure(apart <= 1e-3 * size, Kind::RoutesDiffer, || {
             format!("compensated sums move the end by {apart:.1e} of {size:.1e}")
         })?;
     }
     Ok(match all {
-        _ if four[0].suspicion().is_some() => Verdict::Marked,
+        _ if four[0].unresolved().is_some() => Verdict::Marked,
         Ok(()) => Verdict::Right,
         Err(halt) => ended(&halt.cause),
     })

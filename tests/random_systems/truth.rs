@@ -3,7 +3,7 @@
 use super::dice::Dice;
 use super::system::RandomSystem;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, Triple, VelocityPoint, larger, legendre};
+use contact_geom::{ChartVector, PhasePoint, VelocityPoint, legendre, max_or_nan};
 use exact_lagrangian::{ExactError, herglotz_flow};
 
 /// The pieces that a reference may take: what needs more is left alone.
@@ -34,9 +34,9 @@ impl<const N: usize> Truth<N> {
     /// to its size on the way.
     pub fn error(&self, q: &SVector<f64, N>, p: &SVector<f64, N>, z: Option<f64>) -> f64 {
         let [size_q, size_p, size_z] = self.size;
-        let (dq, dp) = (largest(&(q - self.end.q)), largest(&(p - self.end.p)));
+        let (dq, dp) = (max_abs_or_nan(&(q - self.end.q)), max_abs_or_nan(&(p - self.end.p)));
         let dz = z.map_or(0.0, |z| (z - self.end.z).abs());
-        larger(larger(relative(dq, size_q), relative(dp, size_p)), relative(dz, size_z))
+        max_or_nan(max_or_nan(relative(dq, size_q), relative(dp, size_p)), relative(dz, size_z))
     }
 
     /// The error that rounding may make in some steps: to some hundred units a step, which grow as the motion lets them and add
@@ -47,7 +47,7 @@ impl<const N: usize> Truth<N> {
 
     /// The error of `(q, p)` relative to its size at the end, as `Run::accuracy` promises it.
     pub fn error_at_end(&self, q: &SVector<f64, N>, p: &SVector<f64, N>) -> f64 {
-        let norm = |q: &SVector<f64, N>, p: &SVector<f64, N>| larger(largest(q), largest(p));
+        let norm = |q: &SVector<f64, N>, p: &SVector<f64, N>| max_or_nan(max_abs_or_nan(q), max_abs_or_nan(p));
         relative(norm(&(q - self.end.q), &(p - self.end.p)), norm(&self.end.q, &self.end.p))
     }
 }
@@ -57,8 +57,8 @@ fn relative(difference: f64, size: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference / size }
 }
 
-fn largest<const N: usize>(x: &SVector<f64, N>) -> f64 {
-    contact_geom::largest(x.iter().copied())
+fn max_abs_or_nan<const N: usize>(x: &SVector<f64, N>) -> f64 {
+    contact_geom::max_abs_or_nan(x.iter().copied())
 }
 
 /// The end of a motion, piece by piece, and its largest position, momentum and action.
@@ -71,8 +71,8 @@ fn pieces<const N: usize>(
     let (mut x, mut done, mut size, mut work) = (*start, 0.0, [0.0; 3], 0);
     for _ in 0..PIECES {
         let at = legendre(system, t0 + done, &x);
-        for (size, now) in size.iter_mut().zip([largest(&at.q), largest(&at.p), at.z.abs()]) {
-            *size = larger(*size, now);
+        for (size, now) in size.iter_mut().zip([max_abs_or_nan(&at.q), max_abs_or_nan(&at.p), at.z.abs()]) {
+            *size = max_or_nan(*size, now);
         }
         if done == span {
             return if size.iter().all(|s| s.is_finite()) { Ok((x, size)) } else { Err(NoTruth::TooLong) };
@@ -104,15 +104,15 @@ pub fn truth<const N: usize>(
     // A start beside it, by a part in 1e8 of each coordinate and of the size on the way.
     const ASIDE: f64 = 1e-8;
     let mut dice = Dice::of(1);
-    let from = Triple::from(*start);
-    let beside = Triple::from_fn(|i| {
+    let from = ChartVector::from(*start);
+    let beside = ChartVector::from_fn(|i| {
         let reach = if i < N { size[0] } else { 0.0 };
-        from.component(i) + ASIDE * dice.between(0.5, 1.0) * larger(from.component(i).abs(), reach)
+        from.component(i) + ASIDE * dice.between(0.5, 1.0) * max_or_nan(from.component(i).abs(), reach)
     });
     if let Ok((end, _)) = pieces(system, t0, &beside.into(), span) {
         let end = legendre(system, t0 + span, &end);
-        truth.condition = larger(1.0, truth.error(&end.q, &end.p, Some(end.z)) / ASIDE);
-        truth.condition = larger(truth.condition, truth.error_at_end(&end.q, &end.p) / ASIDE);
+        truth.condition = max_or_nan(1.0, truth.error(&end.q, &end.p, Some(end.z)) / ASIDE);
+        truth.condition = max_or_nan(truth.condition, truth.error_at_end(&end.q, &end.p) / ASIDE);
     } else {
         truth.condition = f64::INFINITY;
     }

@@ -13,7 +13,7 @@ pub enum Verdict {
     /// Checked as far as it goes: there is no reference for the motion, or the motion is so ill-conditioned that there is no
     /// right answer.
     NoReference,
-    /// Marked as suspicious.
+    /// Flagged as unresolved.
     Marked,
     /// Refused before the first step.
     Refused(&'static str),
@@ -72,7 +72,7 @@ pub fn refused(error: &InputError) -> Verdict {
         InputError::Accuracy { .. } => "accuracy",
         InputError::Times { .. } => "times",
         InputError::Stages { .. } => "stages",
-        InputError::Clock { .. } => "clock",
+        InputError::TimeTransformation { .. } => "clock",
         InputError::Dimension => "dimension",
         InputError::Count { .. } => "count",
         InputError::Geometry(_) => "geometry",

@@ -5,7 +5,7 @@ use crate::implicit::FullPattern;
 use crate::lanes::{LANES, Lanes};
 use crate::term::column;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Dual, Scalar, Triple, seed};
+use contact_geom::{ChartVector, Dual, Scalar, seed};
 
 /// A local term `l(t, q, v, z; c)` of a Lagrangian: any function of `K` unknowns, their velocities and the action z of the whole system, with
 /// `P` parameters.
@@ -111,13 +111,13 @@ pub(crate) struct LocalKind<V, const K: usize, const P: usize> {
 }
 
 /// Eight elements, or the fewer that are left.
-struct Pack<const K: usize, const P: usize> {
+struct SimdBatch<const K: usize, const P: usize> {
     count: usize,
     places: [[usize; K]; LANES],
     c: [Lanes; P],
 }
 
-impl<const K: usize, const P: usize> Pack<K, P> {
+impl<const K: usize, const P: usize> SimdBatch<K, P> {
     /// Their unknowns.
     #[inline(always)]
     fn gather(&self, x: &[f64]) -> SVector<Lanes, K> {
@@ -126,8 +126,8 @@ impl<const K: usize, const P: usize> Pack<K, P> {
     }
 
     #[inline(always)]
-    fn point(&self, at: Place) -> Triple<K, Lanes> {
-        Triple { x: self.gather(at.q), y: self.gather(at.v), z: Lanes::splat(at.z) }
+    fn point(&self, at: Place) -> ChartVector<K, Lanes> {
+        ChartVector { x: self.gather(at.q), y: self.gather(at.v), z: Lanes::splat(at.z) }
     }
 
     /// Adds to a vector over the unknowns; what is fixed has no place in it.
@@ -150,13 +150,13 @@ impl<const K: usize, const P: usize> Pack<K, P> {
 impl<V: LocalLagrangian<K, P>, const K: usize, const P: usize> LocalKind<V, K, P> {
     /// Calls a function with the elements, eight at a time, in the order of [`Elements::visit`].
     #[inline(always)]
-    fn packs(&self, mut f: impl FnMut(Pack<K, P>)) {
+    fn packs(&self, mut f: impl FnMut(SimdBatch<K, P>)) {
         for run in &self.elements.runs {
             for e in (0..run.len).step_by(LANES) {
                 let count = LANES.min(run.len - e);
                 // The first stands in the lanes that are left.
                 let places = std::array::from_fn(|lane| run.start.map(|s| s + e + if lane < count { lane } else { 0 }));
-                f(Pack { count, places, c: self.elements.parameters_part(run, e, count) });
+                f(SimdBatch { count, places, c: self.elements.parameters_part(run, e, count) });
             }
         }
         let loose = &self.elements.loose;
@@ -168,7 +168,7 @@ impl<V: LocalLagrangian<K, P>, const K: usize, const P: usize> LocalKind<V, K, P
                 let all = &self.elements.loose_parameters[p];
                 Lanes::new(std::array::from_fn(|lane| all.get(of(lane)).copied().unwrap_or(f64::NAN)))
             });
-            f(Pack { count, places, c });
+            f(SimdBatch { count, places, c });
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::drag::Drag;
 use crate::system::{AssembledSystem, State};
-use contact_geom::larger;
-use discrete_herglotz::{EnergyDrift, EnergyLook, Suspicion};
+use contact_geom::max_or_nan;
+use discrete_herglotz::{EnergyDrift, EnergyLook, UnresolvedStep};
 
 /// The steps between two looks in long runs: one costs about five of the cheapest steps, half a per cent of them.
 const APART: usize = 1024;
@@ -33,7 +33,7 @@ pub(crate) struct EnergyMonitor {
     start: [f64; 2],
     t0: f64,
     looked: usize,
-    suspicion: Option<Suspicion>,
+    unresolved: Option<UnresolvedStep>,
 }
 
 /// The parts of an energy.
@@ -72,7 +72,7 @@ impl EnergyMonitor {
         energies: impl FnOnce(bool) -> Energies,
     ) -> Self {
         let general = !system.locals.is_empty();
-        let (known, misfit) = match &system.drag {
+        let (known, defect) = match &system.drag {
             _ if general => (Some(Known::Conserved), 0.0),
             Drag::Constant(gamma) => {
                 let conserved = start.z.is_some() || *gamma == 0.0;
@@ -86,7 +86,7 @@ impl EnergyMonitor {
             start: [0.0; 2],
             t0: start.t,
             looked: 0,
-            suspicion: (misfit > 1.0).then_some(Suspicion { step: 0, misfit }),
+            unresolved: (defect > 1.0).then_some(UnresolvedStep { step: 0, defect }),
         };
         if let Some(known) = known {
             let Energies { kinetic, total, terms } = energies(known == Known::Bounded);
@@ -108,12 +108,12 @@ impl EnergyMonitor {
 
     /// Whether a look after so many steps can tell something.
     pub fn tells(&self, taken: usize) -> bool {
-        self.suspicion.is_none() && self.known.is_some() && taken > self.looked
+        self.unresolved.is_none() && self.known.is_some() && taken > self.looked
     }
 
     /// What was seen so far.
-    pub fn suspicion(&self) -> Option<Suspicion> {
-        self.suspicion
+    pub fn unresolved(&self) -> Option<UnresolvedStep> {
+        self.unresolved
     }
 
     /// Looks at a state, whose energies are those at a time, `T + V` where that is asked for.
@@ -129,11 +129,11 @@ impl EnergyMonitor {
         let Energies { kinetic, total, terms } = energies(t, bounded);
         // What may only fall is no drift where it falls.
         let [start, start_terms] = self.start;
-        let (found, log_factor) = if bounded { (larger(total, start), 0.0) } else { (total, log_factor) };
+        let (found, log_factor) = if bounded { (max_or_nan(total, start), 0.0) } else { (total, log_factor) };
         let look = EnergyLook { total: found, kinetic, terms, log_factor, taken };
         let rounding = |sigma: f64| f64::EPSILON * (kinetic + terms + start_terms * sigma);
         self.looked = taken;
-        let Some(misfit) = drift.misfit(&look, rounding) else { return };
+        let Some(defect) = drift.defect(&look, rounding) else { return };
         // Only the times of the steps matter; and no more than a few thousand of them.
         let span = t - self.t0;
         let times = taken.min(TIMES);
@@ -143,7 +143,7 @@ impl EnergyMonitor {
             falls && energies(s, bounded).total.to_bits() == total.to_bits()
         });
         if steady {
-            self.suspicion = Some(Suspicion { step: taken - 1, misfit });
+            self.unresolved = Some(UnresolvedStep { step: taken - 1, defect });
         } else {
             self.known = None;
         }

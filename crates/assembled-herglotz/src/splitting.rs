@@ -8,7 +8,7 @@ use crate::kernels::Weight;
 use crate::monitor::{EnergyMonitor, Reached, StepFacts};
 use crate::pass::{InverseMasses, Pass, Passed};
 use crate::system::{AssembledSystem, Masses, State};
-use discrete_herglotz::{Halt, InputError, SplittingScheme, StepError, Suspicion};
+use discrete_herglotz::{InputError, SplittingScheme, StepError, StepFailure, UnresolvedStep};
 
 /// The steps between two looks whether all numbers are finite.
 const LOOK: usize = 256;
@@ -142,8 +142,8 @@ impl<'a> AssembledSplitting<'a> {
         };
         // That of the flow: splittings have no other.
         let log_sigma = system.rate(start.t) * h;
-        let facts = StepFacts { h, log_sigma, order: scheme.order() };
-        let monitor = EnergyMonitor::new(system, start, facts, |bounded| {
+        let info = StepFacts { h, log_sigma, order: scheme.order() };
+        let monitor = EnergyMonitor::new(system, start, info, |bounded| {
             system.energies((start.t, &q, start.v, start.z.unwrap_or(0.0)), bounded)
         });
         let splitting = AssembledSplitting {
@@ -191,9 +191,9 @@ impl<'a> AssembledSplitting<'a> {
     /// Takes steps.
     ///
     /// # Errors
-    /// [`Halt`] with [`StepError::NonFinite`] where a velocity is no number any more. That is looked for every 256 steps, and
+    /// [`StepFailure`] with [`StepError::NonFinite`] where a velocity is no number any more. That is looked for every 256 steps, and
     /// `taken` are the steps up to the last look at which all was well; the state is that after it was found.
-    pub fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+    pub fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let mut taken = 0;
         while taken < steps {
             let some = LOOK.min(steps - taken);
@@ -205,7 +205,7 @@ impl<'a> AssembledSplitting<'a> {
             }
             // A number that is none makes the sum one.
             if !(self.v.iter().sum::<f64>() + self.z).is_finite() {
-                return Err(Halt { taken, cause: StepError::NonFinite });
+                return Err(StepFailure { taken, cause: StepError::NonFinite });
             }
             taken += some;
         }
@@ -244,11 +244,11 @@ impl<'a> AssembledSplitting<'a> {
     /// conformal factor where L does not depend on time, and without the action at least does not grow by drag. It is looked at after 4, 16, 64 and 256
     /// steps, every 1024, and here: what follows such a step may be wrong. Nothing is seen without the action where gamma is positive, and of
     /// systems that depend on time.
-    pub fn suspicion(&mut self) -> Option<Suspicion> {
+    pub fn unresolved(&mut self) -> Option<UnresolvedStep> {
         if self.monitor.tells(self.taken) {
             self.look();
         }
-        self.monitor.suspicion()
+        self.monitor.unresolved()
     }
 
     /// The state after the steps taken.

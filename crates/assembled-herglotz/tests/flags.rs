@@ -9,14 +9,14 @@ use assembled_herglotz::{
 };
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
-use discrete_herglotz::{SplittingScheme, Suspicion};
+use discrete_herglotz::{SplittingScheme, UnresolvedStep};
 
 /// The flag after some steps, and the largest position.
-fn explicit(system: &AssembledSystem, start: State, h: f64, steps: usize) -> (Option<Suspicion>, f64) {
+fn explicit(system: &AssembledSystem, start: State, h: f64, steps: usize) -> (Option<UnresolvedStep>, f64) {
     let mut motion = AssembledSplitting::new(system, &SplittingScheme::STRANG, h, start).unwrap();
     motion.advance(steps).unwrap();
-    let largest = motion.state().q.iter().fold(0.0f64, |most, q| most.max(q.abs()));
-    (motion.suspicion(), largest)
+    let max_abs_or_nan = motion.state().q.iter().fold(0.0f64, |most, q| most.max(q.abs()));
+    (motion.unresolved(), max_abs_or_nan)
 }
 
 /// A lattice whose fastest waves have the frequency 5.7: steps of 0.4 are unstable, with a drag of either sign, with the action and where z does
@@ -28,16 +28,16 @@ fn an_unstable_lattice() {
     for (gamma, z) in [(-0.01, Some(0.0)), (-0.01, None), (0.0, None), (0.01, Some(0.0))] {
         let system = lattice([100, 80], SineGordon { omega_squared: 1.0 }, 4.0, gamma).unwrap();
         let start = State { t: 0.0, q: &q, v: &v, z };
-        let (found, largest) = explicit(&system, start, 0.4, 50);
-        assert!(largest > 1e3, "{largest:e}");
-        assert!(found.is_some_and(|s| s.step < 50 && s.misfit > 1.0), "gamma = {gamma}, {z:?}: {found:?}");
+        let (found, max_abs_or_nan) = explicit(&system, start, 0.4, 50);
+        assert!(max_abs_or_nan > 1e3, "{max_abs_or_nan:e}");
+        assert!(found.is_some_and(|s| s.step < 50 && s.defect > 1.0), "gamma = {gamma}, {z:?}: {found:?}");
         // Seen in mid-run, it stays.
         let later = explicit(&system, start, 0.4, 300).0;
         assert!(later.is_some_and(|s| s.step < 64), "{later:?}");
         for (h, steps) in [(0.1, 1100), (-0.1, 200), (0.2, 100)] {
-            let (found, largest) = explicit(&system, start, h, steps);
+            let (found, max_abs_or_nan) = explicit(&system, start, h, steps);
             // Waves of 0.1 in all add up to some times that at places, and grow by e^(0.01 * 110) at the most.
-            assert!(found.is_none() && largest < 1.0, "h = {h}: {found:?}, {largest}");
+            assert!(found.is_none() && max_abs_or_nan < 1.0, "h = {h}: {found:?}, {max_abs_or_nan}");
         }
     }
 }
@@ -53,7 +53,7 @@ fn two_bodies_head_on() {
             for (h, steps, hit) in [(0.01, 40, false), (0.01, 200, true), (0.003, 1100, true)] {
                 let mut motion = AssembledSplitting::new(&system, &scheme, h, start).unwrap();
                 motion.advance(steps).unwrap();
-                let found = motion.suspicion();
+                let found = motion.unresolved();
                 assert_eq!(found.is_some(), hit, "{}, gamma = {gamma}, {z:?}, h = {h}: {found:?}", scheme.name());
             }
         }
@@ -92,21 +92,21 @@ fn implicit_steps_past_a_centre() {
             for stages in [1, 2] {
                 let mut motion = AssembledGauss::new(system, stages, h, start, None).unwrap();
                 let done = motion.advance((10.0 / h) as usize);
-                let found = motion.suspicion();
+                let found = motion.unresolved();
                 assert!(done.is_err() || found.is_some() || !free(motion.q()), "{which}, {stages}, h = {h}");
                 flagged[which] += usize::from(done.is_ok() && found.is_some());
             }
         }
         let mut motion = AssembledMidpoint::new(&plain, h, start, None).unwrap();
         let done = motion.advance((10.0 / h) as usize);
-        let found = motion.suspicion();
+        let found = motion.unresolved();
         assert!(done.is_err() || found.is_some() || !free(motion.state().q), "midpoint, h = {h}");
     }
     assert!(flagged.iter().all(|count| *count > 0), "{flagged:?}");
     for system in [&general, &plain] {
         let mut motion = AssembledGauss::new(system, 2, 0.02, start, None).unwrap();
         motion.advance(30).unwrap();
-        assert_eq!(motion.suspicion(), None);
+        assert_eq!(motion.unresolved(), None);
     }
 }
 
@@ -119,7 +119,7 @@ fn a_strong_drag() {
         let chain = fput_chain(5, FputBond { alpha: 0.0, beta: 1.0 }, gamma).unwrap();
         let mut midpoint = AssembledMidpoint::new(&chain, 0.1, start, None).unwrap();
         let mut gauss = AssembledGauss::new(&chain, 1, 0.1, start, None).unwrap();
-        assert_eq!([midpoint.suspicion().is_some(), gauss.suspicion().is_some()], [flagged; 2]);
+        assert_eq!([midpoint.unresolved().is_some(), gauss.unresolved().is_some()], [flagged; 2]);
     }
 }
 
@@ -146,8 +146,8 @@ fn no_false_flags() {
             let system = AssembledSystem::new(3)
                 .and_then(|s| s.with_mass(1.0).with_drag(-0.01).with_potential(Driven { pulse }, [[0], [1], [2]]))
                 .unwrap();
-            let (found, largest) = explicit(&system, State { z, ..start }, 0.05, 2000);
-            assert!(found.is_none() && largest > 0.5, "pulse: {pulse}: {found:?}, {largest}");
+            let (found, max_abs_or_nan) = explicit(&system, State { z, ..start }, 0.05, 2000);
+            assert!(found.is_none() && max_abs_or_nan > 0.5, "pulse: {pulse}: {found:?}, {max_abs_or_nan}");
         }
     }
     // The rate is positive half of the time.
@@ -163,7 +163,7 @@ fn no_false_flags() {
         let mut gauss = AssembledGauss::new(&damped, 2, 0.05, start, None).unwrap();
         midpoint.advance(3000).unwrap();
         gauss.advance(3000).unwrap();
-        assert_eq!([midpoint.suspicion(), gauss.suspicion()], [None; 2]);
+        assert_eq!([midpoint.unresolved(), gauss.unresolved()], [None; 2]);
     }
     let planets = OuterSolarSystem::system(6, -1e-7).unwrap();
     let (q, v) = (OuterSolarSystem::positions(6), OuterSolarSystem::velocities(6));

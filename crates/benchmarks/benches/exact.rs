@@ -3,7 +3,7 @@
 //! whole computation.
 
 use contact_geom::systems::{DoublePendulum, Kepler, Pendulum, System};
-use contact_geom::{DiscretePoint, Triple, VelocityPoint, herglotz_field};
+use contact_geom::{ChartVector, DiscretePoint, VelocityPoint, herglotz_field};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use differential_equations::prelude::{ExplicitRungeKutta, IVP, ODE};
 use discrete_herglotz::{DiscreteLagrangian, derived_jet};
@@ -15,7 +15,7 @@ struct FirstOrder<'a, S, const N: usize, const M: usize>(&'a S);
 
 impl<S: System<N>, const N: usize, const M: usize> ODE<f64, [f64; M]> for FirstOrder<'_, S, N, M> {
     fn diff(&self, t: f64, y: &[f64; M], d: &mut [f64; M]) {
-        let x = Triple::<N>::from_fn(|i| y[i]);
+        let x = ChartVector::<N>::from_fn(|i| y[i]);
         match herglotz_field(self.0, t, &x.into()) {
             Ok(f) => (0..M).for_each(|i| d[i] = f.component(i)),
             Err(_) => d.fill(f64::NAN),
@@ -29,7 +29,7 @@ fn by_dop853<S: System<N>, const N: usize, const M: usize>(
     x: &VelocityPoint<N>,
     h: f64,
 ) -> Option<[f64; M]> {
-    let (method, x) = (ExplicitRungeKutta::dop853().rtol(1e-13).atol(1e-13), Triple::from(*x));
+    let (method, x) = (ExplicitRungeKutta::dop853().rtol(1e-13).atol(1e-13), ChartVector::from(*x));
     let ode = FirstOrder::<S, N, M>(system);
     let start = std::array::from_fn(|i| x.component(i));
     let solution = IVP::ode(&ode, 0.0, h, start).method(method).solve().ok()?;

@@ -5,7 +5,7 @@
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum};
-use contact_geom::{Lagrangian, PhasePoint, ValueOnly};
+use contact_geom::{Lagrangian, PhasePoint, WithoutClosedDerivatives};
 use criterion::{Criterion, criterion_group, criterion_main};
 use discrete_herglotz::{Splitting, SplittingScheme, Stepper};
 use std::hint::black_box;
@@ -138,7 +138,7 @@ fn pair<L: Lagrangian<D> + Problem<D>, const D: usize, const S: usize, const ACT
     start: PhasePoint<D>,
 ) {
     let h = 0.002 * S as f64;
-    let derived = ValueOnly(lagrangian);
+    let derived = WithoutClosedDerivatives(lagrangian);
     let hand = by_hand::<L, D, S, ACTION>(scheme, gamma, h, start);
     let name = format!("{name}/{}{}", scheme.name(), if ACTION { "/z" } else { "" });
     for library in [

@@ -33,21 +33,22 @@ pub mod statements;
 pub mod systems;
 
 pub use dynamics::{
-    Clock, DarbouxBracket, DarbouxField, Defect, Defects, Derivatives, Energy, HerglotzField, Hessian,
+    DarbouxBracket, DarbouxField, Defect, Defects, Derivatives, Energy, HerglotzField, Hessian,
     InfinitesimalConformality, Lagrangian, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient,
-    Regularity, Structure, Symmetry, ValueOnly, check_closed_derivatives, conformal_factor_along, derivative_along,
-    derived_gradient, derived_hessian, dissipation_defect, gradient_rounding, hamiltonian_vector_field, herglotz_field,
-    herglotz_rates, infinitesimal_conformality, jacobi_bracket, legendre, legendre_jacobian, lie_bracket,
-    lie_derivative, regularity,
+    Regularity, Structure, Symmetry, TimeTransformation, WithoutClosedDerivatives, check_closed_derivatives,
+    conformal_factor_along, derivative_along, derived_gradient, derived_hessian, dissipation_defect, gradient_rounding,
+    hamiltonian_vector_field, herglotz_field, herglotz_rates, infinitesimal_conformality, jacobi_bracket, legendre,
+    legendre_jacobian, lie_bracket, lie_derivative, regularity,
 };
 pub use error::GeometryError;
 pub use forms::{
-    Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, EtaMinus, EtaPlus, Form, LagrangianForm,
-    PhasePoint, SecondDiscreteJet, Smooth, SmoothFunction, Triple, VelocityPoint, conformality,
+    ChartVector, Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, EtaMinus, EtaPlus, Form,
+    LagrangianForm, PhasePoint, SecondDiscreteJet, Smooth, SmoothFunction, VelocityPoint, conformality,
     conformality_with_jacobian, generic, seed,
 };
 pub use number::{
-    Border, Dual, KernelDual, Larger, Largest, Module, Scalar, larger, largest, legendre_polynomials, linear,
+    AugmentedVector, Dual, KernelDual, MaxAbsOrNan, MaxOrNan, Scalar, TangentVector, legendre_polynomials, linear,
+    max_abs_or_nan, max_or_nan,
 };
 pub use statement::Statement;
 

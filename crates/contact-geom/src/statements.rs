@@ -8,11 +8,11 @@
 
 use crate::systems::{FreeParticle, HarmonicOscillator, System};
 use crate::{
-    ContactForm, Darboux, DarbouxBracket, DarbouxField, Derivatives, Dual, Energy, Form, GeometryError, HerglotzField,
-    Lagrangian, LagrangianForm, Larger, Largest, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup,
-    PhasePoint, Quotient, Scalar, Smooth, SmoothFunction, Statement, Triple, VelocityPoint, conformal_factor_along,
-    conformality, dissipation_defect, generic, hamiltonian_vector_field, herglotz_field, infinitesimal_conformality,
-    jacobi_bracket, legendre, legendre_jacobian, lie_bracket, lie_derivative, regularity,
+    ChartVector, ContactForm, Darboux, DarbouxBracket, DarbouxField, Derivatives, Dual, Energy, Form, GeometryError,
+    HerglotzField, Lagrangian, LagrangianForm, Legendre, LiftedAction, MaxAbsOrNan, MaxOrNan, NoetherMomentum,
+    OneParameterGroup, PhasePoint, Quotient, Scalar, Smooth, SmoothFunction, Statement, VelocityPoint,
+    conformal_factor_along, conformality, dissipation_defect, generic, hamiltonian_vector_field, herglotz_field,
+    infinitesimal_conformality, jacobi_bracket, legendre, legendre_jacobian, lie_bracket, lie_derivative, regularity,
 };
 use nalgebra::SVector;
 
@@ -62,7 +62,7 @@ pub fn residual<const N: usize>(
 pub struct AnyFunction(pub f64);
 
 impl<const N: usize> SmoothFunction<N> for AnyFunction {
-    fn value<T: Scalar>(&self, _t: T, x: &Triple<N, T>) -> T {
+    fn value<T: Scalar>(&self, _t: T, x: &ChartVector<N, T>) -> T {
         let mut phase = T::from(self.0) + x.z * 0.4;
         let mut sum = x.z * self.0 + 0.3;
         for i in 0..N {
@@ -78,7 +78,7 @@ impl<const N: usize> SmoothFunction<N> for AnyFunction {
 pub struct SystemHamiltonian<'a, S>(pub &'a S);
 
 impl<const N: usize, S: System<N>> SmoothFunction<N> for SystemHamiltonian<'_, S> {
-    fn value<T: Scalar>(&self, t: T, x: &Triple<N, T>) -> T {
+    fn value<T: Scalar>(&self, t: T, x: &ChartVector<N, T>) -> T {
         // Only built where `hamiltonian` is known, which does not depend on the point.
         self.0.hamiltonian(t, &(*x).into()).unwrap_or_else(T::zero)
     }
@@ -91,28 +91,29 @@ pub fn known_hamiltonian<const N: usize, S: System<N>>(system: &S) -> Option<Sys
 }
 
 /// The difference of two elements relative to the larger of them (and to `least`, for what may vanish).
-fn relative<const N: usize>(a: Triple<N>, b: Triple<N>, least: f64) -> f64 {
-    a.minus(b).largest() / a.largest().larger(b.largest()).larger(least)
+fn relative<const N: usize>(a: ChartVector<N>, b: ChartVector<N>, least: f64) -> f64 {
+    a.minus(b).max_abs_or_nan() / a.max_abs_or_nan().max_or_nan(b.max_abs_or_nan()).max_or_nan(least)
 }
 
 /// The difference of two numbers relative to the larger of them (and to `least`).
 fn relative_number(a: f64, b: f64, least: f64) -> f64 {
-    (a - b).abs() / a.abs().larger(b.abs()).larger(least)
+    (a - b).abs() / a.abs().max_or_nan(b.abs()).max_or_nan(least)
 }
 
 /// The contact condition, flat, sharp and Reeb field of one form: closed against generic, and against their definitions.
-fn form_residual<const N: usize>(form: &impl ContactForm<N>, x: &Triple<N>) -> Result<f64, GeometryError> {
+fn form_residual<const N: usize>(form: &impl ContactForm<N>, x: &ChartVector<N>) -> Result<f64, GeometryError> {
     let (eta, d_eta, reeb) = (form.eta(x)?, form.d_eta(x)?, form.reeb(x)?);
-    let contraction =
-        crate::forms::smooth::apply_transposed(&d_eta, &reeb).largest() / (d_eta.largest() * reeb.largest());
-    let mut worst = contraction.larger((eta.dot(&reeb) - 1.0).abs() / (eta.largest() * reeb.largest()).larger(1.0));
-    worst = worst.larger(relative(reeb, generic::reeb(form, x)?, 0.0));
-    worst = worst.larger(relative(form.flat(x, &reeb)?, eta, 0.0));
-    for j in 0..Triple::<N>::DIMENSION {
-        let e = Triple::from_fn(|i| f64::from(u8::from(i == j)));
+    let contraction = crate::forms::smooth::apply_transposed(&d_eta, &reeb).max_abs_or_nan()
+        / (d_eta.max_abs_or_nan() * reeb.max_abs_or_nan());
+    let mut worst = contraction
+        .max_or_nan((eta.dot(&reeb) - 1.0).abs() / (eta.max_abs_or_nan() * reeb.max_abs_or_nan()).max_or_nan(1.0));
+    worst = worst.max_or_nan(relative(reeb, generic::reeb(form, x)?, 0.0));
+    worst = worst.max_or_nan(relative(form.flat(x, &reeb)?, eta, 0.0));
+    for j in 0..ChartVector::<N>::DIMENSION {
+        let e = ChartVector::from_fn(|i| f64::from(u8::from(i == j)));
         let flat = form.flat(x, &e)?;
-        worst = worst.larger(relative(flat, generic::flat(form, x, &e)?, 0.0));
-        worst = worst.larger(relative(form.sharp(x, &flat)?, e, 0.0)).larger(relative(
+        worst = worst.max_or_nan(relative(flat, generic::flat(form, x, &e)?, 0.0));
+        worst = worst.max_or_nan(relative(form.sharp(x, &flat)?, e, 0.0)).max_or_nan(relative(
             generic::sharp(form, x, &flat)?,
             e,
             0.0,
@@ -126,12 +127,12 @@ fn forms<'a, const N: usize, L: Lagrangian<N>>(
     lagrangian: &'a L,
     t: f64,
     x: &VelocityPoint<N>,
-) -> (Triple<N>, LagrangianForm<'a, L>, Triple<N>) {
+) -> (ChartVector<N>, LagrangianForm<'a, L>, ChartVector<N>) {
     (legendre(lagrangian, t, x).into(), LagrangianForm { lagrangian, t }, (*x).into())
 }
 
 /// The volume of a form in closed form against the generic one; infinite where it vanishes.
-fn volume_residual<const N: usize>(form: &impl ContactForm<N>, x: &Triple<N>) -> Result<f64, GeometryError> {
+fn volume_residual<const N: usize>(form: &impl ContactForm<N>, x: &ChartVector<N>) -> Result<f64, GeometryError> {
     let (closed, generic) = (form.volume(x)?, generic::volume(form, x)?);
     Ok(if generic == 0.0 { f64::INFINITY } else { (closed - generic).abs() / generic.abs() })
 }
@@ -139,18 +140,18 @@ fn volume_residual<const N: usize>(form: &impl ContactForm<N>, x: &Triple<N>) ->
 /// Statement 1: `eta ^ (d eta)^n` is a volume form on T\*Q x R and TQ x R.
 fn volume<const N: usize>(system: &impl System<N>, t: f64, x: &VelocityPoint<N>) -> Result<f64, GeometryError> {
     let (phase, eta_l, velocity) = forms(system, t, x);
-    Ok(volume_residual(&Darboux, &phase)?.larger(volume_residual(&eta_l, &velocity)?))
+    Ok(volume_residual(&Darboux, &phase)?.max_or_nan(volume_residual(&eta_l, &velocity)?))
 }
 
 /// Statement 2: the Reeb field; flat and sharp are inverse; `flat(R) = eta`; `R = d/dz` in Darboux coordinates.
 fn reeb<const N: usize>(system: &impl System<N>, t: f64, x: &VelocityPoint<N>) -> Result<f64, GeometryError> {
     let (phase, eta_l, velocity) = forms(system, t, x);
-    let dz = Triple { x: SVector::zeros(), y: SVector::zeros(), z: 1.0 };
-    let darboux = relative(generic::reeb(&Darboux, &phase)?, dz, 0.0).larger(form_residual(&Darboux, &phase)?);
+    let dz = ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 1.0 };
+    let darboux = relative(generic::reeb(&Darboux, &phase)?, dz, 0.0).max_or_nan(form_residual(&Darboux, &phase)?);
     // eta_L's d eta in closed form against that by differentiating its components.
     let (closed, derived) = (eta_l.d_eta(&velocity)?, Form(&eta_l).d_eta(&velocity)?);
-    let d_eta = (&closed - &derived).largest() / derived.largest();
-    Ok(darboux.larger(d_eta).larger(form_residual(&eta_l, &velocity)?))
+    let d_eta = (&closed - &derived).max_abs_or_nan() / derived.max_abs_or_nan();
+    Ok(darboux.max_or_nan(d_eta).max_or_nan(form_residual(&eta_l, &velocity)?))
 }
 
 /// `flat(X_f) = df - (f + R(f)) eta`, `f = -eta(X_f)` and `eta`-component by component, for one form and function.
@@ -158,15 +159,15 @@ fn hamiltonian_field_residual<const N: usize>(
     form: &impl ContactForm<N>,
     f: &impl SmoothFunction<N>,
     t: f64,
-    x: &Triple<N>,
+    x: &ChartVector<N>,
 ) -> Result<f64, GeometryError> {
     let field = hamiltonian_vector_field(form, f, t, x)?;
     let (value, df, eta) = (f.value(t, x), f.differential(t, x), form.eta(x)?);
     let contracted = df.minus(eta.scale(value + df.dot(&form.reeb(x)?)));
-    let size = df.largest().larger(contracted.largest());
-    let flat = form.flat(x, &field)?.minus(contracted).largest() / size;
+    let size = df.max_abs_or_nan().max_or_nan(contracted.max_abs_or_nan());
+    let flat = form.flat(x, &field)?.minus(contracted).max_abs_or_nan() / size;
     let terms = eta.x.abs().dot(&field.x.abs()) + eta.y.abs().dot(&field.y.abs()) + (eta.z * field.z).abs();
-    Ok(flat.larger((value + eta.dot(&field)).abs() / terms.larger(value.abs())))
+    Ok(flat.max_or_nan((value + eta.dot(&field)).abs() / terms.max_or_nan(value.abs())))
 }
 
 /// Statement 3: the contact Hamiltonian vector field, of E_L on TQ x R, of any f on both; closed form in Darboux
@@ -180,17 +181,17 @@ fn hamiltonian_field<const N: usize>(
     let any = AnyFunction(0.37);
     let closed = DarbouxField { hamiltonian: &any, t }.at(&phase)?;
     Ok(relative(closed, hamiltonian_vector_field(&Darboux, &any, t, &phase)?, 0.0)
-        .larger(hamiltonian_field_residual(&Darboux, &any, t, &phase)?)
-        .larger(hamiltonian_field_residual(&eta_l, &any, t, &velocity)?)
-        .larger(hamiltonian_field_residual(&eta_l, &Energy(system), t, &velocity)?))
+        .max_or_nan(hamiltonian_field_residual(&Darboux, &any, t, &phase)?)
+        .max_or_nan(hamiltonian_field_residual(&eta_l, &any, t, &velocity)?)
+        .max_or_nan(hamiltonian_field_residual(&eta_l, &Energy(system), t, &velocity)?))
 }
 
 /// A function of `(q, p)` alone, for a strict contactomorphism: `R(f) = 0`.
 struct WithoutAction(AnyFunction);
 
 impl<const N: usize> SmoothFunction<N> for WithoutAction {
-    fn value<T: Scalar>(&self, t: T, x: &Triple<N, T>) -> T {
-        self.0.value(t, &Triple { z: T::zero(), ..*x })
+    fn value<T: Scalar>(&self, t: T, x: &ChartVector<N, T>) -> T {
+        self.0.value(t, &ChartVector { z: T::zero(), ..*x })
     }
 }
 
@@ -200,12 +201,12 @@ fn conformal_residual<const N: usize, F: Smooth<N> + ContactForm<N>>(
     field: &impl Smooth<N>,
     f: &impl SmoothFunction<N>,
     t: f64,
-    x: &Triple<N>,
+    x: &ChartVector<N>,
 ) -> Result<f64, GeometryError> {
     let measured = infinitesimal_conformality(form, field, x)?;
     let rate = -f.differential(t, x).dot(&form.reeb(x)?);
-    let size = 1.0 + lie_derivative(form, field, x)?.largest();
-    Ok(measured.defect.larger((measured.rate - rate).abs() / size))
+    let size = 1.0 + lie_derivative(form, field, x)?.max_abs_or_nan();
+    Ok(measured.defect.max_or_nan((measured.rate - rate).abs() / size))
 }
 
 /// Statement 4: `L_{X_f} eta = -R(f) eta`, strict where `R(f) = 0`; and `X_{f,g} = [X_f, X_g]`, on T\*Q x R; xi_L on TQ x R.
@@ -221,8 +222,8 @@ fn infinitesimal_conformal<const N: usize>(
     let strict = WithoutAction(f);
     let strict_field = DarbouxField { hamiltonian: &strict, t };
     let change = lie_derivative(&Darboux, &strict_field, &phase)?;
-    worst = worst.larger(change.largest() / (1.0 + strict_field.at(&phase)?.largest()));
-    worst = worst.larger(conformal_residual(
+    worst = worst.max_or_nan(change.max_abs_or_nan() / (1.0 + strict_field.at(&phase)?.max_abs_or_nan()));
+    worst = worst.max_or_nan(conformal_residual(
         &eta_l,
         &HerglotzField { lagrangian: system, t },
         &Energy(system),
@@ -231,11 +232,11 @@ fn infinitesimal_conformal<const N: usize>(
     )?);
     let bracket = DarbouxBracket { f: &f, g: &g };
     let commutator = lie_bracket(&field(&f), &field(&g), &phase)?;
-    worst = worst.larger(relative(DarbouxField { hamiltonian: &bracket, t }.at(&phase)?, commutator, 1.0));
+    worst = worst.max_or_nan(relative(DarbouxField { hamiltonian: &bracket, t }.at(&phase)?, commutator, 1.0));
     let forward = jacobi_bracket(&Darboux, &f, &g, t, &phase)?;
     let backward = jacobi_bracket(&Darboux, &g, &f, t, &phase)?;
-    worst = worst.larger(relative_number(forward, bracket.value(t, &phase), 1.0));
-    Ok(worst.larger(relative_number(forward, -backward, 1.0)))
+    worst = worst.max_or_nan(relative_number(forward, bracket.value(t, &phase), 1.0));
+    Ok(worst.max_or_nan(relative_number(forward, -backward, 1.0)))
 }
 
 /// Statement 6: `X_H(H) = -R(H) H`, for E_L and any f.
@@ -243,7 +244,7 @@ fn energy_decay<const N: usize>(system: &impl System<N>, t: f64, x: &VelocityPoi
     let (phase, eta_l, velocity) = forms(system, t, x);
     let (energy, any) = (Energy(system), AnyFunction(0.37));
     Ok(dissipation_defect(&eta_l, &energy, &energy, t, &velocity)?
-        .larger(dissipation_defect(&Darboux, &any, &any, t, &phase)?))
+        .max_or_nan(dissipation_defect(&Darboux, &any, &any, t, &phase)?))
 }
 
 /// Statement 7: L is regular exactly if eta_L is contact, since `eta_L ^ (d eta_L)^n` is `det W` times the canonical
@@ -261,8 +262,8 @@ fn regular_iff_contact<const N: usize>(
         return Ok(f64::INFINITY);
     }
     let reeb = eta_l.reeb(&velocity)?;
-    let through_w = (h.vv * reeb.y + h.vz).largest() / h.vv.largest().larger(h.vz.largest());
-    Ok(relative_number(generic::volume(&eta_l, &velocity)?, determinant, 0.0).larger(through_w))
+    let through_w = (h.vv * reeb.y + h.vz).max_abs_or_nan() / h.vv.max_abs_or_nan().max_or_nan(h.vz.max_abs_or_nan());
+    Ok(relative_number(generic::volume(&eta_l, &velocity)?, determinant, 0.0).max_or_nan(through_w))
 }
 
 /// Statement 8: `xi_L = X_{E_L}` is a second-order equation that solves Herglotz' equations.
@@ -277,7 +278,8 @@ fn second_order_equation<const N: usize>(
     let (_, eta_l, velocity) = forms(system, t, x);
     let field = herglotz_field(system, t, x)?;
     let hamiltonian = hamiltonian_vector_field(&eta_l, &Energy(system), t, &velocity)?;
-    let second_order = (field.x - x.v).largest().larger((hamiltonian.x - x.v).largest()) / (1.0 + x.v.largest());
+    let second_order = (field.x - x.v).max_abs_or_nan().max_or_nan((hamiltonian.x - x.v).max_abs_or_nan())
+        / (1.0 + x.v.max_abs_or_nan());
     // d/dt L_v along the field, by a dual along it.
     let along = |re: f64, d: f64| Dual { re, d: SVector::<f64, 1>::new(d) };
     let moving = VelocityPoint {
@@ -289,10 +291,10 @@ fn second_order_equation<const N: usize>(
     let mut herglotz: f64 = (field.z - system.value(t, &x.q, &x.v, x.z)).abs() / (1.0 + field.z.abs());
     for i in 0..N {
         let terms = [g.y[i].d[0], g.x[i].re, g.y[i].re * g.z.re];
-        let size = 1.0 + terms.iter().fold(0.0, |m: f64, a| m.larger(a.abs()));
-        herglotz = herglotz.larger((terms[0] - terms[1] - terms[2]).abs() / size);
+        let size = 1.0 + terms.iter().fold(0.0, |m: f64, a| m.max_or_nan(a.abs()));
+        herglotz = herglotz.max_or_nan((terms[0] - terms[1] - terms[2]).abs() / size);
     }
-    Ok(relative(field, hamiltonian, 1.0).larger(second_order).larger(herglotz))
+    Ok(relative(field, hamiltonian, 1.0).max_or_nan(second_order).max_or_nan(herglotz))
 }
 
 /// Statement 9: `FL* eta_Q = eta_L`; and where H is known, `E_L = H o FL` and `FL_* xi_L = X_H`.
@@ -304,15 +306,15 @@ fn legendre_is_contact<const N: usize>(
     let (phase, eta_l, velocity) = forms(system, t, x);
     let map = Legendre { lagrangian: system, t };
     let pullback = conformality(&eta_l, &Darboux, &map, &velocity)?;
-    let mut worst = pullback.defect.larger((pullback.sigma - 1.0).abs());
+    let mut worst = pullback.defect.max_or_nan((pullback.sigma - 1.0).abs());
     let jacobian = legendre_jacobian(system, t, x);
     let (_, derived) = map.with_jacobian(&velocity)?;
-    worst = worst.larger((&jacobian - &derived).largest() / derived.largest());
+    worst = worst.max_or_nan((&jacobian - &derived).max_abs_or_nan() / derived.max_abs_or_nan());
     if let Some(h) = known_hamiltonian(system) {
         let energy = Energy(system).value(t, &velocity);
-        worst = worst.larger(relative_number(energy, h.value(t, &phase), 1.0));
+        worst = worst.max_or_nan(relative_number(energy, h.value(t, &phase), 1.0));
         let pushed = crate::forms::smooth::apply(&jacobian, &herglotz_field(system, t, x)?);
-        worst = worst.larger(relative(pushed, DarbouxField { hamiltonian: &h, t }.at(&phase)?, 1.0));
+        worst = worst.max_or_nan(relative(pushed, DarbouxField { hamiltonian: &h, t }.at(&phase)?, 1.0));
     }
     Ok(worst)
 }
@@ -329,13 +331,13 @@ fn dissipated_quantities<const N: usize>(
     let mut worst = dissipation_defect(&eta_l, &energy, &energy, t, &velocity)?;
     for symmetry in system.symmetries() {
         let momentum = NoetherMomentum { lagrangian: system, group: &symmetry };
-        worst = worst.larger(dissipation_defect(&eta_l, &energy, &momentum, t, &velocity)?);
+        worst = worst.max_or_nan(dissipation_defect(&eta_l, &energy, &momentum, t, &velocity)?);
         // Conserved: X_H(momentum / energy) = 0, relative to the rates of the two.
         let field = hamiltonian_vector_field(&eta_l, &energy, t, &velocity)?;
         let d = Quotient { f: &momentum, g: &energy }.differential(t, &velocity);
         let size = d.x.abs().dot(&field.x.abs()) + d.y.abs().dot(&field.y.abs()) + (d.z * field.z).abs();
         if size > 0.0 {
-            worst = worst.larger(d.dot(&field).abs() / size);
+            worst = worst.max_or_nan(d.dot(&field).abs() / size);
         }
     }
     if dissipation_defect(&eta_l, &energy, &AnyFunction(0.37), t, &velocity)? < 1e-9 {
@@ -359,11 +361,11 @@ fn noether<const N: usize>(
         let (value, eta_xi) = (momentum.value(t, &velocity), eta_l.eta(&velocity)?.dot(&group.velocity_generator(x)));
         let residual = group
             .symmetry_defect(system, t, x)
-            .larger(action.defect)
-            .larger((action.sigma - 1.0).abs())
-            .larger(relative_number(value, -eta_xi, 1.0))
-            .larger(dissipation_defect(&eta_l, &Energy(system), &momentum, t, &velocity)?);
-        worst = Some(worst.map_or(residual, |w: f64| w.larger(residual)));
+            .max_or_nan(action.defect)
+            .max_or_nan((action.sigma - 1.0).abs())
+            .max_or_nan(relative_number(value, -eta_xi, 1.0))
+            .max_or_nan(dissipation_defect(&eta_l, &Energy(system), &momentum, t, &velocity)?);
+        worst = Some(worst.map_or(residual, |w: f64| w.max_or_nan(residual)));
     }
     Ok(worst)
 }
@@ -373,19 +375,19 @@ pub trait ClosedFlow {
     /// The system's name.
     fn name(&self) -> &'static str;
     /// The state after time `t`.
-    fn flow<T: Scalar>(&self, t: f64, x: &Triple<1, T>) -> Triple<1, T>;
+    fn flow<T: Scalar>(&self, t: f64, x: &ChartVector<1, T>) -> ChartVector<1, T>;
     /// The Hamiltonian.
-    fn hamiltonian<T: Scalar>(&self, x: &Triple<1, T>) -> T;
+    fn hamiltonian<T: Scalar>(&self, x: &ChartVector<1, T>) -> T;
 }
 
 impl ClosedFlow for FreeParticle {
     fn name(&self) -> &'static str {
         System::name(self)
     }
-    fn flow<T: Scalar>(&self, t: f64, x: &Triple<1, T>) -> Triple<1, T> {
+    fn flow<T: Scalar>(&self, t: f64, x: &ChartVector<1, T>) -> ChartVector<1, T> {
         self.solution(t, &(*x).into()).into()
     }
-    fn hamiltonian<T: Scalar>(&self, x: &Triple<1, T>) -> T {
+    fn hamiltonian<T: Scalar>(&self, x: &ChartVector<1, T>) -> T {
         x.y[0] * x.y[0] * 0.5 - x.z * self.gamma
     }
 }
@@ -394,10 +396,10 @@ impl ClosedFlow for HarmonicOscillator {
     fn name(&self) -> &'static str {
         System::name(self)
     }
-    fn flow<T: Scalar>(&self, t: f64, x: &Triple<1, T>) -> Triple<1, T> {
+    fn flow<T: Scalar>(&self, t: f64, x: &ChartVector<1, T>) -> ChartVector<1, T> {
         self.solution(t, &(*x).into()).into()
     }
-    fn hamiltonian<T: Scalar>(&self, x: &Triple<1, T>) -> T {
+    fn hamiltonian<T: Scalar>(&self, x: &ChartVector<1, T>) -> T {
         x.y[0] * x.y[0] * 0.5 + x.x[0] * x.x[0] * 0.5 - x.z * self.gamma
     }
 }
@@ -413,11 +415,11 @@ impl ClosedFlow for ActionSquared {
     fn name(&self) -> &'static str {
         "action_squared"
     }
-    fn flow<T: Scalar>(&self, t: f64, x: &Triple<1, T>) -> Triple<1, T> {
+    fn flow<T: Scalar>(&self, t: f64, x: &ChartVector<1, T>) -> ChartVector<1, T> {
         let factor = (x.z * (0.5 * self.c * t) + 1.0).recip();
-        Triple { x: x.x, y: x.y * (factor * factor), z: x.z * factor }
+        ChartVector { x: x.x, y: x.y * (factor * factor), z: x.z * factor }
     }
-    fn hamiltonian<T: Scalar>(&self, x: &Triple<1, T>) -> T {
+    fn hamiltonian<T: Scalar>(&self, x: &ChartVector<1, T>) -> T {
         x.z * x.z * (0.5 * self.c)
     }
 }
@@ -429,13 +431,13 @@ struct Closed<'a, F> {
 }
 
 impl<F: ClosedFlow> Smooth<1> for Closed<'_, F> {
-    fn at<T: Scalar>(&self, x: &Triple<1, T>) -> Result<Triple<1, T>, GeometryError> {
+    fn at<T: Scalar>(&self, x: &ChartVector<1, T>) -> Result<ChartVector<1, T>, GeometryError> {
         Ok(self.flow.flow(self.t, x))
     }
 }
 
 impl<F: ClosedFlow> SmoothFunction<1> for Closed<'_, F> {
-    fn value<T: Scalar>(&self, _t: T, x: &Triple<1, T>) -> T {
+    fn value<T: Scalar>(&self, _t: T, x: &ChartVector<1, T>) -> T {
         self.flow.hamiltonian(x)
     }
 }
@@ -448,7 +450,7 @@ impl<F: ClosedFlow> SmoothFunction<1> for Closed<'_, F> {
 pub fn conformal_flow(
     flow: &impl ClosedFlow,
     t: f64,
-    x: &Triple<1>,
+    x: &ChartVector<1>,
     quadrature: &[(f64, f64)],
 ) -> Result<f64, GeometryError> {
     let map = Closed { flow, t };
@@ -456,5 +458,5 @@ pub fn conformal_flow(
     let sigma = conformal_factor_along(&Darboux, &map, |s| flow.flow(s, x), quadrature)?;
     let (before, after) = (flow.hamiltonian(x), flow.hamiltonian(&flow.flow(t, x)));
     let decay = (after - sigma * before).abs() / (1.0 + before.abs());
-    Ok(pullback.defect.larger(relative_number(pullback.sigma, sigma, 0.0)).larger(decay))
+    Ok(pullback.defect.max_or_nan(relative_number(pullback.sigma, sigma, 0.0)).max_or_nan(decay))
 }

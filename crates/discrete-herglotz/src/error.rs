@@ -39,11 +39,11 @@ pub enum InputError {
     Accuracy {
         /// The error that was asked for.
         wanted: f64,
-        /// The smallest distance of pilot runs; infinite where none were compared. Below the wanted error where something else than their
+        /// The smallest distance of trial runs; infinite where none were compared. Below the wanted error where something else than their
         /// distance stands in the way.
         reached: f64,
         /// What stands in the way.
-        cause: Obstacle,
+        cause: SelectionFailure,
     },
     /// There are too many of something to be counted, kept, or to be told apart.
     #[error("{what} = {found:e}; at most {most:e} are possible: {remedy}")]
@@ -95,9 +95,9 @@ pub enum InputError {
         /// The number of stages that was passed.
         found: usize,
     },
-    /// A clock stands still, runs backward or is not defined at the start.
-    #[error("the clock's rate dt/dtau is {rate} at the start; it must be positive and finite")]
-    Clock {
+    /// A time transformation stands still, runs backward or is not defined at the start.
+    #[error("the rate dt/dtau dt/dtau is {rate} at the start; it must be positive and finite")]
+    TimeTransformation {
         /// The rate at the start.
         rate: f64,
     },
@@ -273,7 +273,7 @@ pub enum StepError {
     },
     /// A formula branches on the value of a number, of which vector lanes have several.
     #[error(
-        "the Lagrangian or the clock asks for one value (`re`, `extent`, `==`) of lanes that differ; \
+        "the Lagrangian or the time transformation asks for one value (`re`, `extent`, `==`) of lanes that differ; \
          choose by `if_less`, `max`, `min`, `abs` or `signum`"
     )]
     Branched,
@@ -287,7 +287,7 @@ impl From<StepError> for GeometryError {
 
 /// What keeps a wanted accuracy from being reached.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
-pub enum Obstacle {
+pub enum SelectionFailure {
     /// Round-off: shorter steps do not better the result.
     #[error("round-off of the motion is larger; ask for less")]
     RoundOff,
@@ -307,12 +307,12 @@ pub enum Obstacle {
     },
     /// Runs agree where they are compared, and between the nodes of their steps the motion does not solve its equations.
     #[error(
-        "between the nodes of their steps the motion misses its equations by {misfit:.1e} of its size, which shorter steps better only \
+        "between the nodes of their steps the motion misses its equations by {defect:.1e} of its size, which shorter steps better only \
          with order {order:.1}: a kink, a jump or something narrow lies there; ask for less, or smooth the Lagrangian"
     )]
     Misfit {
         /// The largest misfit of the finer run, relative to the largest momentum.
-        misfit: f64,
+        defect: f64,
         /// The order with which it falls.
         order: f64,
     },
@@ -344,7 +344,7 @@ pub enum Obstacle {
         /// The time.
         t: f64,
     },
-    /// The pilot runs would cost too much.
+    /// The trial runs would cost too much.
     #[error(
         "the budget of the trial runs is used up, since the steps that the motion needs are too many to be tried; take a method of higher \
          order, a shorter span, or give a step"
@@ -380,19 +380,19 @@ fn how_runs_converge(order: f64) -> String {
 /// A step whose ends do not fit each other by far more than the error of a step that resolves the motion: it may have crossed
 /// a pole, a wall or a centre of force without meeting it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Suspicion {
+pub struct UnresolvedStep {
     /// The first such step, counted from 0.
     pub step: usize,
     /// The misfit, in units of the largest that a step which resolves its motion can have: above one.
-    pub misfit: f64,
+    pub defect: f64,
 }
 
-impl std::fmt::Display for Suspicion {
+impl std::fmt::Display for UnresolvedStep {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Suspicion { step, misfit } = self;
+        let UnresolvedStep { step, defect } = self;
         write!(
             f,
-            "step {step} does not resolve the motion (misfit {misfit:.1e}); what follows may be wrong: take a smaller step"
+            "step {step} does not resolve the motion (misfit {defect:.1e}); what follows may be wrong: take a smaller step"
         )
     }
 }
@@ -454,25 +454,35 @@ mod tests {
     /// is not told, and runs that do not converge have no order.
     #[test]
     fn an_accuracy_says_what_was_not_reached() {
-        let said = |reached: f64, cause: Obstacle| InputError::Accuracy { wanted: 1e-9, reached, cause }.to_string();
-        let misfit = Obstacle::Misfit { misfit: 3e-4, order: 0.5 };
+        let said =
+            |reached: f64, cause: SelectionFailure| InputError::Accuracy { wanted: 1e-9, reached, cause }.to_string();
+        let defect = SelectionFailure::Misfit { defect: 3e-4, order: 0.5 };
         let table = [
-            (said(1e-16, misfit), "1e-9 is not certain, though trial runs agree to 1.0e-16: between the nodes"),
-            (said(1e-16, misfit), "misses its equations by 3.0e-4 of its size"),
-            (said(1e-16, Obstacle::Hidden { distance: 2e-3 }), "with one step more ends 2.0e-3 away from them: a kink"),
+            (said(1e-16, defect), "1e-9 is not certain, though trial runs agree to 1.0e-16: between the nodes"),
+            (said(1e-16, defect), "misses its equations by 3.0e-4 of its size"),
             (
-                said(1e-7, Obstacle::Budget),
+                said(1e-16, SelectionFailure::Hidden { distance: 2e-3 }),
+                "with one step more ends 2.0e-3 away from them: a kink",
+            ),
+            (
+                said(1e-7, SelectionFailure::Budget),
                 "1e-9 is not reached (trial runs agree to 1.0e-7): the budget of the trial runs",
             ),
-            (said(f64::INFINITY, Obstacle::Budget), "1e-9 is not reached, and no two trial runs could be compared: "),
-            (said(1e-7, Obstacle::Order { order: 1.9 }), "runs converge only with order 1.9: "),
-            (said(1e-7, Obstacle::Order { order: 0.0 }), "runs do not converge as their steps get shorter: "),
-            (said(1e-7, Obstacle::Order { order: -0.7 }), "runs do not converge as their steps get shorter: "),
-            (said(1e-7, Obstacle::Order { order: f64::NAN }), "runs do not converge as their steps get shorter: "),
+            (
+                said(f64::INFINITY, SelectionFailure::Budget),
+                "1e-9 is not reached, and no two trial runs could be compared: ",
+            ),
+            (said(1e-7, SelectionFailure::Order { order: 1.9 }), "runs converge only with order 1.9: "),
+            (said(1e-7, SelectionFailure::Order { order: 0.0 }), "runs do not converge as their steps get shorter: "),
+            (said(1e-7, SelectionFailure::Order { order: -0.7 }), "runs do not converge as their steps get shorter: "),
+            (
+                said(1e-7, SelectionFailure::Order { order: f64::NAN }),
+                "runs do not converge as their steps get shorter: ",
+            ),
         ];
         for (sentence, words) in table {
             assert!(sentence.contains(words), "no {words:?} in {sentence:?}");
-            let foreign = ["inf", "NaN", "best estimate", "clock"];
+            let foreign = ["inf", "NaN", "best estimate", "transformation"];
             assert!(foreign.iter().all(|word| !sentence.contains(word)), "{sentence:?}");
         }
     }

@@ -35,17 +35,19 @@ mod switching;
 mod theory;
 
 pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus, branch, continuation};
-pub use ensemble::{Ending, Ensemble, EnsembleError, InLanes, Member, Merge, ObservedEnsemble, ShardedEnsemble, Tally};
-pub use error::{InputError, Obstacle, Status, StepError, Suspicion};
-pub use gauss::{ClockedGauss, ClockedStepper, DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper};
+pub use ensemble::{
+    BatchKernel, Ending, Ensemble, EnsembleError, Member, Merge, ObservedEnsemble, ShardedEnsemble, Tally,
+};
+pub use error::{InputError, SelectionFailure, Status, StepError, UnresolvedStep};
+pub use gauss::{DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper, TransformedGauss, TransformedStepper};
 pub use rules::*;
 #[cfg(feature = "csv")]
 pub use run::CsvRows;
 pub use run::{
-    AnyIntegrator, Checkpoint, CheckpointError, Course, Crossing, Doubt, EnergyDrift, EnergyLook, Event, Events, Facts,
-    Halt, INTERRUPTION, Integrator, Interrupt, Interrupted, Item, LastStep, Moment, MomentumDecay, MomentumRow, Needs,
-    Observer, Outcome, Plan, Problem, Progress, Quotient, Row, Rows, Run, Start, Stepper, Steps, Stop, Terminal,
-    UnknownIntegrator, Until, Wants, verified,
+    AnyIntegrator, Checkpoint, CheckpointError, Crossing, EnergyDrift, EnergyLook, Event, Events, INTERRUPTION,
+    Integrator, Interrupt, LastStep, MethodInfo, MomentumDecay, MomentumRow, Observer, Outcome, OutputRequest, Plan,
+    PlanEntry, Problem, Progress, Quotient, ResumeState, Row, Rows, Run, RunInfo, Start, StepFailure, StepView,
+    Stepper, StepperOptions, Steps, Stop, SuspectInterval, Terminal, UnknownIntegrator, Until, check_claims,
 };
 pub use solve::{CROSSOVER, ITERATION_LIMIT, Solver, last_correction};
 pub use splitting::{
@@ -53,8 +55,8 @@ pub use splitting::{
 };
 pub use switching::{DividedGauss, jumps_between};
 pub use theory::{
-    DiscreteLagrangian, DiscretePath, DiscreteRegularity, HamiltonianFlow, Transition, derived_jet, derived_second_jet,
-    discrete_action, discrete_flow, discrete_flow_jacobian, discrete_momentum, discrete_regularity,
+    DiscreteLagrangian, DiscretePath, DiscreteRegularity, DiscreteStep, HamiltonianFlow, derived_jet,
+    derived_second_jet, discrete_action, discrete_flow, discrete_flow_jacobian, discrete_momentum, discrete_regularity,
     discrete_symmetry_defect, hamiltonian_flow, hamiltonian_flow_jacobian, legendre_inverse, legendre_minus,
     legendre_minus_inverse, legendre_plus, legendre_plus_inverse, sigma_d, statements,
 };

@@ -1,7 +1,7 @@
 //! Steps that are solved by Newton's method on all stages at once, with the feature `faer` or without: `.ci/run` runs both.
 
 use contact_geom::systems::HarmonicOscillator;
-use contact_geom::{DiscretePoint, Triple, VelocityPoint, largest, legendre};
+use contact_geom::{ChartVector, DiscretePoint, VelocityPoint, legendre, max_abs_or_nan};
 use discrete_herglotz::{DiscreteLagrangian, Gauss, Solver};
 
 /// Eight steps of order 24 by Newton's method on the stages meet the closed form, to the rounding of eight sums.
@@ -16,8 +16,8 @@ fn newton_steps_of_gauss_collocation() {
         (state, velocity) = (step.end, step.velocity);
     }
     let expected = legendre(&damped, 4.0, &damped.solution(4.0, &x));
-    let off = Triple::from(state).minus(expected.into());
-    let off = largest([off.x[0], off.y[0], off.z]);
+    let off = ChartVector::from(state).minus(expected.into());
+    let off = max_abs_or_nan([off.x[0], off.y[0], off.z]);
     assert!(off <= 8.0 * 4.0 * f64::EPSILON, "{off:e}");
 }
 

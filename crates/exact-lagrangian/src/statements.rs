@@ -22,8 +22,8 @@ use crate::{
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::systems::System;
 use contact_geom::{
-    Derivatives, DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, Larger, Largest, PhasePoint, Scalar,
-    SecondDiscreteJet, Smooth, Statement, Triple, VelocityPoint, herglotz_rates, larger, legendre, seed,
+    ChartVector, Derivatives, DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, MaxAbsOrNan, MaxOrNan, PhasePoint,
+    Scalar, SecondDiscreteJet, Smooth, Statement, VelocityPoint, herglotz_rates, legendre, max_or_nan, seed,
 };
 use discrete_herglotz::{
     DiscreteLagrangian, InputError, StepError, derived_jet, derived_second_jet, discrete_flow, legendre_minus_inverse,
@@ -56,7 +56,7 @@ pub fn residual<S: System<N>, const N: usize>(
     x: &VelocityPoint<N>,
     h: f64,
 ) -> Result<Option<f64>, ExactError<N>> {
-    let at = Place { system, t, x, h, exponential: ContactExponential::new(system, h)? };
+    let at = Sample { system, t, x, h, exponential: ContactExponential::new(system, h)? };
     Ok(Some(match statement {
         Statement::HerglotzPrinciple => at.principle()?,
         Statement::ChetaevMultiplier => at.multiplier()?,
@@ -85,8 +85,8 @@ pub fn condition<const N: usize>(
     h: f64,
 ) -> Result<f64, ExactError<N>> {
     let differential = ContactExponential::new(lagrangian, h)?.differential(t, x)?;
-    let position = x.q.largest().larger(differential.image.q1.largest());
-    Ok((position / (differential.regularity().smallest * x.v.largest())).larger(1.0))
+    let position = x.q.max_abs_or_nan().max_or_nan(differential.image.q1.max_abs_or_nan());
+    Ok((position / (differential.regularity().smallest * x.v.max_abs_or_nan())).max_or_nan(1.0))
 }
 
 /// How far a motion of a discrete Lagrangian's own equations is from the exact one: the discrete Herglotz equations of
@@ -106,15 +106,15 @@ pub fn follows_motion<const N: usize>(
     let exact = ByEquations(ExactLagrangian::new(lagrangian, h)?);
     let mut at = herglotz_flow(lagrangian, t, x, h)?.end;
     let mut pair = DiscretePoint { q0: x.q, q1: at.q, z0: x.z };
-    let (mut worst, mut size): (f64, f64) = (0.0, x.q.largest().larger(x.z.abs()));
+    let (mut worst, mut size): (f64, f64) = (0.0, x.q.max_abs_or_nan().max_or_nan(x.z.abs()));
     for k in 1..=steps {
         let time = t + k as f64 * h;
         pair = discrete_flow(&exact, time - h, &pair).map_err(|e| ExactError::Input(InputError::FirstStep(e)))?;
         let z = at.z;
         at = herglotz_flow(lagrangian, time, &at, h)?.end;
-        size = size.larger(at.q.largest()).larger(at.z.abs());
+        size = size.max_or_nan(at.q.max_abs_or_nan()).max_or_nan(at.z.abs());
         let growth = ((k + 1) * (k + 1)) as f64;
-        worst = worst.larger((pair.q1 - at.q).largest().larger((pair.z0 - z).abs()) / (size * growth));
+        worst = worst.max_or_nan((pair.q1 - at.q).max_abs_or_nan().max_or_nan((pair.z0 - z).abs()) / (size * growth));
     }
     Ok(worst)
 }
@@ -139,7 +139,7 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ByEquations<L, 
 }
 
 /// Where a statement is evaluated.
-struct Place<'a, S, const N: usize> {
+struct Sample<'a, S, const N: usize> {
     system: &'a S,
     t: f64,
     x: &'a VelocityPoint<N>,
@@ -148,9 +148,9 @@ struct Place<'a, S, const N: usize> {
 }
 
 /// The difference of two elements relative to the larger of them.
-fn relative<const N: usize>(a: impl Into<Triple<N>>, b: impl Into<Triple<N>>) -> f64 {
+fn relative<const N: usize>(a: impl Into<ChartVector<N>>, b: impl Into<ChartVector<N>>) -> f64 {
     let (a, b) = (a.into(), b.into());
-    a.minus(b).largest() / a.largest().larger(b.largest())
+    a.minus(b).max_abs_or_nan() / a.max_abs_or_nan().max_or_nan(b.max_abs_or_nan())
 }
 
 /// The difference of two numbers relative to a size.
@@ -158,7 +158,7 @@ fn apart(a: f64, b: f64, size: f64) -> f64 {
     (a - b).abs() / size
 }
 
-impl<S: System<N>, const N: usize> Place<'_, S, N> {
+impl<S: System<N>, const N: usize> Sample<'_, S, N> {
     /// The exact discrete Lagrangian on the branch of the motion from `x`, and its point of Q x Q x R.
     fn exact(&self) -> Result<(ExactLagrangian<&S, N>, DiscretePoint<N>), ExactError<N>> {
         let exact = ExactLagrangian::new(self.system, self.h)?.near(self.x.v);
@@ -168,9 +168,10 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
     /// The condition of the motion: the largest entry of `T phi_h`, at least 1.
     fn growth(&self) -> Result<f64, ExactError<N>> {
         let end = self.exponential.varied(self.t, self.x)?.end;
-        let of =
-            |c: &SVector<_, N>| c.iter().map(|e: &contact_geom::Dual<f64, Triple<N>>| e.d.largest()).fold(1.0, larger);
-        Ok(of(&end.q).larger(of(&end.v)).larger(end.z.d.largest()))
+        let of = |c: &SVector<_, N>| {
+            c.iter().map(|e: &contact_geom::Dual<f64, ChartVector<N>>| e.d.max_abs_or_nan()).fold(1.0, max_or_nan)
+        };
+        Ok(of(&end.q).max_or_nan(of(&end.v)).max_or_nan(end.z.d.max_abs_or_nan()))
     }
 
     fn step_error(e: StepError) -> ExactError<N> {
@@ -180,7 +181,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
     /// Statement 10: along the motion the action's derivative vanishes for variations that vanish at the ends; along another
     /// curve with the same ends it does not; and `dZ/dz0 = e^(int L_z)`.
     fn principle(&self) -> Result<f64, ExactError<N>> {
-        let Place { system, t, x, h, .. } = *self;
+        let Sample { system, t, x, h, .. } = *self;
         let curve = MotionCurve { lagrangian: system, t0: t, start: *x };
         let wave = |i: usize, k: f64| {
             move |s: f64| {
@@ -193,14 +194,17 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let span = (t, h);
         let motion = herglotz_flow(system, t, x, h)?;
         // The terms that cancel: L_v times the variation's velocity, over the time, grown by sigma.
-        let p = legendre(system, t, x).p.largest().larger(legendre(system, t + h, &motion.end).p.largest());
+        let p = legendre(system, t, x)
+            .p
+            .max_abs_or_nan()
+            .max_or_nan(legendre(system, t + h, &motion.end).p.max_abs_or_nan());
         let mut worst: f64 = 0.0;
         for i in 0..N {
             for k in [1.0, 2.0] {
                 let variation = wave(i, k);
                 let slope = action_derivative(system, &curve, &variation, span, (x.z, 0.0))?;
-                let size = (1.0 + p) * k * std::f64::consts::PI * motion.sigma().larger(1.0);
-                worst = worst.larger(slope.abs() / size);
+                let size = (1.0 + p) * k * std::f64::consts::PI * motion.sigma().max_or_nan(1.0);
+                worst = worst.max_or_nan(slope.abs() / size);
             }
             let bent = VariedCurve { curve: &curve, variation: &wave(i, 1.0), by: 0.01 * h };
             let slope = action_derivative(system, &bent, &wave(i, 1.0), span, (x.z, 0.0))?;
@@ -213,7 +217,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let growth = action_derivative(system, &curve, &still, span, (x.z, 1.0))?;
         let along = action(system, &curve, span, x.z)?;
         let end = apart(along.z, motion.end.z, 1.0 + motion.end.z.abs());
-        Ok(worst.larger(end).larger(apart(growth, along.b.exp(), growth)).larger(apart(
+        Ok(worst.max_or_nan(end).max_or_nan(apart(growth, along.b.exp(), growth)).max_or_nan(apart(
             along.b,
             motion.b,
             1.0 + motion.b.abs(),
@@ -222,25 +226,25 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
 
     /// Statement 27: Chetaev's multiplier is `-L_z`, and the accelerations are Herglotz'.
     fn multiplier(&self) -> Result<f64, ExactError<N>> {
-        let Place { system, t, x, .. } = *self;
+        let Sample { system, t, x, .. } = *self;
         let chetaev = NonHolonomic::new(system);
         let solved = chetaev.chetaev(t, &chetaev.lift(t, x))?;
         let (field, rate) = herglotz_rates(system, t, x)?;
-        let size = 1.0 + field.y.largest().larger(rate.abs());
-        Ok(((solved.a - field.y).largest() / size).larger(apart(solved.multiplier, -rate, size)))
+        let size = 1.0 + field.y.max_abs_or_nan().max_or_nan(rate.abs());
+        Ok(((solved.a - field.y).max_abs_or_nan() / size).max_or_nan(apart(solved.multiplier, -rate, size)))
     }
 
     /// Statement 28: `T pi (Gamma) = xi_L o pi`, and the flows are pi-related; the constraint is kept.
     fn projected_flow(&self) -> Result<f64, ExactError<N>> {
-        let Place { system, t, x, h, .. } = *self;
+        let Sample { system, t, x, h, .. } = *self;
         let chetaev = NonHolonomic::new(system);
         let start = chetaev.lift(t, x);
         let gamma = chetaev.chetaev(t, &start)?;
-        let projected = Triple { x: start.v, y: gamma.a, z: start.w };
+        let projected = ChartVector { x: start.v, y: gamma.a, z: start.w };
         let field = relative(projected, HerglotzField { lagrangian: system, t }.at(&(*x).into())?);
         let along = chetaev.flow(t, &start, h)?;
         let flow = relative(along.end.project(), herglotz_flow(system, t, x, h)?.end) / self.growth()?;
-        Ok(field.larger(flow).larger(along.defect))
+        Ok(field.max_or_nan(flow).max_or_nan(along.defect))
     }
 
     /// Statement 29: `exp_h` is a local diffeomorphism: `T exp_h` and the derivative of the retraction, by duals through the
@@ -250,7 +254,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         if forward.regularity().smallest == 0.0 {
             return Ok(f64::INFINITY);
         }
-        let image: Triple<N> = forward.image.into();
+        let image: ChartVector<N> = forward.image.into();
         let (start, _) = self.exponential.lifted(self.t, &seed(&image).into(), Some(&self.x.v))?;
         let back = DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| match i {
             _ if i < N => start.q[i].d.component(j),
@@ -258,8 +262,8 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
             _ => start.z.d.component(j),
         });
         let jacobian = forward.jacobian();
-        let defect = (&back * &jacobian - DMatrix::identity(2 * N + 1, 2 * N + 1)).largest();
-        Ok(defect / (back.largest() * jacobian.largest()).larger(self.growth()?))
+        let defect = (&back * &jacobian - DMatrix::identity(2 * N + 1, 2 * N + 1)).max_abs_or_nan();
+        Ok(defect / (back.max_abs_or_nan() * jacobian.max_abs_or_nan()).max_or_nan(self.growth()?))
     }
 
     /// Statement 30: `exp_h^xi = pr~_1 o exp_h^Gamma o (pi|M_L)^-1`.
@@ -274,7 +278,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
     /// singular value is `(1 + |D1|^2 + |D2|^2 + sigma_d^2)^(-1/2)`, with the derivatives by duals; and
     /// `T exp_h^xi = T pr~_1 T exp_h^Gamma T(pi|M_L)^-1`.
     fn projection(&self) -> Result<f64, ExactError<N>> {
-        let Place { system, t, x, h, .. } = *self;
+        let Sample { system, t, x, h, .. } = *self;
         let chetaev = NonHolonomic::new(system);
         let (exact, y) = self.exact()?;
         let jet = derived_jet(&exact, t, &y).map_err(Self::step_error)?;
@@ -283,7 +287,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let graph = apart(smallest, slope.sqrt().recip(), smallest);
         // The basis is known to round-off times the condition of the differential that it spans.
         let condition = self.exponential.differential(t, x)?.jacobian().singular_values();
-        let graph = graph / (condition.largest() / condition.min());
+        let graph = graph / (condition.max_abs_or_nan() / condition.min());
         // Rows q0, z0, q1 of the differential, in the order q0, q1, z0.
         let differential = chetaev.exponential_differential(t, x, h)?;
         let row = |i: usize| match i {
@@ -293,7 +297,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         };
         let projected = DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| differential[(row(i), j)]);
         let jacobian = self.exponential.differential(t, x)?.jacobian();
-        Ok(graph.larger((&projected - &jacobian).largest() / jacobian.largest()) / self.growth()?)
+        Ok(graph.max_or_nan((&projected - &jacobian).max_abs_or_nan() / jacobian.max_abs_or_nan()) / self.growth()?)
     }
 
     /// Statement 32: `R_h^(e-) o exp_h = id`, `exp_h o R_h^(e-) = id`, `R_h^(e+) = phi_h o R_h^(e-)`; velocities in units of the
@@ -302,20 +306,20 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let (exact, y) = self.exact()?;
         let found = exact.retract(self.t, &y)?;
         let condition = condition(self.system, self.t, self.x, self.h)?;
-        let back = (found.start.v - self.x.v).largest() / (self.x.v.largest() * condition);
+        let back = (found.start.v - self.x.v).max_abs_or_nan() / (self.x.v.max_abs_or_nan() * condition);
         let forth = relative(self.exponential.at(self.t, &found.start)?, y);
         let moved = HerglotzFlow { lagrangian: self.system, t: self.t, duration: self.h };
         let end = relative(moved.at(&found.start.into())?, found.end);
-        Ok(back.larger(forth.larger(end) / self.growth()?))
+        Ok(back.max_or_nan(forth.max_or_nan(end) / self.growth()?))
     }
 
     /// Statement 33: along the motion a variation of z obeys `y' = a + b' y`, and is
     /// `e^b(t) (int a e^(-b) ds + y(0))`; `L_h^e = z(h) - z(0)`. The integrals by Gauss' formula with 24 nodes on quarter panels.
     fn linear_equation(&self) -> Result<f64, ExactError<N>> {
-        let Place { system, t, x, h, .. } = *self;
+        let Sample { system, t, x, h, .. } = *self;
         let [.., g] = collocations();
-        let (mut varied, end) = (seed(&Triple::from(*x)).into(), self.exponential.varied(t, x)?);
-        let mut integrals = Triple::<N>::from_fn(|_| 0.0);
+        let (mut varied, end) = (seed(&ChartVector::from(*x)).into(), self.exponential.varied(t, x)?);
+        let mut integrals = ChartVector::<N>::from_fn(|_| 0.0);
         let (mut sizes, mut action, mut exponent) = (0.0, 0.0, 0.0);
         let parts = 4 * end.panels;
         let part = h / f64::from(parts);
@@ -329,7 +333,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
                 for i in 0..N {
                     let (by_q, by_v) = (at.end.q[i].d.scale(d.x[i] * decay), at.end.v[i].d.scale(d.y[i] * decay));
                     integrals = integrals.plus(by_q).plus(by_v);
-                    sizes += by_q.largest() + by_v.largest();
+                    sizes += by_q.max_abs_or_nan() + by_v.max_abs_or_nan();
                 }
                 action += system.value(from + c * part, &point.q, &point.v, point.z) * weight * part;
             }
@@ -338,45 +342,55 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
             varied = next.end;
         }
         let growth = end.b.re.exp();
-        let formula = Triple { z: integrals.z + 1.0, ..integrals }.scale(growth);
-        let size = formula.largest().larger(end.end.z.d.largest()).larger(sizes * growth);
-        let formula = formula.minus(end.end.z.d).largest() / size;
+        let formula = ChartVector { z: integrals.z + 1.0, ..integrals }.scale(growth);
+        let size = formula.max_abs_or_nan().max_or_nan(end.end.z.d.max_abs_or_nan()).max_or_nan(sizes * growth);
+        let formula = formula.minus(end.end.z.d).max_abs_or_nan() / size;
         let (exact, y) = self.exact()?;
         let value = exact.retract(t, &y)?.action;
         // The two positions are rounded, and the action depends on them by the momenta.
-        let terms = action.abs().larger(end.action.re.abs());
-        let rounded = terms.larger(self.momenta()? * y.q0.largest().larger(y.q1.largest()));
-        let along = apart(end.action.re, action, terms.larger(self.momenta()? * h));
-        Ok(formula.larger(along).larger(apart(value, action, rounded)) / self.growth()?)
+        let terms = action.abs().max_or_nan(end.action.re.abs());
+        let rounded = terms.max_or_nan(self.momenta()? * y.q0.max_abs_or_nan().max_or_nan(y.q1.max_abs_or_nan()));
+        let along = apart(end.action.re, action, terms.max_or_nan(self.momenta()? * h));
+        Ok(formula.max_or_nan(along).max_or_nan(apart(value, action, rounded)) / self.growth()?)
     }
 
     /// The size of the momenta at both ends of the motion.
     fn momenta(&self) -> Result<f64, ExactError<N>> {
         let end = herglotz_flow(self.system, self.t, self.x, self.h)?.end;
-        let p0 = legendre(self.system, self.t, self.x).p.largest();
-        Ok(p0.larger(legendre(self.system, self.t + self.h, &end).p.largest()))
+        let p0 = legendre(self.system, self.t, self.x).p.max_abs_or_nan();
+        Ok(p0.max_or_nan(legendre(self.system, self.t + self.h, &end).p.max_abs_or_nan()))
     }
 
     /// Statement 34: `D1 L_h^e = -p0 e^b`, `D2 L_h^e = p1`, `Dz L_h^e = e^b - 1`, against the derivatives by duals; the second
     /// derivatives from the variational equation likewise.
     fn derivatives(&self) -> Result<f64, ExactError<N>> {
         let (exact, y) = self.exact()?;
-        let of = |jet: DiscreteJet<N>| Triple { x: jet.d1, y: jet.d2, z: jet.dz };
+        let of = |jet: DiscreteJet<N>| ChartVector { x: jet.d1, y: jet.d2, z: jet.dz };
         let formula = exact.jet(self.t, &y).map_err(Self::step_error)?;
         let derived = derived_jet(&exact, self.t, &y).map_err(Self::step_error)?;
-        let first =
-            relative(of(formula), of(derived)).larger(apart(formula.dz, derived.dz, derived.dz.abs().larger(self.h)));
+        let first = relative(of(formula), of(derived)).max_or_nan(apart(
+            formula.dz,
+            derived.dz,
+            derived.dz.abs().max_or_nan(self.h),
+        ));
         let sigma =
             apart(formula.sigma(), herglotz_flow(self.system, self.t, self.x, self.h)?.sigma(), formula.sigma());
         let closed = exact.second_jet(self.t, &y).map_err(Self::step_error)?;
         let duals = derived_second_jet(&exact, self.t, &y).map_err(Self::step_error)?;
-        let size =
-            duals.d11.largest().larger(duals.d12.largest()).larger(duals.d22.largest()).larger(duals.d1z.largest());
-        let blocks = (closed.d11 - duals.d11).largest().larger((closed.d12 - duals.d12).largest());
-        let blocks = blocks.larger((closed.d22 - duals.d22).largest()).larger((closed.d1z - duals.d1z).largest());
-        let blocks = blocks.larger((closed.d2z - duals.d2z).largest()).larger((closed.dzz - duals.dzz).abs());
+        let size = duals
+            .d11
+            .max_abs_or_nan()
+            .max_or_nan(duals.d12.max_abs_or_nan())
+            .max_or_nan(duals.d22.max_abs_or_nan())
+            .max_or_nan(duals.d1z.max_abs_or_nan());
+        let blocks = (closed.d11 - duals.d11).max_abs_or_nan().max_or_nan((closed.d12 - duals.d12).max_abs_or_nan());
+        let blocks = blocks
+            .max_or_nan((closed.d22 - duals.d22).max_abs_or_nan())
+            .max_or_nan((closed.d1z - duals.d1z).max_abs_or_nan());
+        let blocks =
+            blocks.max_or_nan((closed.d2z - duals.d2z).max_abs_or_nan()).max_or_nan((closed.dzz - duals.dzz).abs());
         let growth = self.growth()?;
-        Ok(first.larger(sigma).larger(blocks / (size * growth)) / growth)
+        Ok(first.max_or_nan(sigma).max_or_nan(blocks / (size * growth)) / growth)
     }
 
     /// The transforms `F-L_h^e` and `F+L_h^e` by their definition, the derivatives by duals.
@@ -393,13 +407,13 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let found = self.exact()?.0.retract(self.t, &y)?;
         let start = legendre(self.system, self.t, &found.start);
         let end = legendre(self.system, self.t + self.h, &found.end);
-        Ok(relative(minus, start).larger(relative(plus, end)) / self.growth()?)
+        Ok(relative(minus, start).max_or_nan(relative(plus, end)) / self.growth()?)
     }
 
     /// Statement 36: `L_h^e` is regular, `F+L_h^e = phi_h^{X_H} o F-L_h^e`, and one step of the discrete flow by the discrete
     /// Herglotz equations is the motion; [`follows_motion`] has the many steps of item 3.
     fn regular_and_exact(&self) -> Result<f64, ExactError<N>> {
-        let Place { t, h, .. } = *self;
+        let Sample { t, h, .. } = *self;
         let (minus, plus, y) = self.transforms()?;
         let (exact, _) = self.exact()?;
         let second = derived_second_jet(&exact, t, &y).map_err(Self::step_error)?;
@@ -410,7 +424,7 @@ impl<S: System<N>, const N: usize> Place<'_, S, N> {
         let step = exact.forward(t, &minus, &guess, &mut Default::default()).map_err(Self::step_error)?;
         let flow = relative(step.end, plus);
         let solved = legendre_minus_inverse(&ByEquations(exact), t, &minus, &guess).map_err(Self::step_error)?;
-        Ok(flow.larger(relative(solved, y)) / self.growth()?)
+        Ok(flow.max_or_nan(relative(solved, y)) / self.growth()?)
     }
 }
 
@@ -432,15 +446,19 @@ pub fn composition<const N: usize>(
     let first = ExactLagrangian::new(lagrangian, h1)?.near(x.v);
     let second = ExactLagrangian::new(lagrangian, h2)?.near(middle.v);
     let ends = [x.q, whole.end.q];
-    let aside = |by: f64| middle.q + SVector::from_element(by * (h1 + h2) * (1.0 + x.v.largest()));
+    let aside = |by: f64| middle.q + SVector::from_element(by * (h1 + h2) * (1.0 + x.v.max_abs_or_nan()));
     let found = compose(&first, &second, t, (&ends, x.z), &aside(1e-3)).map_err(failed)?;
     let beside = through(&first, &second, t, (&ends, x.z), &aside(1e-2)).map_err(failed)?;
-    let p = lagrangian.gradient(t, x).y.largest().larger(lagrangian.gradient(t + h1, &middle).y.largest());
-    if beside.slope.largest() < 1e-4 * p || beside.value == found.value {
+    let p = lagrangian
+        .gradient(t, x)
+        .y
+        .max_abs_or_nan()
+        .max_or_nan(lagrangian.gradient(t + h1, &middle).y.max_abs_or_nan());
+    if beside.slope.max_abs_or_nan() < 1e-4 * p || beside.value == found.value {
         return Ok(f64::INFINITY);
     }
-    let size = x.q.largest().larger(whole.end.q.largest()).larger(middle.q.largest());
+    let size = x.q.max_abs_or_nan().max_or_nan(whole.end.q.max_abs_or_nan()).max_or_nan(middle.q.max_abs_or_nan());
     // The rounding of the ends moves the value by p times it.
     let value = apart(found.value, whole.action, whole.action.abs() + p * size);
-    Ok(value.larger((found.q1 - middle.q).largest() / size))
+    Ok(value.max_or_nan((found.q1 - middle.q).max_abs_or_nan() / size))
 }

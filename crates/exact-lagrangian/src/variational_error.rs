@@ -1,7 +1,7 @@
 //! Variational error analysis: how well a discrete Lagrangian matches the exact one, and what order its flow has.
 
 use crate::{ExactError, herglotz_flow};
-use contact_geom::{Derivatives, DiscretePoint, Lagrangian, PhasePoint, Triple, VelocityPoint, larger};
+use contact_geom::{ChartVector, Derivatives, DiscretePoint, Lagrangian, PhasePoint, VelocityPoint, max_or_nan};
 use discrete_herglotz::{DiscreteLagrangian, InputError, Solver, legendre_minus, legendre_plus};
 
 /// What the errors at all time steps say of an order.
@@ -74,7 +74,7 @@ const FIT: usize = 8;
 const CLEAR: f64 = 200.0;
 
 /// Measures the orders of a discrete Lagrangian, given as a function of the time step, along the motion from a start at time t.
-/// `largest` is the largest step tried; the others are smaller by factors of the square root of two. For an author of a
+/// `max_abs_or_nan` is the largest step tried; the others are smaller by factors of the square root of two. For an author of a
 /// method: the documented order plus one is what `value` and `flow` should show, on a problem nonlinear in q and z.
 ///
 /// ```
@@ -97,17 +97,17 @@ pub fn error_orders<D: DiscreteLagrangian<N>, const N: usize>(
     method: impl Fn(f64) -> Result<D, InputError>,
     t: f64,
     x: &VelocityPoint<N>,
-    largest: f64,
+    max_abs_or_nan: f64,
 ) -> Result<ErrorOrders, ExactError<N>> {
-    if !(largest > 0.0 && largest.is_finite()) {
-        return Err(InputError::Step { h: largest }.into());
+    if !(max_abs_or_nan > 0.0 && max_abs_or_nan.is_finite()) {
+        return Err(InputError::Step { h: max_abs_or_nan }.into());
     }
     let p0 = lagrangian.gradient(t, x).y;
     let start = PhasePoint { q: x.q, p: p0, z: x.z };
     let mut rows: [Vec<Row>; 4] = Default::default();
     let mut solver = Solver::default();
     for k in 0..STEPS {
-        let h = largest * 0.5f64.powf(0.5 * k as f64);
+        let h = max_abs_or_nan * 0.5f64.powf(0.5 * k as f64);
         let ld = method(h)?;
         let motion = match herglotz_flow(lagrangian, t, x, h) {
             Ok(motion) => motion,
@@ -122,7 +122,7 @@ pub fn error_orders<D: DiscreteLagrangian<N>, const N: usize>(
         let momentum = f64::EPSILON * p0.amax().max(end.p.amax()) + position * slope(lagrangian, t, x) / h;
         let action = p0.amax().max(end.p.amax()) * position + f64::EPSILON * motion.action.abs();
         let state = position + f64::EPSILON * end.p.amax().max(end.z.abs()).max(x.z.abs());
-        let away = |found: PhasePoint<N>, truth: PhasePoint<N>| Triple::from(found).minus(truth.into()).amax();
+        let away = |found: PhasePoint<N>, truth: PhasePoint<N>| ChartVector::from(found).minus(truth.into()).amax();
         let mut put = |i: usize, error: Option<f64>, floor: f64| {
             if let Some(error) = error.filter(|e: &f64| e.is_finite()) {
                 rows[i].push(Row { h, error, floor });
@@ -168,7 +168,7 @@ fn raise_floors(rows: &mut [Row]) {
     if slope < FLAT {
         let slope = slope.clamp(-1.0, 0.0);
         let level = seen.iter().map(|(h, e)| e.ln() - slope * h.ln()).sum::<f64>() / seen.len() as f64;
-        rows.iter_mut().for_each(|r| r.floor = larger(r.floor, (level + slope * r.h.ln()).exp()));
+        rows.iter_mut().for_each(|r| r.floor = max_or_nan(r.floor, (level + slope * r.h.ln()).exp()));
     }
 }
 
@@ -203,8 +203,8 @@ mod tests {
     use discrete_herglotz::{Midpoint, StepError};
 
     /// The midpoint rule by its value alone: its momenta and steps are differences that lose digits like `1/h`.
-    struct ValueOnly<'a>(Midpoint<&'a CoupledInZ>);
-    impl DiscreteLagrangian<1> for ValueOnly<'_> {
+    struct WithoutClosedDerivatives<'a>(Midpoint<&'a CoupledInZ>);
+    impl DiscreteLagrangian<1> for WithoutClosedDerivatives<'_> {
         fn step_size(&self) -> f64 {
             DiscreteLagrangian::<1>::step_size(&self.0)
         }
@@ -219,8 +219,10 @@ mod tests {
     fn a_plateau_is_no_order() {
         let system = CoupledInZ::default();
         let x = VelocityPoint::new([0.8], [-0.6], 0.4);
-        let of =
-            |largest| error_orders(&system, |h| Midpoint::new(&system, h).map(ValueOnly), 0.0, &x, largest).unwrap();
+        let of = |max_abs_or_nan| {
+            error_orders(&system, |h| Midpoint::new(&system, h).map(WithoutClosedDerivatives), 0.0, &x, max_abs_or_nan)
+                .unwrap()
+        };
         let orders = of(0.25);
         for (what, found, expected) in [
             ("value", &orders.value, 3.0),
@@ -230,11 +232,11 @@ mod tests {
         ] {
             assert!(found.order.is(expected, 0.15), "{what}: {:?} from {:?}", found.order, found.fitted);
         }
-        for largest in [1e-3, 1e-6, 1e-9] {
-            let orders = of(largest);
+        for max_abs_or_nan in [1e-3, 1e-6, 1e-9] {
+            let orders = of(max_abs_or_nan);
             for (found, expected) in [(&orders.value, 3.0), (&orders.legendre_minus, 2.0), (&orders.flow, 3.0)] {
                 let told = matches!(found.order, Order::Exact | Order::Unclear) || found.order.is(expected, 0.3);
-                assert!(told, "{largest}: {:?} from {:?}", found.order, found.fitted);
+                assert!(told, "{max_abs_or_nan}: {:?} from {:?}", found.order, found.fitted);
             }
         }
     }

@@ -1,39 +1,40 @@
 //! The tables of the README are those that the code makes.
 
 use contact_geom::systems::{Pendulum, System, SystemVisitor, catalogue_size, visit_catalogue};
-use discrete_herglotz::{AnyIntegrator, Facts, Integrator};
+use discrete_herglotz::{AnyIntegrator, Integrator, MethodInfo};
 
 /// The integrators by name, those of one kind in one line: order, what a step solves, its `sigma_d` for a linear drag, and how many of the
 /// catalogue's systems meet the hypotheses.
 fn integrators() -> String {
-    let mut kinds: Vec<(Facts, Vec<AnyIntegrator>)> = Vec::new();
+    let mut kinds: Vec<(MethodInfo, Vec<AnyIntegrator>)> = Vec::new();
     for integrator in AnyIntegrator::all() {
-        let facts = facts(&integrator);
-        let same = |other: &Facts| {
-            let of =
-                |f: &Facts| (f.explicit, f.symmetric, f.exact_rate, f.by_clock, f.substeps, f.collocation.is_some());
-            let of_any_order = facts.collocation.is_some() || facts.substeps && !facts.explicit;
-            of(other) == of(&facts) && (of_any_order || other.order == facts.order)
+        let info = info(&integrator);
+        let same = |other: &MethodInfo| {
+            let of = |f: &MethodInfo| {
+                (f.explicit, f.symmetric, f.exact_rate, f.in_transformed_time, f.substeps, f.collocation.is_some())
+            };
+            let of_any_order = info.collocation.is_some() || info.substeps && !info.explicit;
+            of(other) == of(&info) && (of_any_order || other.order == info.order)
         };
         match kinds.iter_mut().find(|(of_kind, _)| same(of_kind)) {
             Some((_, kind)) => kind.push(integrator),
-            None => kinds.push((facts, vec![integrator])),
+            None => kinds.push((info, vec![integrator])),
         }
     }
     let mut table = format!(
         "| Name | Order | Step | `sigma_d` of a linear drag | Takes, of {} systems |\n|---|---|---|---|---|\n",
         catalogue_size()
     );
-    for (facts, kind) in &kinds {
+    for (info, kind) in &kinds {
         let names: Vec<String> = kind.iter().map(|integrator| format!("`{integrator}`")).collect();
         let last = kind.last().map_or(0, |integrator| integrator.order());
-        let names = match (facts.collocation, names.as_slice()) {
+        let names = match (info.collocation, names.as_slice()) {
             (Some(_), [first, .., last_name]) => format!("{first} .. {last_name}"),
             _ => names.join(", "),
         };
-        let order = if last == facts.order { last.to_string() } else { format!("{} .. {last}", facts.order) };
-        let step = if facts.explicit { "explicit" } else { "implicit" };
-        let rate = if facts.exact_rate { "`e^(gamma h)`" } else { "to the order" };
+        let order = if last == info.order { last.to_string() } else { format!("{} .. {last}", info.order) };
+        let step = if info.explicit { "explicit" } else { "implicit" };
+        let rate = if info.exact_rate { "`e^(gamma h)`" } else { "to the order" };
         let taken = kind.first().map_or(0, taken);
         table += &format!("| {names} | {order} | {step} | {rate} | {taken} |\n");
     }
@@ -53,8 +54,8 @@ fn systems() -> String {
     names.0.join(", ") + "\n"
 }
 
-fn facts(integrator: &AnyIntegrator) -> Facts {
-    Integrator::<'_, Pendulum, 1>::facts(integrator)
+fn info(integrator: &AnyIntegrator) -> MethodInfo {
+    Integrator::<'_, Pendulum, 1>::info(integrator)
 }
 
 /// How many systems of the catalogue meet the hypotheses of an integrator.

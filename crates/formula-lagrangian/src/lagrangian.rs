@@ -4,7 +4,7 @@ use crate::derived::Derived;
 use crate::evaluation::{At, whole, whole_vector};
 use crate::{Formula, FormulaError};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Hessian, Lagrangian, Scalar, Structure, Symmetry, Triple, VelocityPoint};
+use contact_geom::{ChartVector, Hessian, Lagrangian, Scalar, Structure, Symmetry, VelocityPoint};
 
 /// A [`Formula`] over `N` coordinates as a [`Lagrangian`], with its gradient and its second derivatives in closed form and with its
 /// structure proved. All formulas of one dimension are one type: integrators are compiled for it once.
@@ -109,15 +109,15 @@ impl<const N: usize> FormulaLagrangian<N> {
 
 /// What results are written to.
 #[inline(always)]
-fn blank<T: Scalar, const N: usize>() -> Triple<N, T> {
+fn blank<T: Scalar, const N: usize>() -> ChartVector<N, T> {
     let zero = SVector::from_fn(|_, _| T::zero());
-    Triple { x: zero, y: zero, z: T::zero() }
+    ChartVector { x: zero, y: zero, z: T::zero() }
 }
 
 /// See [`whole`].
 #[inline(always)]
-fn whole_triple<T: Scalar, const N: usize>(g: &Triple<N, T>) -> Triple<N, T> {
-    Triple { x: whole_vector(&g.x), y: whole_vector(&g.y), z: whole(g.z) }
+fn whole_triple<T: Scalar, const N: usize>(g: &ChartVector<N, T>) -> ChartVector<N, T> {
+    ChartVector { x: whole_vector(&g.x), y: whole_vector(&g.y), z: whole(g.z) }
 }
 
 impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
@@ -133,7 +133,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     }
 
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
         let mut g = blank::<T, N>();
         let results = &mut [g.x.as_mut_slice(), g.y.as_mut_slice(), std::slice::from_mut(&mut g.z)];
         self.derived.gradient.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), results);
@@ -141,7 +141,7 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     }
 
     #[inline(always)]
-    fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, Triple<N, T>)> {
+    fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, ChartVector<N, T>)> {
         let (mut g, mut value) = (blank::<T, N>(), T::zero());
         let (z, value_slice) = (std::slice::from_mut(&mut g.z), std::slice::from_mut(&mut value));
         let results = &mut [g.x.as_mut_slice(), g.y.as_mut_slice(), z, value_slice];

@@ -34,7 +34,7 @@ fn gauss_steps_of_any_number_of_stages_are_those_of_the_type() {
         let problem = Problem::new(lagrangian, 0.0, start).unwrap();
         let run = problem.by(GaussCollocation { stages }).steps(Steps::Size(0.25));
         let outcome = run.run(Until::Time(20.0)).unwrap();
-        assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
+        assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None));
         [outcome.q[0], outcome.p[0], outcome.z.unwrap()]
     }
     let pendulum = Formula::parse("theta'^2/2 - versine(theta) + gamma*z", &["theta"], &[("gamma", -0.1)]).unwrap();

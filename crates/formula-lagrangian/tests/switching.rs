@@ -45,7 +45,7 @@ fn accuracy_holds_across_kinks_and_jumps() {
             let found = by_accuracy(text, start, span, wanted);
             let off = (found.q[0] - x).hypot(found.p[0] - v) / x.hypot(v);
             assert!(off <= wanted, "{text} to {wanted:e}: {off:e} in {} steps", found.steps);
-            assert_eq!((found.status, found.suspicion), (Status::Completed, None), "{text}");
+            assert_eq!((found.status, found.unresolved), (Status::Completed, None), "{text}");
         }
     }
 }
@@ -61,7 +61,7 @@ fn given_steps_end_on_kinks_and_jumps() {
             let found = by_steps(text, start, span, by, (per_unit * span).ceil() as usize);
             let off = (found.q[0] - x).hypot(found.p[0] - v);
             assert!(off <= bound, "{text} by {by}: {off:e}");
-            assert_eq!((found.status, found.suspicion), (Status::Completed, None), "{text} by {by}");
+            assert_eq!((found.status, found.unresolved), (Status::Completed, None), "{text} by {by}");
         }
     }
 }

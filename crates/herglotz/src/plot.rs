@@ -16,7 +16,7 @@ const IN_A_ROW: usize = 3;
 
 /// The families of integrators, with the number of those that are drawn of each in a comparison.
 const FAMILIES: [(&str, usize); 5] =
-    [("gauss_", 3), ("clocked_gauss_", 2), ("midpoint_by_", 2), ("rules", 2), ("splittings", 3)];
+    [("gauss_", 3), ("transformed_gauss_", 2), ("midpoint_by_", 2), ("rules", 2), ("splittings", 3)];
 
 /// The discrete Lagrangians by a quadrature rule.
 const RULES: [&str; 4] = ["rectangle", "left_midpoint", "midpoint", "trapezoidal"];
@@ -270,11 +270,11 @@ pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String
     let stride = rows.len().div_ceil(PROFILES).max(1);
     let chosen: Vec<&Vec<f64>> = rows.iter().step_by(stride).collect();
     let sizes = chosen.iter().flat_map(|row| (0..length).filter_map(|i| value(row, i))).map(|(_, x)| x.abs());
-    let largest = sizes.fold(0.0, f64::max);
+    let max_abs_or_nan = sizes.fold(0.0, f64::max);
     let times: Vec<f64> = chosen.iter().filter_map(|row| row.first().copied()).collect();
-    if let ([start, .., end], true) = (times.as_slice(), largest > 0.0 && largest.is_finite()) {
+    if let ([start, .., end], true) = (times.as_slice(), max_abs_or_nan > 0.0 && max_abs_or_nan.is_finite()) {
         // The largest value has the height of two and a half of the distances of curves.
-        let height = 2.5 * (end - start) / (times.len() - 1) as f64 / largest;
+        let height = 2.5 * (end - start) / (times.len() - 1) as f64 / max_abs_or_nan;
         let every = length.div_ceil(PLACES).max(1);
         let curves: Vec<Curve> = chosen
             .iter()

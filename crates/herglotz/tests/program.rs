@@ -174,7 +174,7 @@ fn sweeps_do_not_depend_on_threads() {
     let terminal = OSCILLATOR.replace("\"rising\" }", "\"falling\", terminal = true }");
     let file = at.write("terminal.toml", &terminal);
     let said = succeed(&["sweep", &file, "--out", &at.path("terminal")]);
-    assert!(said.starts_with("6 members: 0 completed (0 suspicious), 0 failed, 6 stopped by an event"), "{said}");
+    assert!(said.starts_with("6 members: 0 completed (0 unresolved), 0 failed, 6 stopped by an event"), "{said}");
     // The reason has a comma.
     let table = at.read("terminal/sweep.csv").replace(", in step", " in step");
     for (gamma, t) in column(&table, "gamma").iter().zip(column(&table, "t")) {

@@ -7,7 +7,7 @@ mod random;
 
 use herglotz::{Scene, SceneError};
 use random::Random;
-use runtime_herglotz::{Rate, When};
+use runtime_herglotz::{InitialVelocity, OutputTimes};
 
 const GOOD: &str = r#"[system]
 coordinates = ["theta"]
@@ -116,7 +116,7 @@ const BAD: [(&str, &str); 57] = [
     ("count = 101", "count = 101, spacing = \"log\""),
     ("[system]", "version = 2\nnew = \"thing\"\n[system]"),
     // What the system does not let be done.
-    ("accuracy = 1e-10", "integrator = \"clocked_gauss_8\"\nstep = 0.1"),
+    ("accuracy = 1e-10", "integrator = \"transformed_gauss_8\"\nstep = 0.1"),
 ];
 
 /// What no splitting can run.
@@ -191,7 +191,7 @@ fn a_scene_is_what_it_says() {
     let scene = read(GOOD).unwrap();
     let motion = scene.motion();
     assert_eq!((motion.end, motion.start.q.as_slice(), scene.members().count()), (100.0, [1.0].as_slice(), 101));
-    let Some(When::At(times)) = &motion.rows else { panic!("{:?}", motion.rows) };
+    let Some(OutputTimes::At(times)) = &motion.rows else { panic!("{:?}", motion.rows) };
     assert_eq!((times.len(), times[0], times[1000]), (1001, 0.0, 100.0));
     assert_eq!(scene.columns[5].0, "exp(-0.1*t)*theta");
     let named = GOOD.replace("exp(-0.1*t)*theta", "growth = exp(-0.1*t); scaled = growth*theta");
@@ -201,14 +201,14 @@ fn a_scene_is_what_it_says() {
     let motion = scene.motion();
     assert_eq!((motion.start.t, motion.start.z, motion.end), (2.0, 0.125, -1.0));
     assert_eq!(motion.start.q, [1.0, 2.5, 0.5]);
-    assert_eq!(motion.start.rate, Rate::Momentum(vec![0.25, -1.0, 3.0]));
+    assert_eq!(motion.start.rate, InitialVelocity::Momentum(vec![0.25, -1.0, 3.0]));
     let (members, close) = (scene.members(), |a: f64, b: f64| (a - b).abs() < 1e-12 * b.abs());
     assert_eq!(members.count(), 6);
     // The last one changes first.
     assert_eq!((members.values(0), members.values(2), members.values(3)[0]), (vec![1.0, 1.0], vec![1.0, 100.0], 2.0));
     assert!(close(members.values(4)[1], 10.0), "{:?}", members.values(4));
     let start = members.start(5);
-    assert_eq!((start.q[2], start.rate), (2.0, Rate::Momentum(vec![0.25, 100.0, 3.0])));
+    assert_eq!((start.q[2], start.rate), (2.0, InitialVelocity::Momentum(vec![0.25, 100.0, 3.0])));
 }
 
 #[test]

@@ -2,12 +2,12 @@
 
     python benchmarks/against_heyoka.py [WHEEL]
 
-Needs heyoka beside herglotz. The motions are (T is the end, z is carried along):
+OutputRequest heyoka beside herglotz. The motions are (T is the end, z is carried along):
 
     P2   v^2/2 - 1 + cos q - 0.01 z      q = 1, v = 1   T = 1000
     P6   v^2/2 - q^2/2 - 0.05 z^2        q = 1, v = 0, z = 1   T = 100
 
-Cold is the time from the definition to the end of the first run, once by an accuracy, which is found by pilot runs, and once by given
+Cold is the time from the definition to the end of the first run, once by an accuracy, which is found by trial_runs runs, and once by given
 steps that reach it. Warm is the cheapest way to an error of (q, v) at the end, relative to its size there: of both a list of settings is run. The reference
 is heyoka's with its smallest tolerance.
 """

@@ -6,7 +6,8 @@ use crate::signals::Signals;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use runtime_herglotz::{
-    AnyIntegrator, Assembled, AssembledMotion, Bodies, Boundary, Lattice, Rate, RuntimeError, Start, Steps, When,
+    AnyIntegrator, Assembled, AssembledMotion, Bodies, Boundary, InitialVelocity, Lattice, OutputTimes, RuntimeError,
+    Start, Steps,
 };
 
 /// What is asked of a motion: q0, v0 or p0 without their shape and whether it is p0, z0; t; every; integrator, step, steps; and whether the
@@ -58,7 +59,11 @@ fn run(
     system: impl Send + FnOnce() -> Result<Assembled, RuntimeError>,
 ) -> PyResult<Record> {
     let ((q, rate, is_momentum, z), t, every, (integrator, step, steps), conformal_factor) = request;
-    let rate = if is_momentum { Rate::Momentum(numbers("p0", &rate)?) } else { Rate::Velocity(numbers("v0", &rate)?) };
+    let rate = if is_momentum {
+        InitialVelocity::Momentum(numbers("p0", &rate)?)
+    } else {
+        InitialVelocity::Velocity(numbers("v0", &rate)?)
+    };
     let times = crate::motion::times(&t)?;
     let (Some(&first), Some(&end)) = (times.first(), times.last()) else { return Err(value_error("`t` is empty")) };
     let by: AnyIntegrator = integrator.parse().map_err(value_error)?;
@@ -73,7 +78,7 @@ fn run(
         }
     };
     let start = Start { t: first, q: numbers("q0", &q)?, rate, z: number("z0", &z)? };
-    let rows = every.map_or(When::At(times), When::Every);
+    let rows = every.map_or(OutputTimes::At(times), OutputTimes::Every);
     let motion = AssembledMotion { rows, conformal_factor, ..AssembledMotion::new(start, end, by, steps) };
     let (kept, outcome) = py
         .detach(move || {

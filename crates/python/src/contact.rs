@@ -2,7 +2,7 @@
 
 use crate::arrays::{matrix, number, numbers, value_error, vector};
 use contact_geom::nalgebra::{DMatrix, SVector};
-use contact_geom::{Darboux, Dual, Triple, conformality_with_jacobian};
+use contact_geom::{ChartVector, Darboux, Dual, conformality_with_jacobian};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use runtime_herglotz::Formula;
@@ -45,7 +45,7 @@ pub fn conformality(
         ($($n:literal)*) => {
             match n {
                 $($n => {
-                    let triple = |x: &[f64]| Triple::<$n>::from_fn(|i| x.get(i).copied().unwrap_or(f64::NAN));
+                    let triple = |x: &[f64]| ChartVector::<$n>::from_fn(|i| x.get(i).copied().unwrap_or(f64::NAN));
                     let (from, to) = (triple(&point), triple(&image));
                     conformality_with_jacobian(&Darboux, &Darboux, &from, &to, &jacobian)
                         .map(|found| (found.sigma, found.defect))

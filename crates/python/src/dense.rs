@@ -5,7 +5,7 @@ use crate::motion::{Motion, columns};
 use crate::signals::Signals;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use runtime_herglotz::{AnyIntegrator, Column, Rate, Start, Steps, Watch, Way, When};
+use runtime_herglotz::{AnyIntegrator, Column, InitialVelocity, OutputTimes, RunMonitor, Start, StepControl, Steps};
 use std::ops::ControlFlow;
 
 /// The ends of a motion's steps.
@@ -26,7 +26,7 @@ struct Keeps {
     signals: Signals,
 }
 
-impl Watch for Keeps {
+impl RunMonitor for Keeps {
     fn node(&mut self, t: f64, [q, v, p]: [&[f64]; 3], z: f64) {
         if self.done {
             return;
@@ -67,13 +67,13 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
     let by = py.detach(|| {
         let plan = motion.system.plan(&motion.motion)?;
         let by = match motion.motion.way {
-            Way::Steps { by, .. } | Way::Accuracy { by: Some(by), .. } => Ok(by),
-            Way::Accuracy { by: None, .. } => plan.integrator.name.parse::<AnyIntegrator>(),
+            StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => Ok(by),
+            StepControl::Accuracy { by: None, .. } => plan.integrator.name.parse::<AnyIntegrator>(),
         };
         let Ok(by) = by else { return Ok(None) };
         let again = runtime_herglotz::Motion {
             // Of a motion that ends where it starts there is no step.
-            way: Way::Steps { by, steps: Steps::Count(plan.steps.max(1)) },
+            way: StepControl::Steps { by, steps: Steps::Count(plan.steps.max(1)) },
             rows: None,
             columns: Vec::new(),
             events: Vec::new(),
@@ -98,10 +98,15 @@ impl Dense {
         let (n, Nodes { t, q, v, p, z }) = (self.system.dimension(), &self.nodes);
         let part = |x: &[f64]| x.get(k * n..(k + 1) * n).unwrap_or_default().to_vec();
         let at = |x: &[f64], k: usize| x.get(k).copied().unwrap_or(f64::NAN);
-        let start = Start { t: at(t, k), q: part(q), rate: Rate::MomentumNear { p: part(p), v: part(v) }, z: at(z, k) };
-        let way = Way::Steps { by: self.by, steps: Steps::Count(1) };
+        let start = Start {
+            t: at(t, k),
+            q: part(q),
+            rate: InitialVelocity::MomentumNear { p: part(p), v: part(v) },
+            z: at(z, k),
+        };
+        let way = StepControl::Steps { by: self.by, steps: Steps::Count(1) };
         let motion = runtime_herglotz::Motion {
-            rows: Some(When::At(times)),
+            rows: Some(OutputTimes::At(times)),
             columns: all.to_vec(),
             ..runtime_herglotz::Motion::new(start, t.get(k + 1).copied().unwrap_or(self.until), way)
         };

@@ -7,8 +7,8 @@ use crate::system::System;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use runtime_herglotz::{
-    Column, Crossing, Ensemble, EnsembleWatch, INTERRUPTION, Interrupt, MemberEnd, Rate, Start, Status, Tally, Varied,
-    When, in_words,
+    Column, Crossing, Ensemble, EnsembleMonitor, INTERRUPTION, InitialVelocity, Interrupt, MemberEnd, OutputTimes,
+    Start, Status, Tally, Varied, in_words,
 };
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -58,17 +58,17 @@ impl Kept {
     }
 }
 
-impl EnsembleWatch for Kept {
+impl EnsembleMonitor for Kept {
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()> {
         let MemberEnd { index, ending, rows, crossings } = member;
         self.crossings.extend(crossings.into_iter().map(|crossing| (index, crossing)));
         let trouble = match &ending {
             Err(cause) => Some(in_words(cause)),
-            Ok(end) => match (&end.status, &end.suspicion) {
+            Ok(end) => match (&end.status, &end.unresolved) {
                 (Status::Stopped { by: INTERRUPTION, t, .. }, _) => Some(format!("interrupted at t = {t}")),
                 // A terminal event is what was asked for.
-                (Status::Completed | Status::Stopped { .. }, suspicion) => {
-                    suspicion.map(|suspicion| suspicion.to_string())
+                (Status::Completed | Status::Stopped { .. }, unresolved) => {
+                    unresolved.map(|unresolved| unresolved.to_string())
                 }
                 (status, _) => Some(status.to_string()),
             },
@@ -126,7 +126,7 @@ pub struct EnsembleRecord {
     crossings: Vec<Found>,
     /// The times of the rows.
     times: Option<Py<PyArray1<f64>>>,
-    in_lanes: usize,
+    batch_kernel: usize,
     /// What a signal's handler has raised.
     interrupted: Option<Py<PyAny>>,
 }
@@ -194,7 +194,8 @@ pub fn run_ensemble(
     };
     let start = |i: usize| {
         let part = |x: &[f64]| x.get(i * n..(i + 1) * n).unwrap_or_default().to_vec();
-        let rate = if is_momentum { Rate::Momentum(part(&rate)) } else { Rate::Velocity(part(&rate)) };
+        let rate =
+            if is_momentum { InitialVelocity::Momentum(part(&rate)) } else { InitialVelocity::Velocity(part(&rate)) };
         Start { t: t0, q: part(&q), rate, z: z.get(i).copied().unwrap_or(f64::NAN) }
     };
     let of_member = |i: usize| varied.iter().map(|all| all.get(i).copied().unwrap_or(f64::NAN)).collect();
@@ -208,7 +209,7 @@ pub fn run_ensemble(
             varied: (!names.is_empty()).then_some(Varied { names: &names, values: &of_member }),
             end,
             way,
-            rows: rows.clone().map(When::At),
+            rows: rows.clone().map(OutputTimes::At),
             columns: &columns,
             events: &events,
             threads,
@@ -237,7 +238,7 @@ pub fn run_ensemble(
         troubles: kept.troubles,
         crossings: kept.crossings.into_iter().map(|(i, c)| (i, c.event, c.t, c.q, c.v, c.p, c.z)).collect(),
         times: rows.map(|rows| vector(py, rows)),
-        in_lanes: tally.in_lanes,
+        batch_kernel: tally.batch_kernel,
         interrupted: raised.map(|raised| raised.into_value(py).into_any()),
     })
 }

@@ -75,7 +75,8 @@ fn catalogue() -> Vec<Entry> {
 /// The names of all integrators that take formulas, which have no clock, with their orders.
 #[pyfunction]
 fn integrators() -> Vec<(String, u32)> {
-    let all =
-        AnyIntegrator::all().into_iter().filter(|integrator| !matches!(integrator, AnyIntegrator::Clocked { .. }));
+    let all = AnyIntegrator::all()
+        .into_iter()
+        .filter(|integrator| !matches!(integrator, AnyIntegrator::TransformedGauss { .. }));
     all.map(|integrator| (integrator.to_string(), integrator.order())).collect()
 }

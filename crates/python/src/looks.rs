@@ -59,7 +59,7 @@ pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyRes
         (place.t, place.sigma, place.log_factor, place.contact_defect, place.herglotz_defect, momenta)
     };
     let places = found.places.into_iter().map(place).collect();
-    let stated = |s: runtime_herglotz::Stated| (s.statement.to_string(), s.method, s.residual);
+    let stated = |s: runtime_herglotz::StatementResidual| (s.statement.to_string(), s.method, s.residual);
     let statements = found.statements.into_iter().map(stated).collect();
     Ok((found.integrator, found.step_size, places, statements, is_contact))
 }

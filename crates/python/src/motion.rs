@@ -4,7 +4,9 @@ use crate::arrays::{number, numbers, shown, value_error, whole, word};
 use crate::signals::Signals;
 use crate::system::System;
 use pyo3::prelude::*;
-use runtime_herglotz::{AnyIntegrator, Column, Direction, Event, Formula, Rate, Start, Steps, Way, When};
+use runtime_herglotz::{
+    AnyIntegrator, Column, Direction, Event, Formula, InitialVelocity, OutputTimes, Start, StepControl, Steps,
+};
 
 /// A motion that is asked for, read from the arguments of `solve`.
 #[pyclass(frozen, module = "herglotz._core")]
@@ -24,7 +26,7 @@ type GivenStart<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, bool, Bound<'py, P
 pub type GivenWay<'py> = [Option<Bound<'py, PyAny>>; 4];
 
 /// The way that arguments say.
-pub fn way([accuracy, integrator, step, steps]: &GivenWay<'_>) -> PyResult<Way> {
+pub fn way([accuracy, integrator, step, steps]: &GivenWay<'_>) -> PyResult<StepControl> {
     /// What is computed to where nothing is said.
     const ACCURACY: f64 = 1e-9;
     let named = |name: &Bound<'_, PyAny>| -> PyResult<AnyIntegrator> {
@@ -42,9 +44,9 @@ pub fn way([accuracy, integrator, step, steps]: &GivenWay<'_>) -> PyResult<Way> 
             Err(value_error("`accuracy` is given beside a step: give the accuracy, or the step with an integrator"))
         }
         (Some(_), None, None) => Err(value_error("a step is given without `integrator`: name one, as \"gauss_8\"")),
-        (Some(steps), Some(by), None) => Ok(Way::Steps { by, steps }),
-        (None, by, None) => Ok(Way::Accuracy { wanted: ACCURACY, by }),
-        (None, by, Some(accuracy)) => Ok(Way::Accuracy { wanted: number("accuracy", accuracy)?, by }),
+        (Some(steps), Some(by), None) => Ok(StepControl::Steps { by, steps }),
+        (None, by, None) => Ok(StepControl::Accuracy { wanted: ACCURACY, by }),
+        (None, by, Some(accuracy)) => Ok(StepControl::Accuracy { wanted: number("accuracy", accuracy)?, by }),
     }
 }
 
@@ -131,18 +133,21 @@ impl Motion {
         let formula = system.inner.formula();
         let (q, rate, is_momentum, z, near) = start;
         let q = numbers("q0", &q)?;
-        let rate =
-            if is_momentum { Rate::Momentum(numbers("p0", &rate)?) } else { Rate::Velocity(numbers("v0", &rate)?) };
+        let rate = if is_momentum {
+            InitialVelocity::Momentum(numbers("p0", &rate)?)
+        } else {
+            InitialVelocity::Velocity(numbers("v0", &rate)?)
+        };
         // The velocity of a motion that goes on.
         let rate = match (rate, near) {
-            (Rate::Momentum(p), Some(v)) if v.len() == p.len() && v.iter().all(|v| v.is_finite()) => {
-                Rate::MomentumNear { p, v }
+            (InitialVelocity::Momentum(p), Some(v)) if v.len() == p.len() && v.iter().all(|v| v.is_finite()) => {
+                InitialVelocity::MomentumNear { p, v }
             }
             (rate, _) => rate,
         };
         let length = match &rate {
-            Rate::Velocity(v) => ("v0", v.len()),
-            Rate::Momentum(p) | Rate::MomentumNear { p, .. } => ("p0", p.len()),
+            InitialVelocity::Velocity(v) => ("v0", v.len()),
+            InitialVelocity::Momentum(p) | InitialVelocity::MomentumNear { p, .. } => ("p0", p.len()),
         };
         let expected = formula.dimension();
         for (what, found) in [("q0", q.len()), length] {
@@ -163,7 +168,7 @@ impl Motion {
         } else {
             times
         };
-        let rows = Some(every.map_or(When::At(times), When::Every));
+        let rows = Some(every.map_or(OutputTimes::At(times), OutputTimes::Every));
         let way = self::way(&way)?;
         let mut all = self::columns(expected, conformal_factor);
         for text in &columns {

@@ -19,7 +19,7 @@ pub struct PathRecord {
     log_factor: f64,
     regularity: f64,
     error_estimate: Option<f64>,
-    suspicion: Option<String>,
+    unresolved: Option<String>,
     iterations: u32,
 }
 
@@ -66,7 +66,7 @@ pub fn search_path(
         log_factor,
         regularity,
         error_estimate,
-        suspicion: found.suspicion.map(|suspicion| suspicion.to_string()),
+        unresolved: found.unresolved.map(|unresolved| unresolved.to_string()),
         iterations,
     })
 }

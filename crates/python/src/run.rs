@@ -6,7 +6,8 @@ use crate::signals::Signals;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use runtime_herglotz::{
-    Crossing, INTERRUPTION, InputError, Interrupted, Outcome, Rate, RuntimeError, Status, Watch, When,
+    Crossing, INTERRUPTION, InitialVelocity, InputError, Outcome, OutputTimes, ResumeState, RunMonitor, RuntimeError,
+    Status,
 };
 use std::ops::ControlFlow;
 
@@ -29,10 +30,10 @@ pub struct Kept {
     /// What a signal's handler has raised.
     raised: Option<PyErr>,
     /// Where a signal has ended it.
-    halted: Option<Interrupted>,
+    halted: Option<ResumeState>,
 }
 
-impl Watch for Kept {
+impl RunMonitor for Kept {
     fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
         let n = self.n;
         let mut rest = numbers;
@@ -63,7 +64,7 @@ impl Watch for Kept {
         self.signals.look()
     }
 
-    fn interrupted(&mut self, at: Interrupted) {
+    fn interrupted(&mut self, at: ResumeState) {
         self.halted = Some(at);
     }
 }
@@ -91,7 +92,7 @@ pub struct Record {
     end: End,
     status: String,
     success: bool,
-    suspicion: Option<String>,
+    unresolved: Option<String>,
     error_estimate: Option<f64>,
     steps: usize,
     evaluations: u64,
@@ -112,8 +113,8 @@ pub fn run(py: Python<'_>, motion: &Motion) -> PyResult<Record> {
 #[pyfunction]
 pub fn resume(py: Python<'_>, motion: &Motion, halted: &[u8], at: f64) -> PyResult<Record> {
     let (mut kept, mut request) = (Kept::of(motion), motion.motion.clone());
-    let from = Interrupted::from_bytes(halted).map_err(value_error)?;
-    if let Some(When::At(times)) = &mut request.rows {
+    let from = ResumeState::from_bytes(halted).map_err(value_error)?;
+    if let Some(OutputTimes::At(times)) = &mut request.rows {
         let onward = request.end >= request.start.t;
         times.retain(|t| if onward { *t > at } else { *t < at });
     }
@@ -133,20 +134,20 @@ fn whole(motion: &Motion, outcome: Result<Outcome, RuntimeError>) -> PyResult<Ou
 fn nothing_yet(motion: &Motion) -> Outcome {
     let start = &motion.motion.start;
     let p = match &start.rate {
-        Rate::Momentum(p) | Rate::MomentumNear { p, .. } => Some(p.clone()),
-        Rate::Velocity(_) => motion.system.geometry(start).ok().map(|geometry| geometry.momentum),
+        InitialVelocity::Momentum(p) | InitialVelocity::MomentumNear { p, .. } => Some(p.clone()),
+        InitialVelocity::Velocity(_) => motion.system.geometry(start).ok().map(|geometry| geometry.momentum),
     };
     Outcome {
         status: Status::Stopped { step: 0, t: start.t, by: INTERRUPTION },
-        suspicion: None,
+        unresolved: None,
         steps: 0,
         t: start.t,
         q: start.q.clone(),
         p: p.unwrap_or_else(|| vec![f64::NAN; start.q.len()]),
         // Where the momentum has several velocities, the one that the motion begins with.
         v: match &start.rate {
-            Rate::Velocity(v) | Rate::MomentumNear { v, .. } => Some(v.clone()),
-            Rate::Momentum(_) => None,
+            InitialVelocity::Velocity(v) | InitialVelocity::MomentumNear { v, .. } => Some(v.clone()),
+            InitialVelocity::Momentum(_) => None,
         },
         z: Some(start.z),
         log_factor: None,
@@ -207,7 +208,7 @@ pub fn record(py: Python<'_>, mut kept: Kept, outcome: Outcome) -> PyResult<Reco
         status: outcome.status.to_string(),
         // A terminal event is what was asked for.
         success: matches!(outcome.status, Status::Completed | Status::Stopped { .. }) && kept.raised.is_none(),
-        suspicion: outcome.suspicion.map(|suspicion| suspicion.to_string()),
+        unresolved: outcome.unresolved.map(|unresolved| unresolved.to_string()),
         error_estimate: outcome.error_estimate,
         steps: outcome.steps,
         evaluations: outcome.evaluations,

@@ -125,7 +125,7 @@ def test_what_is_wrong_is_said_with_the_argument():
 
 def test_ctrl_c_ends_a_run_and_keeps_what_was_computed():
     threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT)).start()
-    with pytest.raises(hz.Interrupted) as caught:
+    with pytest.raises(hz.ResumeState) as caught:
         # Some minutes.
         hz.lattice(SITE, BOND, np.zeros(10000), 1.0, 1e6, step=0.1, every=1000, parameters={"gamma": -1e-9})
     sol = pickle.loads(pickle.dumps(caught.value)).solution

@@ -30,7 +30,7 @@ def press(after):
 def test_ctrl_c_ends_a_run_and_keeps_what_was_computed():
     press(0.4)
     begin = time.monotonic()
-    with pytest.raises(hz.Interrupted) as caught:
+    with pytest.raises(hz.ResumeState) as caught:
         hz.solve(PENDULUM, [1.0], [0.0], 1e7, every=1_000_000, **LONG)
     assert time.monotonic() - begin < 5
     assert isinstance(caught.value, KeyboardInterrupt)
@@ -59,7 +59,7 @@ def test_an_interrupted_run_goes_on_to_the_last_bit():
 
     whole = asked()
     press(0.5)
-    with pytest.raises(hz.Interrupted) as caught:
+    with pytest.raises(hz.ResumeState) as caught:
         asked()
     first = pickle.loads(pickle.dumps(caught.value)).solution
     rest = first.resume()
@@ -132,11 +132,11 @@ WEAK = dict(coordinates=["theta"], parameters={"gamma": -1e-9})
 
 
 def test_ctrl_c_is_heard_in_trial_runs():
-    caught = heard_within(2.0, lambda: hz.solve(**COSTLY), hz.Interrupted)
+    caught = heard_within(2.0, lambda: hz.solve(**COSTLY), hz.ResumeState)
     sol = caught.solution
     assert not sol.success and sol.t_end == 0.0 and sol.steps == 0 and len(sol.t) == 0
     # What was asked for begins anew.
-    rest = heard_within(2.0, sol.resume, hz.Interrupted)
+    rest = heard_within(2.0, sol.resume, hz.ResumeState)
     assert rest.solution.t_end == 0.0
 
 
@@ -166,7 +166,7 @@ def test_ctrl_c_is_heard_in_an_estimate():
     first = time.monotonic() - begin
     after = 1.3 * first
     caught = heard_within(
-        after + 0.5 * first, lambda: hz.solve(PENDULUM, [1.0], [0.0], 5e4, estimate=True, **asked), hz.Interrupted, after
+        after + 0.5 * first, lambda: hz.solve(PENDULUM, [1.0], [0.0], 5e4, estimate=True, **asked), hz.ResumeState, after
     )
     assert caught.solution.t_end == 5e4 and caught.solution.error_estimate == np.inf
 
@@ -200,7 +200,7 @@ def test_ctrl_c_is_heard_in_an_ensemble_of_long_members(integrator, events):
     asked = dict(integrator=integrator, step=1e-3, coordinates=["theta"], parameters={"gamma": -1e-9}, threads=2)
     if events:
         asked["events"] = stop
-    caught = heard_within(4.0, lambda: hz.ensemble(PENDULUM, q, v, 1e6, **asked), hz.Interrupted)
+    caught = heard_within(4.0, lambda: hz.ensemble(PENDULUM, q, v, 1e6, **asked), hz.ResumeState)
     found = caught.solution
     assert len(found) == count and not found.success[-1] and np.isnan(found.t[-1]) | (found.t[-1] < 1e6)
     assert all("interrupted" in found.troubles[i] for i in range(count) if not found.success[i])
@@ -212,7 +212,7 @@ def test_the_finished_members_are_kept():
     count = 30_000
     many = np.linspace(0.5, 1.5, count).reshape(-1, 1)
     asked = dict(integrator="gauss_2", step=1e-2, coordinates=["theta"], parameters={"gamma": -1e-3 * np.ones(count)})
-    caught = heard_within(5.0, lambda: hz.ensemble(PENDULUM, many, many, 1e2, **asked), hz.Interrupted, after=3.0)
+    caught = heard_within(5.0, lambda: hz.ensemble(PENDULUM, many, many, 1e2, **asked), hz.ResumeState, after=3.0)
     found = pickle.loads(pickle.dumps(caught)).solution
     done = int(np.sum(found.success))
     assert 0 < done < count and found.success[0]

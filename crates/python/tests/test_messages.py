@@ -69,7 +69,7 @@ SAID = {
     "observers in a list": (GOOD | dict(observe=["x^2"]), r"`observe` is \['x\^2'\].*observe=\{"),
     "an observer alone": (GOOD | dict(observe="x^2"), r"`observe` is 'x\^2'.*observe=\{"),
     "parameters in a list": (GOOD | dict(parameters=[("gamma", -0.1)]), r"`parameters` is \[.*parameters=\{"),
-    "a clock": (GOOD | dict(integrator="clocked_gauss_8", step=0.1), "functions? do not have"),
+    "a clock": (GOOD | dict(integrator="transformed_gauss_8", step=0.1), "functions? do not have"),
     "a claim": (formula("x'^2/2 + x^2*x'^2", integrator="strang", step=0.1), "not separable"),
     "too exact": (GOOD | dict(accuracy=1e-40), "is not reached.*round-off"),
     "something too fast": (
@@ -79,7 +79,7 @@ SAID = {
 }
 
 # Words of another language, or of the inside.
-FOREIGN = ["`structure`", "take a clock", "HAS_", "Stepper", "argument '", "OverflowError", "`by`", "FormulaLagrangian", "clock_rate"]
+FOREIGN = ["`structure`", "take a clock", "HAS_", "Stepper", "argument '", "OverflowError", "`by`", "FormulaLagrangian", "dt_dtau"]
 
 
 @pytest.mark.parametrize("asked, said", SAID.values(), ids=SAID)
@@ -97,7 +97,7 @@ def test_an_ensemble_says_the_same():
         (dict(threads=2.0), "`threads` is 2.0.*write 2"),
         (dict(events=hz.Event("x", -1)), 'write "falling"'),
         (dict(observe=["x"]), "`observe`"),
-        (dict(integrator="clocked_gauss_8", step=0.1), "functions? do not have"),
+        (dict(integrator="transformed_gauss_8", step=0.1), "functions? do not have"),
     ]:
         with pytest.raises(ValueError, match=said) as caught:
             hz.ensemble(**(many | change))

@@ -84,11 +84,11 @@ def test_a_path_that_is_found_says_what_it_is_worth():
     for steps in (50, 500):
         good = hz.path(q0=[0.0], q1=[1.0], t=2.0, steps=steps, integrator="midpoint", **free)
         error = np.max(np.abs(good.q[:, 0] - np.sin(good.t) / np.sin(2.0)))
-        assert good and good.suspicion is None and good.regularity > 0.0
+        assert good and good.unresolved is None and good.regularity > 0.0
         # To first order in it.
         assert 0.5 * error < good.error_estimate < 2.0 * error
         conjugate = hz.path(q0=[0.0], q1=[1.0], t=np.pi, steps=steps, integrator="midpoint", **free)
         assert np.max(np.abs(conjugate.q)) > 100.0
-        assert not conjugate or "does not resolve" in conjugate.suspicion and conjugate.error_estimate > 0.25
+        assert not conjugate or "does not resolve" in conjugate.unresolved and conjugate.error_estimate > 0.25
     # Of a higher order it is not known what the steps leave out.
     assert hz.path(q0=[0.0], q1=[1.0], t=2.0, steps=20, integrator="gauss_4", **free).error_estimate is None

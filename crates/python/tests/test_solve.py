@@ -23,7 +23,7 @@ def test_a_formula_follows_the_closed_form():
     # The size of the motion falls by e^-2.5; 1e-11 of it was asked for.
     assert np.max(np.abs(sol.q[:, 0] - x)) < 1e-11
     assert np.max(np.abs(sol.v[:, 0] - v)) < 1e-11
-    assert sol.status == "completed" and sol.success and sol.suspicion is None
+    assert sol.status == "completed" and sol.success and sol.unresolved is None
     assert sol.t_end == 50.0 and sol.steps > 0
     assert np.array_equal(sol.t, t)
     assert sol.q.shape == sol.v.shape == sol.p.shape == (501, 1) and sol.z.shape == sol.energy.shape == (501,)

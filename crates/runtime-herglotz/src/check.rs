@@ -4,7 +4,7 @@ use contact_geom::Statement;
 
 /// What a symmetry's momentum is at a place, and what the theorem of Noether predicts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MomentumThere {
+pub struct MomentumSample {
     /// The momentum.
     pub momentum: f64,
     /// That of the start times the conformal factor.
@@ -27,12 +27,12 @@ pub struct Place {
     /// collocation with 16 stages, relative to their size, for a unit of time.
     pub herglotz_defect: f64,
     /// The momenta of the symmetries that are seen, in their order.
-    pub momenta: Vec<MomentumThere>,
+    pub momenta: Vec<MomentumSample>,
 }
 
 /// A statement of the paper on the discrete theory, evaluated on two points of the motion.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stated {
+pub struct StatementResidual {
     /// The statement.
     pub statement: Statement,
     /// The discrete Lagrangian, by the name of its method.
@@ -53,7 +53,7 @@ pub struct Check {
     /// Along the motion.
     pub places: Vec<Place>,
     /// The theorems, worst of a few places.
-    pub statements: Vec<Stated>,
+    pub statements: Vec<StatementResidual>,
 }
 
 /// The largest defect of a step that counts as contact: what differences of sixth order see of steps of the catalogue's systems is
@@ -63,7 +63,7 @@ pub const CONTACT: f64 = 1e-9;
 impl Check {
     /// The largest contact defect.
     pub fn contact_defect(&self) -> f64 {
-        contact_geom::largest(self.places.iter().map(|place| place.contact_defect))
+        contact_geom::max_abs_or_nan(self.places.iter().map(|place| place.contact_defect))
     }
 
     /// Whether every step that was looked at is contact, to [`CONTACT`]: with a factor that is a number other than 0, since what a factor 0
@@ -81,8 +81,8 @@ impl Check {
     /// size of its own.
     pub fn momentum_defect(&self) -> f64 {
         let all = || self.places.iter().flat_map(|place| &place.momenta);
-        let size = contact_geom::largest(all().map(|m| m.predicted));
-        let apart = contact_geom::largest(all().map(|m| m.momentum - m.predicted));
+        let size = contact_geom::max_abs_or_nan(all().map(|m| m.predicted));
+        let apart = contact_geom::max_abs_or_nan(all().map(|m| m.momentum - m.predicted));
         if size > 0.0 { apart / size } else { apart }
     }
 }

@@ -1,7 +1,7 @@
 //! Run time against error on a motion, for all integrators that apply.
 
-use crate::{FirstOrder, Interrupt, Motion, Outcome, Peer, PeerEnd, RuntimeError, System, Watch, Way};
-use contact_geom::largest;
+use crate::{FirstOrder, Interrupt, Motion, Outcome, Peer, PeerEnd, RunMonitor, RuntimeError, StepControl, System};
+use contact_geom::max_abs_or_nan;
 use discrete_herglotz::{AnyIntegrator, InputError, Steps};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -94,7 +94,7 @@ fn apart((q, p): (&[f64], &[f64]), b: &Outcome) -> f64 {
 /// Ends a run that is to be interrupted.
 struct Asking<'i>(Option<&'i Interrupt>);
 
-impl Watch for Asking<'_> {
+impl RunMonitor for Asking<'_> {
     fn poll(&mut self, _part: f64) -> ControlFlow<()> {
         if self.0.is_some_and(Interrupt::is_wanted) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
@@ -113,7 +113,7 @@ impl System {
         peers: &[&dyn Peer],
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Comparison, RuntimeError> {
-        let bare = |way: Way| Motion {
+        let bare = |way: StepControl| Motion {
             action: false,
             interrupt: motion.interrupt.clone(),
             ..Motion::new(motion.start.clone(), motion.end, way)
@@ -121,7 +121,7 @@ impl System {
         let by = AnyIntegrator::Gauss { stages: 16 };
         let mut count = Err(RuntimeError::from(InputError::NoSteps));
         for wanted in REFERENCES {
-            let plan = self.plan(&bare(Way::Accuracy { wanted, by: Some(by) }));
+            let plan = self.plan(&bare(StepControl::Accuracy { wanted, by: Some(by) }));
             let refused = matches!(plan, Err(RuntimeError::Input(InputError::Accuracy { .. })));
             count = plan.map(|plan| plan.steps);
             if !refused {
@@ -130,7 +130,10 @@ impl System {
         }
         let (count, span) = (count?, motion.end - motion.start.t);
         let run = |by: AnyIntegrator, count: usize| {
-            self.run(&bare(Way::Steps { by, steps: Steps::Count(count) }), &mut Asking(motion.interrupt.as_ref()))
+            self.run(
+                &bare(StepControl::Steps { by, steps: Steps::Count(count) }),
+                &mut Asking(motion.interrupt.as_ref()),
+            )
         };
         let (coarse, reference) = (run(by, count)?, run(by, 2 * count)?);
         let reference_error = apart((&coarse.q, &coarse.p), &reference);
@@ -153,7 +156,7 @@ impl System {
                 return Ok(comparison);
             }
             // No formula states a clock.
-            if let AnyIntegrator::Clocked { .. } = by {
+            if let AnyIntegrator::TransformedGauss { .. } = by {
                 continue;
             }
             if let Err(why) = self.check_integrator(by) {
@@ -222,7 +225,7 @@ fn work_of<E>(
         let mut seconds = begin.elapsed();
         let with_error = done.and_then(|done| Some((error(&done.end)?, done)));
         if let Some((error, done)) = with_error {
-            let error = largest([error, by.reference_error]);
+            let error = max_abs_or_nan([error, by.reference_error]);
             let mut spent = seconds;
             for _ in 1..REPETITIONS {
                 if spent > REPEATED {

@@ -1,7 +1,7 @@
 //! Many motions of one formula.
 
-use crate::{Column, Crossing, Event, Interrupt, RuntimeError, Start, System, Way, When};
-use discrete_herglotz::{InputError, Status, Suspicion, Tally};
+use crate::{Column, Crossing, Event, Interrupt, OutputTimes, RuntimeError, Start, StepControl, System};
+use discrete_herglotz::{InputError, Status, Tally, UnresolvedStep};
 use std::ops::ControlFlow;
 
 /// The values of parameters as functions of a member's index.
@@ -26,9 +26,9 @@ pub struct Ensemble<'a> {
     /// The time at which they end.
     pub end: f64,
     /// How they are advanced.
-    pub way: Way,
+    pub way: StepControl,
     /// The states that are recorded.
-    pub rows: Option<When>,
+    pub rows: Option<OutputTimes>,
     /// What a row has, and what is told of the end.
     pub columns: &'a [Column],
     /// The changes of sign that are to be found in each; a terminal one ends its member alone.
@@ -56,7 +56,7 @@ pub struct Ending {
     /// How it ended.
     pub status: Status,
     /// The first step that was seen not to have resolved the motion.
-    pub suspicion: Option<Suspicion>,
+    pub unresolved: Option<UnresolvedStep>,
     /// The steps taken.
     pub steps: usize,
     /// The time reached.
@@ -74,7 +74,7 @@ pub struct Ending {
 }
 
 /// What is handed the members in the order of their index.
-pub trait EnsembleWatch {
+pub trait EnsembleMonitor {
     /// A member at its end; `Break` ends the ensemble after the members under way.
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()>;
 
@@ -89,7 +89,7 @@ pub trait EnsembleWatch {
     }
 }
 
-impl<F: FnMut(MemberEnd) -> ControlFlow<()>> EnsembleWatch for F {
+impl<F: FnMut(MemberEnd) -> ControlFlow<()>> EnsembleMonitor for F {
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()> {
         self(member)
     }
@@ -101,7 +101,7 @@ impl System {
     ///
     /// # Errors
     /// What holds for all members.
-    pub fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleWatch) -> Result<Tally, RuntimeError> {
+    pub fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
         self.kernel.ensemble(ensemble, watch)
     }
 }

@@ -6,13 +6,13 @@
 //! of a site and of a bond, and [`Bodies`].
 //!
 //! ```
-//! use runtime_herglotz::{Column, Motion, Start, System, Way, When};
+//! use runtime_herglotz::{Column, Motion, Start, System, StepControl, OutputTimes};
 //!
 //! let pendulum = System::parse("theta'^2/2 + cos(theta) + gamma*z", &["theta"], &[("gamma", -0.1)])?;
 //! let motion = Motion {
-//!     rows: Some(When::At((0..=10).map(f64::from).collect())),
+//!     rows: Some(OutputTimes::At((0..=10).map(f64::from).collect())),
 //!     columns: vec![Column::Time, Column::parse("theta", pendulum.formula())?, Column::Energy],
-//!     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, Way::Accuracy { wanted: 1e-10, by: None })
+//!     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { wanted: 1e-10, by: None })
 //! };
 //! let (outcome, rows) = pendulum.record(&motion)?;
 //! println!("{}: {rows:?}", outcome.status);
@@ -38,23 +38,23 @@ mod system;
 
 pub use assembled::{Assembled, AssembledMotion, Bodies, Boundary, Lattice};
 pub use catalogue::{CATALOGUE, CatalogueEntry};
-pub use check::{CONTACT, Check, MomentumThere, Place, Stated};
+pub use check::{CONTACT, Check, MomentumSample, Place, StatementResidual};
 pub use column::{Column, velocity_name};
 pub use compare::{Comparison, Work};
-pub use ensemble::{Ending, Ensemble, EnsembleWatch, MemberEnd, Varied};
+pub use ensemble::{Ending, Ensemble, EnsembleMonitor, MemberEnd, Varied};
 pub use error::{RuntimeError, in_words};
 pub use geometry::Geometry;
 pub use interrupt::Interrupt;
-pub use outcome::{Crossing, Outcome, Plan, Watch};
+pub use outcome::{Crossing, Outcome, Plan, RunMonitor};
 pub use parameters::check_parameters;
 pub use path::{BoundaryProblem, FoundPath};
 pub use peer::{FirstOrder, Peer, PeerEnd};
-pub use request::{Direction, Event, Motion, Rate, Start, Way, When};
+pub use request::{Direction, Event, InitialVelocity, Motion, OutputTimes, Start, StepControl};
 pub use system::{SeenSymmetry, System};
 
 pub use contact_geom::{Statement, Structure};
 pub use discrete_herglotz::{
-    AnyIntegrator, Facts, INTERRUPTION, InputError, Interrupted, Item, PathStatus, Status, Steps, Suspicion, Tally,
-    UnknownIntegrator,
+    AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PathStatus, PlanEntry, ResumeState, Status, Steps, Tally,
+    UnknownIntegrator, UnresolvedStep,
 };
 pub use formula_lagrangian::{Expression, Formula, FormulaError, Graph, ParseError, Symbol, Symbols, nearest_name};

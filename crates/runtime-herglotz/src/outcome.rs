@@ -1,6 +1,6 @@
 //! What a motion has led to.
 
-use discrete_herglotz::{Facts, Item, Status, Suspicion};
+use discrete_herglotz::{MethodInfo, PlanEntry, Status, UnresolvedStep};
 
 /// What a motion has led to. Where it was ended before its time, that is what was computed before.
 #[derive(Clone, Debug, PartialEq)]
@@ -8,7 +8,7 @@ pub struct Outcome {
     /// How it ended.
     pub status: Status,
     /// The first step that cannot have resolved the motion, where one was seen.
-    pub suspicion: Option<Suspicion>,
+    pub unresolved: Option<UnresolvedStep>,
     /// The steps taken.
     pub steps: usize,
     /// The time reached.
@@ -54,19 +54,19 @@ pub struct Plan {
     /// In words.
     pub text: String,
     /// What is known of the integrator that was named or chosen.
-    pub integrator: Facts,
+    pub integrator: MethodInfo,
     /// The step, negative where the motion goes back.
     pub step_size: f64,
     /// The number of steps.
     pub steps: usize,
-    /// The error that the pilot runs found or predict, where an accuracy was asked for.
+    /// The error that the trial runs found or predict, where an accuracy was asked for.
     pub error: Option<f64>,
     /// The lines of the text.
-    pub items: Vec<Item>,
+    pub items: Vec<PlanEntry>,
 }
 
 /// What is seen of a motion while it goes on. `Break` ends it, with all that was seen kept.
-pub trait Watch {
+pub trait RunMonitor {
     /// A recorded row.
     fn row(&mut self, _numbers: &[f64]) -> std::ops::ControlFlow<()> {
         std::ops::ControlFlow::Continue(())
@@ -87,7 +87,7 @@ pub trait Watch {
 
     /// The motion as it would go on from where [`poll`](Self::poll) has ended it, where its steps can be saved; those of a
     /// [resumable](crate::Motion::resumable) one can.
-    fn interrupted(&mut self, _at: discrete_herglotz::Interrupted) {}
+    fn interrupted(&mut self, _at: discrete_herglotz::ResumeState) {}
 
     /// Is asked after each [`poll`](Self::poll) whether the motion is to be saved there, and goes on.
     fn wants_checkpoint(&mut self) -> bool {
@@ -96,19 +96,19 @@ pub trait Watch {
 
     /// The motion after so many steps as it would go on from there, where a [checkpoint](Self::wants_checkpoint) is wanted and its steps can
     /// be saved. All rows and crossings up to there were handed on.
-    fn checkpoint(&mut self, _steps: usize, _at: discrete_herglotz::Interrupted) -> std::ops::ControlFlow<()> {
+    fn checkpoint(&mut self, _steps: usize, _at: discrete_herglotz::ResumeState) -> std::ops::ControlFlow<()> {
         std::ops::ControlFlow::Continue(())
     }
 }
 
 /// Nothing is watched.
-impl Watch for () {}
+impl RunMonitor for () {}
 
 /// Keeps the rows of a motion.
 #[derive(Default)]
 pub(crate) struct KeptRows(pub Vec<Vec<f64>>);
 
-impl Watch for KeptRows {
+impl RunMonitor for KeptRows {
     fn row(&mut self, numbers: &[f64]) -> std::ops::ControlFlow<()> {
         self.0.push(numbers.to_vec());
         std::ops::ControlFlow::Continue(())

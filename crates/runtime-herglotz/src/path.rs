@@ -2,7 +2,7 @@
 
 use crate::kernel::path;
 use crate::{RuntimeError, System};
-use discrete_herglotz::{AnyIntegrator, PathStatus, Suspicion};
+use discrete_herglotz::{AnyIntegrator, PathStatus, UnresolvedStep};
 
 /// A path between two positions that is to be found: critical for the discrete action of Herglotz' principle.
 ///
@@ -62,7 +62,7 @@ pub struct FoundPath {
     /// By how much the steps move the path, in units of its range, where that is known: by a discrete Lagrangian of order one or two.
     pub error_estimate: Option<f64>,
     /// Why a path that was found may be far from every motion: its steps do not resolve it, or its ends are conjugate to within their error.
-    pub suspicion: Option<Suspicion>,
+    pub unresolved: Option<UnresolvedStep>,
     /// The corrections that were made.
     pub iterations: u32,
 }

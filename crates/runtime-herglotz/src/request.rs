@@ -6,7 +6,7 @@ use formula_lagrangian::Expression;
 
 /// What a motion starts with beside its position.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Rate {
+pub enum InitialVelocity {
     /// The velocities.
     Velocity(Vec<f64>),
     /// The momenta `L_v`.
@@ -29,7 +29,7 @@ pub struct Start {
     /// The position.
     pub q: Vec<f64>,
     /// The velocity, or the momentum.
-    pub rate: Rate,
+    pub rate: InitialVelocity,
     /// The action.
     pub z: f64,
 }
@@ -37,13 +37,13 @@ pub struct Start {
 impl Start {
     /// At a time, a position, a velocity and an action.
     pub fn new(t: f64, q: impl Into<Vec<f64>>, v: impl Into<Vec<f64>>, z: f64) -> Self {
-        Start { t, q: q.into(), rate: Rate::Velocity(v.into()), z }
+        Start { t, q: q.into(), rate: InitialVelocity::Velocity(v.into()), z }
     }
 }
 
 /// How a motion is advanced.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Way {
+pub enum StepControl {
     /// To a relative error of (q, p) and v, by this integrator, or by one that is chosen for it.
     Accuracy {
         /// The error.
@@ -62,7 +62,7 @@ pub enum Way {
 
 /// Which states are recorded.
 #[derive(Clone, Debug, PartialEq)]
-pub enum When {
+pub enum OutputTimes {
     /// The start, every so many steps, and the end.
     Every(usize),
     /// These times, in the order of the motion.
@@ -117,12 +117,12 @@ impl Event {
 /// A motion to be computed, with all that is to be recorded of it.
 ///
 /// ```
-/// use runtime_herglotz::{Column, Motion, Start, System, Way, When};
+/// use runtime_herglotz::{Column, Motion, Start, System, StepControl, OutputTimes};
 /// let system = System::parse("x'^2/2 - x^2/2 + gamma*z", &["x"], &[("gamma", -0.1)])?;
 /// let motion = Motion {
-///     rows: Some(When::At(vec![0.0, 5.0, 10.0])),
+///     rows: Some(OutputTimes::At(vec![0.0, 5.0, 10.0])),
 ///     columns: vec![Column::Time, Column::Position(0), Column::Energy],
-///     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, Way::Accuracy { wanted: 1e-9, by: None })
+///     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { wanted: 1e-9, by: None })
 /// };
 /// let (outcome, rows) = system.record(&motion)?;
 /// assert_eq!((outcome.t, rows.len()), (10.0, 3));
@@ -135,9 +135,9 @@ pub struct Motion {
     /// The time at which it ends, before or after that of the start.
     pub end: f64,
     /// How it is advanced.
-    pub way: Way,
+    pub way: StepControl,
     /// The states that are recorded, as rows of the columns.
-    pub rows: Option<When>,
+    pub rows: Option<OutputTimes>,
     /// What a row has.
     pub columns: Vec<Column>,
     /// The changes of sign that are to be found.
@@ -150,17 +150,17 @@ pub struct Motion {
     pub estimate: bool,
     /// The scale of each coordinate that errors are measured by; without it they are relative to the size of the whole state.
     pub scales: Option<Vec<f64>>,
-    /// Whether every step is handed to [`Watch::node`](crate::Watch::node).
+    /// Whether every step is handed to [`RunMonitor::node`](crate::RunMonitor::node).
     pub nodes: bool,
     /// Whether it is refused where it could not be interrupted and [resumed](crate::System::resume).
     pub resumable: bool,
-    /// Whether its plan, its check or its comparison is to end; the motion itself is ended by its [`Watch`](crate::Watch).
+    /// Whether its plan, its check or its comparison is to end; the motion itself is ended by its [`RunMonitor`](crate::RunMonitor).
     pub interrupt: Option<Interrupt>,
 }
 
 impl Motion {
     /// From a start to a time, with nothing recorded but the end.
-    pub fn new(start: Start, end: f64, way: Way) -> Self {
+    pub fn new(start: Start, end: f64, way: StepControl) -> Self {
         Motion {
             start,
             end,

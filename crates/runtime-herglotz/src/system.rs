@@ -2,9 +2,9 @@
 
 use crate::kernel::{Kernel, kernel_of};
 use crate::outcome::KeptRows;
-use crate::{Check, Geometry, Motion, Outcome, Plan, RuntimeError, Start, Watch};
+use crate::{Check, Geometry, Motion, Outcome, Plan, RunMonitor, RuntimeError, Start};
 use contact_geom::Structure;
-use discrete_herglotz::{AnyIntegrator, InputError, Interrupted};
+use discrete_herglotz::{AnyIntegrator, InputError, ResumeState};
 use formula_lagrangian::Formula;
 use std::sync::Arc;
 
@@ -20,9 +20,9 @@ pub enum SeenSymmetry {
 /// A Lagrangian by its formula, in 1 to 16 coordinates, with all that integrators need. Cloning is cheap.
 ///
 /// ```
-/// use runtime_herglotz::{Motion, Start, System, Way};
+/// use runtime_herglotz::{Motion, Start, System, StepControl};
 /// let pendulum = System::parse("theta'^2/2 + cos(theta) + gamma*z", &["theta"], &[("gamma", -0.1)])?;
-/// let motion = Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 100.0, Way::Accuracy { wanted: 1e-10, by: None });
+/// let motion = Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 100.0, StepControl::Accuracy { wanted: 1e-10, by: None });
 /// println!("{}", pendulum.plan(&motion)?.text);
 /// println!("theta = {}", pendulum.run(&motion, &mut ())?.q[0]);
 /// # Ok::<(), runtime_herglotz::RuntimeError>(())
@@ -111,7 +111,7 @@ impl System {
     ///
     /// # Errors
     /// Those of [`plan`](Self::plan).
-    pub fn run(&self, motion: &Motion, watch: &mut dyn Watch) -> Result<Outcome, RuntimeError> {
+    pub fn run(&self, motion: &Motion, watch: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
         self.kernel.run(motion, watch, None)
     }
 
@@ -120,7 +120,12 @@ impl System {
     ///
     /// # Errors
     /// Those of [`run`](Self::run); [`InputError::AnotherRun`].
-    pub fn resume(&self, motion: &Motion, from: Interrupted, watch: &mut dyn Watch) -> Result<Outcome, RuntimeError> {
+    pub fn resume(
+        &self,
+        motion: &Motion,
+        from: ResumeState,
+        watch: &mut dyn RunMonitor,
+    ) -> Result<Outcome, RuntimeError> {
         self.kernel.run(motion, watch, Some(from))
     }
 

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
 use runtime_herglotz::{
-    AnyIntegrator, AssembledMotion, Bodies, Boundary, Column, Lattice, Motion, Outcome, Rate, RuntimeError, Start,
-    Status, Steps, System, Watch, Way, When,
+    AnyIntegrator, AssembledMotion, Bodies, Boundary, Column, InitialVelocity, Lattice, Motion, Outcome, OutputTimes,
+    RunMonitor, RuntimeError, Start, Status, StepControl, Steps, System,
 };
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
@@ -37,7 +37,7 @@ fn small_rows(text: &str, coordinates: &str, parameters: &[(&str, f64)], motion:
     columns.extend((0..n).map(Column::Momentum));
     columns.extend([Column::Action, Column::Energy]);
     columns.extend(motion.conformal_factor.then_some(Column::LogFactor));
-    let way = Way::Steps { by: motion.by, steps: motion.steps };
+    let way = StepControl::Steps { by: motion.by, steps: motion.steps };
     let asked = Motion {
         rows: Some(motion.rows.clone()),
         columns,
@@ -74,7 +74,7 @@ fn a_short_lattice_is_the_small_system_of_its_formula() {
         let lattice = chain(n, boundary).system().unwrap();
         for name in ALL {
             let start = Start::new(0.5, waves(n), vec![0.1; n], 0.2);
-            let rows = When::At(vec![0.5, 1.0, 1.03, 2.5]);
+            let rows = OutputTimes::At(vec![0.5, 1.0, 1.03, 2.5]);
             let motion = AssembledMotion {
                 rows,
                 conformal_factor: true,
@@ -144,7 +144,7 @@ fn few_bodies_are_the_small_system_of_their_formula() {
             }
         }
         for name in ["strang", "blanes_moan_6", "midpoint"] {
-            let start = Start { t: 0.0, q: q.clone(), rate: Rate::Velocity(v.clone()), z: 0.0 };
+            let start = Start { t: 0.0, q: q.clone(), rate: InitialVelocity::Velocity(v.clone()), z: 0.0 };
             let motion = AssembledMotion::new(start, 1.0, by(name), Steps::Count(20));
             let (_, found) = bodies.record(&motion).unwrap();
             let off = distance(&found, &small_rows(&text, &format!("q[{n}]"), &[], &motion));
@@ -171,7 +171,7 @@ fn a_thousand_sites_move_in_their_normal_modes() {
     let amplitude = |t: f64| (0.5 * gamma * t).exp() * ((damped * t).cos() - 0.5 * gamma / damped * (damped * t).sin());
     let start = Start::new(0.0, shape.clone(), vec![0.0; n], 0.0);
     let motion = AssembledMotion {
-        rows: When::Every(50),
+        rows: OutputTimes::Every(50),
         ..AssembledMotion::new(start, time, by("blanes_moan_6"), Steps::Size(0.1))
     };
     let (_, rows) = lattice.system().unwrap().record(&motion).unwrap();
@@ -191,7 +191,7 @@ fn energy_over_sigma_is_conserved() {
         let start = Start::new(0.0, waves(200), vec![0.0; 200], 0.0);
         let steps = Steps::Size(0.02);
         let motion = AssembledMotion {
-            rows: When::Every(50),
+            rows: OutputTimes::Every(50),
             conformal_factor: true,
             ..AssembledMotion::new(start, 20.0, by(name), steps)
         };
@@ -218,7 +218,7 @@ fn momenta_of_bodies_decay_as_the_factor() {
         let v: Vec<f64> = (0..n * dimensions).map(|k| 0.3 * (angle(k) + 1.0).cos()).collect();
         let start = Start::new(0.0, q, v, 0.0);
         let motion = AssembledMotion {
-            rows: When::Every(20),
+            rows: OutputTimes::Every(20),
             ..AssembledMotion::new(start, 10.0, by("strang"), Steps::Size(0.05))
         };
         let (outcome, rows) = bodies.record(&motion).unwrap();
@@ -298,9 +298,9 @@ fn what_is_wrong_is_said_with_the_argument() {
         (ask(&|m| m.end = 0.0), "`t` ends at 0, where the motion starts at 0"),
         (ask(&|m| m.steps = Steps::Size(-0.1)), "`step` is -0.1"),
         (ask(&|m| m.steps = Steps::Size(1e-300)), "`step` gives 1.0e300 steps"),
-        (ask(&|m| m.rows = When::Every(0)), "`every` is 0"),
-        (ask(&|m| m.rows = When::At(vec![0.5, 0.2])), "the time t = 0.2 of row 1 is out of order"),
-        (ask(&|m| m.rows = When::At(vec![f64::NAN])), "the time t = NaN of row 0"),
+        (ask(&|m| m.rows = OutputTimes::Every(0)), "`every` is 0"),
+        (ask(&|m| m.rows = OutputTimes::At(vec![0.5, 0.2])), "the time t = 0.2 of row 1 is out of order"),
+        (ask(&|m| m.rows = OutputTimes::At(vec![f64::NAN])), "the time t = NaN of row 0"),
         (ask(&|m| m.start.q = vec![0.0; 3]), "`q` has 3 numbers, where the system has 20"),
         (ask(&|m| m.start.q[7] = f64::NAN), "`q[7]` is NaN"),
         (ask(&|m| m.start.z = f64::INFINITY), "`z` is inf"),
@@ -315,7 +315,7 @@ fn what_is_wrong_is_said_with_the_argument() {
 /// Ends a motion after so many rows.
 struct Until(usize);
 
-impl Watch for Until {
+impl RunMonitor for Until {
     fn row(&mut self, _: &[f64]) -> ControlFlow<()> {
         self.0 -= 1;
         if self.0 == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -333,7 +333,7 @@ fn a_motion_that_is_stopped_or_fails_has_a_state_of_numbers() {
     // Steps far beyond the limit of stability.
     let start = Start::new(0.0, waves(30), vec![0.0; 30], 0.0);
     let motion = AssembledMotion {
-        rows: When::Every(1000),
+        rows: OutputTimes::Every(1000),
         ..AssembledMotion::new(start, 1e5, by("strang"), Steps::Size(10.0))
     };
     let Outcome { status, q, p, v, z, .. } = lattice.run(&motion, &mut ()).unwrap();

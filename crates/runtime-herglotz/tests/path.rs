@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
 use runtime_herglotz::{
-    AnyIntegrator, BoundaryProblem, FoundPath, Motion, PathStatus, RuntimeError, Start, System, Way,
+    AnyIntegrator, BoundaryProblem, FoundPath, Motion, PathStatus, RuntimeError, Start, StepControl, System,
 };
 
 const GAMMA: f64 = -0.2;
@@ -27,7 +27,7 @@ fn the_oscillator_between_two_positions() {
         let by: AnyIntegrator = name.parse().unwrap();
         let problem = BoundaryProblem { z0: 0.5, ..BoundaryProblem::new([vec![0.0], vec![1.0]], (1.0, t1), by, 40) };
         let found = search(&system, &problem);
-        assert!(found.is_found() && found.suspicion.is_none() && found.regularity > 1e-3, "{found:?}");
+        assert!(found.is_found() && found.unresolved.is_none() && found.regularity > 1e-3, "{found:?}");
         assert_eq!((found.t[0], found.t[40], found.q[0], found.q[40], found.z[0]), (1.0, t1, 0.0, 1.0, 0.5));
         for k in 0..=40 {
             let t = found.t[k] - 1.0;
@@ -39,7 +39,7 @@ fn the_oscillator_between_two_positions() {
             assert!((found.v[k] - found.p[k]).abs() < 1e-14, "{name}, {k}");
         }
         let start = Start::new(1.0, [0.0], [found.v[0]], 0.5);
-        let motion = Motion::new(start, t1, Way::Accuracy { wanted: 1e-12, by: None });
+        let motion = Motion::new(start, t1, StepControl::Accuracy { wanted: 1e-12, by: None });
         let z = system.run(&motion, &mut ()).unwrap().z.unwrap();
         assert!((found.z[40] - z).abs() < 10.0 * error && (found.action() - (z - 0.5)).abs() < 10.0 * error);
         // What the steps leave out is known of orders one and two.
@@ -88,5 +88,5 @@ fn what_cannot_be_searched_for_is_refused() {
     let free = system.with_parameters(&[("gamma", 0.0)]).unwrap();
     let by: AnyIntegrator = "midpoint".parse().unwrap();
     let conjugate = search(&free, &BoundaryProblem { by, span: (0.0, std::f64::consts::PI), ..good });
-    assert!(conjugate.status != PathStatus::Found || conjugate.suspicion.is_some(), "{conjugate:?}");
+    assert!(conjugate.status != PathStatus::Found || conjugate.unresolved.is_some(), "{conjugate:?}");
 }

@@ -4,22 +4,22 @@
 
 use contact_geom::systems as typed;
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint, herglotz_field};
-use discrete_herglotz::{AnyIntegrator, InputError, Interrupted, Problem, Status, Steps, Until};
+use discrete_herglotz::{AnyIntegrator, InputError, Problem, ResumeState, Status, Steps, Until};
 use formula_lagrangian::Formula;
 use runtime_herglotz::{
-    CATALOGUE, CatalogueEntry, Column, Crossing, Direction, Ensemble, Event, MemberEnd, Motion, RuntimeError,
-    SeenSymmetry, Start, System, Varied, Watch, Way, When,
+    CATALOGUE, CatalogueEntry, Column, Crossing, Direction, Ensemble, Event, MemberEnd, Motion, OutputTimes,
+    RunMonitor, RuntimeError, SeenSymmetry, Start, StepControl, System, Varied,
 };
 use std::ops::ControlFlow;
 
 const GAUSS: AnyIntegrator = AnyIntegrator::Gauss { stages: 8 };
 
-fn by_steps(count: usize) -> Way {
-    Way::Steps { by: GAUSS, steps: Steps::Count(count) }
+fn by_steps(count: usize) -> StepControl {
+    StepControl::Steps { by: GAUSS, steps: Steps::Count(count) }
 }
 
-fn accurate(wanted: f64) -> Way {
-    Way::Accuracy { wanted, by: None }
+fn accurate(wanted: f64) -> StepControl {
+    StepControl::Accuracy { wanted, by: None }
 }
 
 fn pendulum() -> System {
@@ -73,7 +73,7 @@ fn every_entry_runs_and_its_steps_are_contact() {
         let system = System::new(&entry.formula().unwrap()).unwrap();
         let motion = Motion::new(start_of(entry), entry.t + 3.0, accurate(1e-9));
         let outcome = system.run(&motion, &mut ()).unwrap();
-        assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None), "{}", entry.name);
+        assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None), "{}", entry.name);
         let check = system.check(&motion, 3).unwrap_or_else(|error| panic!("{}: {error}", entry.name));
         assert!(check.is_contact(), "{}: {:e}", entry.name, check.contact_defect());
         assert!(check.momentum_defect() <= 1e-11, "{}: {:e}", entry.name, check.momentum_defect());
@@ -96,7 +96,7 @@ fn one_to_sixteen_coordinates() {
         let system = System::parse(text, &[&format!("x[{n}]")], &[("gamma", -0.2)]).unwrap();
         assert_eq!(system.dimension(), n);
         let motion = Motion {
-            rows: Some(When::Every(usize::MAX)),
+            rows: Some(OutputTimes::Every(usize::MAX)),
             columns: vec![Column::Energy, Column::LogFactor],
             ..Motion::new(Start::new(0.0, vec![0.7; n], vec![0.1; n], 0.0), 5.0, accurate(1e-10))
         };
@@ -117,9 +117,9 @@ fn sixteen_coupled_coordinates() {
     let text = format!("({mass})/2 + sum(i, 0, n-1, cos(q[i])) + 0.1*cos(sum(i, 0, n-1, q[i])) - 0.05*z^2");
     let system = System::parse(&text, &["x[16]"], &[]).unwrap();
     let start = Start::new(0.0, vec![0.3; 16], (0..16).map(|i| 0.05 * f64::from(i)).collect::<Vec<_>>(), 0.5);
-    let of = |way: Way| system.run(&Motion::new(start.clone(), 2.0, way), &mut ()).unwrap();
+    let of = |way: StepControl| system.run(&Motion::new(start.clone(), 2.0, way), &mut ()).unwrap();
     let exact = of(accurate(1e-10));
-    let six = of(Way::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(40) });
+    let six = of(StepControl::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(40) });
     assert_eq!((exact.status, six.status), (Status::Completed, Status::Completed));
     for (a, b) in exact.q.iter().zip(&six.q).chain(exact.p.iter().zip(&six.p)) {
         assert!((a - b).abs() < 1e-9, "{a} and {b}");
@@ -131,7 +131,7 @@ fn sixteen_coupled_coordinates() {
         t0: 0.0,
         varied: None,
         end: 2.0,
-        way: Way::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(40) },
+        way: StepControl::Steps { by: AnyIntegrator::Gauss { stages: 6 }, steps: Steps::Count(40) },
         rows: None,
         columns: &[],
         events: &[],
@@ -161,7 +161,7 @@ fn what_fills_a_kernel_is_not_seen() {
         nodes: true,
         resumable: true,
         events: vec![event],
-        rows: Some(When::Every(8)),
+        rows: Some(OutputTimes::Every(8)),
         columns: vec![Column::Position(9), Column::parse("sum(i, 0, n-1, q[i])", system.formula()).unwrap()],
         ..Motion::new(start.clone(), 6.0, by_steps(24))
     };
@@ -223,10 +223,10 @@ struct Seen {
     nodes: usize,
     /// The polls after which the motion is ended.
     polls: Option<usize>,
-    interrupted: Option<Interrupted>,
+    interrupted: Option<ResumeState>,
 }
 
-impl Watch for Seen {
+impl RunMonitor for Seen {
     fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
         self.rows.push(numbers.to_vec());
         ControlFlow::Continue(())
@@ -248,7 +248,7 @@ impl Watch for Seen {
             None => ControlFlow::Continue(()),
         }
     }
-    fn interrupted(&mut self, at: Interrupted) {
+    fn interrupted(&mut self, at: ResumeState) {
         self.interrupted = Some(at);
     }
 }
@@ -258,7 +258,7 @@ fn a_run_is_that_of_the_typed_formula() {
     let system = pendulum();
     let formula = system.formula();
     let motion = Motion {
-        rows: Some(When::At(vec![0.0, 2.5, 5.0, 20.0])),
+        rows: Some(OutputTimes::At(vec![0.0, 2.5, 5.0, 20.0])),
         columns: ["t", "theta", "theta'", "p_theta", "z", "energy", "exp(-gamma*t)*theta*theta'"]
             .map(|text| Column::parse(text, formula).unwrap())
             .into(),
@@ -292,12 +292,16 @@ fn quantities_in_columns_and_events() {
     let column = |text: &str| Column::parse(text, formula).unwrap();
     let event = |text: &str| Event::new(formula.expression(text).unwrap());
     let motion = Motion {
-        rows: Some(When::At(vec![1.0, 1.25, 3.0, 6.0])),
+        rows: Some(OutputTimes::At(vec![1.0, 1.25, 3.0, 6.0])),
         columns: ["t", "energy/sigma", "sigma", "log_factor + 1", "p_x/2 - x'", "energy", "x'^2 + x^2/2 - gamma*z"]
             .map(column)
             .into(),
         events: ["sigma - 0.5", "energy - 0.25", "p_x"].map(event).into(),
-        ..Motion::new(Start::new(1.0, [1.0], [0.0], 0.0), 6.0, Way::Steps { by: GAUSS, steps: Steps::Count(50) })
+        ..Motion::new(
+            Start::new(1.0, [1.0], [0.0], 0.0),
+            6.0,
+            StepControl::Steps { by: GAUSS, steps: Steps::Count(50) },
+        )
     };
     let mut seen = Seen::default();
     system.run(&motion, &mut seen).unwrap();
@@ -323,7 +327,7 @@ fn quantities_in_columns_and_events() {
         t0: 1.0,
         varied: Some(Varied { names: &["gamma"], values: &|i| vec![-0.1 * i as f64] }),
         end: 6.0,
-        way: Way::Steps { by: GAUSS, steps: Steps::Count(50) },
+        way: StepControl::Steps { by: GAUSS, steps: Steps::Count(50) },
         rows: None,
         columns: &["sigma", "energy"].map(column),
         events: &[event("sigma - 0.75")],
@@ -342,7 +346,7 @@ fn quantities_in_columns_and_events() {
     let system = System::parse("x'^2/2 - x^2/2 - z^2/8", &["x"], &[]).unwrap();
     let function = system.formula().expression("sigma - 0.5").unwrap();
     let motion = Motion {
-        rows: Some(When::At(vec![0.55, 2.0])),
+        rows: Some(OutputTimes::At(vec![0.55, 2.0])),
         columns: vec![
             Column::parse("log(sigma) - log_factor", system.formula()).unwrap(),
             Column::parse("log_factor", system.formula()).unwrap(),
@@ -361,7 +365,7 @@ fn a_terminal_event_ends_the_rows_too() {
     let system = pendulum();
     let event = Event { terminal: true, ..Event::new(system.formula().expression("theta").unwrap()) };
     let motion = Motion {
-        rows: Some(When::At((0..=40).map(|k| 0.1 * f64::from(k)).collect())),
+        rows: Some(OutputTimes::At((0..=40).map(|k| 0.1 * f64::from(k)).collect())),
         columns: vec![Column::Time, Column::Position(0)],
         events: vec![event],
         ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 4.0, by_steps(4))
@@ -378,14 +382,14 @@ fn a_terminal_event_ends_the_rows_too() {
 
 #[test]
 fn an_interrupted_motion_goes_on_to_the_last_bit() {
-    goes_on(When::Every(100), 100.0);
+    goes_on(OutputTimes::Every(100), 100.0);
     // Rows at all times of the whole motion, one of which is that of the interruption, on and back.
     let times = |end: f64| (0..=1000).map(move |k| if k == 1000 { end } else { end * f64::from(k) / 1000.0 }).collect();
-    goes_on(When::At(times(100.0)), 100.0);
-    goes_on(When::At(times(-100.0)), -100.0);
+    goes_on(OutputTimes::At(times(100.0)), 100.0);
+    goes_on(OutputTimes::At(times(-100.0)), -100.0);
 }
 
-fn goes_on(rows: When, end: f64) {
+fn goes_on(rows: OutputTimes, end: f64) {
     let system = pendulum();
     let motion = Motion {
         rows: Some(rows),
@@ -454,13 +458,13 @@ fn members_are_single_runs_whatever_the_threads() {
     assert!(one[7].ending.is_err());
 
     // Rows: those of a run of its own.
-    let recorded = Ensemble { rows: Some(When::At(vec![0.0, 5.0, 10.0])), varied: None, ..of(2) };
+    let recorded = Ensemble { rows: Some(OutputTimes::At(vec![0.0, 5.0, 10.0])), varied: None, ..of(2) };
     let all = members(&system, &recorded);
     let motion =
         Motion { rows: recorded.rows.clone(), columns: columns.to_vec(), ..Motion::new(start(4), 10.0, by_steps(40)) };
     assert_eq!(all[4].rows, system.record(&motion).unwrap().1);
     // Rows that end before the motion does: the end is its own.
-    let early = Ensemble { rows: Some(When::At(vec![0.0, 5.0])), varied: None, ..of(2) };
+    let early = Ensemble { rows: Some(OutputTimes::At(vec![0.0, 5.0])), varied: None, ..of(2) };
     let ending = members(&system, &early).swap_remove(4).ending.unwrap();
     let end_of_all = all[4].ending.clone().unwrap();
     assert_eq!((ending.v, ending.columns), (end_of_all.v, end_of_all.columns));
@@ -487,7 +491,7 @@ fn events_of_members_are_those_of_single_runs() {
         let slow = Event::new(of("theta' - gamma*theta"));
         let down = Event { direction: Direction::Falling, terminal, ..Event::new(of("theta")) };
         let events = [slow, down];
-        let rows = Some(When::At((0..=8).map(f64::from).collect()));
+        let rows = Some(OutputTimes::At((0..=8).map(f64::from).collect()));
         let many = Ensemble {
             count: 40,
             start: &start,
@@ -545,7 +549,8 @@ fn a_comparison_ranks_integrators() {
 #[test]
 fn bad_input_says_what_is_wrong() {
     let system = pendulum();
-    let run = |start: Start, way: Way| system.run(&Motion::new(start, 1.0, way), &mut ()).unwrap_err().to_string();
+    let run =
+        |start: Start, way: StepControl| system.run(&Motion::new(start, 1.0, way), &mut ()).unwrap_err().to_string();
     let good = || Start::new(0.0, [1.0], [0.0], 0.0);
     assert!(run(Start::new(0.0, [1.0, 2.0], [0.0], 0.0), by_steps(1)).contains("`q` has 2 numbers"));
     assert!(run(Start::new(0.0, [1.0], [f64::NAN], 0.0), by_steps(1)).contains("`v[0]` is NaN"));

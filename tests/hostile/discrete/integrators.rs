@@ -7,40 +7,40 @@ use crate::numbers::{Claiming, HOSTILE, Report};
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::MidpointRule;
 use discrete_herglotz::{
-    AnyIntegrator, ByRule, Checkpoint, CheckpointError, Composed, Discrete, DiscreteLagrangian, Discretisation, Facts,
-    InputError, Integrator, Interrupted, Item, Method, Midpoint, Moment, Problem, SplittingScheme, Status, Stepper,
-    Steps, Until, Wants,
+    AnyIntegrator, Checkpoint, CheckpointError, CompositionMethod, CustomMethod, DiscreteLagrangian,
+    DiscretizationMethod, InputError, Integrator, Method, MethodInfo, Midpoint, PlanEntry, Problem, QuadratureMethod,
+    ResumeState, SplittingScheme, Status, StepView, Stepper, StepperOptions, Steps, Until,
 };
 use std::ops::ControlFlow;
 
 pub const ATTACKS: &[Attack] = &[
     Attack {
-        on: &["Discretisation::check", "Discretisation::discretise", "Discretisation::facts", "Discrete::symmetric"],
+        on: &["Discretisation::check", "Discretisation::discretise", "Discretisation::info", "CustomMethod::symmetric"],
         run: discretisations,
     },
     Attack {
         on: &[
             "Integrator::check",
-            "Integrator::facts",
+            "Integrator::info",
             "Integrator::stepper",
             "Composed::new",
-            "Stepper::account",
+            "Stepper::work_summary",
             "Stepper::has_constant_rate",
-            "Item::computed",
-            "Item::skipped",
+            "PlanEntry::computed",
+            "PlanEntry::skipped",
         ],
         run: integrators,
     },
-    Attack { on: &["Discrete::new", "Facts::of_discrete", "Run::accuracy"], run: orders },
+    Attack { on: &["CustomMethod::new", "MethodInfo::of_discrete", "Run::accuracy"], run: orders },
     Attack { on: &["Stepper::save", "Stepper::restore"], run: saved },
     Attack {
         on: &[
             "Checkpoint::every",
-            "Moment::interrupted",
-            "Interrupted::read",
-            "Interrupted::write",
-            "Interrupted::from_bytes",
-            "Interrupted::to_bytes",
+            "StepView::resume_state",
+            "ResumeState::read",
+            "ResumeState::write",
+            "ResumeState::from_bytes",
+            "ResumeState::to_bytes",
             "Run::resume",
         ],
         run: resumed,
@@ -49,26 +49,26 @@ pub const ATTACKS: &[Attack] = &[
 
 /// A discrete Lagrangian is made of each step that is one.
 fn discretisations(report: &mut Report) {
-    fn one(report: &mut Report, rule: &impl Discretisation<'static, Claiming, 1>) {
-        let facts = rule.facts();
-        report.check(rule.check(&Claiming).is_ok() && facts.symmetric && facts.order == 2, || format!("{facts:?}"));
+    fn one(report: &mut Report, rule: &impl DiscretizationMethod<'static, Claiming, 1>) {
+        let info = rule.info();
+        report.check(rule.check(&Claiming).is_ok() && info.symmetric && info.order == 2, || format!("{info:?}"));
         for h in HOSTILE.into_iter().chain(STEPS) {
             let made = rule.discretise(&tame(), h).map(|ld| ld.step_size());
             let good = h != 0.0 && h.is_finite();
-            report.check(if good { made == Ok(h) } else { made.is_err() }, || format!("{}: {made:?}", facts.name));
+            report.check(if good { made == Ok(h) } else { made.is_err() }, || format!("{}: {made:?}", info.name));
         }
     }
-    one(report, &ByRule::<MidpointRule>::default());
+    one(report, &QuadratureMethod::<MidpointRule>::default());
     one(report, &Method::Trapezoidal);
-    one(report, &Discrete::new("mine", 2, |h| Midpoint::new(Claiming, h)).symmetric());
+    one(report, &CustomMethod::new("mine", 2, |h| Midpoint::new(Claiming, h)).symmetric());
 }
 
 /// A stepper starts at a finite state by a step that is one, and its states are finite.
 fn integrators(report: &mut Report) {
-    fn one(report: &mut Report, by: &dyn Integrator<'static, Claiming, 1>, wants: Wants) {
-        let facts = by.facts();
-        let said = !facts.name.is_empty() && facts.order > 0 && facts.price > 0;
-        report.check(said && by.check(&Claiming).is_ok(), || format!("{facts:?}"));
+    fn one(report: &mut Report, by: &dyn Integrator<'static, Claiming, 1>, wants: StepperOptions) {
+        let info = by.info();
+        let said = !info.name.is_empty() && info.order > 0 && info.cost_per_evaluation > 0;
+        report.check(said && by.check(&Claiming).is_ok(), || format!("{info:?}"));
         let driven = |mut stepper: Box<dyn Stepper<1>>| {
             let _ = stepper.advance(3);
             (stepper.state(), stepper.time())
@@ -80,29 +80,31 @@ fn integrators(report: &mut Report) {
         for h in HOSTILE.into_iter().chain(STEPS) {
             let made = by.stepper(&tame(), h, wants);
             let refused = h == 0.0 || !h.is_finite();
-            report.check(!refused || made.is_err(), || format!("{}: the step {h} is taken", facts.name));
+            report.check(!refused || made.is_err(), || format!("{}: the step {h} is taken", info.name));
             report.door(&h, made.map(driven));
         }
         let mut stepper = by.stepper(&tame(), 0.1, wants).unwrap();
-        let account = stepper.account();
-        report.check(!account.is_empty() && account.iter().all(|i| !i.why.is_empty()), || format!("{account:?}"));
+        let work_summary = stepper.work_summary();
+        report.check(!work_summary.is_empty() && work_summary.iter().all(|i| !i.why.is_empty()), || {
+            format!("{work_summary:?}")
+        });
         // What says that its rate is constant has the same in all steps.
         let mut rate = || stepper.advance(1).map(|()| stepper.sigma());
         let same = rate() == rate();
-        report.check(same || !stepper.has_constant_rate(), || format!("{}: another rate", facts.name));
+        report.check(same || !stepper.has_constant_rate(), || format!("{}: another rate", info.name));
     }
-    let rule = ByRule::<MidpointRule>::default();
-    for wants in [Wants::default(), Wants { action: true, watched: true }] {
+    let rule = QuadratureMethod::<MidpointRule>::default();
+    for wants in [StepperOptions::default(), StepperOptions { action: true, watched: true }] {
         one(report, &rule, wants);
-        one(report, &Composed::new(rule, SplittingScheme::YOSHIDA_4), wants);
+        one(report, &CompositionMethod::new(rule, SplittingScheme::YOSHIDA_4), wants);
         for by in BY.into_iter().flatten() {
             one(report, &by, wants);
         }
     }
-    let nystrom = Composed::new(rule, SplittingScheme::BLANES_MOAN_6);
+    let nystrom = CompositionMethod::new(rule, SplittingScheme::BLANES_MOAN_6);
     let refused = Integrator::<'_, Claiming, 1>::check(&nystrom, &Claiming);
     report.check(matches!(refused, Err(InputError::Hypothesis { .. })), || format!("{refused:?}"));
-    let items = [Item::computed("this", "said"), Item::skipped("that", "said")];
+    let items = [PlanEntry::computed("this", "said"), PlanEntry::skipped("that", "said")];
     report.check(items.map(|item| item.computed) == [true, false], || "items".into());
 }
 
@@ -110,8 +112,8 @@ fn integrators(report: &mut Report) {
 fn orders(report: &mut Report) {
     let problem = tame();
     for order in [0, 1, 2, 1000, u32::MAX] {
-        let by = || Discrete::new("mine", order, |h| Midpoint::new(Claiming, h));
-        report.check(Facts::of_discrete::<1>("mine", order).order == order, || "another order".into());
+        let by = || CustomMethod::new("mine", order, |h| Midpoint::new(Claiming, h));
+        report.check(MethodInfo::of_discrete::<1>("mine", order).order == order, || "another order".into());
         let given = problem.by(by()).steps(Steps::Count(7)).run(Until::Time(0.5)).map(|o| (o.q, o.p));
         report.check(given.is_ok() == (order > 0), || format!("order {order}: {given:?}"));
         for error in [1e-4, 0.0, f64::NAN, -1.0] {
@@ -127,7 +129,8 @@ fn orders(report: &mut Report) {
 fn saved(report: &mut Report) {
     let start: PhasePoint<1> = *tame().state();
     for by in BY.into_iter().flatten() {
-        let stepper = || Integrator::stepper(&by, &tame(), 0.1, Wants { action: true, watched: true }).unwrap();
+        let stepper =
+            || Integrator::stepper(&by, &tame(), 0.1, StepperOptions { action: true, watched: true }).unwrap();
         let mut first = stepper();
         report.check(first.advance(3).is_ok(), || format!("{by}: three steps"));
         let words = first.save().unwrap();
@@ -151,7 +154,7 @@ fn resumed(report: &mut Report) {
     for count in 0..6 {
         for value in HOSTILE {
             std::fs::write(&path, value.to_le_bytes().repeat(count)).unwrap();
-            let read = Interrupted::read(&path);
+            let read = ResumeState::read(&path);
             report.check(matches!(read, Err(CheckpointError::Foreign)), || format!("{count} of {value}: {read:?}"));
         }
     }
@@ -164,7 +167,7 @@ fn resumed(report: &mut Report) {
             let outcome = seven(&problem, by).observe(&mut last).run(until).unwrap();
             report.check(outcome == whole && last.error.is_none(), || format!("{:?}: {outcome:?}", last.error));
             // The last one is at the end, where nothing is left to do.
-            let resumed = || seven(&problem, by).resume(Interrupted::read(&path).unwrap());
+            let resumed = || seven(&problem, by).resume(ResumeState::read(&path).unwrap());
             report.check(resumed().run(until) == Ok(whole), || format!("{:?}", resumed().run(until)));
             let others = [resumed().run(Until::Time(0.6)), resumed().steps(Steps::Count(8)).run(until)];
             let others = others.into_iter().chain([
@@ -177,7 +180,7 @@ fn resumed(report: &mut Report) {
         }
         // By hand, in the middle, and to a place that is none.
         let mut kept = None;
-        let mut keep = |at: &Moment<'_, 1>| {
+        let mut keep = |at: &StepView<'_, 1>| {
             if at.k == 3 {
                 kept = at.interrupted();
             }
@@ -187,7 +190,7 @@ fn resumed(report: &mut Report) {
         if let Some(kept) = kept {
             report.check(kept.write(path.join("below a file")).is_err(), || "a file below a file".into());
             kept.write(&path).unwrap();
-            let read = Interrupted::read(&path).unwrap();
+            let read = ResumeState::read(&path).unwrap();
             report.check(read == kept && seven(&problem, by).resume(read).run(until) == Ok(whole), || "by hand".into());
             let bytes = kept.to_bytes();
             report.check(std::fs::read(&path).unwrap() == bytes, || "the bytes are not those of the file".into());
@@ -195,13 +198,13 @@ fn resumed(report: &mut Report) {
                 let mut other = bytes.clone();
                 other[place] ^= 4;
                 let cut = &bytes[..place];
-                let read = [other.as_slice(), cut].map(Interrupted::from_bytes);
+                let read = [other.as_slice(), cut].map(ResumeState::from_bytes);
                 report.check(read.iter().all(Result::is_err), || format!("{place} of {}: {read:?}", bytes.len()));
             }
         }
         for value in HOSTILE.into_iter().filter(|value| value.abs() < 10.0) {
             let other = Problem::new(&Claiming, 0.0, VelocityPoint::new([value], [0.7], 0.2)).unwrap();
-            let run = seven(&other, by).resume(Interrupted::read(&path).unwrap()).run(until);
+            let run = seven(&other, by).resume(ResumeState::read(&path).unwrap()).run(until);
             report.check(run == Err(InputError::AnotherRun), || format!("from {value}: {run:?}"));
         }
         report.check(whole.status == Status::Completed, || format!("{whole:?}"));

@@ -5,18 +5,18 @@ use crate::Attack;
 use crate::numbers::{Claiming, Everything, Grade, HOSTILE, Report, fine, grade, places, triples};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::{Pendulum, QuadraticInZ};
-use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Statement, Structure, Symmetry, Triple};
+use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint, Statement, Structure, Symmetry};
 use discrete_herglotz::{
-    ActionStrang, AnyIntegrator, DiscreteLagrangian, DiscretePath, Gauss, HamiltonianFlow, Method, Midpoint,
-    MomentumDecay, MomentumRow, Problem, Rectangle, Riccati, Solver, Steps, Strang, Transition, Trapezoidal, Until,
-    derived_jet, derived_second_jet, discrete_action, discrete_flow, discrete_flow_jacobian, discrete_momentum,
-    discrete_regularity, discrete_symmetry_defect, hamiltonian_flow, hamiltonian_flow_jacobian, last_correction,
-    legendre_inverse, legendre_minus, legendre_minus_inverse, legendre_plus, legendre_plus_inverse, sigma_d,
-    statements, verified,
+    ActionStrang, AnyIntegrator, DiscreteLagrangian, DiscretePath, DiscreteStep, Gauss, HamiltonianFlow, Method,
+    Midpoint, MomentumDecay, MomentumRow, Problem, Rectangle, Riccati, Solver, Steps, Strang, Trapezoidal, Until,
+    check_claims, derived_jet, derived_second_jet, discrete_action, discrete_flow, discrete_flow_jacobian,
+    discrete_momentum, discrete_regularity, discrete_symmetry_defect, hamiltonian_flow, hamiltonian_flow_jacobian,
+    last_correction, legendre_inverse, legendre_minus, legendre_minus_inverse, legendre_plus, legendre_plus_inverse,
+    sigma_d, statements,
 };
 
 pub const ATTACKS: &[Attack] = &[
-    Attack { on: &["Transition::checked"], run: transitions },
+    Attack { on: &["DiscreteStep::checked"], run: transitions },
     Attack {
         on: &[
             "derived_jet",
@@ -79,13 +79,13 @@ pub const ATTACKS: &[Attack] = &[
     Attack { on: &["last_correction"], run: corrections },
     Attack { on: &["Solver::on_the_stack", "Solver::by_faer", "Solver::solve"], run: solvers },
     Attack { on: &["statements::residual"], run: residuals },
-    Attack { on: &["verified"], run: claims },
+    Attack { on: &["check_claims"], run: claims },
 ];
 
 fn transitions(report: &mut Report) {
     for x in triples() {
         for sigma in HOSTILE {
-            let made = Transition { end: PhasePoint::from(x), velocity: x.y, sigma, iterations: 1 };
+            let made = DiscreteStep { end: PhasePoint::from(x), velocity: x.y, sigma, iterations: 1 };
             let checked = made.checked();
             let good = x.is_finite() && sigma.is_finite() && sigma > 0.0;
             report.check(checked.is_ok() == good, || format!("{made:?}: {checked:?}"));
@@ -133,7 +133,7 @@ fn steps(report: &mut Report) {
             for way in [HamiltonianFlow::Direct, HamiltonianFlow::ThroughPlus, HamiltonianFlow::ThroughMinus] {
                 report.door(&input, hamiltonian_flow(ld, t, &x, &guess, way));
             }
-            let points = DiscretePoint::from(Triple::from(x));
+            let points = DiscretePoint::from(ChartVector::from(x));
             let image = discrete_flow(ld, t, &points);
             report.door(&input, image);
             // Of a splitting they do not depend on the action.
@@ -298,7 +298,7 @@ fn residuals(report: &mut Report) {
 /// A claim is verified where it can be, and where it cannot it is not taken for true.
 fn claims(report: &mut Report) {
     for (t, x) in places() {
-        let found = verified(&Claiming, t, &x.into());
+        let found = check_claims(&Claiming, t, &x.into());
         // The claims have nothing to do with the action.
         let bad = grade(&(t, (x.x, x.y))) == Grade::Bad;
         report.check(!bad || found.is_err(), || format!("at t = {t}, {x:?}: {found:?}"));

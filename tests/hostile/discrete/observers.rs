@@ -5,8 +5,8 @@ use crate::Attack;
 use crate::numbers::{Everything, HOSTILE, Report, fine, triples};
 use contact_geom::{PhasePoint, VelocityPoint};
 use discrete_herglotz::{
-    AnyIntegrator, Course, CsvRows, Event, Events, InputError, Moment, Needs, Observer, Outcome, Problem, Progress,
-    Quotient, Rows, Status, StepError, Steps, Stop, Until,
+    AnyIntegrator, CsvRows, Event, Events, InputError, Observer, Outcome, OutputRequest, Problem, Progress, Quotient,
+    Rows, RunInfo, Status, StepError, StepView, Steps, Stop, Until,
 };
 use std::ops::ControlFlow;
 
@@ -38,13 +38,13 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: events,
     },
-    Attack { on: &["Run::observe", "Stop::here", "Stop::failed", "Needs::and"], run: odd_observers },
+    Attack { on: &["Run::observe", "Stop::here", "Stop::failed", "OutputRequest::and"], run: odd_observers },
     Attack {
         on: &[
-            "Moment::velocity",
-            "Moment::velocity_at",
-            "Moment::energy",
-            "Moment::last_step",
+            "StepView::velocity",
+            "StepView::velocity_at",
+            "StepView::energy",
+            "StepView::last_step",
             "LastStep::span",
             "LastStep::ends",
             "LastStep::at",
@@ -181,10 +181,10 @@ fn events(report: &mut Report) {
 struct AtTheStart(Stop<1>);
 
 impl Observer<1> for AtTheStart {
-    fn start(&mut self, _at: &Moment<'_, 1>) -> ControlFlow<Stop<1>> {
+    fn start(&mut self, _at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
         ControlFlow::Break(self.0)
     }
-    fn step(&mut self, _at: &Moment<'_, 1>) -> ControlFlow<Stop<1>> {
+    fn step(&mut self, _at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
         ControlFlow::Continue(())
     }
 }
@@ -193,10 +193,10 @@ impl Observer<1> for AtTheStart {
 struct Refusing;
 
 impl Observer<1> for Refusing {
-    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         Err(InputError::Times { index: 0, t: course.t_end })
     }
-    fn step(&mut self, _at: &Moment<'_, 1>) -> ControlFlow<Stop<1>> {
+    fn step(&mut self, _at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
         ControlFlow::Continue(())
     }
 }
@@ -208,7 +208,7 @@ impl Observer<1> for AsksFor {
     fn next(&self, _taken: usize) -> usize {
         self.0
     }
-    fn step(&mut self, at: &Moment<'_, 1>) -> ControlFlow<Stop<1>> {
+    fn step(&mut self, at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
         self.1.push(at.k);
         ControlFlow::Continue(())
     }
@@ -245,8 +245,9 @@ fn odd_observers(report: &mut Report) {
     report.check(last.1 == [outcome.steps] && outcome.status == Status::Completed, || format!("{outcome:?}"));
     let all = [(false, false), (false, true), (true, false), (true, true)];
     for (a, b) in all.into_iter().flat_map(|a| all.map(|b| (a, b))) {
-        let [of_a, of_b] = [a, b].map(|(action, conformal_factor)| Needs { action, conformal_factor, saved: false });
-        let both = Needs { action: a.0 || b.0, conformal_factor: a.1 || b.1, saved: false };
+        let [of_a, of_b] =
+            [a, b].map(|(action, conformal_factor)| OutputRequest { action, conformal_factor, saved: false });
+        let both = OutputRequest { action: a.0 || b.0, conformal_factor: a.1 || b.1, saved: false };
         report.check(of_a.and(of_b) == both, || format!("{of_a:?} and {of_b:?}"));
     }
 }
@@ -257,7 +258,7 @@ fn moments(report: &mut Report) {
         for until in [0.5, -0.5] {
             let mut at_start = None;
             let mut seen = 0;
-            let mut look = |at: &Moment<'_, 1>| {
+            let mut look = |at: &StepView<'_, 1>| {
                 report.door(&at.t, at.velocity());
                 report.door(&at.t, at.energy());
                 for value in HOSTILE {
@@ -293,10 +294,10 @@ impl Observer<1> for Start<'_> {
     fn next(&self, _taken: usize) -> usize {
         usize::MAX
     }
-    fn start(&mut self, at: &Moment<'_, 1>) -> ControlFlow<Stop<1>> {
+    fn start(&mut self, at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
         self.step(at)
     }
-    fn step(&mut self, at: &Moment<'_, 1>) -> ControlFlow<Stop<1>> {
+    fn step(&mut self, at: &StepView<'_, 1>) -> ControlFlow<Stop<1>> {
         self.0.push((at.k, at.last_step().is_some()));
         ControlFlow::Continue(())
     }

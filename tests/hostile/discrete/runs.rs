@@ -69,7 +69,7 @@ impl Lagrangian<0> for Empty {
 
 fn integrators(report: &mut Report) {
     for stages in [0, 17, usize::MAX] {
-        for integrator in [AnyIntegrator::Gauss { stages }, AnyIntegrator::Clocked { stages }] {
+        for integrator in [AnyIntegrator::Gauss { stages }, AnyIntegrator::TransformedGauss { stages }] {
             let refused = integrator.check(&Claiming);
             report.check(refused == Err(InputError::Stages { found: stages }), || format!("{integrator}: {refused:?}"));
         }

@@ -5,7 +5,7 @@ use crate::Attack;
 use crate::numbers::{Claiming, Everything, Grade, HOSTILE, Numbers, Report, fine, grade, triples};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, QuadraticInZ};
-use contact_geom::{DiscretePoint, PhasePoint, Triple};
+use contact_geom::{ChartVector, DiscretePoint, PhasePoint};
 use discrete_herglotz::{
     ActionFlow, ActionMap, ActionSplitting, Composition, DiscreteLagrangian, EnergyDrift, EnergyLook, Flow, Gauss,
     GaussRoute, InputError, Midpoint, Riccati, Splitting, SplittingScheme, Stepper,
@@ -22,9 +22,9 @@ pub const ATTACKS: &[Attack] = &[
             "Flow::time",
             "Flow::step",
             "Flow::step_back",
-            "Flow::suspicion",
+            "Flow::unresolved",
             "DiscreteLagrangian::check_start",
-            "DiscreteLagrangian::misfit",
+            "DiscreteLagrangian::defect",
         ],
         run: flows,
     },
@@ -44,9 +44,9 @@ pub const ATTACKS: &[Attack] = &[
     },
     Attack {
         on: &[
-            "Gauss::clocked_stepper",
-            "ClockedStepper::time_momentum",
-            "ClockedStepper::advance_to",
+            "Gauss::transformed_stepper",
+            "TransformedStepper::time_momentum",
+            "TransformedStepper::advance_to",
             "Stepper::advance_until",
         ],
         run: clocked,
@@ -72,14 +72,14 @@ pub const ATTACKS: &[Attack] = &[
             "Stepper::time",
             "Stepper::sigma",
             "Stepper::evaluations",
-            "Stepper::suspicion",
+            "Stepper::unresolved",
             "Stepper::doubt",
             "Stepper::guess",
             "Stepper::last_velocity",
         ],
         run: steppers,
     },
-    Attack { on: &["EnergyDrift::new", "EnergyDrift::misfit"], run: drifts },
+    Attack { on: &["EnergyDrift::new", "EnergyDrift::defect"], run: drifts },
 ];
 
 /// An energy that is no number is no drift, and what is one is above one.
@@ -94,8 +94,8 @@ fn drifts(report: &mut Report) {
         for (start, wild) in wild.iter().flat_map(|w| [(tame, *w), (*w, tame), (*w, *w)]) {
             for log_factor in [0.0, -1.0, value] {
                 let mut drift = EnergyDrift::new(2, &start);
-                let found = drift.misfit(&EnergyLook { log_factor, taken: 100, ..wild }, |_| 0.0);
-                report.check(found.is_none_or(|misfit| misfit > 1.0), || format!("{start:?}, {wild:?}: {found:?}"));
+                let found = drift.defect(&EnergyLook { log_factor, taken: 100, ..wild }, |_| 0.0);
+                report.check(found.is_none_or(|defect| defect > 1.0), || format!("{start:?}, {wild:?}: {found:?}"));
             }
         }
     }
@@ -175,7 +175,7 @@ fn steppers(report: &mut Report) {
         report.check(stepper.advance(0).is_ok() && stepper.state() == start && stepper.time() == 0.0, || {
             "no step".into()
         });
-        let blank = stepper.sigma() == 1.0 && stepper.suspicion().is_none() && stepper.doubt().is_none();
+        let blank = stepper.sigma() == 1.0 && stepper.unresolved().is_none() && stepper.doubt().is_none();
         report.check(blank && stepper.last_velocity().is_none(), || "before the first step".into());
         // A guess of another motion changes the work alone.
         stepper.guess(&foreign);
@@ -190,13 +190,13 @@ fn flows(report: &mut Report) {
     let ld = Midpoint::new(Everything, 0.1).unwrap();
     for (t, x) in starts() {
         drive(report, &(t, x), Flow::new(&ld, t, x));
-        drive(report, &(t, x), Flow::from_points(&ld, t, DiscretePoint::from(Triple::from(x))));
+        drive(report, &(t, x), Flow::from_points(&ld, t, DiscretePoint::from(ChartVector::from(x))));
         if let Ok(mut flow) = Flow::new(&ld, t, x) {
             let _ = flow.advance(3);
             let seen = flow.state().check().is_ok() && flow.time().is_finite();
             report.check(seen, || format!("{x:?}: {:?}", flow.state()));
-            let mark = flow.suspicion().is_none_or(|s| s.step < 3 && s.misfit >= 1.0);
-            report.check(mark, || format!("{x:?}: {:?}", flow.suspicion()));
+            let mark = flow.unresolved().is_none_or(|s| s.step < 3 && s.defect >= 1.0);
+            report.check(mark, || format!("{x:?}: {:?}", flow.unresolved()));
             let back = flow.step_back().is_err() || flow.state().check().is_ok();
             report
                 .check(back && flow.step().map_or(true, |s| s.to.check().is_ok()), || format!("{x:?}: back and forth"));
@@ -213,9 +213,9 @@ fn flows(report: &mut Report) {
         let start = ld.check_start(0.0, &state, &v);
         report.check(number.is_finite() || start.is_err(), || format!("a start at {number}"));
         let calm = SVector::from([1.0]);
-        let misfit = ld.misfit([&calm, &calm, &calm, &calm], &tame, number);
+        let defect = ld.defect([&calm, &calm, &calm, &calm], &tame, number);
         let regular = (0.5..=2.0).contains(&number);
-        report.check(misfit.is_none() == regular || number.abs() > 1.0, || format!("sigma = {number}: {misfit:?}"));
+        report.check(defect.is_none() == regular || number.abs() > 1.0, || format!("sigma = {number}: {defect:?}"));
     }
 }
 
@@ -261,20 +261,22 @@ fn clocked(report: &mut Report) {
         let gauss = Gauss::new(kepler, 4, h).unwrap();
         for x in [[value, 0.0, 0.0, 1.0], [1.0, value, 0.0, 1.0], [1.0, 0.0, value, 1.0], [value; 4]] {
             let start = PhasePoint::<2>::new([x[0], x[1]], [x[2], x[3]], 0.0);
-            let made = gauss.clocked_stepper(kepler.clock(), 0.0, start, start.p).map(|mut stepper| {
-                let _ = stepper.advance(3);
-                (stepper.state(), stepper.time(), stepper.time_momentum())
-            });
+            let made =
+                gauss.transformed_stepper(kepler.time_transformation(), 0.0, start, start.p).map(|mut stepper| {
+                    let _ = stepper.advance(3);
+                    (stepper.state(), stepper.time(), stepper.time_momentum())
+                });
             report.door(&start, made);
         }
         let start = PhasePoint::<2>::new([1.0, 0.0], [0.0, 1.0], 0.0);
-        report
-            .check(value.is_finite() || gauss.clocked_stepper(kepler.clock(), value, start, start.p).is_err(), || {
-                format!("from t = {value}")
-            });
+        report.check(
+            value.is_finite()
+                || gauss.transformed_stepper(kepler.time_transformation(), value, start, start.p).is_err(),
+            || format!("from t = {value}"),
+        );
         // A time that is far away is not asked for: that many steps are what it takes.
         if !value.is_finite() || value.abs() <= 1.0 {
-            let mut stepper = gauss.clocked_stepper(kepler.clock(), 0.0, start, start.p).unwrap();
+            let mut stepper = gauss.transformed_stepper(kepler.time_transformation(), 0.0, start, start.p).unwrap();
             let done = stepper.advance_to(value);
             let at = if value * h > 0.0 { value } else { 0.0 };
             // Of a time too short for its steps it says so, and stays.

@@ -5,11 +5,11 @@ use crate::numbers::{Everything, HOSTILE, Report, fine, places, triples};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::statements::AnyFunction;
 use contact_geom::{
-    Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, Energy, EtaMinus, EtaPlus, Form, HerglotzField,
-    InfinitesimalConformality, LagrangianForm, OneParameterGroup, SecondDiscreteJet, Smooth, SmoothFunction, Symmetry,
-    Triple, VelocityPoint, conformal_factor_along, conformality, conformality_with_jacobian, derivative_along,
-    dissipation_defect, generic, hamiltonian_vector_field, infinitesimal_conformality, jacobi_bracket, lie_bracket,
-    lie_derivative,
+    ChartVector, Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, Energy, EtaMinus, EtaPlus, Form,
+    HerglotzField, InfinitesimalConformality, LagrangianForm, OneParameterGroup, SecondDiscreteJet, Smooth,
+    SmoothFunction, Symmetry, VelocityPoint, conformal_factor_along, conformality, conformality_with_jacobian,
+    derivative_along, dissipation_defect, generic, hamiltonian_vector_field, infinitesimal_conformality,
+    jacobi_bracket, lie_bracket, lie_derivative,
 };
 
 pub const ATTACKS: &[Attack] = &[
@@ -119,7 +119,7 @@ fn groups(report: &mut Report) {
 
 /// Closed forms and generic ones, on T*Q x R, on TQ x R and on Q x Q x R.
 fn forms(report: &mut Report) {
-    fn one(report: &mut Report, form: &impl ContactForm<1>, x: &Triple<1>, of: &Triple<1>) {
+    fn one(report: &mut Report, form: &impl ContactForm<1>, x: &ChartVector<1>, of: &ChartVector<1>) {
         report.formula(&of.y, form.eta(x));
         report.formula(&(*of, *of), form.flat(x, of));
         report.formula(&(*of, *of), form.sharp(x, of));
@@ -128,7 +128,7 @@ fn forms(report: &mut Report) {
         report.formula(&of.y, generic::reeb(form, x));
         report.formula(&of.y, generic::volume(form, x));
     }
-    let upward = Triple { x: [0.0].into(), y: [0.0].into(), z: 1.0 };
+    let upward = ChartVector { x: [0.0].into(), y: [0.0].into(), z: 1.0 };
     for x in triples() {
         one(report, &Darboux, &x, &x);
         one(report, &Form(Darboux), &x, &x);
@@ -205,7 +205,7 @@ fn fields(report: &mut Report) {
         let found = infinitesimal_conformality(&form, &field, &x);
         report.formula(&(t, x), found.map(|InfinitesimalConformality { rate, defect }| (rate, defect)));
     }
-    let path = |_: f64| Triple { x: [0.3].into(), y: [0.7].into(), z: 0.2 };
+    let path = |_: f64| ChartVector { x: [0.3].into(), y: [0.7].into(), z: 0.2 };
     for value in HOSTILE {
         let factor = conformal_factor_along(&Darboux, &f, path, &[(0.1, value), (0.2, 0.5)]);
         report.check(factor.as_ref().is_ok_and(|s| value.is_finite() || !s.is_finite() || *s == 0.0), || {

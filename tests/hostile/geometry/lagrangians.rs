@@ -6,9 +6,9 @@ use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::statements::ActionSquared;
 use contact_geom::systems::{CoupledInZ, FreeParticle, HarmonicOscillator, Kepler, LaneEmden, Pendulum, UniformField};
 use contact_geom::{
-    Clock, Derivatives, Dual, Lagrangian, Regularity, Statement, Structure, ValueOnly, VelocityPoint,
-    check_closed_derivatives, derived_gradient, derived_hessian, gradient_rounding, herglotz_field, herglotz_rates,
-    legendre, legendre_jacobian, legendre_polynomials, regularity, statements,
+    Derivatives, Dual, Lagrangian, Regularity, Statement, Structure, TimeTransformation, VelocityPoint,
+    WithoutClosedDerivatives, check_closed_derivatives, derived_gradient, derived_hessian, gradient_rounding,
+    herglotz_field, herglotz_rates, legendre, legendre_jacobian, legendre_polynomials, regularity, statements,
 };
 
 pub const ATTACKS: &[Attack] = &[
@@ -52,7 +52,7 @@ pub const ATTACKS: &[Attack] = &[
         ],
         run: closed_forms,
     },
-    Attack { on: &["Kepler::clock", "Clock::rate", "Lagrangian::clock_rate"], run: clocks },
+    Attack { on: &["Kepler::time_transformation", "TimeTransformation::rate", "Lagrangian::dt_dtau"], run: clocks },
 ];
 
 fn herglotz(report: &mut Report) {
@@ -62,7 +62,7 @@ fn herglotz(report: &mut Report) {
         report.formula(&(t, x), fine(legendre_jacobian(&Everything, t, &at)));
         report.formula(&(t, x), herglotz_field(&Everything, t, &at));
         report.formula(&(t, x), herglotz_rates(&Everything, t, &at));
-        report.formula(&(t, x), herglotz_field(&ValueOnly(Everything), t, &at));
+        report.formula(&(t, x), herglotz_field(&WithoutClosedDerivatives(Everything), t, &at));
         let (of_value, of_gradient) = gradient_rounding(&Everything, t, &at);
         // Sizes, or no numbers: never a number below 0.
         let entries = (0..3).map(|i| of_gradient.component(i)).chain([of_value]);
@@ -195,11 +195,11 @@ fn closed_forms(report: &mut Report) {
 
 fn clocks(report: &mut Report) {
     let kepler = Kepler::<2>::default();
-    let clock = kepler.clock();
+    let clock = kepler.time_transformation();
     for value in HOSTILE {
         let q = SVector::from([value, 0.3]);
         report.formula(&value, fine(clock.rate(&q)));
-        report.formula(&value, fine(kepler.clock_rate(&q)));
+        report.formula(&value, fine(kepler.dt_dtau(&q)));
     }
 }
 

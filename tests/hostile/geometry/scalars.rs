@@ -4,23 +4,26 @@ use crate::Attack;
 use crate::numbers::{HOSTILE, Report, fine, triples};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
-    Border, DiscretePoint, Dual, Larger, Largest, Module, PhasePoint, Scalar, VelocityPoint, larger, largest, linear,
-    seed,
+    AugmentedVector, DiscretePoint, Dual, MaxAbsOrNan, MaxOrNan, PhasePoint, Scalar, TangentVector, VelocityPoint,
+    linear, max_abs_or_nan, max_or_nan, seed,
 };
 
 pub const ATTACKS: &[Attack] = &[
-    Attack { on: &["larger", "largest", "Larger::larger", "Largest::largest"], run: maxima },
+    Attack {
+        on: &["max_or_nan", "max_abs_or_nan", "MaxOrNan::max_or_nan", "MaxAbsOrNan::max_abs_or_nan"],
+        run: maxima,
+    },
     Attack { on: &["SingularMatrix::of", "linear::solve", "linear::solve_in_kernel"], run: systems_of_equations },
     Attack {
         on: &[
-            "Triple::dot",
-            "Triple::scale",
-            "Triple::plus",
-            "Triple::minus",
-            "Triple::component",
-            "Triple::to_vector",
-            "Triple::amax",
-            "Triple::is_finite",
+            "ChartVector::dot",
+            "ChartVector::scale",
+            "ChartVector::plus",
+            "ChartVector::minus",
+            "ChartVector::component",
+            "ChartVector::to_vector",
+            "ChartVector::amax",
+            "ChartVector::is_finite",
             "seed",
         ],
         run: coordinates,
@@ -69,18 +72,18 @@ pub const ATTACKS: &[Attack] = &[
 fn maxima(report: &mut Report) {
     for a in HOSTILE {
         for b in HOSTILE {
-            let most = larger(a, b);
+            let most = max_or_nan(a, b);
             let good = if a.is_nan() || b.is_nan() { most.is_nan() } else { most >= a && most >= b };
             report.check(good, || format!("larger({a}, {b}) = {most}"));
-            report.check(a.larger(b).to_bits() == most.to_bits() || most.is_nan(), || format!("{a}.larger({b})"));
-            let most = SVector::from([a, 1.0, b]).largest();
+            report.check(a.max_or_nan(b).to_bits() == most.to_bits() || most.is_nan(), || format!("{a}.larger({b})"));
+            let most = SVector::from([a, 1.0, b]).max_abs_or_nan();
             report.check(most.is_nan() == (a.is_nan() || b.is_nan()), || format!("[{a}, 1, {b}].largest() = {most}"));
-            let most = largest([a, 1.0, b]);
+            let most = max_abs_or_nan([a, 1.0, b]);
             let good = if a.is_nan() || b.is_nan() { most.is_nan() } else { most >= a.abs() && most >= b.abs() };
             report.check(good, || format!("largest([{a}, 1, {b}]) = {most}"));
         }
     }
-    report.check(largest([]) == 0.0, || "the largest of nothing".into());
+    report.check(max_abs_or_nan([]) == 0.0, || "the largest of nothing".into());
 }
 
 /// Matrices that are singular, nearly so or not finite.
@@ -123,7 +126,7 @@ fn coordinates(report: &mut Report) {
         report.formula(&x, fine(x.plus(one)));
         report.formula(&x, fine(x.minus(one)));
         report.formula(&x.x, fine(seed(&x).x[0].re));
-        let most = largest((0..3).map(|i| x.component(i)));
+        let most = max_abs_or_nan((0..3).map(|i| x.component(i)));
         report.check(most.is_nan() || x.amax() == most, || format!("{x:?}: amax {}", x.amax()));
         let finite = (0..3).all(|i| x.component(i).is_finite());
         report.check(x.is_finite() == finite, || format!("{x:?}: is_finite"));
@@ -154,12 +157,12 @@ fn points(report: &mut Report) {
 
 fn differentials(report: &mut Report) {
     type D = Dual<f64, SVector<f64, 1>>;
-    let null: SVector<f64, 1> = Module::<f64>::null();
+    let null: SVector<f64, 1> = TangentVector::<f64>::null();
     report.check(D::constant(1.0).d == null, || "a constant's differential".into());
     for value in HOSTILE {
         report.formula(&value, fine(D::constant(value)));
-        let border = Border::<1> { x: SVector::from([value]), z: 1.0 };
-        let numbers = |b: Border<1>| (b.x, b.z);
+        let border = AugmentedVector::<1> { x: SVector::from([value]), z: 1.0 };
+        let numbers = |b: AugmentedVector<1>| (b.x, b.z);
         report.formula(&value, fine(numbers(border.each(|a| a + 1.0))));
         report.formula(&value, fine(numbers(border.join(border, |a, b| a + b))));
         report.formula(&value, fine(numbers(border.scaled(2.0))));

@@ -120,6 +120,6 @@ impl Factors {
                 size = size.max((a * x[column]).abs());
             }
         }
-        (super::largest(work), size)
+        (super::max_abs_or_nan(work), size)
     }
 }

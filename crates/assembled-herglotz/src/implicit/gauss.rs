@@ -2,15 +2,15 @@
 
 use super::border::{Border, Scalars};
 use super::corrections::{Corrections, Verdict};
-use super::largest;
 use super::lu::LuFactors;
+use super::max_abs_or_nan;
 use super::stages::{Assembly, MOST, Table};
 use crate::AssemblyError;
 use crate::local::{First, Place};
 use crate::memory::limit;
 use crate::monitor::{Energies, EnergyMonitor, Reached, StepFacts};
 use crate::system::{AssembledSystem, State};
-use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError, Suspicion};
+use discrete_herglotz::{ITERATION_LIMIT, InputError, StepError, StepFailure, UnresolvedStep};
 
 /// Contact Gauss collocation with one or two stages, of order 2 or 4, for systems of any size and any local terms: the stage equations of
 /// [`Gauss`](discrete_herglotz::Gauss),
@@ -121,8 +121,8 @@ impl<'a> AssembledGauss<'a> {
         let table = Table::new(stages, h);
         let rho = table.factors([first.z; MOST]);
         let end = table.b.iter().zip(rho).take(stages).fold(1.0, |end, (b, rho)| end - b * rho * first.z);
-        let facts = StepFacts { h, log_sigma: -end.ln(), order: 2 * stages as u32 };
-        let monitor = EnergyMonitor::new(system, start, facts, |bounded| {
+        let info = StepFacts { h, log_sigma: -end.ln(), order: 2 * stages as u32 };
+        let monitor = EnergyMonitor::new(system, start, info, |bounded| {
             if general {
                 energies(&first, (start.v, &first.v), z)
             } else {
@@ -168,11 +168,11 @@ impl<'a> AssembledGauss<'a> {
     /// Takes steps.
     ///
     /// # Errors
-    /// [`Halt`] with the steps taken before and the cause: [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`],
+    /// [`StepFailure`] with the steps taken before and the cause: [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`],
     /// [`StepError::StageFactor`] or [`StepError::SigmaVanished`]. The state is that before the step which failed.
-    pub fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+    pub fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
-            self.step().map_err(|cause| Halt { taken, cause })?;
+            self.step().map_err(|cause| StepFailure { taken, cause })?;
             if self.monitor.is_due(self.taken) {
                 self.look();
             }
@@ -201,11 +201,11 @@ impl<'a> AssembledGauss<'a> {
     /// conformal factor where L does not depend on time, and without the action at least does not grow by drag. It is looked at after 4, 16, 64 and 256
     /// steps, every 1024, and here: what follows such a step may be wrong. Nothing is seen without the action where gamma is positive, and of
     /// systems that depend on time; without general terms the conformal factor of a step is compared with the exponential as well.
-    pub fn suspicion(&mut self) -> Option<Suspicion> {
+    pub fn unresolved(&mut self) -> Option<UnresolvedStep> {
         if self.monitor.tells(self.taken) {
             self.look();
         }
-        self.monitor.suspicion()
+        self.monitor.unresolved()
     }
 
     /// The time.
@@ -285,10 +285,10 @@ impl<'a> AssembledGauss<'a> {
             for (change, (l_v, p)) in change.iter_mut().zip(first.v.iter().zip(&self.p)) {
                 *change = l_v - p;
             }
-            size = largest(change);
+            size = max_abs_or_nan(change);
             mass.solve(change)?;
             self.end.iter_mut().zip(&*change).for_each(|(v, change)| *v -= change);
-            let (now, speed) = (largest(change), largest(&self.end));
+            let (now, speed) = (max_abs_or_nan(change), max_abs_or_nan(&self.end));
             match corrections.judge(now, f64::EPSILON * speed) {
                 Verdict::Done => return Ok(()),
                 Verdict::Further => {}
@@ -412,7 +412,7 @@ impl<'a> AssembledGauss<'a> {
     fn solve(&mut self) -> Result<(), StepError> {
         let Table { s, a, .. } = self.table;
         // Below this times eps a correction does not move the position.
-        let resolution = largest(&self.q) / self.h.abs();
+        let resolution = max_abs_or_nan(&self.q) / self.h.abs();
         let mut corrections = Corrections::new();
         let mut size = f64::INFINITY;
         for _ in 0..ITERATION_LIMIT {
@@ -423,7 +423,7 @@ impl<'a> AssembledGauss<'a> {
                     *residual = self.rho[k] * self.stages[k].v[i] - self.p[i] - force;
                 }
             }
-            size = largest(&self.residual);
+            size = max_abs_or_nan(&self.residual);
             if !size.is_finite() {
                 return Err(StepError::NonFinite);
             }
@@ -440,7 +440,7 @@ impl<'a> AssembledGauss<'a> {
             let moved = self.border_change()?;
             self.next.iter_mut().zip(&self.change).for_each(|(v, change)| *v -= change);
             self.iterations += 1;
-            let (now, speed) = (largest(&self.change), largest(&self.next));
+            let (now, speed) = (max_abs_or_nan(&self.change), max_abs_or_nan(&self.next));
             let scale = speed + resolution;
             let now = if scale > 0.0 { (now / scale).max(moved) } else { moved };
             if !now.is_finite() {

@@ -1,6 +1,6 @@
 //! faer's factors of a sparse matrix without symmetry.
 
-use super::largest;
+use super::max_abs_or_nan;
 use crate::AssemblyError;
 use discrete_herglotz::StepError;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
@@ -114,7 +114,7 @@ impl LuFactors {
     /// [`StepError::Singular`] where it does not.
     pub fn check(&mut self, x: &[f64], b: &[f64]) -> Result<(), StepError> {
         self.residual.copy_from_slice(b);
-        let mut size = largest(b);
+        let mut size = max_abs_or_nan(b);
         for (column, ends) in self.begins.windows(2).enumerate() {
             let range = ends[0] as usize..ends[1] as usize;
             for (row, a) in self.rows[range.clone()].iter().zip(&self.entries[range]) {
@@ -123,7 +123,7 @@ impl LuFactors {
                 size = size.max(term.abs());
             }
         }
-        if largest(&self.residual) <= f64::EPSILON.sqrt() * size {
+        if max_abs_or_nan(&self.residual) <= f64::EPSILON.sqrt() * size {
             return Ok(());
         }
         self.ready = false;

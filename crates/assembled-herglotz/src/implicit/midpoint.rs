@@ -2,14 +2,14 @@
 
 use super::corrections::{Corrections, Verdict};
 use super::krylov::Krylov;
-use super::largest;
+use super::max_abs_or_nan;
 use super::sparse::Sparse;
 use crate::AssemblyError;
 use crate::blocks::BLOCK;
 use crate::kernels::Weight;
 use crate::monitor::{EnergyMonitor, Reached, StepFacts};
 use crate::system::{AssembledSystem, State};
-use discrete_herglotz::{Halt, ITERATION_LIMIT, InputError, StepError, Suspicion};
+use discrete_herglotz::{ITERATION_LIMIT, InputError, StepError, StepFailure, UnresolvedStep};
 
 /// The symmetric midpoint rule on `L = sum m_i v_i^2/2 - V(t, q) + gamma z`: the discrete Herglotz equations of
 /// [`Midpoint`](discrete_herglotz::Midpoint), for systems of any size.
@@ -145,11 +145,11 @@ impl<'a> AssembledMidpoint<'a> {
     /// Takes steps.
     ///
     /// # Errors
-    /// [`Halt`] with the steps taken before and the cause: [`StepError::NotConverged`], [`StepError::Singular`],
+    /// [`StepFailure`] with the steps taken before and the cause: [`StepError::NotConverged`], [`StepError::Singular`],
     /// [`StepError::NonFinite`], or [`StepError::SigmaVanished`] of a rate that has grown beyond `|gamma h| < 2`. The state is that before the step which failed.
-    pub fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+    pub fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
-            self.step().map_err(|cause| Halt { taken, cause })?;
+            self.step().map_err(|cause| StepFailure { taken, cause })?;
             if self.monitor.is_due(self.taken) {
                 self.look();
             }
@@ -171,11 +171,11 @@ impl<'a> AssembledMidpoint<'a> {
     /// conformal factor where L does not depend on time, and without the action at least does not grow by drag. It is looked at after 4, 16, 64 and 256
     /// steps, every 1024, and here: what follows such a step may be wrong. Nothing is seen without the action where gamma is positive, and of
     /// systems that depend on time; the conformal factor of a step is compared with the exponential as well.
-    pub fn suspicion(&mut self) -> Option<Suspicion> {
+    pub fn unresolved(&mut self) -> Option<UnresolvedStep> {
         if self.monitor.tells(self.taken) {
             self.look();
         }
-        self.monitor.suspicion()
+        self.monitor.unresolved()
     }
 
     /// The state.
@@ -256,7 +256,7 @@ impl<'a> AssembledMidpoint<'a> {
     /// Solves for the mean velocity, from the guess in `before` and into it.
     fn solve(&mut self, t: f64, half: f64) -> Result<(), StepError> {
         let (h, n) = (self.h, self.system.unknowns());
-        let resolution = largest(&self.q) / h.abs();
+        let resolution = max_abs_or_nan(&self.q) / h.abs();
         let mut corrections = Corrections::new();
         let mut size = f64::INFINITY;
         for _ in 0..ITERATION_LIMIT {
@@ -270,7 +270,7 @@ impl<'a> AssembledMidpoint<'a> {
                 let (u, v) = (self.before[i], self.v[i]);
                 self.residual[i] = m * (u - (1.0 + half) * v) - 0.5 * h * self.residual[i];
             }
-            size = largest(&self.residual);
+            size = max_abs_or_nan(&self.residual);
             if !size.is_finite() {
                 return Err(StepError::NonFinite);
             }
@@ -282,7 +282,7 @@ impl<'a> AssembledMidpoint<'a> {
                 *u -= change;
             }
             self.iterations += 1;
-            let (now, speed) = (largest(&self.change), largest(&self.before));
+            let (now, speed) = (max_abs_or_nan(&self.change), max_abs_or_nan(&self.before));
             if !now.is_finite() {
                 return Err(StepError::NonFinite);
             }

@@ -1,7 +1,7 @@
 //! The sparse matrix of a midpoint step, and its factors.
 
 use super::factors::Factors;
-use super::largest;
+use super::max_abs_or_nan;
 use super::pattern::Pattern;
 use crate::AssemblyError;
 use crate::memory::limit;
@@ -47,6 +47,6 @@ impl Sparse {
     /// for: Newton's method makes up for the rest.
     pub fn solves(&self, x: &[f64], b: &[f64], work: &mut [f64]) -> bool {
         let (left, size) = self.factors.residual(&self.entries, x, b, work);
-        left <= f64::EPSILON.sqrt() * (size + largest(b))
+        left <= f64::EPSILON.sqrt() * (size + max_abs_or_nan(b))
     }
 }

@@ -1,6 +1,6 @@
 //! One-parameter groups acting on Q, their lifts to the contact manifolds, and their momenta.
 
-use crate::{Derivatives, Dual, GeometryError, Lagrangian, Scalar, Triple, VelocityPoint, largest};
+use crate::{ChartVector, Derivatives, Dual, GeometryError, Lagrangian, Scalar, VelocityPoint, max_abs_or_nan};
 use nalgebra::SVector;
 
 type Line<T> = SVector<T, 1>;
@@ -38,16 +38,16 @@ pub trait OneParameterGroup<const N: usize> {
 
     /// The lift to Q x Q x R, `(q0, q1, z0) -> (act q0, act q1, z0)`; paper, section 3.2.
     #[inline]
-    fn on_discrete<T: Scalar>(&self, s: T, x: &Triple<N, T>) -> Triple<N, T> {
-        Triple { x: self.act(s, &x.x), y: self.act(s, &x.y), z: x.z }
+    fn on_discrete<T: Scalar>(&self, s: T, x: &ChartVector<N, T>) -> ChartVector<N, T> {
+        ChartVector { x: self.act(s, &x.x), y: self.act(s, &x.y), z: x.z }
     }
 
     /// The generator of the lift to TQ x R, `(xi_Q(q), T xi_Q . v, 0)`.
     #[inline]
-    fn velocity_generator<T: Scalar>(&self, x: &VelocityPoint<N, T>) -> Triple<N, T> {
+    fn velocity_generator<T: Scalar>(&self, x: &VelocityPoint<N, T>) -> ChartVector<N, T> {
         let moving = SVector::from_fn(|i, _| Dual { re: x.q[i], d: Line::new(x.v[i]) });
         let xi = self.generator(&moving);
-        Triple { x: xi.map(|c| c.re), y: xi.map(|c| c.d[0]), z: T::zero() }
+        ChartVector { x: xi.map(|c| c.re), y: xi.map(|c| c.d[0]), z: T::zero() }
     }
 
     /// The momentum `J = p . xi_Q(q) = -eta(xi)`; the project's sign for the continuous and the discrete side, see
@@ -130,7 +130,7 @@ impl<const N: usize> Symmetry<N> {
             return Err(GeometryError::WrongSize { what: "the axis of rotation", expected: N, found: 3 });
         }
         // Relative to the largest component: the squares of a huge axis overflow, those of a tiny one vanish.
-        let most = largest(axis);
+        let most = max_abs_or_nan(axis);
         let axis = axis.map(|a| a / most);
         let length = SVector::from(axis).norm();
         let unit: SVector<f64, N> = SVector::from_fn(|i, _| axis[i] / length);

@@ -1,6 +1,6 @@
 //! Derivatives of systems of many coordinates: by blocks of directions, so that the numbers stay small enough for the stack.
 
-use crate::{Derivatives, Hessian, KernelDual, Lagrangian, Scalar, Triple, VelocityPoint};
+use crate::{ChartVector, Derivatives, Hessian, KernelDual, Lagrangian, Scalar, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// The largest dimension whose directions are carried all at once: nested, those of all coordinates take memory as the third
@@ -51,9 +51,9 @@ pub(crate) fn with_gradient<T: Scalar, const N: usize>(
     lagrangian: &(impl Lagrangian<N> + ?Sized),
     t: T,
     x: &VelocityPoint<N, T>,
-) -> (T, Triple<N, T>) {
+) -> (T, ChartVector<N, T>) {
     let zero = T::zero();
-    let mut gradient = Triple { x: SVector::from_element(zero), y: SVector::from_element(zero), z: zero };
+    let mut gradient = ChartVector { x: SVector::from_element(zero), y: SVector::from_element(zero), z: zero };
     let mut re = zero;
     for start in starts(2 * N + 1) {
         let l = value(lagrangian, t, x, start);

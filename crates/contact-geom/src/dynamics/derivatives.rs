@@ -1,7 +1,7 @@
 //! The derivatives of Lagrangians.
 
 use crate::dynamics::blocks::{self, BLOCK};
-use crate::{Dual, KernelDual, Lagrangian, Module, Scalar, Triple, VelocityPoint, seed};
+use crate::{ChartVector, Dual, KernelDual, Lagrangian, Scalar, TangentVector, VelocityPoint, seed};
 use nalgebra::{SMatrix, SVector};
 use num_traits::One;
 
@@ -17,10 +17,10 @@ pub trait Derivatives<const N: usize>: Lagrangian<N> {
     /// The value and the differential along given directions: the coordinates of `x` carry the directions as duals.
     /// It uses
     /// [`closed_gradient`](Lagrangian::closed_gradient) where there is one.
-    fn along<T: Scalar, D: Module<T>>(&self, t: T, x: &VelocityPoint<N, Dual<T, D>>) -> Dual<T, D>;
+    fn along<T: Scalar, D: TangentVector<T>>(&self, t: T, x: &VelocityPoint<N, Dual<T, D>>) -> Dual<T, D>;
 
     /// The value with the partial derivatives `(L_q, L_v, L_z)`, for kernels.
-    fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, Triple<N, T>);
+    fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, ChartVector<N, T>);
 
     /// The value with the partial derivatives `L_q` alone, for kernels: what a force needs.
     fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>);
@@ -35,7 +35,7 @@ pub trait Derivatives<const N: usize>: Lagrangian<N> {
     fn mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SMatrix<T, N, N>;
 
     /// The partial derivatives `(L_q, L_v, L_z)`.
-    fn gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Triple<N, T>;
+    fn gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> ChartVector<N, T>;
 
     /// The second partial derivatives in `(q, v, z)`.
     fn hessian<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Hessian<N, T>;
@@ -43,7 +43,7 @@ pub trait Derivatives<const N: usize>: Lagrangian<N> {
 
 impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
     #[inline(always)]
-    fn along<T: Scalar, D: Module<T>>(&self, t: T, x: &VelocityPoint<N, Dual<T, D>>) -> Dual<T, D> {
+    fn along<T: Scalar, D: TangentVector<T>>(&self, t: T, x: &VelocityPoint<N, Dual<T, D>>) -> Dual<T, D> {
         let base = VelocityPoint { q: x.q.map(|a| a.re), v: x.v.map(|a| a.re), z: x.z.re };
         let g = match self.closed_gradient(t, &base) {
             Some(g) => g,
@@ -58,7 +58,7 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
     }
 
     #[inline(always)]
-    fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, Triple<N, T>) {
+    fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, ChartVector<N, T>) {
         if let Some(both) = self.closed_with_gradient(t, x) {
             return both;
         }
@@ -68,9 +68,9 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
         if const { N > BLOCK } {
             return blocks::with_gradient(self, t, x);
         }
-        let mut q = still::<T, Triple<N, T>, N>(&x.q);
-        let mut v = still::<T, Triple<N, T>, N>(&x.v);
-        let mut z = KernelDual::<T, Triple<N, T>>::constant(x.z);
+        let mut q = still::<T, ChartVector<N, T>, N>(&x.q);
+        let mut v = still::<T, ChartVector<N, T>, N>(&x.v);
+        let mut z = KernelDual::<T, ChartVector<N, T>>::constant(x.z);
         for i in 0..N {
             q[i].d.x[i] = T::one();
             v[i].d.y[i] = T::one();
@@ -152,7 +152,7 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
     }
 
     #[inline]
-    fn gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Triple<N, T> {
+    fn gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> ChartVector<N, T> {
         match self.closed_gradient(t, x) {
             Some(gradient) => gradient,
             None if const { Self::PROVED } => missing(),
@@ -165,7 +165,7 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
         match self.closed_hessian(t, x) {
             Some(hessian) => hessian,
             None if const { Self::PROVED } => {
-                let Triple { x, y, z } = missing();
+                let ChartVector { x, y, z } = missing();
                 let matrix = SMatrix::from_element(z);
                 Hessian { qq: matrix, qv: matrix, vv: matrix, qz: x, vz: y, zz: z }
             }
@@ -176,14 +176,14 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
 
 /// The gradient that a Lagrangian promises, and has not: no number.
 #[cold]
-fn missing<T: Scalar, const N: usize>() -> Triple<N, T> {
+fn missing<T: Scalar, const N: usize>() -> ChartVector<N, T> {
     let none = || SVector::from_fn(|_, _| T::from(f64::NAN));
-    Triple { x: none(), y: none(), z: T::from(f64::NAN) }
+    ChartVector { x: none(), y: none(), z: T::from(f64::NAN) }
 }
 
 /// Coordinates that no direction moves.
 #[inline(always)]
-fn still<T: Scalar, D: Module<T>, const N: usize>(x: &SVector<T, N>) -> SVector<KernelDual<T, D>, N> {
+fn still<T: Scalar, D: TangentVector<T>, const N: usize>(x: &SVector<T, N>) -> SVector<KernelDual<T, D>, N> {
     SVector::from_array_storage(nalgebra::ArrayStorage([std::array::from_fn(|i| KernelDual::constant(x[i]))]))
 }
 
@@ -210,11 +210,11 @@ pub fn derived_gradient<T: Scalar, const N: usize>(
     lagrangian: &(impl Lagrangian<N> + ?Sized),
     t: T,
     x: &VelocityPoint<N, T>,
-) -> Triple<N, T> {
+) -> ChartVector<N, T> {
     if const { N > BLOCK } {
         return blocks::with_gradient(lagrangian, t, x).1;
     }
-    let s = seed(&Triple::from(*x));
+    let s = seed(&ChartVector::from(*x));
     lagrangian.value(Dual::constant(t), &s.x, &s.y, s.z).d
 }
 
@@ -228,7 +228,7 @@ pub fn derived_hessian<T: Scalar, const N: usize>(
     if const { N > BLOCK } {
         return blocks::hessian(lagrangian, t, x);
     }
-    let g = lagrangian.gradient(Dual::constant(t), &seed(&Triple::from(*x)).into());
+    let g = lagrangian.gradient(Dual::constant(t), &seed(&ChartVector::from(*x)).into());
     Hessian {
         qq: SMatrix::from_fn(|i, j| g.x[i].d.x[j]),
         qv: SMatrix::from_fn(|i, j| g.x[i].d.y[j]),

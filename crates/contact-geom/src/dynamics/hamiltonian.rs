@@ -1,7 +1,7 @@
 //! Contact Hamiltonian vector fields, the Jacobi bracket and dissipated quantities.
 
 use crate::forms::smooth::{apply, apply_transposed};
-use crate::{ContactForm, GeometryError, Largest, Module, Scalar, Smooth, SmoothFunction, Triple};
+use crate::{ChartVector, ContactForm, GeometryError, MaxAbsOrNan, Scalar, Smooth, SmoothFunction, TangentVector};
 
 /// The contact Hamiltonian vector field `X_f` of any contact form: `flat(X_f) = df - (f + R(f)) eta`; paper, section 2.1.
 ///
@@ -11,8 +11,8 @@ pub fn hamiltonian_vector_field<const N: usize>(
     form: &impl ContactForm<N>,
     f: &impl SmoothFunction<N>,
     t: f64,
-    x: &Triple<N>,
-) -> Result<Triple<N>, GeometryError> {
+    x: &ChartVector<N>,
+) -> Result<ChartVector<N>, GeometryError> {
     let df = f.differential(t, x);
     let rate = df.dot(&form.reeb(x)?);
     form.sharp(x, &df.minus(form.eta(x)?.scale(f.value(t, x) + rate)))
@@ -29,15 +29,20 @@ pub struct DarbouxField<'a, H> {
 }
 
 impl<const N: usize, H: SmoothFunction<N>> Smooth<N> for DarbouxField<'_, H> {
-    fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
+    fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
         let t = T::from(self.t);
         let (h, dh) = (self.hamiltonian.value(t, x), self.hamiltonian.differential(t, x));
-        Ok(Triple { x: dh.y, y: -dh.x - x.y * dh.z, z: x.y.dot(&dh.y) - h })
+        Ok(ChartVector { x: dh.y, y: -dh.x - x.y * dh.z, z: x.y.dot(&dh.y) - h })
     }
 }
 
 /// The derivative `X(f)` of a function along a vector.
-pub fn derivative_along<const N: usize>(f: &impl SmoothFunction<N>, t: f64, x: &Triple<N>, vector: &Triple<N>) -> f64 {
+pub fn derivative_along<const N: usize>(
+    f: &impl SmoothFunction<N>,
+    t: f64,
+    x: &ChartVector<N>,
+    vector: &ChartVector<N>,
+) -> f64 {
     f.differential(t, x).dot(vector)
 }
 
@@ -50,7 +55,7 @@ pub fn jacobi_bracket<const N: usize>(
     f: &impl SmoothFunction<N>,
     g: &impl SmoothFunction<N>,
     t: f64,
-    x: &Triple<N>,
+    x: &ChartVector<N>,
 ) -> Result<f64, GeometryError> {
     let x_f = hamiltonian_vector_field(form, f, t, x)?;
     let rate = derivative_along(f, t, x, &form.reeb(x)?);
@@ -67,9 +72,9 @@ pub struct DarbouxBracket<'a, F, G> {
 }
 
 impl<const N: usize, F: SmoothFunction<N>, G: SmoothFunction<N>> SmoothFunction<N> for DarbouxBracket<'_, F, G> {
-    fn value<T: Scalar>(&self, t: T, x: &Triple<N, T>) -> T {
+    fn value<T: Scalar>(&self, t: T, x: &ChartVector<N, T>) -> T {
         let (f, df, dg) = (self.f.value(t, x), self.f.differential(t, x), self.g.differential(t, x));
-        let x_f = Triple { x: df.y, y: -df.x - x.y * df.z, z: x.y.dot(&df.y) - f };
+        let x_f = ChartVector { x: df.y, y: -df.x - x.y * df.z, z: x.y.dot(&df.y) - f };
         dg.dot(&x_f) + self.g.value(t, x) * df.z
     }
 }
@@ -84,7 +89,7 @@ pub fn dissipation_defect<const N: usize>(
     hamiltonian: &impl SmoothFunction<N>,
     f: &impl SmoothFunction<N>,
     t: f64,
-    x: &Triple<N>,
+    x: &ChartVector<N>,
 ) -> Result<f64, GeometryError> {
     let field = hamiltonian_vector_field(form, hamiltonian, t, x)?;
     let rate = derivative_along(hamiltonian, t, x, &form.reeb(x)?);
@@ -101,8 +106,8 @@ pub fn dissipation_defect<const N: usize>(
 pub fn lie_bracket<const N: usize>(
     x_field: &impl Smooth<N>,
     y_field: &impl Smooth<N>,
-    at: &Triple<N>,
-) -> Result<Triple<N>, GeometryError> {
+    at: &ChartVector<N>,
+) -> Result<ChartVector<N>, GeometryError> {
     let ((x, dx), (y, dy)) = (x_field.with_jacobian(at)?, y_field.with_jacobian(at)?);
     Ok(apply(&dy, &x).minus(apply(&dx, &y)))
 }
@@ -114,8 +119,8 @@ pub fn lie_bracket<const N: usize>(
 pub fn lie_derivative<const N: usize>(
     form: &impl Smooth<N>,
     field: &impl Smooth<N>,
-    at: &Triple<N>,
-) -> Result<Triple<N>, GeometryError> {
+    at: &ChartVector<N>,
+) -> Result<ChartVector<N>, GeometryError> {
     let ((eta, d_form), (x, d_field)) = (form.with_jacobian(at)?, field.with_jacobian(at)?);
     let contraction = apply_transposed(&(d_form.transpose() - &d_form), &x);
     let exact = apply_transposed(&d_form, &x).plus(apply_transposed(&d_field, &eta));
@@ -138,11 +143,11 @@ pub struct InfinitesimalConformality {
 pub fn infinitesimal_conformality<const N: usize, F: Smooth<N> + ContactForm<N>>(
     form: &F,
     field: &impl Smooth<N>,
-    at: &Triple<N>,
+    at: &ChartVector<N>,
 ) -> Result<InfinitesimalConformality, GeometryError> {
     let change = lie_derivative(form, field, at)?;
     let rate = change.dot(&form.reeb(at)?);
-    let defect = change.minus(form.eta(at)?.scale(rate)).largest() / (1.0 + change.largest());
+    let defect = change.minus(form.eta(at)?.scale(rate)).max_abs_or_nan() / (1.0 + change.max_abs_or_nan());
     Ok(InfinitesimalConformality { rate, defect })
 }
 
@@ -157,7 +162,7 @@ pub fn infinitesimal_conformality<const N: usize, F: Smooth<N> + ContactForm<N>>
 pub fn conformal_factor_along<const N: usize>(
     form: &impl ContactForm<N>,
     hamiltonian: &impl SmoothFunction<N>,
-    path: impl Fn(f64) -> Triple<N>,
+    path: impl Fn(f64) -> ChartVector<N>,
     quadrature: &[(f64, f64)],
 ) -> Result<f64, GeometryError> {
     let mut exponent = 0.0;
@@ -178,7 +183,7 @@ pub struct Quotient<'a, F, G> {
 }
 
 impl<const N: usize, F: SmoothFunction<N>, G: SmoothFunction<N>> SmoothFunction<N> for Quotient<'_, F, G> {
-    fn value<T: Scalar>(&self, t: T, x: &Triple<N, T>) -> T {
+    fn value<T: Scalar>(&self, t: T, x: &ChartVector<N, T>) -> T {
         self.f.value(t, x) / self.g.value(t, x)
     }
 }

@@ -2,8 +2,11 @@
 
 use crate::dynamics::blocks::BLOCK;
 use crate::linear::{SingularMatrix, solve};
-use crate::{Border, Derivatives, Dual, GeometryError, Lagrangian, Module, PhasePoint, Scalar, Smooth, SmoothFunction};
-use crate::{OneParameterGroup, Triple, VelocityPoint};
+use crate::{
+    AugmentedVector, Derivatives, Dual, GeometryError, Lagrangian, PhasePoint, Scalar, Smooth, SmoothFunction,
+    TangentVector,
+};
+use crate::{ChartVector, OneParameterGroup, VelocityPoint};
 use nalgebra::{DMatrix, SMatrix, SVector};
 use num_traits::One;
 
@@ -13,26 +16,26 @@ pub struct Regularity {
     /// The smallest singular value; 0 where the Lagrangian is singular.
     pub smallest: f64,
     /// The largest singular value.
-    pub largest: f64,
+    pub max_abs_or_nan: f64,
 }
 
 impl Regularity {
     /// The singular values of a matrix that decides regularity. A matrix that is not finite counts as singular.
     pub fn of(matrix: DMatrix<f64>) -> Self {
         if !matrix.iter().all(|e| e.is_finite()) {
-            return Regularity { smallest: 0.0, largest: f64::INFINITY };
+            return Regularity { smallest: 0.0, max_abs_or_nan: f64::INFINITY };
         }
         if matrix.is_empty() {
             // Of dimension 0 there is one matrix, the identity.
-            return Regularity { smallest: 1.0, largest: 1.0 };
+            return Regularity { smallest: 1.0, max_abs_or_nan: 1.0 };
         }
         let values = matrix.singular_values();
-        Regularity { smallest: values.min(), largest: values.max() }
+        Regularity { smallest: values.min(), max_abs_or_nan: values.max() }
     }
 
     /// The condition number; infinite for a singular matrix. Digits beyond `16 - log10(condition)` are noise.
     pub fn condition(&self) -> f64 {
-        if self.smallest > 0.0 { self.largest / self.smallest } else { f64::INFINITY }
+        if self.smallest > 0.0 { self.max_abs_or_nan / self.smallest } else { f64::INFINITY }
     }
 }
 
@@ -47,7 +50,7 @@ pub fn regularity<const N: usize>(lagrangian: &impl Lagrangian<N>, t: f64, x: &V
 pub struct Energy<'a, L>(pub &'a L);
 
 impl<const N: usize, L: Lagrangian<N>> SmoothFunction<N> for Energy<'_, L> {
-    fn value<T: Scalar>(&self, t: T, x: &Triple<N, T>) -> T {
+    fn value<T: Scalar>(&self, t: T, x: &ChartVector<N, T>) -> T {
         x.y.dot(&self.0.gradient(t, &(*x).into()).y) - self.0.value(t, &x.x, &x.y, x.z)
     }
 }
@@ -90,7 +93,7 @@ pub struct Legendre<'a, L> {
 }
 
 impl<const N: usize, L: Lagrangian<N>> Smooth<N> for Legendre<'_, L> {
-    fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
+    fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
         Ok(legendre(self.lagrangian, T::from(self.t), &(*x).into()).into())
     }
 }
@@ -109,7 +112,7 @@ pub fn herglotz_field<T: Scalar, const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: T,
     x: &VelocityPoint<N, T>,
-) -> Result<Triple<N, T>, GeometryError> {
+) -> Result<ChartVector<N, T>, GeometryError> {
     Ok(herglotz_rates(lagrangian, t, x)?.0)
 }
 
@@ -123,12 +126,12 @@ pub fn herglotz_rates<T: Scalar, const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: T,
     x: &VelocityPoint<N, T>,
-) -> Result<(Triple<N, T>, T), GeometryError> {
+) -> Result<(ChartVector<N, T>, T), GeometryError> {
     if const { N > BLOCK } {
         return rates_of_many(lagrangian, t, x);
     }
     // L_q, L_z and L along the N + 1 directions of q and z.
-    let still = Dual::<T, Border<N, T>>::constant;
+    let still = Dual::<T, AugmentedVector<N, T>>::constant;
     let mut y = VelocityPoint { q: x.q.map(still), v: x.v.map(still), z: still(x.z) };
     for i in 0..N {
         y.q[i].d.x[i] = T::one();
@@ -137,9 +140,9 @@ pub fn herglotz_rates<T: Scalar, const N: usize>(
     let Dual { re: zdot, d: slope } = lagrangian.along(t, &y);
     // L_v, and its derivatives along the velocities and the drift: only these second derivatives are needed.
     let moving = |re: T, drift: T| {
-        Dual::<Dual<T, Border<N, T>>, SVector<Dual<T, Border<N, T>>, N>>::constant(Dual {
+        Dual::<Dual<T, AugmentedVector<N, T>>, SVector<Dual<T, AugmentedVector<N, T>>, N>>::constant(Dual {
             re,
-            d: Border { x: Module::null(), z: drift },
+            d: AugmentedVector { x: TangentVector::null(), z: drift },
         })
     };
     let mut y = VelocityPoint {
@@ -151,11 +154,11 @@ pub fn herglotz_rates<T: Scalar, const N: usize>(
         y.v[i].re.d.x[i] = T::one();
         y.v[i].d[i] = Dual::one();
     }
-    let p = lagrangian.along(Dual { re: t, d: Border { x: Module::null(), z: T::one() } }, &y).d;
+    let p = lagrangian.along(Dual { re: t, d: AugmentedVector { x: TangentVector::null(), z: T::one() } }, &y).d;
     let mut a = SVector::<T, N>::from_fn(|i, _| slope.x[i] + p[i].re * slope.z - p[i].d.z);
     let mut w = SMatrix::<T, N, N>::from_fn(|i, j| p[i].d.x[j]);
     solve(&mut w, &mut a).map_err(irregular)?;
-    Ok((Triple { x: x.v, y: a, z: zdot }, slope.z))
+    Ok((ChartVector { x: x.v, y: a, z: zdot }, slope.z))
 }
 
 /// [`herglotz_rates`] of many coordinates: by blocks of directions, for the sake of the stack.
@@ -164,7 +167,7 @@ fn rates_of_many<T: Scalar, const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: T,
     x: &VelocityPoint<N, T>,
-) -> Result<(Triple<N, T>, T), GeometryError> {
+) -> Result<(ChartVector<N, T>, T), GeometryError> {
     let (zdot, slope) = lagrangian.with_gradient(t, x);
     let drifting = |re: T, drift: T| Dual { re, d: SVector::<T, 1>::new(drift) };
     let y = VelocityPoint {
@@ -175,7 +178,7 @@ fn rates_of_many<T: Scalar, const N: usize>(
     let p = lagrangian.gradient(drifting(t, T::one()), &y).y;
     let mut a = SVector::<T, N>::from_fn(|i, _| slope.x[i] + p[i].re * slope.z - p[i].d[0]);
     solve(&mut lagrangian.mass_matrix(t, x), &mut a).map_err(irregular)?;
-    Ok((Triple { x: x.v, y: a, z: zdot }, slope.z))
+    Ok((ChartVector { x: x.v, y: a, z: zdot }, slope.z))
 }
 
 /// What a singular W means for the equations of motion.
@@ -193,7 +196,7 @@ pub struct HerglotzField<'a, L> {
 }
 
 impl<const N: usize, L: Lagrangian<N>> Smooth<N> for HerglotzField<'_, L> {
-    fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
+    fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
         herglotz_field(self.lagrangian, T::from(self.t), &(*x).into())
     }
 }
@@ -209,7 +212,7 @@ pub struct NoetherMomentum<'a, L, G> {
 }
 
 impl<const N: usize, L: Lagrangian<N>, G: OneParameterGroup<N>> SmoothFunction<N> for NoetherMomentum<'_, L, G> {
-    fn value<T: Scalar>(&self, t: T, x: &Triple<N, T>) -> T {
+    fn value<T: Scalar>(&self, t: T, x: &ChartVector<N, T>) -> T {
         self.group.momentum(&x.x, &self.lagrangian.gradient(t, &(*x).into()).y)
     }
 }
@@ -224,7 +227,7 @@ pub struct LiftedAction<'a, G> {
 }
 
 impl<const N: usize, G: OneParameterGroup<N>> Smooth<N> for LiftedAction<'_, G> {
-    fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
+    fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
         Ok(self.group.on_velocities(T::from(self.s), &(*x).into()).into())
     }
 }

@@ -1,6 +1,6 @@
 //! Lagrangians L(t, q, v, z).
 
-use crate::{Hessian, Scalar, Structure, Triple, VelocityPoint};
+use crate::{ChartVector, Hessian, Scalar, Structure, VelocityPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// A Lagrangian of Herglotz' variational principle, `L : R x TQ x R -> R`, written once as a generic function.
@@ -27,9 +27,9 @@ use nalgebra::{SMatrix, SVector};
 /// assert_eq!(Damped.gradient(0.0, &x).y[0], 2.0); // L_v
 /// ```
 pub trait Lagrangian<const N: usize> {
-    /// Whether this Lagrangian states a clock, that is, whether [`clock_rate`](Self::clock_rate) is overridden: it is asked for
+    /// Whether this Lagrangian states a time transformation, that is, whether [`dt_dtau`](Self::dt_dtau) is overridden: it is asked for
     /// and compiled only then.
-    const HAS_CLOCK: bool = false;
+    const HAS_TIME_TRANSFORMATION: bool = false;
 
     /// Whether [`structure`](Self::structure) and all closed derivatives are there and follow from the formula of L, as those of the crate
     /// `formula-lagrangian` do: they are not probed, and no other derivatives are compiled.
@@ -46,7 +46,7 @@ pub trait Lagrangian<const N: usize> {
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T;
 
     /// The partial derivatives `(L_q, L_v, L_z)` in closed form, if the implementor has one that is worth it.
-    fn closed_gradient<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+    fn closed_gradient<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
         None
     }
 
@@ -57,7 +57,7 @@ pub trait Lagrangian<const N: usize> {
 
     /// The value with the gradient, where the two share work that the compiler cannot see: the default asks for each by itself.
     #[inline(always)]
-    fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, Triple<N, T>)> {
+    fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, ChartVector<N, T>)> {
         self.closed_gradient(t, x).map(|gradient| (self.value(t, &x.q, &x.v, x.z), gradient))
     }
 
@@ -100,21 +100,21 @@ pub trait Lagrangian<const N: usize> {
     /// function q.
     fn switching_functions(&self, _t: f64, _x: &VelocityPoint<N>, _values: &mut Vec<f64>) {}
 
-    /// The rate `g(q) = dt/dtau` of the [`Clock`](crate::Clock) by whose time tau the steps of this motion are best equal, for
-    /// autonomous Lagrangians: it should fall as the motion gets faster, and be positive. With [`HAS_CLOCK`](Self::HAS_CLOCK); the
+    /// The rate `g(q) = dt/dtau` of the [`TimeTransformation`](crate::TimeTransformation) by whose time tau the steps of this motion are best equal, for
+    /// autonomous Lagrangians: it should fall as the motion gets faster, and be positive. With [`HAS_TIME_TRANSFORMATION`](Self::HAS_TIME_TRANSFORMATION); the
     /// default is the time itself.
     #[inline(always)]
-    fn clock_rate<T: Scalar>(&self, _q: &SVector<T, N>) -> T {
+    fn dt_dtau<T: Scalar>(&self, _q: &SVector<T, N>) -> T {
         T::one()
     }
 }
 
 /// A Lagrangian without its closed derivatives: all are found by automatic differentiation, to see what they cost or gain.
 #[derive(Clone, Copy, Debug)]
-pub struct ValueOnly<L>(pub L);
+pub struct WithoutClosedDerivatives<L>(pub L);
 
-impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<L> {
-    const HAS_CLOCK: bool = L::HAS_CLOCK;
+impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for WithoutClosedDerivatives<L> {
+    const HAS_TIME_TRANSFORMATION: bool = L::HAS_TIME_TRANSFORMATION;
     const HAS_SWITCHING_FUNCTIONS: bool = L::HAS_SWITCHING_FUNCTIONS;
 
     #[inline(always)]
@@ -128,13 +128,13 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for ValueOnly<L> {
         self.0.switching_functions(t, x, values);
     }
     #[inline(always)]
-    fn clock_rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
-        self.0.clock_rate(q)
+    fn dt_dtau<T: Scalar>(&self, q: &SVector<T, N>) -> T {
+        self.0.dt_dtau(q)
     }
 }
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
-    const HAS_CLOCK: bool = L::HAS_CLOCK;
+    const HAS_TIME_TRANSFORMATION: bool = L::HAS_TIME_TRANSFORMATION;
     const HAS_SWITCHING_FUNCTIONS: bool = L::HAS_SWITCHING_FUNCTIONS;
     const PROVED: bool = L::PROVED;
     const INTERPRETED: bool = L::INTERPRETED;
@@ -144,7 +144,7 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
         (**self).value(t, q, v, z)
     }
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
         (**self).closed_gradient(t, x)
     }
     #[inline(always)]
@@ -152,7 +152,7 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
         (**self).closed_hessian(t, x)
     }
     #[inline(always)]
-    fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, Triple<N, T>)> {
+    fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, ChartVector<N, T>)> {
         (**self).closed_with_gradient(t, x)
     }
     #[inline(always)]
@@ -178,7 +178,7 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for &L {
         (**self).switching_functions(t, x, values);
     }
     #[inline(always)]
-    fn clock_rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
-        (**self).clock_rate(q)
+    fn dt_dtau<T: Scalar>(&self, q: &SVector<T, N>) -> T {
+        (**self).dt_dtau(q)
     }
 }

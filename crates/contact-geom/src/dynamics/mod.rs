@@ -1,8 +1,7 @@
-//! Lagrangians and what they claim of themselves, Herglotz and contact Hamiltonian vector fields, symmetries, clocks.
+//! Lagrangians and what they claim of themselves, Herglotz and contact Hamiltonian vector fields, symmetries, time transformations.
 
 mod action;
 pub(crate) mod blocks;
-mod clock;
 mod derivatives;
 mod hamiltonian;
 mod herglotz;
@@ -10,9 +9,9 @@ mod lagrangian;
 pub(crate) mod probe;
 mod rounding;
 mod structure;
+mod time_transformation;
 
 pub use action::{OneParameterGroup, Symmetry};
-pub use clock::Clock;
 pub use derivatives::{Derivatives, Hessian, derived_gradient, derived_hessian};
 pub use hamiltonian::{
     DarbouxBracket, DarbouxField, InfinitesimalConformality, Quotient, conformal_factor_along, derivative_along,
@@ -23,7 +22,8 @@ pub use herglotz::{
     Energy, HerglotzField, Legendre, LiftedAction, NoetherMomentum, Regularity, herglotz_field, herglotz_rates,
     legendre, legendre_jacobian, regularity,
 };
-pub use lagrangian::{Lagrangian, ValueOnly};
+pub use lagrangian::{Lagrangian, WithoutClosedDerivatives};
 pub use probe::check_closed_derivatives;
 pub use rounding::gradient_rounding;
 pub use structure::{Defect, Defects, Structure};
+pub use time_transformation::TimeTransformation;

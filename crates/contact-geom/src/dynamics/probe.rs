@@ -1,7 +1,7 @@
 //! The derivatives of a Lagrangian at one point along a few directions, each with the size of its terms.
 
 use crate::number::rounded::Rounded;
-use crate::{Dual, Lagrangian, VelocityPoint, largest};
+use crate::{Dual, Lagrangian, VelocityPoint, max_abs_or_nan};
 use nalgebra::{SMatrix, SVector};
 
 /// A number with its derivatives along a line through the whole of TQ x R, and in time.
@@ -33,7 +33,7 @@ enum Along {
 impl<const N: usize> Probe<N> {
     pub fn new(t: f64, x: &VelocityPoint<N>) -> Self {
         let length = |size: f64| if size == 0.0 { 1.0 } else { size };
-        let [q, v] = [&x.q, &x.v].map(|c| length(largest(c.iter().copied())));
+        let [q, v] = [&x.q, &x.v].map(|c| length(max_abs_or_nan(c.iter().copied())));
         Probe { t, x: *x, lengths: [q, v, length(x.z.abs()), length(t.abs())] }
     }
 
@@ -89,7 +89,7 @@ impl<const N: usize> Probe<N> {
             })
         };
         let along = [sum(0, &closed.x), sum(1, &closed.y), closed.z * self.direction(Along::Outer, 2, 0)];
-        Some(largest(along.iter().zip(&l.d).flat_map(|(closed, derived)| {
+        Some(max_abs_or_nan(along.iter().zip(&l.d).flat_map(|(closed, derived)| {
             let parts = |a: &First| [a.re, a.d[0], a.d[1], a.d[2]].map(|m| entries(&m));
             let pairs = parts(closed).into_iter().flatten().zip(parts(derived).into_iter().flatten());
             pairs.map(|(closed, derived)| mismatch(closed, derived))
@@ -113,7 +113,7 @@ impl<const N: usize> Probe<N> {
             (vector(b, 1).dot(&closed.vz) * number(a), 1, 2),
             (number(b) * closed.zz * number(a), 2, 2),
         ];
-        Some(largest(along.into_iter().map(|(closed, i, j)| mismatch(closed, l.d[i].d[j].re))))
+        Some(max_abs_or_nan(along.into_iter().map(|(closed, i, j)| mismatch(closed, l.d[i].d[j].re))))
     }
 }
 

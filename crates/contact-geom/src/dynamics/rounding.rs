@@ -1,7 +1,7 @@
 //! The round-off of a Lagrangian's derivatives.
 
 use crate::number::rounded::Rounded;
-use crate::{Derivatives, Lagrangian, Triple, VelocityPoint};
+use crate::{ChartVector, Derivatives, Lagrangian, VelocityPoint};
 
 /// What rounding may have changed of the value of L and of its gradient `(L_q, L_v, L_z)` at a point, to first order: the roundings of
 /// each operation, and one of each coordinate, carried to the result. Forces that cancel at an equilibrium are rounded like the terms
@@ -18,11 +18,11 @@ pub fn gradient_rounding<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,
     x: &VelocityPoint<N>,
-) -> (f64, Triple<N>) {
+) -> (f64, ChartVector<N>) {
     let once = |value: f64| Rounded { value, size: value.abs() };
     let x = VelocityPoint { q: x.q.map(once), v: x.v.map(once), z: once(x.z) };
     let (l, g) = lagrangian.with_gradient(once(t), &x);
     let unit = 0.5 * f64::EPSILON;
-    let gradient = Triple { x: g.x.map(|e| e.size * unit), y: g.y.map(|e| e.size * unit), z: g.z.size * unit };
+    let gradient = ChartVector { x: g.x.map(|e| e.size * unit), y: g.y.map(|e| e.size * unit), z: g.z.size * unit };
     (l.size * unit, gradient)
 }

@@ -2,7 +2,7 @@
 
 use crate::dynamics::probe::{Moving, Probe, entries};
 use crate::number::rounded::Rounded;
-use crate::{Lagrangian, VelocityPoint, larger, largest};
+use crate::{Lagrangian, VelocityPoint, max_abs_or_nan, max_or_nan};
 
 /// The declared structure of a Lagrangian: claims that let a method skip work. A claim that is not made costs time only; a
 /// false one would cost the answer, so [`Structure::defects`] measures each at a point.
@@ -69,7 +69,7 @@ impl Structure {
         if !l.re.re.re.value.is_finite() {
             return None;
         }
-        let worst = |sizes: &mut dyn Iterator<Item = Rounded>| largest(sizes.map(Rounded::relative));
+        let worst = |sizes: &mut dyn Iterator<Item = Rounded>| max_abs_or_nan(sizes.map(Rounded::relative));
         // A first or second derivative with its changes along the line and in time.
         let all = |second: [(usize, usize); 3]| worst(&mut second.into_iter().flat_map(|(i, j)| entries(&l.d[i].d[j])));
         let changes = |i: usize, j: usize| l.d[i].d[j].d[0];
@@ -89,20 +89,20 @@ impl Structure {
             let linear = worst(&mut [linear.re, linear.d[1]].into_iter());
             // At rest such a Lagrangian is defined where it is in motion.
             let linear = if linear.is_nan() { f64::INFINITY } else { linear };
-            [constant_mass(), all([(q, v), (z, q), (z, v)])].into_iter().fold(linear, larger)
+            [constant_mass(), all([(q, v), (z, q), (z, v)])].into_iter().fold(linear, max_or_nan)
         };
         let made =
             |made: bool, claim: &'static str, size: &dyn Fn() -> f64| made.then(|| Defect { claim, size: size() });
         let of = |claim, size: Option<f64>| size.map(|size| Defect { claim, size });
         let defects = [
             made(self.autonomous, "autonomous", &autonomous),
-            made(self.z_free, "z_free", &|| larger(affine(), worst(&mut entries(&l.re.d[z]).into_iter()))),
+            made(self.z_free, "z_free", &|| max_or_nan(affine(), worst(&mut entries(&l.re.d[z]).into_iter()))),
             made(self.z_affine, "z_affine", &affine),
-            made(self.constant_rate, "constant_rate", &|| larger(affine(), in_time(&l.re.d[z]).relative())),
+            made(self.constant_rate, "constant_rate", &|| max_or_nan(affine(), in_time(&l.re.d[z]).relative())),
             made(self.separable, "separable", &separable),
             made(self.quadratic, "quadratic", &|| {
                 let second = [(q, q), (q, v), (v, v)].into_iter().map(|(i, j)| changes(i, j));
-                larger(affine(), worst(&mut { second }))
+                max_or_nan(affine(), worst(&mut { second }))
             }),
             made(self.constant_mass, "constant_mass", &constant_mass),
             of("closed_gradient", probe.closed_gradient(lagrangian, &l)),

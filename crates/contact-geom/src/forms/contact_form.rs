@@ -1,7 +1,7 @@
 //! Contact forms: what follows from eta and d eta at a point.
 
 use crate::forms::smooth::apply_transposed;
-use crate::{GeometryError, Smooth, Triple};
+use crate::{ChartVector, GeometryError, Smooth};
 use nalgebra::{DMatrix, DVector};
 
 /// A contact form on a manifold of dimension `2N + 1`, in a chart; paper, section 2.1.
@@ -13,19 +13,19 @@ pub trait ContactForm<const N: usize> {
     ///
     /// # Errors
     /// A [`GeometryError`] where the form is not defined.
-    fn eta(&self, x: &Triple<N>) -> Result<Triple<N>, GeometryError>;
+    fn eta(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError>;
 
     /// The two-form `d eta (x)` as the skew matrix `M_ij = d_i eta_j - d_j eta_i`, so that `d eta (u, w) = u . M w`.
     ///
     /// # Errors
     /// A [`GeometryError`] where the form is not defined.
-    fn d_eta(&self, x: &Triple<N>) -> Result<DMatrix<f64>, GeometryError>;
+    fn d_eta(&self, x: &ChartVector<N>) -> Result<DMatrix<f64>, GeometryError>;
 
     /// The volume `eta ^ (d eta)^n` on the coordinate vectors; the form is contact exactly where it does not vanish.
     ///
     /// # Errors
     /// Those of [`eta`](Self::eta).
-    fn volume(&self, x: &Triple<N>) -> Result<f64, GeometryError> {
+    fn volume(&self, x: &ChartVector<N>) -> Result<f64, GeometryError> {
         generic::volume(self, x)
     }
 
@@ -33,7 +33,7 @@ pub trait ContactForm<const N: usize> {
     ///
     /// # Errors
     /// [`GeometryError::Singular`] where the form is not contact.
-    fn reeb(&self, x: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn reeb(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         generic::reeb(self, x)
     }
 
@@ -41,7 +41,7 @@ pub trait ContactForm<const N: usize> {
     ///
     /// # Errors
     /// Those of [`eta`](Self::eta).
-    fn flat(&self, x: &Triple<N>, v: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn flat(&self, x: &ChartVector<N>, v: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         generic::flat(self, x, v)
     }
 
@@ -49,28 +49,28 @@ pub trait ContactForm<const N: usize> {
     ///
     /// # Errors
     /// [`GeometryError::Singular`] where the form is not contact.
-    fn sharp(&self, x: &Triple<N>, alpha: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn sharp(&self, x: &ChartVector<N>, alpha: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         generic::sharp(self, x, alpha)
     }
 }
 
 impl<const N: usize, F: ContactForm<N>> ContactForm<N> for &F {
-    fn eta(&self, x: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn eta(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         (**self).eta(x)
     }
-    fn d_eta(&self, x: &Triple<N>) -> Result<DMatrix<f64>, GeometryError> {
+    fn d_eta(&self, x: &ChartVector<N>) -> Result<DMatrix<f64>, GeometryError> {
         (**self).d_eta(x)
     }
-    fn volume(&self, x: &Triple<N>) -> Result<f64, GeometryError> {
+    fn volume(&self, x: &ChartVector<N>) -> Result<f64, GeometryError> {
         (**self).volume(x)
     }
-    fn reeb(&self, x: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn reeb(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         (**self).reeb(x)
     }
-    fn flat(&self, x: &Triple<N>, v: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn flat(&self, x: &ChartVector<N>, v: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         (**self).flat(x, v)
     }
-    fn sharp(&self, x: &Triple<N>, alpha: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn sharp(&self, x: &ChartVector<N>, alpha: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         (**self).sharp(x, alpha)
     }
 }
@@ -80,11 +80,11 @@ impl<const N: usize, F: ContactForm<N>> ContactForm<N> for &F {
 pub struct Form<S>(pub S);
 
 impl<const N: usize, S: Smooth<N>> ContactForm<N> for Form<S> {
-    fn eta(&self, x: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn eta(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         self.0.at(x)
     }
 
-    fn d_eta(&self, x: &Triple<N>) -> Result<DMatrix<f64>, GeometryError> {
+    fn d_eta(&self, x: &ChartVector<N>) -> Result<DMatrix<f64>, GeometryError> {
         let (_, jacobian) = self.0.with_jacobian(x)?;
         Ok(jacobian.transpose() - jacobian)
     }
@@ -98,7 +98,10 @@ pub mod generic {
     ///
     /// # Errors
     /// Those of the form.
-    pub fn volume<const N: usize>(form: &(impl ContactForm<N> + ?Sized), x: &Triple<N>) -> Result<f64, GeometryError> {
+    pub fn volume<const N: usize>(
+        form: &(impl ContactForm<N> + ?Sized),
+        x: &ChartVector<N>,
+    ) -> Result<f64, GeometryError> {
         let (eta, d_eta) = (form.eta(x)?, form.d_eta(x)?);
         let bordered = DMatrix::from_fn(2 * N + 2, 2 * N + 2, |i, j| match (i, j) {
             (0, 0) => 0.0,
@@ -113,7 +116,7 @@ pub mod generic {
     /// The matrix of [`flat`]: `flat(v) = (M + eta eta^T)^T v`.
     fn flat_matrix<const N: usize>(
         form: &(impl ContactForm<N> + ?Sized),
-        x: &Triple<N>,
+        x: &ChartVector<N>,
     ) -> Result<DMatrix<f64>, GeometryError> {
         let eta: DVector<f64> = form.eta(x)?.to_vector();
         Ok(form.d_eta(x)? + &eta * eta.transpose())
@@ -125,9 +128,9 @@ pub mod generic {
     /// Those of the form.
     pub fn flat<const N: usize>(
         form: &(impl ContactForm<N> + ?Sized),
-        x: &Triple<N>,
-        v: &Triple<N>,
-    ) -> Result<Triple<N>, GeometryError> {
+        x: &ChartVector<N>,
+        v: &ChartVector<N>,
+    ) -> Result<ChartVector<N>, GeometryError> {
         Ok(apply_transposed(&flat_matrix(form, x)?, v))
     }
 
@@ -137,12 +140,12 @@ pub mod generic {
     /// [`GeometryError::Singular`] where the form is not contact.
     pub fn sharp<const N: usize>(
         form: &(impl ContactForm<N> + ?Sized),
-        x: &Triple<N>,
-        alpha: &Triple<N>,
-    ) -> Result<Triple<N>, GeometryError> {
+        x: &ChartVector<N>,
+        alpha: &ChartVector<N>,
+    ) -> Result<ChartVector<N>, GeometryError> {
         let solution = flat_matrix(form, x)?.transpose().lu().solve(&alpha.to_vector());
         match solution {
-            Some(v) if v.iter().all(|c| c.is_finite()) => Ok(Triple::from_fn(|i| v[i])),
+            Some(v) if v.iter().all(|c| c.is_finite()) => Ok(ChartVector::from_fn(|i| v[i])),
             _ => Err(GeometryError::Singular {
                 what: "flat",
                 pivot: 0.0,
@@ -157,8 +160,8 @@ pub mod generic {
     /// [`GeometryError::Singular`] where the form is not contact.
     pub fn reeb<const N: usize>(
         form: &(impl ContactForm<N> + ?Sized),
-        x: &Triple<N>,
-    ) -> Result<Triple<N>, GeometryError> {
+        x: &ChartVector<N>,
+    ) -> Result<ChartVector<N>, GeometryError> {
         sharp(form, x, &form.eta(x)?)
     }
 

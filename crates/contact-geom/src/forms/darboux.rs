@@ -1,6 +1,6 @@
 //! The canonical contact form of T\*Q x R, in Darboux coordinates.
 
-use crate::{ContactForm, GeometryError, Scalar, Smooth, Triple};
+use crate::{ChartVector, ContactForm, GeometryError, Scalar, Smooth};
 use nalgebra::{DMatrix, SVector};
 
 /// `eta = dz - p dq` on T\*Q x R, with Reeb field `d/dz`; paper, section 2.1.
@@ -9,17 +9,17 @@ pub struct Darboux;
 
 impl<const N: usize> Smooth<N> for Darboux {
     #[inline]
-    fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
-        Ok(Triple { x: -x.y, y: SVector::from_fn(|_, _| T::zero()), z: T::one() })
+    fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
+        Ok(ChartVector { x: -x.y, y: SVector::from_fn(|_, _| T::zero()), z: T::one() })
     }
 }
 
 impl<const N: usize> ContactForm<N> for Darboux {
-    fn eta(&self, x: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn eta(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         self.at(x)
     }
 
-    fn d_eta(&self, _x: &Triple<N>) -> Result<DMatrix<f64>, GeometryError> {
+    fn d_eta(&self, _x: &ChartVector<N>) -> Result<DMatrix<f64>, GeometryError> {
         // dq ^ dp.
         Ok(DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| match (i, j) {
             (i, j) if i < N && j == i + N => 1.0,
@@ -28,22 +28,22 @@ impl<const N: usize> ContactForm<N> for Darboux {
         }))
     }
 
-    fn volume(&self, _x: &Triple<N>) -> Result<f64, GeometryError> {
+    fn volume(&self, _x: &ChartVector<N>) -> Result<f64, GeometryError> {
         Ok(canonical_volume(N))
     }
 
-    fn reeb(&self, _x: &Triple<N>) -> Result<Triple<N>, GeometryError> {
-        Ok(Triple { x: SVector::zeros(), y: SVector::zeros(), z: 1.0 })
+    fn reeb(&self, _x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
+        Ok(ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 1.0 })
     }
 
-    fn flat(&self, x: &Triple<N>, v: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn flat(&self, x: &ChartVector<N>, v: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         // i_v (dq ^ dp) + eta(v) eta.
         let eta_v = v.z - x.y.dot(&v.x);
-        Ok(Triple { x: -v.y - x.y * eta_v, y: v.x, z: eta_v })
+        Ok(ChartVector { x: -v.y - x.y * eta_v, y: v.x, z: eta_v })
     }
 
-    fn sharp(&self, x: &Triple<N>, alpha: &Triple<N>) -> Result<Triple<N>, GeometryError> {
-        Ok(Triple { x: alpha.y, y: -alpha.x - x.y * alpha.z, z: alpha.z + x.y.dot(&alpha.y) })
+    fn sharp(&self, x: &ChartVector<N>, alpha: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
+        Ok(ChartVector { x: alpha.y, y: -alpha.x - x.y * alpha.z, z: alpha.z + x.y.dot(&alpha.y) })
     }
 }
 

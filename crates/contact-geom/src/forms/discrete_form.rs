@@ -2,7 +2,7 @@
 
 use crate::forms::fibre_form::{FibreForm, contact_form_by_fibre};
 use crate::linear::solve;
-use crate::{ContactForm, DiscretePoint, GeometryError, Regularity, Triple};
+use crate::{ChartVector, ContactForm, DiscretePoint, GeometryError, Regularity};
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// A discrete Lagrangian's value and first derivatives at a point `(q0, q1, z0)`.
@@ -118,7 +118,7 @@ impl<const N: usize> SecondDiscreteJet<N> {
 pub struct EtaMinus<F>(pub F);
 
 impl<F> EtaMinus<F> {
-    fn fibre_form<const N: usize>(&self, x: &Triple<N>) -> Result<FibreForm<N>, GeometryError>
+    fn fibre_form<const N: usize>(&self, x: &ChartVector<N>) -> Result<FibreForm<N>, GeometryError>
     where
         F: Fn(&DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, GeometryError>,
     {
@@ -143,12 +143,12 @@ impl<const N: usize, F> ContactForm<N> for EtaPlus<F>
 where
     F: Fn(&DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, GeometryError>,
 {
-    fn eta(&self, x: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn eta(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         let jet = (self.0)(&(*x).into())?.first;
-        Ok(Triple { x: jet.d1, y: SVector::zeros(), z: jet.sigma() })
+        Ok(ChartVector { x: jet.d1, y: SVector::zeros(), z: jet.sigma() })
     }
 
-    fn d_eta(&self, x: &Triple<N>) -> Result<DMatrix<f64>, GeometryError> {
+    fn d_eta(&self, x: &ChartVector<N>) -> Result<DMatrix<f64>, GeometryError> {
         // d(z0 + L_d) - D2 dq1 differentiated: dq1 ^ d(D2).
         let jet = (self.0)(&(*x).into())?;
         Ok(DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| match (i, j) {
@@ -160,20 +160,20 @@ where
         }))
     }
 
-    fn volume(&self, x: &Triple<N>) -> Result<f64, GeometryError> {
+    fn volume(&self, x: &ChartVector<N>) -> Result<f64, GeometryError> {
         // eta+ = sigma eta-, and a volume of degree n + 1 in eta scales by sigma^(n+1).
         let sigma = (self.0)(&(*x).into())?.first.sigma();
         Ok(EtaMinus(&self.0).volume(x)? * sigma.powi(N as i32 + 1))
     }
 
     /// `R+` moves neither `q1` nor `D2 L_d`: `R+ = (a, 0, c)` with `D21 a + D2z c = 0` and `D1 a + sigma_d c = 1`.
-    fn reeb(&self, x: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    fn reeb(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         let jet = (self.0)(&(*x).into())?;
         let mut a = -jet.d2z;
         solve(&mut jet.d12.transpose(), &mut a).map_err(|e| {
             e.of("D1 D2 L_d", "the discrete Lagrangian is not regular here; take a smaller step or another point")
         })?;
         let c = 1.0 / (jet.first.sigma() + jet.first.d1.dot(&a));
-        Ok(Triple { x: a * c, y: SVector::zeros(), z: c })
+        Ok(ChartVector { x: a * c, y: SVector::zeros(), z: c })
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::forms::darboux::canonical_volume;
 use crate::linear::solve;
-use crate::{GeometryError, Triple};
+use crate::{ChartVector, GeometryError};
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// The one-form `eta = dz - P dx` at a point, with the derivatives of `P(x, y, z)` there.
@@ -26,8 +26,8 @@ pub(crate) struct FibreForm<const N: usize> {
 const REMEDY: &str = "the form is not contact here; choose a regular Lagrangian, or a point where it is regular";
 
 impl<const N: usize> FibreForm<N> {
-    pub fn eta(&self) -> Triple<N> {
-        Triple { x: -self.p, y: SVector::zeros(), z: 1.0 }
+    pub fn eta(&self) -> ChartVector<N> {
+        ChartVector { x: -self.p, y: SVector::zeros(), z: 1.0 }
     }
 
     /// `-dP ^ dx = dx ^ dP`.
@@ -48,16 +48,16 @@ impl<const N: usize> FibreForm<N> {
     }
 
     /// `R = d/dz - (P_y)^-1 P_z d/dy`.
-    pub fn reeb(&self) -> Result<Triple<N>, GeometryError> {
+    pub fn reeb(&self) -> Result<ChartVector<N>, GeometryError> {
         let mut y = -self.p_z;
         solve(&mut self.p_y.clone_owned(), &mut y).map_err(|e| e.of(self.what, REMEDY))?;
-        Ok(Triple { x: SVector::zeros(), y, z: 1.0 })
+        Ok(ChartVector { x: SVector::zeros(), y, z: 1.0 })
     }
 
-    pub fn flat(&self, v: &Triple<N>) -> Triple<N> {
+    pub fn flat(&self, v: &ChartVector<N>) -> ChartVector<N> {
         let eta_v = v.z - self.p.dot(&v.x);
         let dp_v = self.p_x * v.x + self.p_y * v.y + self.p_z * v.z;
-        Triple {
+        ChartVector {
             x: self.p_x.tr_mul(&v.x) - dp_v - self.p * eta_v,
             y: self.p_y.tr_mul(&v.x),
             z: self.p_z.dot(&v.x) + eta_v,
@@ -65,36 +65,36 @@ impl<const N: usize> FibreForm<N> {
     }
 
     /// Solves `flat(v) = alpha` block by block: `v_x` from the second block, `eta(v)` from the third, `v_y` from the first.
-    pub fn sharp(&self, alpha: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+    pub fn sharp(&self, alpha: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
         let mut x = alpha.y;
         solve(&mut self.p_y.transpose(), &mut x).map_err(|e| e.of(self.what, REMEDY))?;
         let eta_v = alpha.z - self.p_z.dot(&x);
         let z = eta_v + self.p.dot(&x);
         let mut y = self.p_x.tr_mul(&x) - alpha.x - self.p * eta_v - self.p_x * x - self.p_z * z;
         solve(&mut self.p_y.clone_owned(), &mut y).map_err(|e| e.of(self.what, REMEDY))?;
-        Ok(Triple { x, y, z })
+        Ok(ChartVector { x, y, z })
     }
 }
 
 /// The methods of [`ContactForm`](crate::ContactForm) by those of the [`FibreForm`] at a point.
 macro_rules! contact_form_by_fibre {
     () => {
-        fn eta(&self, x: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+        fn eta(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
             Ok(self.fibre_form(x)?.eta())
         }
-        fn d_eta(&self, x: &Triple<N>) -> Result<DMatrix<f64>, GeometryError> {
+        fn d_eta(&self, x: &ChartVector<N>) -> Result<DMatrix<f64>, GeometryError> {
             Ok(self.fibre_form(x)?.d_eta())
         }
-        fn volume(&self, x: &Triple<N>) -> Result<f64, GeometryError> {
+        fn volume(&self, x: &ChartVector<N>) -> Result<f64, GeometryError> {
             Ok(self.fibre_form(x)?.volume())
         }
-        fn reeb(&self, x: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+        fn reeb(&self, x: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
             self.fibre_form(x)?.reeb()
         }
-        fn flat(&self, x: &Triple<N>, v: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+        fn flat(&self, x: &ChartVector<N>, v: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
             Ok(self.fibre_form(x)?.flat(v))
         }
-        fn sharp(&self, x: &Triple<N>, alpha: &Triple<N>) -> Result<Triple<N>, GeometryError> {
+        fn sharp(&self, x: &ChartVector<N>, alpha: &ChartVector<N>) -> Result<ChartVector<N>, GeometryError> {
             self.fibre_form(x)?.sharp(alpha)
         }
     };

@@ -1,7 +1,7 @@
 //! The contact form of a Lagrangian on TQ x R.
 
 use crate::forms::fibre_form::{FibreForm, contact_form_by_fibre};
-use crate::{ContactForm, Derivatives, GeometryError, Lagrangian, Scalar, Smooth, Triple};
+use crate::{ChartVector, ContactForm, Derivatives, GeometryError, Lagrangian, Scalar, Smooth};
 use nalgebra::{DMatrix, SVector};
 
 /// `eta_L = dz - theta_L` with `theta_L = L_v dq`, at a fixed time; contact exactly where L is regular. Its Reeb field is
@@ -15,14 +15,14 @@ pub struct LagrangianForm<'a, L> {
 }
 
 impl<const N: usize, L: Lagrangian<N>> Smooth<N> for LagrangianForm<'_, L> {
-    fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
+    fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
         let momentum = self.lagrangian.gradient(T::from(self.t), &(*x).into()).y;
-        Ok(Triple { x: -momentum, y: SVector::from_fn(|_, _| T::zero()), z: T::one() })
+        Ok(ChartVector { x: -momentum, y: SVector::from_fn(|_, _| T::zero()), z: T::one() })
     }
 }
 
 impl<L> LagrangianForm<'_, L> {
-    fn fibre_form<const N: usize>(&self, x: &Triple<N>) -> Result<FibreForm<N>, GeometryError>
+    fn fibre_form<const N: usize>(&self, x: &ChartVector<N>) -> Result<FibreForm<N>, GeometryError>
     where
         L: Lagrangian<N>,
     {

@@ -13,6 +13,6 @@ pub use contact_form::{ContactForm, Form, generic};
 pub use darboux::Darboux;
 pub use discrete_form::{DiscreteJet, EtaMinus, EtaPlus, SecondDiscreteJet};
 pub use lagrangian_form::LagrangianForm;
-pub use points::{DiscretePoint, PhasePoint, Triple, VelocityPoint, seed};
+pub use points::{ChartVector, DiscretePoint, PhasePoint, VelocityPoint, seed};
 pub use pullback::{Conformality, conformality, conformality_with_jacobian};
 pub use smooth::{Smooth, SmoothFunction};

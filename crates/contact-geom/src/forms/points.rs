@@ -1,6 +1,6 @@
 //! Points of the three contact manifolds, and the coordinates that they share.
 
-use crate::{Dual, GeometryError, Larger, Largest, Module, Scalar};
+use crate::{Dual, GeometryError, MaxAbsOrNan, MaxOrNan, Scalar, TangentVector};
 use nalgebra::{DVector, SVector};
 
 /// Coordinates `(x, y, z)` in `R^N x R^N x R`: of a point in a chart, of a tangent vector or of a covector.
@@ -8,7 +8,7 @@ use nalgebra::{DVector, SVector};
 /// All three contact manifolds have this shape: `(q, p, z)` on T\*Q x R, `(q, v, z)` on TQ x R, `(q0, q1, z0)` on
 /// Q x Q x R. As a matrix index the order is `x_1..x_N, y_1..y_N, z`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Triple<const N: usize, T = f64> {
+pub struct ChartVector<const N: usize, T = f64> {
     /// The first block: `q`, or `q0`.
     pub x: SVector<T, N>,
     /// The second block: `p`, `v`, or `q1`.
@@ -17,35 +17,35 @@ pub struct Triple<const N: usize, T = f64> {
     pub z: T,
 }
 
-impl<T: Scalar, const N: usize> Module<T> for Triple<N, T> {
+impl<T: Scalar, const N: usize> TangentVector<T> for ChartVector<N, T> {
     #[inline(always)]
     fn null() -> Self {
-        Triple { x: Module::null(), y: Module::null(), z: T::zero() }
+        ChartVector { x: TangentVector::null(), y: TangentVector::null(), z: T::zero() }
     }
     #[inline(always)]
     fn each(self, mut f: impl FnMut(T) -> T) -> Self {
-        Triple { x: Module::each(self.x, &mut f), y: Module::each(self.y, &mut f), z: f(self.z) }
+        ChartVector { x: TangentVector::each(self.x, &mut f), y: TangentVector::each(self.y, &mut f), z: f(self.z) }
     }
     #[inline(always)]
     fn join(self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
-        Triple {
-            x: Module::join(self.x, other.x, &mut f),
-            y: Module::join(self.y, other.y, &mut f),
+        ChartVector {
+            x: TangentVector::join(self.x, other.x, &mut f),
+            y: TangentVector::join(self.y, other.y, &mut f),
             z: f(self.z, other.z),
         }
     }
     #[inline(always)]
     fn scaled(self, a: T) -> Self {
-        Triple { x: self.x.scaled(a), y: self.y.scaled(a), z: self.z * a }
+        ChartVector { x: self.x.scaled(a), y: self.y.scaled(a), z: self.z * a }
     }
     #[inline(always)]
     fn combined(self, a: T, other: Self, b: T) -> Self {
         let (x, y) = (self.x.combined(a, other.x, b), self.y.combined(a, other.y, b));
-        Triple { x, y, z: self.z * a + b * other.z }
+        ChartVector { x, y, z: self.z * a + b * other.z }
     }
 }
 
-impl<T: Scalar, const N: usize> Triple<N, T> {
+impl<T: Scalar, const N: usize> ChartVector<N, T> {
     /// The pairing of a covector with a vector: the sum of the products of their components.
     #[inline]
     pub fn dot(&self, other: &Self) -> T {
@@ -71,7 +71,7 @@ impl<T: Scalar, const N: usize> Triple<N, T> {
     }
 }
 
-impl<const N: usize> Triple<N> {
+impl<const N: usize> ChartVector<N> {
     /// The dimension `2N + 1` of the manifold.
     pub const DIMENSION: usize = 2 * N + 1;
 
@@ -88,7 +88,7 @@ impl<const N: usize> Triple<N> {
 
     /// The element whose component of index `i` is `f(i)`.
     pub fn from_fn(mut f: impl FnMut(usize) -> f64) -> Self {
-        Triple { x: SVector::from_fn(|i, _| f(i)), y: SVector::from_fn(|i, _| f(N + i)), z: f(2 * N) }
+        ChartVector { x: SVector::from_fn(|i, _| f(i)), y: SVector::from_fn(|i, _| f(N + i)), z: f(2 * N) }
     }
 
     /// The components as a vector of dimension `2N + 1`.
@@ -98,7 +98,7 @@ impl<const N: usize> Triple<N> {
 
     /// The largest absolute component; not a number where a component is not, unlike nalgebra's function of this name.
     pub fn amax(&self) -> f64 {
-        self.x.largest().larger(self.y.largest()).larger(self.z.abs())
+        self.x.max_abs_or_nan().max_or_nan(self.y.max_abs_or_nan()).max_or_nan(self.z.abs())
     }
 
     /// Whether every component is finite.
@@ -109,9 +109,9 @@ impl<const N: usize> Triple<N> {
     }
 }
 
-impl<const N: usize> Largest for Triple<N> {
+impl<const N: usize> MaxAbsOrNan for ChartVector<N> {
     #[inline]
-    fn largest(&self) -> f64 {
+    fn max_abs_or_nan(&self) -> f64 {
         self.amax()
     }
 }
@@ -119,9 +119,9 @@ impl<const N: usize> Largest for Triple<N> {
 /// The point of a chart as duals whose differentials are the `2N + 1` coordinate directions: the identity map together
 /// with its derivative.
 #[inline]
-pub fn seed<T: Scalar, const N: usize>(point: &Triple<N, T>) -> Triple<N, Dual<T, Triple<N, T>>> {
-    let mut seeded: Triple<N, Dual<T, Triple<N, T>>> =
-        Triple { x: point.x.map(Dual::constant), y: point.y.map(Dual::constant), z: Dual::constant(point.z) };
+pub fn seed<T: Scalar, const N: usize>(point: &ChartVector<N, T>) -> ChartVector<N, Dual<T, ChartVector<N, T>>> {
+    let mut seeded: ChartVector<N, Dual<T, ChartVector<N, T>>> =
+        ChartVector { x: point.x.map(Dual::constant), y: point.y.map(Dual::constant), z: Dual::constant(point.z) };
     for i in 0..N {
         seeded.x[i].d.x[i] = T::one();
         seeded.y[i].d.y[i] = T::one();
@@ -178,16 +178,16 @@ macro_rules! point {
             }
         }
 
-        impl<const N: usize, T> From<$name<N, T>> for Triple<N, T> {
+        impl<const N: usize, T> From<$name<N, T>> for ChartVector<N, T> {
             #[inline]
             fn from(point: $name<N, T>) -> Self {
-                Triple { x: point.$x, y: point.$y, z: point.$z }
+                ChartVector { x: point.$x, y: point.$y, z: point.$z }
             }
         }
 
-        impl<const N: usize, T> From<Triple<N, T>> for $name<N, T> {
+        impl<const N: usize, T> From<ChartVector<N, T>> for $name<N, T> {
             #[inline]
-            fn from(point: Triple<N, T>) -> Self {
+            fn from(point: ChartVector<N, T>) -> Self {
                 $name { $x: point.x, $y: point.y, $z: point.z }
             }
         }

@@ -1,14 +1,14 @@
 //! Pullbacks of contact forms: is a map contact, and with which conformal factor?
 
 use crate::forms::smooth::apply_transposed;
-use crate::{ContactForm, GeometryError, Largest, Smooth, Triple};
+use crate::{ChartVector, ContactForm, GeometryError, MaxAbsOrNan, Smooth};
 use nalgebra::DMatrix;
 
 /// The pullback of a contact form along a map at a point, compared with the contact form there: `F* tau = sigma eta`?
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conformality<const N: usize> {
     /// The covector `F* tau`.
-    pub pullback: Triple<N>,
+    pub pullback: ChartVector<N>,
     /// The conformal factor `sigma = (F* tau)(R)`, with R the Reeb field of `eta`.
     pub sigma: f64,
     /// The largest component of `F* tau - sigma eta`, relative to the largest of `F* tau`.
@@ -29,7 +29,7 @@ pub fn conformality<const N: usize>(
     source: &impl ContactForm<N>,
     target: &impl ContactForm<N>,
     map: &impl Smooth<N>,
-    x: &Triple<N>,
+    x: &ChartVector<N>,
 ) -> Result<Conformality<N>, GeometryError> {
     let (image, jacobian) = map.with_jacobian(x)?;
     conformality_with_jacobian(source, target, x, &image, &jacobian)
@@ -42,11 +42,11 @@ pub fn conformality<const N: usize>(
 pub fn conformality_with_jacobian<const N: usize>(
     source: &impl ContactForm<N>,
     target: &impl ContactForm<N>,
-    x: &Triple<N>,
-    image: &Triple<N>,
+    x: &ChartVector<N>,
+    image: &ChartVector<N>,
     jacobian: &DMatrix<f64>,
 ) -> Result<Conformality<N>, GeometryError> {
-    let size = Triple::<N>::DIMENSION;
+    let size = ChartVector::<N>::DIMENSION;
     for found in [jacobian.nrows(), jacobian.ncols()] {
         if found != size {
             return Err(GeometryError::WrongSize { what: "the Jacobian", expected: size, found });
@@ -54,7 +54,7 @@ pub fn conformality_with_jacobian<const N: usize>(
     }
     let pullback = apply_transposed(jacobian, &target.eta(image)?);
     let sigma = pullback.dot(&source.reeb(x)?);
-    let (difference, size) = (pullback.minus(source.eta(x)?.scale(sigma)).largest(), pullback.largest());
+    let (difference, size) = (pullback.minus(source.eta(x)?.scale(sigma)).max_abs_or_nan(), pullback.max_abs_or_nan());
     // A map that sends everything to one point pulls back nothing: conformal, with the factor 0.
     let defect = if difference == 0.0 && size == 0.0 { 0.0 } else { difference / size };
     Ok(Conformality { pullback, sigma, defect })

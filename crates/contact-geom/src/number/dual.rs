@@ -3,7 +3,7 @@
 // The product and quotient rules mix operations: clippy takes that for a slip.
 #![allow(clippy::suspicious_arithmetic_impl)]
 
-use crate::{Module, Scalar};
+use crate::{Scalar, TangentVector};
 use num_traits::{One, Zero};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -42,7 +42,7 @@ pub struct KernelDual<T, D> {
 /// The arithmetic, with what the compiler is told of its functions.
 macro_rules! arithmetic {
     ($Dual:ident, $inline:meta) => {
-        impl<T: Scalar, D: Module<T>> $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> $Dual<T, D> {
             /// A constant: its differential vanishes.
             #[$inline]
             pub fn constant(re: T) -> Self {
@@ -62,14 +62,14 @@ macro_rules! arithmetic {
             }
         }
 
-        impl<T: Scalar, D: Module<T>> From<f64> for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> From<f64> for $Dual<T, D> {
             #[$inline]
             fn from(x: f64) -> Self {
                 $Dual::constant(T::from(x))
             }
         }
 
-        impl<T: Scalar, D: Module<T>> Zero for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> Zero for $Dual<T, D> {
             #[$inline]
             fn zero() -> Self {
                 $Dual::constant(T::zero())
@@ -79,14 +79,14 @@ macro_rules! arithmetic {
             }
         }
 
-        impl<T: Scalar, D: Module<T>> One for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> One for $Dual<T, D> {
             #[$inline]
             fn one() -> Self {
                 $Dual::constant(T::one())
             }
         }
 
-        impl<T: Scalar, D: Module<T>> Neg for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> Neg for $Dual<T, D> {
             type Output = Self;
             #[$inline]
             fn neg(self) -> Self {
@@ -94,7 +94,7 @@ macro_rules! arithmetic {
             }
         }
 
-        impl<T: Scalar, D: Module<T>> Add for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> Add for $Dual<T, D> {
             type Output = Self;
             #[$inline]
             fn add(self, b: Self) -> Self {
@@ -102,7 +102,7 @@ macro_rules! arithmetic {
             }
         }
 
-        impl<T: Scalar, D: Module<T>> Sub for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> Sub for $Dual<T, D> {
             type Output = Self;
             #[$inline]
             fn sub(self, b: Self) -> Self {
@@ -110,7 +110,7 @@ macro_rules! arithmetic {
             }
         }
 
-        impl<T: Scalar, D: Module<T>> Mul for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> Mul for $Dual<T, D> {
             type Output = Self;
             #[$inline]
             fn mul(self, b: Self) -> Self {
@@ -119,7 +119,7 @@ macro_rules! arithmetic {
             }
         }
 
-        impl<T: Scalar, D: Module<T>> Div for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> Div for $Dual<T, D> {
             type Output = Self;
             #[$inline]
             fn div(self, b: Self) -> Self {
@@ -128,7 +128,7 @@ macro_rules! arithmetic {
             }
         }
 
-        impl<T: Scalar, D: Module<T>> Add<f64> for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> Add<f64> for $Dual<T, D> {
             type Output = Self;
             #[$inline]
             fn add(self, b: f64) -> Self {
@@ -136,7 +136,7 @@ macro_rules! arithmetic {
             }
         }
 
-        impl<T: Scalar, D: Module<T>> Sub<f64> for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> Sub<f64> for $Dual<T, D> {
             type Output = Self;
             #[$inline]
             fn sub(self, b: f64) -> Self {
@@ -144,7 +144,7 @@ macro_rules! arithmetic {
             }
         }
 
-        impl<T: Scalar, D: Module<T>> Mul<f64> for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> Mul<f64> for $Dual<T, D> {
             type Output = Self;
             #[$inline]
             fn mul(self, b: f64) -> Self {
@@ -152,7 +152,7 @@ macro_rules! arithmetic {
             }
         }
 
-        impl<T: Scalar, D: Module<T>> Div<f64> for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> Div<f64> for $Dual<T, D> {
             type Output = Self;
             #[$inline]
             fn div(self, b: f64) -> Self {
@@ -160,35 +160,35 @@ macro_rules! arithmetic {
             }
         }
 
-        impl<T: Scalar, D: Module<T>> AddAssign for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> AddAssign for $Dual<T, D> {
             #[$inline]
             fn add_assign(&mut self, b: Self) {
                 *self = *self + b;
             }
         }
 
-        impl<T: Scalar, D: Module<T>> SubAssign for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> SubAssign for $Dual<T, D> {
             #[$inline]
             fn sub_assign(&mut self, b: Self) {
                 *self = *self - b;
             }
         }
 
-        impl<T: Scalar, D: Module<T>> MulAssign for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> MulAssign for $Dual<T, D> {
             #[$inline]
             fn mul_assign(&mut self, b: Self) {
                 *self = *self * b;
             }
         }
 
-        impl<T: Scalar, D: Module<T>> DivAssign for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> DivAssign for $Dual<T, D> {
             #[$inline]
             fn div_assign(&mut self, b: Self) {
                 *self = *self / b;
             }
         }
 
-        impl<T: Scalar, D: Module<T>> Scalar for $Dual<T, D> {
+        impl<T: Scalar, D: TangentVector<T>> Scalar for $Dual<T, D> {
             const NESTED: bool = true;
 
             #[$inline]
@@ -201,12 +201,12 @@ macro_rules! arithmetic {
             }
             #[$inline]
             fn extent(self) -> f64 {
-                let mut largest = self.re.extent();
+                let mut max_abs_or_nan = self.re.extent();
                 self.d.each(|a| {
-                    largest = largest.max(a.extent());
+                    max_abs_or_nan = max_abs_or_nan.max(a.extent());
                     a
                 });
-                largest
+                max_abs_or_nan
             }
             #[$inline]
             fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {

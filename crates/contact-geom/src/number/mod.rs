@@ -1,9 +1,9 @@
 //! Numbers: scalars, dual numbers, small linear systems, and maxima that keep a NaN.
 
 mod dual;
-mod largest;
 mod legendre_polynomials;
 pub mod linear;
+mod max_or_nan;
 mod module;
 #[cfg(feature = "num-dual")]
 mod num_dual;
@@ -12,7 +12,7 @@ pub(crate) mod rounded;
 mod scalar;
 
 pub use dual::{Dual, KernelDual};
-pub use largest::{Larger, Largest, larger, largest};
 pub use legendre_polynomials::legendre_polynomials;
-pub use module::{Border, Module};
+pub use max_or_nan::{MaxAbsOrNan, MaxOrNan, max_abs_or_nan, max_or_nan};
+pub use module::{AugmentedVector, TangentVector};
 pub use scalar::Scalar;

@@ -6,10 +6,10 @@ use std::fmt::Debug;
 
 /// The free module that a differential lives in: one component of `T` for each direction.
 ///
-/// Its shape is chosen by what is wanted: [`SVector`] for `N` directions, [`Border`] for `N + 1`,
-/// [`Triple`](crate::Triple) for all `2N + 1` coordinates of a contact manifold. So no direction is carried that nobody
+/// Its shape is chosen by what is wanted: [`SVector`] for `N` directions, [`AugmentedVector`] for `N + 1`,
+/// [`ChartVector`](crate::ChartVector) for all `2N + 1` coordinates of a contact manifold. So no direction is carried that nobody
 /// asked for.
-pub trait Module<T>: Copy + PartialEq + Debug + 'static {
+pub trait TangentVector<T>: Copy + PartialEq + Debug + 'static {
     /// The differential of a constant.
     fn null() -> Self;
     /// Applies `f` to each component.
@@ -22,7 +22,7 @@ pub trait Module<T>: Copy + PartialEq + Debug + 'static {
     fn combined(self, a: T, other: Self, b: T) -> Self;
 }
 
-impl<T: Scalar, const N: usize> Module<T> for SVector<T, N> {
+impl<T: Scalar, const N: usize> TangentVector<T> for SVector<T, N> {
     #[inline(always)]
     fn null() -> Self {
         SVector::from_array_storage(nalgebra::ArrayStorage([[T::zero(); N]]))
@@ -59,32 +59,32 @@ impl<T: Scalar, const N: usize> Module<T> for SVector<T, N> {
 
 /// `N` directions and one more: an element of `T^N x T`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Border<const N: usize, T = f64> {
+pub struct AugmentedVector<const N: usize, T = f64> {
     /// The first `N` components.
     pub x: SVector<T, N>,
     /// The last component.
     pub z: T,
 }
 
-impl<T: Scalar, const N: usize> Module<T> for Border<N, T> {
+impl<T: Scalar, const N: usize> TangentVector<T> for AugmentedVector<N, T> {
     #[inline(always)]
     fn null() -> Self {
-        Border { x: Module::null(), z: T::zero() }
+        AugmentedVector { x: TangentVector::null(), z: T::zero() }
     }
     #[inline(always)]
     fn each(self, mut f: impl FnMut(T) -> T) -> Self {
-        Border { x: Module::each(self.x, &mut f), z: f(self.z) }
+        AugmentedVector { x: TangentVector::each(self.x, &mut f), z: f(self.z) }
     }
     #[inline(always)]
     fn join(self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
-        Border { x: Module::join(self.x, other.x, &mut f), z: f(self.z, other.z) }
+        AugmentedVector { x: TangentVector::join(self.x, other.x, &mut f), z: f(self.z, other.z) }
     }
     #[inline(always)]
     fn scaled(self, a: T) -> Self {
-        Border { x: self.x.scaled(a), z: self.z * a }
+        AugmentedVector { x: self.x.scaled(a), z: self.z * a }
     }
     #[inline(always)]
     fn combined(self, a: T, other: Self, b: T) -> Self {
-        Border { x: self.x.combined(a, other.x, b), z: self.z * a + b * other.z }
+        AugmentedVector { x: self.x.combined(a, other.x, b), z: self.z * a + b * other.z }
     }
 }

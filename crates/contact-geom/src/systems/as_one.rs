@@ -21,7 +21,7 @@ macro_rules! systems {
                 match self { $($name::$system(system) => system.value(t, q, v, z),)* }
             }
             #[inline]
-            fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<$n, T>) -> Option<Triple<$n, T>> {
+            fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<$n, T>) -> Option<ChartVector<$n, T>> {
                 match self { $($name::$system(system) => system.closed_gradient(t, x),)* }
             }
             #[inline]

@@ -1,6 +1,6 @@
 //! Bodies in space that attract each other, with drag.
 
-use crate::{Lagrangian, Scalar, Structure, Triple, VelocityPoint};
+use crate::{ChartVector, Lagrangian, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// Bodies in space with Newton's gravitation of each pair and linear drag,
@@ -84,9 +84,9 @@ impl<const N: usize> Lagrangian<N> for Bodies<N> {
     }
 
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
         let y = SVector::from_fn(|d, _| x.v[d] * self.masses[d]);
-        Some(Triple { x: self.forces(&x.q), y, z: T::from(self.gamma) })
+        Some(ChartVector { x: self.forces(&x.q), y, z: T::from(self.gamma) })
     }
 
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! Duffing's oscillator, free and forced.
 
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint};
+use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// Duffing's oscillator, `L = v^2/2 - alpha q^2/2 - beta q^4/4 + force cos(omega t) q + gamma z`. Dimensionless: lengths
@@ -51,10 +51,10 @@ impl Lagrangian<1> for Duffing {
     }
 
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<1, T>) -> Option<Triple<1, T>> {
+    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<1, T>) -> Option<ChartVector<1, T>> {
         let q = x.q[0];
         let force = (t * self.omega).cos() * self.force - q * (q * q * self.beta + self.alpha);
-        Some(Triple { x: SVector::from([force]), y: x.v, z: T::from(self.gamma) })
+        Some(ChartVector { x: SVector::from([force]), y: x.v, z: T::from(self.gamma) })
     }
 
     fn structure(&self) -> Structure {

@@ -2,7 +2,7 @@
 
 use super::closed_form::{relative_exp_m1, relative_sin};
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint};
+use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// The harmonic oscillator with linear drag, `L = v^2/2 - q^2/2 + gamma z`. Dimensionless: time in units of the inverse
@@ -75,8 +75,8 @@ impl Lagrangian<1> for HarmonicOscillator {
     }
 
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<Triple<1, T>> {
-        Some(Triple { x: -x.q, y: x.v, z: T::from(self.gamma) })
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<ChartVector<1, T>> {
+        Some(ChartVector { x: -x.q, y: x.v, z: T::from(self.gamma) })
     }
 
     fn structure(&self) -> Structure {

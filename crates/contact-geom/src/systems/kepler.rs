@@ -1,7 +1,7 @@
 //! Kepler's problem with drag, in any dimension.
 
 use super::{System, between};
-use crate::{Clock, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, Triple, VelocityPoint};
+use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, TimeTransformation, VelocityPoint};
 use nalgebra::SVector;
 
 /// Kepler's problem with linear drag, `L = |v|^2/2 + mu/|q| + gamma z` in R^D. Dimensionless: lengths in units of the
@@ -24,7 +24,7 @@ impl<const D: usize> Default for Kepler<D> {
 }
 
 impl<const D: usize> Lagrangian<D> for Kepler<D> {
-    const HAS_CLOCK: bool = true;
+    const HAS_TIME_TRANSFORMATION: bool = true;
 
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, D>, v: &SVector<T, D>, z: T) -> T {
@@ -32,10 +32,10 @@ impl<const D: usize> Lagrangian<D> for Kepler<D> {
     }
 
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<D, T>) -> Option<Triple<D, T>> {
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<D, T>) -> Option<ChartVector<D, T>> {
         let inverse = x.q.dot(&x.q).sqrt().recip();
         let pull = inverse * inverse * inverse * -self.mu;
-        Some(Triple { x: x.q * pull, y: x.v, z: T::from(self.gamma) })
+        Some(ChartVector { x: x.q * pull, y: x.v, z: T::from(self.gamma) })
     }
 
     fn structure(&self) -> Structure {
@@ -50,8 +50,8 @@ impl<const D: usize> Lagrangian<D> for Kepler<D> {
     }
 
     #[inline(always)]
-    fn clock_rate<T: Scalar>(&self, q: &SVector<T, D>) -> T {
-        self.clock().rate(q)
+    fn dt_dtau<T: Scalar>(&self, q: &SVector<T, D>) -> T {
+        self.time_transformation().rate(q)
     }
 }
 
@@ -82,14 +82,14 @@ impl<const D: usize> System<D> for Kepler<D> {
 }
 
 impl<const D: usize> Kepler<D> {
-    /// The natural clock: its rate `|q|^(3/2)` is the time of fall to the centre but for a factor, so that all passages of the
+    /// The natural time transformation: its rate `|q|^(3/2)` is the time of fall to the centre but for a factor, so that all passages of the
     /// centre, near or far, take as many steps.
-    pub fn clock(&self) -> Radial {
+    pub fn time_transformation(&self) -> Radial {
         Radial { exponent: 1.5 }
     }
 }
 
-/// The clock `g = |q|^a`. Of Kepler's problem the times are the eccentric anomaly for `a = 1` and the true one for `a = 2`, but
+/// the time transformation `g = |q|^a`. Of Kepler's problem the times are the eccentric anomaly for `a = 1` and the true one for `a = 2`, but
 /// for constant factors and without drag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Radial {
@@ -97,7 +97,7 @@ pub struct Radial {
     pub exponent: f64,
 }
 
-impl<const D: usize> Clock<D> for Radial {
+impl<const D: usize> TimeTransformation<D> for Radial {
     #[inline(always)]
     fn rate<T: Scalar>(&self, q: &SVector<T, D>) -> T {
         let (square, halves) = (q.dot(q), 2.0 * self.exponent);

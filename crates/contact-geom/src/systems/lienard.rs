@@ -1,6 +1,6 @@
 //! Liénard systems as contact Hamiltonian systems without a Lagrangian.
 
-use crate::{PhasePoint, Scalar, SmoothFunction, Triple};
+use crate::{ChartVector, PhasePoint, Scalar, SmoothFunction};
 
 /// A forced Liénard system `q'' + f(q) q' + F(q, t) = 0` as the contact Hamiltonian `H = p z + f(q) z + F(q, t)` on
 /// T\*R x R. Dimensionless.
@@ -39,7 +39,7 @@ impl Lienard {
 
 impl SmoothFunction<1> for Lienard {
     #[inline(always)]
-    fn value<T: Scalar>(&self, t: T, x: &Triple<1, T>) -> T {
+    fn value<T: Scalar>(&self, t: T, x: &ChartVector<1, T>) -> T {
         let (q, p, z) = (x.x[0], x.y[0], x.z);
         let forcing = (t * self.omega).cos() * self.amplitude;
         z * (p + horner(&self.damping, q)) + horner(&self.restoring, q) - forcing
@@ -61,7 +61,7 @@ mod tests {
         let system =
             Lienard { damping: [0.3, -0.2, 0.7], restoring: [0.1, 1.0, -0.4, 0.6], amplitude: 0.5, omega: 1.2 };
         for (t, q, p, z) in [(0.0, 1.0, 0.0, 0.5), (0.7, -1.3, 0.4, -0.9), (2.0, 0.2, -2.0, 1.5)] {
-            let x = Triple { x: [q].into(), y: [p].into(), z };
+            let x = ChartVector { x: [q].into(), y: [p].into(), z };
             let (h, d) = (system.value(t, &x), system.differential(t, &x));
             let f: f64 = 0.3 - 0.2 * q + 0.7 * q * q;
             let force: f64 = 0.1 + q - 0.4 * q * q + 0.6 * q * q * q - 0.5 * (1.2 * t).cos();

@@ -44,7 +44,7 @@ pub use spherical_pendulum::SphericalPendulum;
 pub use uniform_field::UniformField;
 pub use van_der_pol::VanDerPol;
 
-use crate::{Hessian, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, Triple, VelocityPoint};
+use crate::{ChartVector, Hessian, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use as_one::systems;
 use nalgebra::SVector;
 
@@ -93,7 +93,7 @@ systems! {
 }
 
 systems! {
-    /// The systems of the catalogue in two coordinates, as one system; [`Kepler`] states a clock and stays a type of its own.
+    /// The systems of the catalogue in two coordinates, as one system; [`Kepler`] states a time transformation and stays a type of its own.
     ///
     /// For speed take a system's own type: a kernel for this one asks which it is, at each evaluation.
     TwoCoordinates<2> {

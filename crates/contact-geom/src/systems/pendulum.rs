@@ -1,7 +1,7 @@
 //! The damped pendulum.
 
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint};
+use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// The pendulum with linear drag, `L = v^2/2 - (1 - cos q) + gamma z`. Dimensionless: time in units of `sqrt(l/g)`, `q` the
@@ -27,8 +27,8 @@ impl Lagrangian<1> for Pendulum {
     }
 
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<Triple<1, T>> {
-        Some(Triple { x: SVector::from([-x.q[0].sin()]), y: x.v, z: T::from(self.gamma) })
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<ChartVector<1, T>> {
+        Some(ChartVector { x: SVector::from([-x.q[0].sin()]), y: x.v, z: T::from(self.gamma) })
     }
 
     fn structure(&self) -> Structure {

@@ -1,7 +1,7 @@
 //! The oscillator whose Lagrangian is quadratic in the action.
 
 use super::{System, between};
-use crate::{Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint};
+use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// The oscillator with a drag proportional to the action, `L = v^2/2 - q^2/2 - c z^2/2`. Dimensionless: time in units of
@@ -29,8 +29,8 @@ impl Lagrangian<1> for QuadraticInZ {
     }
 
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<Triple<1, T>> {
-        Some(Triple { x: -x.q, y: x.v, z: x.z * -self.c })
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<ChartVector<1, T>> {
+        Some(ChartVector { x: -x.q, y: x.v, z: x.z * -self.c })
     }
 
     fn structure(&self) -> Structure {

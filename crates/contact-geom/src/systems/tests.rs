@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::linear::solve;
-use crate::{Derivatives, OneParameterGroup, Triple};
+use crate::{ChartVector, Derivatives, OneParameterGroup};
 use nalgebra::{SMatrix, SVector};
 
 /// Weyl's sequence: multiples of numbers that are independent over the rationals fill the cube evenly.
@@ -81,7 +81,7 @@ fn samples_are_finite_and_regular() {
     impl AtPoint for Regular {
         fn at<const N: usize, S: System<N>>(&mut self, system: &S, t: f64, x: &VelocityPoint<N>) {
             let (name, h) = (system.name(), system.hessian(t, x));
-            let finite = Triple::from(*x).is_finite() && system.gradient(t, x).is_finite();
+            let finite = ChartVector::from(*x).is_finite() && system.gradient(t, x).is_finite();
             assert!(t.is_finite() && finite && system.value(t, &x.q, &x.v, x.z).is_finite(), "{name} at {x:?}");
             let seconds = h.qq.iter().chain(&h.qv).chain(&h.vv).chain(&h.qz).chain(&h.vz);
             assert!(seconds.chain([&h.zz]).all(|e| e.is_finite()), "{name} at {x:?}");

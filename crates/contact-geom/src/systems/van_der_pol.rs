@@ -1,6 +1,6 @@
 //! Van der Pol's oscillator as a contact Hamiltonian system.
 
-use crate::{PhasePoint, Scalar, SmoothFunction, Triple};
+use crate::{ChartVector, PhasePoint, Scalar, SmoothFunction};
 
 /// Van der Pol's oscillator `q'' + mu (q^2 - 1) q' + q = amplitude cos(omega t)` as the contact Hamiltonian
 /// `H = p z + mu (q^2 - 1) z + q - amplitude cos(omega t)` on T\*R x R. Dimensionless: time in units of the inverse
@@ -33,7 +33,7 @@ impl VanDerPol {
 
 impl SmoothFunction<1> for VanDerPol {
     #[inline(always)]
-    fn value<T: Scalar>(&self, t: T, x: &Triple<1, T>) -> T {
+    fn value<T: Scalar>(&self, t: T, x: &ChartVector<1, T>) -> T {
         let (q, p, z) = (x.x[0], x.y[0], x.z);
         z * (p + (q * q - 1.0) * self.mu) + q - (t * self.omega).cos() * self.amplitude
     }
@@ -50,7 +50,7 @@ mod tests {
         let general =
             Lienard { damping: [-1.5, 0.0, 1.5], restoring: [0.0, 1.0, 0.0, 0.0], amplitude: 0.4, omega: 1.1 };
         for (t, q, p, z) in [(0.0, 2.0, 0.0, 0.5), (0.7, -1.3, 0.4, -0.9), (2.0, 0.2, -2.0, 1.5)] {
-            let x = Triple { x: [q].into(), y: [p].into(), z };
+            let x = ChartVector { x: [q].into(), y: [p].into(), z };
             let difference = system.differential(t, &x).minus(general.differential(t, &x));
             // A few roundings of terms below 8.
             assert!(difference.amax() <= 32.0 * f64::EPSILON);

@@ -1,9 +1,9 @@
 //! Continuation by pseudo-arclength: a branch of paths along a parameter, around its folds.
 
+use super::block_elimination::BlockElimination;
 use super::critical_path::CriticalPath;
 use super::deflation::square;
 use super::problem::BoundaryPath;
-use super::sweep::Sweep;
 use crate::{DiscreteLagrangian, DiscretePath, InputError};
 use contact_geom::GeometryError;
 use contact_geom::nalgebra::SVector;
@@ -191,7 +191,7 @@ impl<F> Follower<F> {
         let problem = self.of(parameter)?;
         let equations = problem.equations();
         let mut nodes = problem.nodes(problem.moved(q.to_vec()));
-        let mut sweep = Sweep::new(&equations);
+        let mut sweep = BlockElimination::new(&equations);
         let Ok(measured) = sweep.forward(&equations, &mut nodes) else { return Ok(None) };
         if measured.regularity.is_nan() || measured.regularity <= 0.0 {
             return Ok(None);

@@ -1,15 +1,15 @@
 //! A path that was found, and how the search for it ended.
 
+use super::block_elimination::{Measured, Nodes};
 use super::judge::Judgement;
-use super::sweep::{Measured, Nodes};
-use crate::{DiscretePath, StepError, Suspicion};
+use crate::{DiscretePath, StepError, UnresolvedStep};
 use contact_geom::nalgebra::SVector;
 
 /// How the search for a critical path ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PathStatus {
     /// The path satisfies the discrete Herglotz equations to round-off; whether it is near a motion its
-    /// [suspicion](CriticalPath::suspicion) tells.
+    /// [unresolved step](CriticalPath::unresolved) tells.
     Found,
     /// The iterations were used up.
     NotConverged,
@@ -86,7 +86,7 @@ pub struct CriticalPath<const N: usize> {
     /// The first step that cannot have resolved the motion, as of a run of the same discrete Lagrangian; or else the one where the error
     /// estimate is largest, if that is above a quarter. The path may then be far from every motion: it may have crossed a centre of force
     /// without meeting it, or its ends be conjugate. Of found paths only.
-    pub suspicion: Option<Suspicion>,
+    pub unresolved: Option<UnresolvedStep>,
     /// The corrections that were made, from all starts.
     pub iterations: u32,
 }
@@ -121,7 +121,7 @@ impl<const N: usize> CriticalPath<N> {
             log_factor: f64::NAN,
             regularity: 0.0,
             error_estimate: None,
-            suspicion: None,
+            unresolved: None,
             iterations,
         }
     }
@@ -136,7 +136,7 @@ impl<const N: usize> CriticalPath<N> {
         }
     }
 
-    pub(super) fn judged(self, Judgement { suspicion, error_estimate }: Judgement) -> Self {
-        CriticalPath { suspicion, error_estimate, ..self }
+    pub(super) fn judged(self, Judgement { unresolved, error_estimate }: Judgement) -> Self {
+        CriticalPath { unresolved, error_estimate, ..self }
     }
 }

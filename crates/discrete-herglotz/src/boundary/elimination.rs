@@ -1,6 +1,6 @@
 //! Block elimination of the linearised discrete Herglotz equations along a path.
 
-use super::sweep::Herglotz;
+use super::block_elimination::HerglotzEquation;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscreteJet, SecondDiscreteJet};
 
@@ -102,7 +102,7 @@ impl<const N: usize> Panel<N> {
     pub fn open(&mut self, opening: &SecondDiscreteJet<N>, p: &SVector<f64, N>) {
         self.bottom.first += self.bottom.here;
         self.action.first += self.action.here;
-        let at = Herglotz::new(p, opening, &SVector::zeros());
+        let at = HerglotzEquation::new(p, opening, &SVector::zeros());
         // `next` becomes `here` of the second point.
         self.closing = Some(BlockRows { next: at.next, first: at.here, ..BlockRows::zero() });
     }

@@ -1,7 +1,7 @@
 //! The index of a critical path: the inertia of the second variation of the action.
 
+use super::block_elimination::{Equations, Nodes, Undefined};
 use super::end::Conditions;
-use super::sweep::{Equations, Nodes, Undefined};
 use crate::DiscreteLagrangian;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 

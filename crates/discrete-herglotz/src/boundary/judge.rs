@@ -1,13 +1,13 @@
 //! Whether a found path is a motion: its steps resolve it, and what they leave out does not move it by as much as it moves.
 
-use super::sweep::{Carry, Equations, Nodes, Sweep};
-use crate::run::watch::{ROUNDED, at_rest, rounding};
-use crate::{DiscreteLagrangian, Suspicion};
+use super::block_elimination::{BlockElimination, Carry, Equations, Nodes};
+use crate::run::resolution_monitor::{ROUNDED, at_rest, rounding};
+use crate::{DiscreteLagrangian, UnresolvedStep};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, larger, largest};
+use contact_geom::{PhasePoint, max_abs_or_nan, max_or_nan};
 
 /// The part of its range by which the steps may move a path that they resolve.
-const MOST: f64 = 0.25;
+const LARGEST_CORRECTION: f64 = 0.25;
 
 /// What a second-order rule leaves out of the equation of a point, in third differences of the momenta: `h^3 p'''/12` by the trapezoidal rule and
 /// kicks and drifts, of an oscillator, and twice as much by the midpoint rule.
@@ -17,7 +17,7 @@ const DEFECT: f64 = 1.0 / 6.0;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Judgement {
     /// The first step that cannot have resolved the motion.
-    pub suspicion: Option<Suspicion>,
+    pub unresolved: Option<UnresolvedStep>,
     /// By how much the steps move the path, in units of its range; `None` where it is not known what they leave out.
     pub error_estimate: Option<f64>,
 }
@@ -27,15 +27,15 @@ pub(super) struct Judgement {
 /// the ends are conjugate to within that error, though the factorisation sees nothing of it. `to` is workspace.
 pub(super) fn judge<D: DiscreteLagrangian<N>, const N: usize>(
     of: &Equations<'_, D, N>,
-    sweep: &mut Sweep<N>,
+    sweep: &mut BlockElimination<N>,
     x: &mut Nodes<N>,
     to: &mut [SVector<f64, N>],
 ) -> Judgement {
     let turn = look(of, &sweep.momenta, x);
     let moved = moved(of, sweep, x, to);
-    let beyond = moved.filter(|(part, _)| *part > MOST);
-    let of_ends = beyond.map(|(part, step)| Suspicion { step, misfit: part / MOST });
-    Judgement { suspicion: turn.or(of_ends), error_estimate: moved.map(|(part, _)| part) }
+    let beyond = moved.filter(|(part, _)| *part > LARGEST_CORRECTION);
+    let of_ends = beyond.map(|(part, step)| UnresolvedStep { step, defect: part / LARGEST_CORRECTION });
+    Judgement { unresolved: turn.or(of_ends), error_estimate: moved.map(|(part, _)| part) }
 }
 
 /// The first step that does not resolve the motion by the velocities of four in sequence.
@@ -43,7 +43,7 @@ fn look<D: DiscreteLagrangian<N>, const N: usize>(
     of: &Equations<'_, D, N>,
     momenta: &[Carry<N>],
     x: &Nodes<N>,
-) -> Option<Suspicion> {
+) -> Option<UnresolvedStep> {
     let h = of.ld.step_size();
     let mut velocities = [SVector::zeros(); 4];
     let mut floor = 0.0;
@@ -60,10 +60,10 @@ fn look<D: DiscreteLagrangian<N>, const N: usize>(
         // From the fourth step on all four are velocities of the path.
         let four = velocities.each_ref();
         let to = PhasePoint { q: q1, p: *p, z: x.z[k + 1] };
-        if let Some(misfit) = of.ld.misfit(four, &to, *sigma)
+        if let Some(defect) = of.ld.defect(four, &to, *sigma)
             && !at_rest(four, h, floor)
         {
-            return Some(Suspicion { step: k, misfit });
+            return Some(UnresolvedStep { step: k, defect });
         }
     }
     None
@@ -72,7 +72,7 @@ fn look<D: DiscreteLagrangian<N>, const N: usize>(
 /// The largest part of its range by which the steps move a coordinate, and the step where; infinite where the equations have no solution.
 fn moved<D: DiscreteLagrangian<N>, const N: usize>(
     of: &Equations<'_, D, N>,
-    sweep: &mut Sweep<N>,
+    sweep: &mut BlockElimination<N>,
     x: &mut Nodes<N>,
     to: &mut [SVector<f64, N>],
 ) -> Option<(f64, usize)> {
@@ -101,12 +101,13 @@ fn moved<D: DiscreteLagrangian<N>, const N: usize>(
     for q in &x.q {
         (low, high) = (low.inf(q), high.sup(q));
     }
-    let (range, size) = (high - low, larger(largest(low.iter().copied()), largest(high.iter().copied())));
+    let (range, size) =
+        (high - low, max_or_nan(max_abs_or_nan(low.iter().copied()), max_abs_or_nan(high.iter().copied())));
     let mut worst = (0.0, 0);
     for (k, (to, q)) in to.iter().zip(&x.q).enumerate() {
         // A coordinate that stays where it is has no range but its rounding.
         let parts = (0..N).filter(|&i| range[i] > ROUNDED * size).map(|i| (to[i] - q[i]).abs() / range[i]);
-        let part = parts.fold(0.0, larger);
+        let part = parts.fold(0.0, max_or_nan);
         if part.is_nan() || part > worst.0 {
             worst = (if part.is_nan() { f64::INFINITY } else { part }, k.min(of.steps - 1));
         }

@@ -1,5 +1,6 @@
 //! The discrete Herglotz principle as a boundary-value problem.
 
+mod block_elimination;
 mod branch;
 mod continuation;
 mod critical_path;
@@ -10,7 +11,6 @@ mod index;
 mod judge;
 mod newton;
 mod problem;
-mod sweep;
 mod thomas;
 
 pub use branch::branch;

@@ -1,9 +1,9 @@
 //! Newton's method with a line search for the discrete Herglotz equations of a whole path.
 
+use super::block_elimination::{BlockElimination, Equations, Measured, Nodes};
 use super::critical_path::{CriticalPath, PathStatus};
 use super::deflation::Deflation;
 use super::judge::{Judgement, judge};
-use super::sweep::{Equations, Measured, Nodes, Sweep};
 use crate::{DiscreteLagrangian, last_correction};
 use contact_geom::nalgebra::SVector;
 
@@ -42,7 +42,7 @@ pub(super) fn search<D: DiscreteLagrangian<N>, const N: usize>(
     mut x: Nodes<N>,
     deflation: &Deflation<'_, N>,
 ) -> CriticalPath<N> {
-    let mut sweep = Sweep::new(of);
+    let mut sweep = BlockElimination::new(of);
     let first = x.q.iter().fold(SVector::zeros(), |most: SVector<f64, N>, q| most.sup(&q.abs()));
     let mut trial = x.clone();
     let mut at = match sweep.forward(of, &mut x) {

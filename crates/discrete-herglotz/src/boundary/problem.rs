@@ -1,11 +1,11 @@
 //! The boundary-value problem of the discrete Herglotz principle.
 
+use super::block_elimination::{Equations, Nodes};
 use super::critical_path::CriticalPath;
 use super::deflation::{Deflation, square};
 use super::end::{Conditions, End};
 use super::index::inertia;
 use super::newton::search;
-use super::sweep::{Equations, Nodes};
 use crate::{DiscreteLagrangian, DiscretePath, InputError};
 use contact_geom::GeometryError;
 use contact_geom::nalgebra::SVector;

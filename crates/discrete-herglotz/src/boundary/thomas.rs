@@ -1,6 +1,6 @@
 //! Block elimination without exchanges of rows: the block Thomas algorithm, for paths whose beginnings end away from conjugate points.
 
-use super::sweep::{Carry, Eliminated, Equations, Measured, Nodes, Sweep, Undefined};
+use super::block_elimination::{BlockElimination, Carry, Eliminated, Equations, Measured, Nodes, Undefined};
 use crate::DiscreteLagrangian;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{DiscretePoint, SecondDiscreteJet};
@@ -12,7 +12,7 @@ const LEAST_PIVOT: f64 = 1.0 / 8192.0;
 const REGULAR: f64 = 1e-6;
 
 /// Why a path needs another route.
-enum Obstacle {
+enum PivotFailure {
     /// Second derivatives of the discrete Lagrangian in the action do not vanish.
     Coupled,
     /// A pivot is too small, or a number is not finite.
@@ -33,7 +33,7 @@ struct Carried<const N: usize> {
     change: f64,
 }
 
-impl<const N: usize> Sweep<N> {
+impl<const N: usize> BlockElimination<N> {
     /// Like [`forward`](Sweep::forward), where the path is regular enough for it; `None` elsewhere.
     ///
     /// With `dq_k = r_k - X_k dq_{k+1}` of the points before, the momentum at point k varies by `S dq_k + s`, where
@@ -49,8 +49,8 @@ impl<const N: usize> Sweep<N> {
         if !self.coupled {
             match self.thomas::<D, false>(of, x)? {
                 Ok(measured) => return Ok(Some(measured)),
-                Err(Obstacle::Coupled) => self.coupled = true,
-                Err(Obstacle::Pivot) => return Ok(None),
+                Err(PivotFailure::Coupled) => self.coupled = true,
+                Err(PivotFailure::Pivot) => return Ok(None),
             }
         }
         Ok(self.thomas::<D, true>(of, x)?.ok())
@@ -60,7 +60,7 @@ impl<const N: usize> Sweep<N> {
         &mut self,
         of: &Equations<'_, D, N>,
         x: &mut Nodes<N>,
-    ) -> Result<Result<Measured<N>, Obstacle>, Undefined> {
+    ) -> Result<Result<Measured<N>, PivotFailure>, Undefined> {
         let (start, end) = of.conditions.momenta();
         let (zero, h) = (SVector::<f64, N>::zeros(), of.ld.step_size());
         let mut measured = Measured::new();
@@ -81,7 +81,7 @@ impl<const N: usize> Sweep<N> {
                 Err(cause) => return Err(Undefined { step: k, cause: *cause }),
             };
             if !COUPLED && is_coupled(jet) {
-                return Ok(Err(Obstacle::Coupled));
+                return Ok(Err(PivotFailure::Coupled));
             }
             let sigma = jet.first.sigma();
             measured.factor(k, sigma);
@@ -110,7 +110,7 @@ impl<const N: usize> Sweep<N> {
                     // The last position is given.
                     measured.regularity = self.finish(&here, &rhs, &diagonal);
                 } else if !reduce(&mut here, &diagonal, &mut next, &mut rhs) {
-                    return Ok(Err(Obstacle::Pivot));
+                    return Ok(Err(PivotFailure::Pivot));
                 }
                 point = Eliminated { next, rhs };
             }
@@ -148,7 +148,7 @@ impl<const N: usize> Sweep<N> {
         measured.log_factor += measured.factors.ln();
         // What is not finite, or small, is looked at more closely.
         let sound = measured.squares.sum().is_finite() && x.z[of.steps].is_finite() && measured.regularity >= REGULAR;
-        Ok(if sound { Ok(measured) } else { Err(Obstacle::Pivot) })
+        Ok(if sound { Ok(measured) } else { Err(PivotFailure::Pivot) })
     }
 }
 

@@ -4,7 +4,7 @@ use super::member::{Ending, Member};
 use super::{EnsembleError, SHARD, Shard};
 use crate::run::digest;
 use crate::run::saved::{Saved, load_option, save_option};
-use crate::{CheckpointError, InputError, Row, Status, Suspicion};
+use crate::{CheckpointError, InputError, Row, Status, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use std::collections::BTreeMap;
@@ -157,13 +157,13 @@ impl Shards {
 /// A shard as words, its number first. Of a member that has not completed they say no more than that.
 pub(super) fn words_of<const N: usize>(shard: usize, of: &Shard<N>) -> Vec<u64> {
     let mut words = vec![shard as u64];
-    of.in_lanes.save(&mut words);
+    of.batch_kernel.save(&mut words);
     of.members.len().save(&mut words);
     for member in &of.members {
         let completed = member.ending.ok().filter(|ending| ending.status == Status::Completed);
         completed.is_some().save(&mut words);
-        if let Some(Ending { suspicion, steps, t, state, .. }) = completed {
-            save_option(suspicion.as_ref(), &mut words);
+        if let Some(Ending { unresolved, steps, t, state, .. }) = completed {
+            save_option(unresolved.as_ref(), &mut words);
             steps.save(&mut words);
             t.save(&mut words);
             state.save(&mut words);
@@ -176,9 +176,9 @@ pub(super) fn words_of<const N: usize>(shard: usize, of: &Shard<N>) -> Vec<u64> 
 /// A shard from its words, and its number; members that have not completed are those which [`Task`](super::Task) runs again.
 pub(super) fn shard_of<const N: usize>(mut from: &[u64]) -> Option<(usize, Shard<N>)> {
     let from = &mut from;
-    let (mut shard, mut in_lanes, mut count) = (0usize, 0, 0);
+    let (mut shard, mut batch_kernel, mut count) = (0usize, 0, 0);
     shard.load(from)?;
-    in_lanes.load(from)?;
+    batch_kernel.load(from)?;
     count.load(from)?;
     let first = shard.checked_mul(SHARD)?;
     if count > SHARD {
@@ -189,20 +189,20 @@ pub(super) fn shard_of<const N: usize>(mut from: &[u64]) -> Option<(usize, Shard
         let (mut completed, mut rows) = (false, Vec::new());
         completed.load(from)?;
         let ending = if completed {
-            let suspicion = load_option(from, || Suspicion { step: 0, misfit: 0.0 })?;
+            let unresolved = load_option(from, || UnresolvedStep { step: 0, defect: 0.0 })?;
             let (mut steps, mut t) = (0, 0.0);
             let mut state = PhasePoint { q: SVector::zeros(), p: SVector::zeros(), z: 0.0 };
             steps.load(from)?;
             t.load(from)?;
             state.load(from)?;
             rows = load_rows(from)?;
-            Ok(Ending { status: Status::Completed, suspicion, steps, t, state })
+            Ok(Ending { status: Status::Completed, unresolved, steps, t, state })
         } else {
             Err(InputError::NoSteps)
         };
         members.push(Member { index: first.checked_add(place)?, ending, rows });
     }
-    from.is_empty().then_some((shard, Shard { members, in_lanes, with_causes: false }))
+    from.is_empty().then_some((shard, Shard { members, batch_kernel, with_causes: false }))
 }
 
 fn save_rows<const N: usize>(rows: &[Row<N>], to: &mut Vec<u64>) {

@@ -4,16 +4,16 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::judge::Judge;
-use super::lane::{Lane, Wants, interrupted};
-use super::pack::Pack;
-use super::twofold::{Pair, Summed};
-use crate::gauss::FEW;
-use crate::gauss::coefficients::{Coefficients, MOST};
+use super::lane::{Lane, LaneOptions, interrupted};
+use super::simd_batch::SimdBatch;
+use super::twofold::{CompensatedBatch, Pair};
+use crate::gauss::FEW_STAGES;
+use crate::gauss::coefficients::{Coefficients, MAX_STAGES};
 use crate::gauss::condensed::Condensed;
 use crate::gauss::instructions::Instructions;
 use crate::gauss::resolution::{MOVED, of_sigma};
 use crate::run::interrupt::BETWEEN;
-use crate::run::watch::ROUNDED;
+use crate::run::resolution_monitor::ROUNDED;
 use crate::splitting::separable::SeparableForm;
 use crate::{InputError, Interrupt, StepError};
 use contact_geom::nalgebra::SVector;
@@ -40,19 +40,19 @@ pub(super) struct GaussPacks<'a, L, const N: usize> {
 /// What a step multiplies with, in two parts where it acts in the same direction in every step.
 struct Table {
     s: usize,
-    b: [[f64; MOST]; MOST],
-    b_tail: [[f64; MOST]; MOST],
-    u: [Pair; MOST],
-    d: [[f64; MOST]; MOST],
-    inverse_rho: [f64; MOST],
-    times: [f64; MOST],
-    first: [[f64; MOST]; MOST],
+    b: [[f64; MAX_STAGES]; MAX_STAGES],
+    b_tail: [[f64; MAX_STAGES]; MAX_STAGES],
+    u: [Pair; MAX_STAGES],
+    d: [[f64; MAX_STAGES]; MAX_STAGES],
+    inverse_rho: [f64; MAX_STAGES],
+    times: [f64; MAX_STAGES],
+    first: [[f64; MAX_STAGES]; MAX_STAGES],
     end_u: Pair,
-    end_b: [Pair; MOST],
+    end_b: [Pair; MAX_STAGES],
     grow: Pair,
-    end_v: [Pair; MOST],
+    end_v: [Pair; MAX_STAGES],
     /// What takes the last coefficient of the polynomial through the accelerations.
-    last: [f64; MOST],
+    last: [f64; MAX_STAGES],
 }
 
 /// The last coefficient of the accelerations in the Legendre polynomials, in units of the largest of them, that is a doubt. A run of its own marks steps from
@@ -114,7 +114,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 
     /// Takes all steps of some motions, in place, with a state recorded after each `rows` of them. One whose steps could not be solved, or
     /// that is not finite, is not finite then.
-    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: Wants) {
+    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: LaneOptions) {
         let stride = wants.rows.unwrap_or(self.steps);
         if action {
             instructions.dispatch(All::<_, N, true> { packs: self, lanes, stride });
@@ -149,30 +149,30 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, 
 
 /// The most packs that take a stage one after the other: what one waits for, the work of the next ones fills. Their numbers lie in
 /// the first cache.
-const ABREAST: usize = 2;
+const PACKS_IN_FLIGHT: usize = 2;
 
 /// The state and the workspace of the motions of a pack.
 struct Moving<S: Simd, const K: usize, const N: usize> {
-    q: [Summed<S, K>; N],
-    v: [Summed<S, K>; N],
-    z: Summed<S, K>,
+    q: [CompensatedBatch<S, K>; N],
+    v: [CompensatedBatch<S, K>; N],
+    z: CompensatedBatch<S, K>,
     /// The accelerations of the stages, and their positions.
-    a: [[Pack<S, K>; N]; MOST],
-    x: [[Pack<S, K>; N]; MOST],
+    a: [[SimdBatch<S, K>; N]; MAX_STAGES],
+    x: [[SimdBatch<S, K>; N]; MAX_STAGES],
     /// What the positions begin with: what comes of the state, and of the parts that rounding of the coefficients leaves out.
-    base: [[Pack<S, K>; N]; MOST],
+    base: [[SimdBatch<S, K>; N]; MAX_STAGES],
     /// 1 in lanes whose sweeps go on; and in those that have failed.
-    going: Pack<S, K>,
-    failed: Pack<S, K>,
+    going: SimdBatch<S, K>,
+    failed: SimdBatch<S, K>,
     /// Whether the sweeps of a lane go on, and of all; the largest change and the largest term of the last.
     open: bool,
     whole: bool,
-    change: Pack<S, K>,
-    size: Pack<S, K>,
+    change: SimdBatch<S, K>,
+    size: SimdBatch<S, K>,
     judge: Judge<S, K>,
     /// The largest velocity of the last steps, and 1 in lanes with a step in doubt.
-    fast: Pack<S, K>,
-    doubt: Pack<S, K>,
+    fast: SimdBatch<S, K>,
+    doubt: SimdBatch<S, K>,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
@@ -183,9 +183,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 
     #[inline(always)]
     fn all<S: Simd, const K: usize, const ACTION: bool>(&self, lanes: &mut [Lane<N>], stride: usize) {
-        let width = Pack::<S, K>::COUNT;
-        let mut moving = Vec::with_capacity(ABREAST);
-        for some in lanes.chunks_mut(ABREAST * width) {
+        let width = SimdBatch::<S, K>::COUNT;
+        let mut moving = Vec::with_capacity(PACKS_IN_FLIGHT);
+        for some in lanes.chunks_mut(PACKS_IN_FLIGHT * width) {
             moving.clear();
             for own in some.chunks(width) {
                 moving.push(self.start::<S, K>(own));
@@ -212,17 +212,19 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
     /// From some motions; what is beyond the last repeats it.
     #[inline(always)]
     fn start<S: Simd, const K: usize>(&self, some: &[Lane<N>]) -> Moving<S, K, N> {
-        let zero = Pack::zero();
+        let zero = SimdBatch::zero();
         let of = |f: &dyn Fn(&PhasePoint<N>) -> f64| {
-            Summed::from(Pack::from_lanes(|i| some.get(i).or(some.last()).map_or(0.0, |lane| f(&lane.state))))
+            CompensatedBatch::from(SimdBatch::from_lanes(|i| {
+                some.get(i).or(some.last()).map_or(0.0, |lane| f(&lane.state))
+            }))
         };
         Moving {
             q: std::array::from_fn(|d| of(&|state| state.q[d])),
             v: std::array::from_fn(|d| of(&|state| self.form.velocity(&state.p)[d])),
             z: of(&|state| state.z),
-            a: [[zero; N]; MOST],
-            x: [[zero; N]; MOST],
-            base: [[zero; N]; MOST],
+            a: [[zero; N]; MAX_STAGES],
+            x: [[zero; N]; MAX_STAGES],
+            base: [[zero; N]; MAX_STAGES],
             going: zero,
             failed: zero,
             open: false,
@@ -247,13 +249,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 
     #[inline(always)]
     fn step<S: Simd, const K: usize, const ACTION: bool>(&self, moving: &mut [Moving<S, K, N>], t: f64, warm: bool) {
-        let s = self.table.s.min(MOST);
-        let [zero, one] = [0.0, 1.0].map(Pack::splat);
-        let mut last = [[zero; N]; ABREAST];
+        let s = self.table.s.min(MAX_STAGES);
+        let [zero, one] = [0.0, 1.0].map(SimdBatch::splat);
+        let mut last = [[zero; N]; PACKS_IN_FLIGHT];
         for (m, last) in moving.iter_mut().zip(&mut last) {
             *last = m.a[0];
             if !warm {
-                m.a = [[zero; N]; MOST];
+                m.a = [[zero; N]; MAX_STAGES];
             }
             self.begin(m, s, false);
             (m.going, m.judge) = (one - m.failed, Judge::new());
@@ -292,7 +294,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
     fn sweep<S: Simd, const K: usize, const ACTION: bool>(
         &self,
         moving: &mut [Moving<S, K, N>],
-        rows: &[[f64; MOST]; MOST],
+        rows: &[[f64; MAX_STAGES]; MAX_STAGES],
         judged: bool,
         t: f64,
     ) {
@@ -311,18 +313,18 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         &self,
         m: &mut Moving<S, K, N>,
         t: f64,
-        (i, row): (usize, &[f64; MOST]),
+        (i, row): (usize, &[f64; MAX_STAGES]),
         judged: bool,
     ) {
-        let zero = Pack::zero();
+        let zero = SimdBatch::zero();
         let sum = combined(row, &m.a, self.table.s);
-        let x: [Pack<S, K>; N] = std::array::from_fn(|d| m.base[i][d] + sum[d]);
+        let x: [SimdBatch<S, K>; N] = std::array::from_fn(|d| m.base[i][d] + sum[d]);
         let a = self.accelerations(t + self.table.times[i], &x);
         for d in 0..N {
             let before = m.a[i][d];
             if judged {
-                m.change = m.change.larger((a[d] - before).abs());
-                m.size = m.size.larger(a[d].abs());
+                m.change = m.change.max_or_nan((a[d] - before).abs());
+                m.size = m.size.max_or_nan(a[d].abs());
             }
             // What has ended stays, whatever its neighbours do.
             m.a[i][d] = if m.whole { a[d] } else { m.going.at_most(zero, before, a[d]) };
@@ -334,20 +336,20 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 
     /// Looks whether a step resolves the motion, before it is taken: by its accelerations, and the first of the step before.
     #[inline(always)]
-    fn look<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, last: Option<&[Pack<S, K>; N]>, s: usize) {
-        let (zero, one) = (Pack::<S, K>::zero(), Pack::splat(1.0));
+    fn look<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, last: Option<&[SimdBatch<S, K>; N]>, s: usize) {
+        let (zero, one) = (SimdBatch::<S, K>::zero(), SimdBatch::splat(1.0));
         let mut wide = zero;
         for d in 0..N {
-            wide = wide.larger(m.q[d].value.abs());
+            wide = wide.max_or_nan(m.q[d].value.abs());
         }
         let h = self.h.abs();
-        if s > FEW {
+        if s > FEW_STAGES {
             let tails = combined(&self.table.last, &m.a, s);
             let (mut tail, mut size) = (zero, zero);
             for d in 0..N {
-                tail = tail.larger(tails[d].abs());
+                tail = tail.max_or_nan(tails[d].abs());
                 for a in &m.a[..s] {
-                    size = size.larger(a[d].abs());
+                    size = size.max_or_nan(a[d].abs());
                 }
             }
             let moves = (tail * (h * h)).at_most(wide * MOVED, m.doubt, one);
@@ -356,9 +358,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         }
         let (mut turn, mut fast) = (zero, m.fast * KEPT);
         for d in 0..N {
-            fast = fast.larger(m.v[d].value.abs());
+            fast = fast.max_or_nan(m.v[d].value.abs());
             if let Some(last) = last {
-                turn = turn.larger((m.a[0][d] - last[d]).abs());
+                turn = turn.max_or_nan((m.a[0][d] - last[d]).abs());
             }
         }
         m.fast = fast;
@@ -370,8 +372,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
     #[inline(always)]
     fn begin<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, s: usize, tails: bool) {
         for i in 0..s {
-            let [u, u_tail] = self.table.u[i].map(Pack::splat);
-            let of_tails = if tails { combined(&self.table.b_tail[i], &m.a, s) } else { [Pack::zero(); N] };
+            let [u, u_tail] = self.table.u[i].map(SimdBatch::splat);
+            let of_tails = if tails { combined(&self.table.b_tail[i], &m.a, s) } else { [SimdBatch::zero(); N] };
             for d in 0..N {
                 let (q, v) = (m.q[d], m.v[d]);
                 // The small terms first: a sum that has been rounded would not know them.
@@ -383,10 +385,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 
     /// `M^-1 L_q` at a stage.
     #[inline(always)]
-    fn accelerations<S: Simd, const K: usize>(&self, t: f64, x: &[Pack<S, K>; N]) -> SVector<Pack<S, K>, N> {
-        let zero = Pack::zero();
+    fn accelerations<S: Simd, const K: usize>(&self, t: f64, x: &[SimdBatch<S, K>; N]) -> SVector<SimdBatch<S, K>, N> {
+        let zero = SimdBatch::zero();
         let at = VelocityPoint { q: SVector::from_fn(|d, _| x[d]), v: SVector::from_fn(|_, _| zero), z: zero };
-        let (_, force) = self.form.lagrangian.with_force(Pack::splat(t), &at);
+        let (_, force) = self.form.lagrangian.with_force(SimdBatch::splat(t), &at);
         super::splitting::velocity(&self.form, &force)
     }
 
@@ -395,24 +397,24 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
     fn finish<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64, s: usize) {
         let Table { end_u, end_b, grow, end_v, d: velocities, inverse_rho, times, .. } = &*self.table;
         if ACTION {
-            let mut dz = Summed::product(*grow, m.z);
+            let mut dz = CompensatedBatch::product(*grow, m.z);
             for i in 0..s {
                 let sum = combined(&velocities[i], &m.a, s);
-                let rho = Pack::splat(inverse_rho[i]);
+                let rho = SimdBatch::splat(inverse_rho[i]);
                 let v = SVector::from_fn(|d, _| rho.mul_add(m.v[d].value, sum[d]));
                 let q = SVector::from_fn(|d, _| m.x[i][d]);
-                let action = self.form.lagrangian.value(Pack::splat(t + times[i]), &q, &v, Pack::zero());
+                let action = self.form.lagrangian.value(SimdBatch::splat(t + times[i]), &q, &v, SimdBatch::zero());
                 dz = dz.plus(end_v[i], action);
             }
             m.z = m.z.add(dz);
         }
         for d in 0..N {
-            let (mut dq, mut dv) = (Summed::zero(), Summed::zero());
+            let (mut dq, mut dv) = (CompensatedBatch::zero(), CompensatedBatch::zero());
             for i in 0..s {
                 dq = dq.plus(end_b[i], m.a[i][d]);
                 dv = dv.plus(end_v[i], m.a[i][d]);
             }
-            let (of_u, of_v) = (Summed::product(*end_u, m.v[d]), Summed::product(*grow, m.v[d]));
+            let (of_u, of_v) = (CompensatedBatch::product(*end_u, m.v[d]), CompensatedBatch::product(*grow, m.v[d]));
             m.q[d] = m.q[d].add(dq.with(of_u));
             m.v[d] = m.v[d].add(dv.with(of_v));
         }
@@ -421,22 +423,22 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
 
 /// The matrix `B` of the first sweep of a step: row i takes the last accelerations that are known there, those of the step's stages before i and of the
 /// step before it from i on, to the position that the polynomial through them foretells.
-fn first_sweep(condensed: &Condensed) -> [[f64; MOST]; MOST] {
+fn first_sweep(condensed: &Condensed) -> [[f64; MAX_STAGES]; MAX_STAGES] {
     let (s, c) = (condensed.s, &Coefficients::of(condensed.s).c);
     let zero = Quad::zero();
     // From the nodes of a step to those of this one and of the one before, and one over them.
-    let (mut apart, mut inverse) = ([[[zero; MOST]; MOST]; 2], [[[zero; MOST]; MOST]; 2]);
+    let (mut apart, mut inverse) = ([[[zero; MAX_STAGES]; MAX_STAGES]; 2], [[[zero; MAX_STAGES]; MAX_STAGES]; 2]);
     for (j, k, before) in (0..2 * s * s).map(|at| (at / 2 % s, at / 2 / s, at % 2)) {
         let distance = c[j] - c[k] + Quad::from(before as f64);
         apart[before][j][k] = distance;
         inverse[before][j][k] = if distance.0 == 0.0 { zero } else { distance.recip() };
     }
-    let mut rows = [[0.0; MOST]; MOST];
+    let mut rows = [[0.0; MAX_STAGES]; MAX_STAGES];
     for i in 0..s {
         let before = |k: usize| usize::from(k >= i);
         let mut row = condensed.b[i];
         row[i..].fill(zero);
-        let scale: [Quad; MOST] = std::array::from_fn(|k| {
+        let scale: [Quad; MAX_STAGES] = std::array::from_fn(|k| {
             let others = (0..s).filter(|m| *m != k);
             others.fold(Quad::one(), |product, m| match (before(k), before(m)) {
                 (0, 1) => product * inverse[1][k][m],
@@ -459,21 +461,21 @@ fn first_sweep(condensed: &Condensed) -> [[f64; MOST]; MOST] {
 /// The sum over the stages of a row of coefficients with the values there; in two parts, which do not wait for each other.
 #[inline(always)]
 fn combined<S: Simd, const K: usize, const N: usize>(
-    row: &[f64; MOST],
-    values: &[[Pack<S, K>; N]; MOST],
+    row: &[f64; MAX_STAGES],
+    values: &[[SimdBatch<S, K>; N]; MAX_STAGES],
     s: usize,
-) -> [Pack<S, K>; N] {
-    let (mut sum, mut odd) = ([Pack::zero(); N], [Pack::zero(); N]);
+) -> [SimdBatch<S, K>; N] {
+    let (mut sum, mut odd) = ([SimdBatch::zero(); N], [SimdBatch::zero(); N]);
     let (coefficients, values) = (row[..s].chunks_exact(2), values[..s].chunks_exact(2));
     if let ([c], [value]) = (coefficients.remainder(), values.remainder()) {
         for d in 0..N {
-            odd[d] = Pack::splat(*c) * value[d];
+            odd[d] = SimdBatch::splat(*c) * value[d];
         }
     }
     for (c, value) in coefficients.zip(values) {
         for d in 0..N {
-            sum[d] = Pack::splat(c[0]).mul_add(value[0][d], sum[d]);
-            odd[d] = Pack::splat(c[1]).mul_add(value[1][d], odd[d]);
+            sum[d] = SimdBatch::splat(c[0]).mul_add(value[0][d], sum[d]);
+            odd[d] = SimdBatch::splat(c[1]).mul_add(value[1][d], odd[d]);
         }
     }
     std::array::from_fn(|d| sum[d] + odd[d])

@@ -1,44 +1,44 @@
 //! Whether the sweeps of Gauss collocation go on, lane by lane.
 
-use super::pack::Pack;
+use super::simd_batch::SimdBatch;
 use num_traits::Zero;
 use pulp::Simd;
 
 /// The sweeps after which an iteration counts as not contracting.
 const LIMIT: u32 = 60;
 
-/// See `Sweeps` of `gauss/sweeps.rs`, lane by lane.
+/// See `FixedPointIteration` of `gauss/sweeps.rs`, lane by lane.
 #[derive(Clone, Copy)]
 pub(super) struct Judge<S: Simd, const K: usize> {
-    before: Pack<S, K>,
-    ratio: Pack<S, K>,
+    before: SimdBatch<S, K>,
+    ratio: SimdBatch<S, K>,
     /// 1 where the next sweep is the last.
-    last: Pack<S, K>,
-    risen: Pack<S, K>,
+    last: SimdBatch<S, K>,
+    risen: SimdBatch<S, K>,
     pub count: u32,
 }
 
 impl<S: Simd, const K: usize> Judge<S, K> {
     #[inline(always)]
     pub fn new() -> Self {
-        let zero = Pack::zero();
+        let zero = SimdBatch::zero();
         Judge { before: zero, ratio: zero, last: zero, risen: zero, count: 0 }
     }
 
     /// Judges a sweep by the largest change and the largest term of each lane: 1 where it goes on, in the second where it is given up.
     #[inline(always)]
-    pub fn judge(&mut self, change: Pack<S, K>, size: Pack<S, K>) -> [Pack<S, K>; 2] {
-        let [zero, one] = [0.0, 1.0].map(Pack::splat);
+    pub fn judge(&mut self, change: SimdBatch<S, K>, size: SimdBatch<S, K>) -> [SimdBatch<S, K>; 2] {
+        let [zero, one] = [0.0, 1.0].map(SimdBatch::splat);
         self.count += 1;
         let round_off = size * (0.5 * f64::EPSILON);
         let near = round_off * 256.0;
         // Not `less` the other way: a NaN goes on, and is given up below.
         let enough = change.at_most(round_off * (1.0 / 16.0), one, self.last * change.at_most(near, one, zero));
         let mut going = one - enough;
-        let mut given_up = one - (change + size).at_most(Pack::splat(f64::MAX), one, zero);
+        let mut given_up = one - (change + size).at_most(SimdBatch::splat(f64::MAX), one, zero);
         if self.count > 1 {
             let ratio = change / self.before;
-            let slower = if self.count > 2 { self.ratio } else { Pack::splat(0.1) };
+            let slower = if self.count > 2 { self.ratio } else { SimdBatch::splat(0.1) };
             let expected = ratio.at_most(slower, slower, ratio);
             let next = change * expected;
             let left = round_off * (1.0 / 64.0);
@@ -47,7 +47,7 @@ impl<S: Simd, const K: usize> Judge<S, K> {
             let rises = one.at_most(ratio, one, zero);
             going = (rises * change.at_most(near, one, zero)).at_most(zero, going, zero);
             self.risen += rises;
-            let slow = if self.count > LIMIT { one } else { self.risen.at_most(Pack::splat(3.0), zero, one) };
+            let slow = if self.count > LIMIT { one } else { self.risen.at_most(SimdBatch::splat(3.0), zero, one) };
             given_up = slow.at_most(zero, given_up, one);
             self.ratio = ratio;
         }

@@ -5,7 +5,7 @@ use contact_geom::PhasePoint;
 
 /// What is wanted of members in lanes beside their ends.
 #[derive(Clone, Copy)]
-pub(super) struct Wants {
+pub(super) struct LaneOptions {
     /// A row after each so many steps.
     pub rows: Option<usize>,
     /// Marks where steps do not resolve the motion.

@@ -1,6 +1,6 @@
 //! What becomes of a member of an ensemble.
 
-use crate::{InputError, Outcome, Row, Status, Suspicion};
+use crate::{InputError, Outcome, Row, Status, UnresolvedStep};
 use contact_geom::PhasePoint;
 
 /// One motion of an ensemble, at its end.
@@ -20,7 +20,7 @@ pub struct Ending<const N: usize> {
     /// How it ended.
     pub status: Status,
     /// The first step that was seen not to have resolved the motion, where it was watched.
-    pub suspicion: Option<Suspicion>,
+    pub unresolved: Option<UnresolvedStep>,
     /// The steps taken.
     pub steps: usize,
     /// The time reached.
@@ -31,8 +31,8 @@ pub struct Ending<const N: usize> {
 
 impl<const N: usize> From<Outcome<N>> for Ending<N> {
     fn from(outcome: Outcome<N>) -> Self {
-        let Outcome { status, suspicion, steps, t, .. } = outcome;
-        Ending { status, suspicion, steps, t, state: outcome.state() }
+        let Outcome { status, unresolved, steps, t, .. } = outcome;
+        Ending { status, unresolved, steps, t, state: outcome.state() }
     }
 }
 
@@ -47,10 +47,10 @@ pub struct Tally {
     pub stopped: usize,
     /// Those whose run failed, or that could not begin.
     pub failed: usize,
-    /// Those with a suspicion.
-    pub suspicious: usize,
+    /// Those with an unresolved step.
+    pub unresolved: usize,
     /// Those that were advanced in lanes; the others had a run of their own.
-    pub in_lanes: usize,
+    pub batch_kernel: usize,
     /// The first that failed.
     pub first_failed: Option<usize>,
 }
@@ -58,7 +58,7 @@ pub struct Tally {
 impl Tally {
     pub(super) fn add<const N: usize>(&mut self, member: &Member<N>) {
         self.members += 1;
-        self.suspicious += usize::from(member.ending.is_ok_and(|ending| ending.suspicion.is_some()));
+        self.unresolved += usize::from(member.ending.is_ok_and(|ending| ending.unresolved.is_some()));
         match member.ending.map(|ending| ending.status) {
             Ok(Status::Completed) => self.completed += 1,
             Ok(Status::Stopped { .. }) => self.stopped += 1,

@@ -8,9 +8,9 @@ mod judge;
 mod lane;
 mod member;
 mod observed;
-mod pack;
 mod sharded;
 mod shards;
+mod simd_batch;
 mod single;
 mod splitting;
 #[cfg(test)]
@@ -30,10 +30,10 @@ use crate::switching::has_switching_functions;
 use crate::{
     GaussCollocation, InputError, Integrator, Interrupt, Observer, Rows, SplittingScheme, Start, Status, Steps, Until,
 };
-use accuracy::Length;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, Triple, VelocityPoint, legendre};
+use accuracy::StepControl;
+use contact_geom::{ChartVector, Derivatives, Lagrangian, PhasePoint, VelocityPoint, legendre};
 use gauss::GaussPacks;
-use lane::{Lane, Wants};
+use lane::{Lane, LaneOptions};
 use single::Common;
 use splitting::SplittingPacks;
 use std::num::NonZeroUsize;
@@ -42,7 +42,7 @@ use std::path::PathBuf;
 
 /// What an [`Integrator`] has a kernel for that takes a step of many motions at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum InLanes {
+pub enum BatchKernel {
     /// The steps of a splitting with linear drag.
     Splitting(SplittingScheme),
     /// Those of contact Gauss collocation, for constant mass and constant rate of the conformal factor.
@@ -60,7 +60,7 @@ type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + 
 
 /// Many motions, by one integrator and the same steps.
 ///
-/// Where the [integrator](Integrator::in_lanes) has a kernel for it the motions lie in the lanes of the processor's vector registers, so that a whole
+/// Where the [integrator](Integrator::batch_kernel) has a kernel for it the motions lie in the lanes of the processor's vector registers, so that a whole
 /// pack takes a step together: every [`SplittingScheme`] for separable Lagrangians with linear drag, and [`GaussCollocation`] for those
 /// of a constant rate. All other members, and those that a lane cannot finish (what is not finite, an iteration that does not contract, a
 /// formula that branches), have a run of their own. Packs are shared among threads, in shards; the fold is given the members in the order of
@@ -75,7 +75,7 @@ type MemberOf<'a, L, const N: usize> = Box<dyn Fn(usize) -> (&'a L, Start<N>) + 
 /// Of what a single run looks at: the claims of the structure are probed for some members, the first and the last among them, and not along
 /// all motions; a start must be finite, a motion must end finite. Whether steps resolve the motion is looked at in lanes at one drift of each
 /// step of a splitting, and at the accelerations of each step of collocation. A member with a step in doubt has a run of its own
-/// too, and the [`suspicion`](Ending::suspicion) of that; its state is that of the lane.
+/// too, and the [`unresolved`](Ending::unresolved) of that; its state is that of the lane.
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -100,7 +100,7 @@ pub struct Ensemble<'a, L, const N: usize> {
     count: usize,
     t0: f64,
     integrator: Option<Box<dyn Integrator<'a, L, N> + Sync + 'a>>,
-    length: Option<Length<L, N>>,
+    length: Option<StepControl<L, N>>,
     action: bool,
     /// The steps from one recorded row to the next.
     rows: Option<usize>,
@@ -156,7 +156,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
 
     /// The same by steps of a given length or number.
     pub fn steps(self, steps: Steps) -> Self {
-        Ensemble { length: Some(Length::Given(steps)), ..self }
+        Ensemble { length: Some(StepControl::Given(steps)), ..self }
     }
 
     /// The same on so many threads; as many as there are processors where nothing is said.
@@ -283,8 +283,8 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
         }
         let Some((index, mut plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
         let refused = |cause| EnsembleError::Member { index, cause };
-        if length.wanted().is_some() && integrator.in_lanes().is_some() {
-            let length = Length::Given(Steps::Count(plan.1 + plan.1.div_ceil(8)));
+        if length.wanted().is_some() && integrator.batch_kernel().is_some() {
+            let length = StepControl::Given(Steps::Count(plan.1 + plan.1.div_ceil(8)));
             let (lagrangian, start) = (self.members)(index);
             plan = Common { length, ..common }.plan(integrator, lagrangian, start, self.interrupt).map_err(refused)?;
         }
@@ -329,7 +329,7 @@ impl<L: Lagrangian<N>, const N: usize> Kernel<'_, L, N> {
         }
     }
 
-    fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: Wants) {
+    fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: LaneOptions) {
         match self {
             Kernel::OneByOne => {}
             Kernel::Splitting(packs) => packs.run(instructions, lanes, action, wants),
@@ -357,7 +357,7 @@ struct Task<'e, 'a, L, const N: usize> {
 /// The members of a shard at their ends.
 struct Shard<const N: usize> {
     members: Vec<Member<N>>,
-    in_lanes: usize,
+    batch_kernel: usize,
     /// Whether members that have not completed say why; those that were read from words do not.
     with_causes: bool,
 }
@@ -377,12 +377,12 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         if has_switching_functions(lagrangian, self.common.t0, &start) != Ok(false) {
             return Kernel::OneByOne;
         }
-        let kernel = match self.integrator.in_lanes() {
-            Some(InLanes::Splitting(scheme)) if structure.separable && structure.is_affine_in_z() => {
+        let kernel = match self.integrator.batch_kernel() {
+            Some(BatchKernel::Splitting(scheme)) if structure.separable && structure.is_affine_in_z() => {
                 SplittingPacks::new(lagrangian, &scheme, plan, self.common.t0, state)
                     .map(|packs| Kernel::Splitting(packs.with_interrupt(self.interrupt)))
             }
-            Some(InLanes::Gauss(GaussCollocation { stages }))
+            Some(BatchKernel::Gauss(GaussCollocation { stages }))
                 if structure.separable && structure.has_constant_rate() =>
             {
                 GaussPacks::new(lagrangian, stages, plan, self.common.t0, state)
@@ -400,7 +400,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let mut words = vec![N as u64, self.count as u64, t0.to_bits(), action.into(), self.plan.0.to_bits()];
         words.extend([self.plan.1, self.common.rows.unwrap_or(0)].map(|x| x as u64));
         words.push(length.wanted().unwrap_or(0.0).to_bits());
-        words.extend(self.integrator.facts().name.bytes().map(u64::from));
+        words.extend(self.integrator.info().name.bytes().map(u64::from));
         for index in sample {
             let (lagrangian, start) = (self.members)(index);
             let (q, y, z) = match start {
@@ -440,14 +440,14 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let starts: Vec<_> = range.clone().map(self.members).collect();
         let member = |index| Member { index, ending: Err(InputError::NoSteps), rows: Vec::new() };
         let mut members: Vec<_> = range.map(member).collect();
-        let mut in_lanes = 0;
+        let mut batch_kernel = 0;
         let mut from = 0;
         // Members in sequence that have one Lagrangian.
         for group in starts.chunk_by(|a, b| std::ptr::eq(a.0, b.0)) {
-            in_lanes += self.group(group, &mut members[from..from + group.len()]);
+            batch_kernel += self.group(group, &mut members[from..from + group.len()]);
             from += group.len();
         }
-        Shard { members, in_lanes, with_causes: true }
+        Shard { members, batch_kernel, with_causes: true }
     }
 
     /// Runs members of one Lagrangian; returns how many of them in lanes.
@@ -473,42 +473,42 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
         let most_rows = rows.map(|_| self.common.rows_of(steps));
         let mut lanes: Vec<_> = states.iter().map(|state| Lane::new(t0, *state, most_rows, action)).collect();
         let mut done = [false; SHARD];
-        let mut in_lanes = 0;
-        let wants = Wants { rows, watched: self.watched };
+        let mut batch_kernel = 0;
+        let wants = LaneOptions { rows, watched: self.watched };
         forget_branches();
         if let Some(wanted) = length.wanted() {
             let mut ends: Vec<_> = states.iter().map(|state| Lane::new(t0, *state, None, false)).collect();
-            finer.run(self.instructions, &mut ends, false, Wants { rows: None, watched: false });
+            finer.run(self.instructions, &mut ends, false, LaneOptions { rows: None, watched: false });
             kernel.run(self.instructions, &mut lanes, action, wants);
             accuracy::refuse_beyond(wanted, &mut lanes, &ends);
         } else {
             kernel.run(self.instructions, &mut lanes, action, wants);
         }
         if !branched() {
-            let order = self.integrator.facts().order;
+            let order = self.integrator.info().order;
             let structure = lagrangian.structure();
             let dissipates = structure.autonomous && structure.has_constant_rate() && (structure.z_free || action);
             for ((place, from), Lane { state, rows, doubtful, .. }) in places.into_iter().zip(&states).zip(lanes) {
-                if Triple::from(state).is_finite() {
+                if ChartVector::from(state).is_finite() {
                     let t = t0 + steps as f64 * h;
                     let watched = self.watched && dissipates;
                     let doubtful = doubtful || watched && may_drift(lagrangian, order, (t0, from), (t, &state));
                     let member = &mut members[place];
-                    let mut suspicion = None;
+                    let mut unresolved = None;
                     if doubtful && self.watched {
                         let own = self.by_itself(member.index, None::<&mut Rows<'_, N>>);
                         match own.ending {
-                            Ok(ending) if ending.status == Status::Completed => suspicion = ending.suspicion,
+                            Ok(ending) if ending.status == Status::Completed => unresolved = ending.unresolved,
                             _ => {
                                 (*member, done[place]) = (own, true);
                                 continue;
                             }
                         }
                     }
-                    member.ending = Ok(Ending { status: Status::Completed, suspicion, steps, t, state });
+                    member.ending = Ok(Ending { status: Status::Completed, unresolved, steps, t, state });
                     member.rows = rows.unwrap_or_default();
                     done[place] = true;
-                    in_lanes += 1;
+                    batch_kernel += 1;
                 }
             }
         }
@@ -517,7 +517,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
             let of = (member.index, *start);
             *member = self.common.run(self.integrator, lagrangian, of, None::<&mut Rows<'_, N>>, self.interrupt);
         }
-        in_lanes
+        batch_kernel
     }
 }
 
@@ -528,6 +528,6 @@ impl<const N: usize> Start<N> {
             Start::Velocity(x) => legendre(lagrangian, t0, x),
             Start::Momentum(x, _) => *x,
         };
-        Triple::from(state).is_finite().then_some(state)
+        ChartVector::from(state).is_finite().then_some(state)
     }
 }

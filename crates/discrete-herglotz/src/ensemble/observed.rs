@@ -18,7 +18,7 @@ const SHARD: usize = 16;
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([0.5], [0.0], 0.0))?;
 /// let ensemble = problem.ensemble(10, |i| VelocityPoint::new([0.1 + 0.1 * i as f64], [0.0], 0.0));
 /// let ensemble = ensemble.by(SplittingScheme::BLANES_MOAN_6).steps(Steps::Size(0.25));
-/// // When each pendulum hangs down.
+/// // RowTimes each pendulum hangs down.
 /// let downward = |_: usize| Ok(Events::new([Event::new(|_, x: &PhasePoint<1>| x.q[0])]));
 /// let times = |events: Events<'_, 1>| events.crossings.iter().map(|crossing| crossing.t).collect::<Vec<f64>>();
 /// ensemble.observe(downward, times).run(Until::Time(10.0), |member, times| println!("{}: {times:?}", member.index))?;

@@ -186,7 +186,7 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
         if !shard.with_causes {
             sharded.task.run_again(&mut shard);
         }
-        self.tally.in_lanes += shard.in_lanes;
+        self.tally.batch_kernel += shard.batch_kernel;
         for member in &shard.members {
             self.tally.add(member);
             fold(member);

@@ -1,10 +1,11 @@
 //! A member by a run of its own.
 
-use super::accuracy::Length;
+use super::accuracy::StepControl;
 use super::member::{Ending, Member};
 use crate::run::interrupt::Asking;
 use crate::{
-    Facts, InLanes, InputError, Integrator, Interrupt, Observer, Plan, Problem, Rows, Run, Start, Stepper, Until, Wants,
+    BatchKernel, InputError, Integrator, Interrupt, MethodInfo, Observer, Plan, Problem, Rows, Run, Start, Stepper,
+    StepperOptions, Until,
 };
 use contact_geom::Lagrangian;
 
@@ -15,8 +16,8 @@ pub(super) struct OfMember<'i, 'a, L, const N: usize> {
 }
 
 impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> for OfMember<'i, 'a, L, N> {
-    fn facts(&self) -> Facts {
-        self.integrator.facts()
+    fn info(&self) -> MethodInfo {
+        self.integrator.info()
     }
 
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
@@ -27,7 +28,7 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
         &self,
         problem: &Problem<'p, L, N>,
         h: f64,
-        wants: Wants,
+        wants: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
         let Problem { t0, start, state, structure, .. } = *problem;
         self.integrator.stepper(
@@ -37,15 +38,15 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
         )
     }
 
-    fn in_lanes(&self) -> Option<InLanes> {
-        self.integrator.in_lanes()
+    fn batch_kernel(&self) -> Option<BatchKernel> {
+        self.integrator.batch_kernel()
     }
 }
 
 /// What all members have in common.
 pub(super) struct Common<L, const N: usize> {
     pub t0: f64,
-    pub length: Length<L, N>,
+    pub length: StepControl<L, N>,
     pub until: Until,
     pub action: bool,
     /// The steps from one recorded row to the next.

@@ -1,16 +1,16 @@
 //! Splittings with trajectories in lanes.
 
-use super::lane::{Lane, Wants, interrupted};
-use super::pack::Pack;
+use super::lane::{Lane, LaneOptions, interrupted};
+use super::simd_batch::SimdBatch;
 use crate::gauss::instructions::Instructions;
 use crate::run::interrupt::BETWEEN;
-use crate::run::watch::ROUNDED;
+use crate::run::resolution_monitor::ROUNDED;
 use crate::splitting::drag::{Drag, Drift};
 use crate::splitting::linear_drag::{Stage, SubstepTable};
 use crate::splitting::separable::SeparableForm;
 use crate::{InputError, Interrupt, SplittingScheme};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, largest};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan};
 use pulp::{Simd, WithSimd};
 use std::borrow::Cow;
 
@@ -19,7 +19,7 @@ pub(super) struct SplittingPacks<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
     drag: Drag<N>,
     table: SubstepTable,
-    look: Look,
+    look: DefectSample,
     h: f64,
     t0: f64,
     steps: usize,
@@ -32,7 +32,7 @@ pub(super) struct SplittingPacks<'a, L, const N: usize> {
 /// frequency omega by `omega^2 (s1^2 + s2^2) > 1` (see `run/watch.rs`), so that the longest of all, s, turns it by more than
 /// `s^2 / (s1^2 + s2^2)` of its momentum: the change of the force in the drift times s, against the momentum. What does so has the run of
 /// its own, which judges.
-struct Look {
+struct DefectSample {
     /// Which drift, and its length.
     stage: usize,
     span: f64,
@@ -47,7 +47,7 @@ const MARGIN: f64 = 0.8;
 /// with the momenta of the steps around.
 const KEPT: f64 = 0.9;
 
-impl Look {
+impl DefectSample {
     fn new(table: &SubstepTable) -> Self {
         let squares = || table.joined.iter().map(|stage| stage.span * stage.span);
         let (mut stage, mut longest) = (0, 0.0);
@@ -57,8 +57,8 @@ impl Look {
             }
         }
         let pairs = squares().zip(squares().cycle().skip(1)).map(|(a, b)| a + b);
-        let turn = MARGIN * longest / largest(pairs);
-        Look { stage, span: longest.sqrt(), turn: turn * turn }
+        let turn = MARGIN * longest / max_abs_or_nan(pairs);
+        DefectSample { stage, span: longest.sqrt(), turn: turn * turn }
     }
 }
 
@@ -74,7 +74,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         let form = SeparableForm::read(lagrangian, h, t0, state)?;
         let drag = Drag::of(&form, t0, state)?;
         let table = SubstepTable::new(scheme, h, |s| drag.drift(&lagrangian, t0, s));
-        let look = Look::new(&table);
+        let look = DefectSample::new(&table);
         Ok(SplittingPacks { form, drag, table, look, h, t0, steps, interrupt: None })
     }
 
@@ -85,7 +85,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 
     /// Takes all steps of some motions, in place, with a state recorded after each `rows` of them. One that is not finite at its start or
     /// its end is not finite then.
-    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: Wants) {
+    pub fn run(&self, instructions: Instructions, lanes: &mut [Lane<N>], action: bool, wants: LaneOptions) {
         let stride = wants.rows.unwrap_or(self.steps);
         match (action, wants.watched) {
             (true, true) => instructions.dispatch(All::<_, N, true, true> { packs: self, lanes, stride }),
@@ -98,7 +98,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 
 /// The most packs that take a stage one after the other: what one waits for, the work of the next ones fills. Their numbers lie in
 /// the first cache.
-const ABREAST: usize = 4;
+const PACKS_IN_FLIGHT: usize = 4;
 
 /// All motions of a slice in the lanes of one instruction set.
 struct All<'s, 'a, L, const N: usize, const ACTION: bool, const WATCH: bool> {
@@ -128,16 +128,16 @@ impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const WATCH: bool> Wi
 /// What a step moves, as [`Motion`](crate::splitting) does for one motion.
 #[derive(Clone, Copy)]
 struct Moving<S: Simd, const K: usize, const N: usize> {
-    q: SVector<Pack<S, K>, N>,
-    p: SVector<Pack<S, K>, N>,
+    q: SVector<SimdBatch<S, K>, N>,
+    p: SVector<SimdBatch<S, K>, N>,
     /// What rounding has taken from the damping of p so far.
-    carry: SVector<Pack<S, K>, N>,
-    z: Pack<S, K>,
-    force: SVector<Pack<S, K>, N>,
-    value: Pack<S, K>,
+    carry: SVector<SimdBatch<S, K>, N>,
+    z: SimdBatch<S, K>,
+    force: SVector<SimdBatch<S, K>, N>,
+    value: SimdBatch<S, K>,
     /// The square of the largest momentum of the last steps, and 1 in lanes with a step in doubt.
-    fast: Pack<S, K>,
-    doubt: Pack<S, K>,
+    fast: SimdBatch<S, K>,
+    doubt: SimdBatch<S, K>,
 }
 
 impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
@@ -145,7 +145,7 @@ impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
     #[inline(always)]
     fn from_lanes(some: &[Lane<N>]) -> Self {
         let of = |f: &dyn Fn(&PhasePoint<N>) -> f64| {
-            Pack::from_lanes(|i| some.get(i).or(some.last()).map_or(0.0, |lane| f(&lane.state)))
+            SimdBatch::from_lanes(|i| some.get(i).or(some.last()).map_or(0.0, |lane| f(&lane.state)))
         };
         let (q, p) = (SVector::from_fn(|d, _| of(&|at| at.q[d])), SVector::from_fn(|d, _| of(&|at| at.p[d])));
         Moving { q, p, z: of(&|at| at.z), ..Self::zero() }
@@ -153,13 +153,13 @@ impl<S: Simd, const K: usize, const N: usize> Moving<S, K, N> {
 
     #[inline(always)]
     fn zero() -> Self {
-        let (zero, still) = (Pack::splat(0.0), SVector::from_fn(|_, _| Pack::splat(0.0)));
+        let (zero, still) = (SimdBatch::splat(0.0), SVector::from_fn(|_, _| SimdBatch::splat(0.0)));
         Moving { q: still, p: still, carry: still, z: zero, force: still, value: zero, fast: zero, doubt: zero }
     }
 
     /// The state in a lane.
     fn state(&self, i: usize) -> PhasePoint<N> {
-        let of = |x: &SVector<Pack<S, K>, N>| SVector::from_fn(|d, _| x[d].lanes()[i]);
+        let of = |x: &SVector<SimdBatch<S, K>, N>| SVector::from_fn(|d, _| x[d].lanes()[i]);
         PhasePoint { q: of(&self.q), p: of(&self.p), z: self.z.lanes()[i] }
     }
 }
@@ -176,9 +176,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         lanes: &mut [Lane<N>],
         stride: usize,
     ) {
-        let width = Pack::<S, K>::COUNT;
-        for some in lanes.chunks_mut(ABREAST * width) {
-            let mut moving = [Moving::zero(); ABREAST];
+        let width = SimdBatch::<S, K>::COUNT;
+        for some in lanes.chunks_mut(PACKS_IN_FLIGHT * width) {
+            let mut moving = [Moving::zero(); PACKS_IN_FLIGHT];
             let moving = &mut moving[..some.len().div_ceil(width)];
             for (own, m) in some.chunks(width).zip(moving.iter_mut()) {
                 *m = Moving::from_lanes(own);
@@ -249,8 +249,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 
     /// Looks at the drift, by the force before it.
     #[inline(always)]
-    fn look_at<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, before: &SVector<Pack<S, K>, N>) {
-        let zero = Pack::splat(0.0);
+    fn look_at<S: Simd, const K: usize>(&self, m: &mut Moving<S, K, N>, before: &SVector<SimdBatch<S, K>, N>) {
+        let zero = SimdBatch::splat(0.0);
         let (mut turn, mut fast, mut wide) = (zero, zero, zero);
         for d in 0..N {
             let change = (m.force[d] - before[d]) * self.look.span;
@@ -258,17 +258,17 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
             fast = m.p[d].mul_add(m.p[d], fast);
             wide = m.q[d].mul_add(m.q[d], wide);
         }
-        m.fast = fast.larger(m.fast * KEPT);
+        m.fast = fast.max_or_nan(m.fast * KEPT);
         // What moves the position by less than its rounding is none.
-        let moves = (turn * (self.h * self.h)).at_most(wide * (ROUNDED * ROUNDED), m.doubt, Pack::splat(1.0));
+        let moves = (turn * (self.h * self.h)).at_most(wide * (ROUNDED * ROUNDED), m.doubt, SimdBatch::splat(1.0));
         m.doubt = turn.at_most(m.fast * self.look.turn, m.doubt, moves);
     }
 
     #[inline(always)]
     fn take_force<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, t: f64) {
-        let zero = Pack::splat(0.0);
+        let zero = SimdBatch::splat(0.0);
         let rest = VelocityPoint { q: m.q, v: SVector::from_fn(|_, _| zero), z: zero };
-        let (value, force) = self.form.lagrangian.with_force(Pack::splat(t), &rest);
+        let (value, force) = self.form.lagrangian.with_force(SimdBatch::splat(t), &rest);
         m.force = force;
         // What is stored is computed.
         if ACTION {
@@ -278,7 +278,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 
     #[inline(always)]
     fn kick_and_drift<S: Simd, const K: usize, const ACTION: bool>(&self, m: &mut Moving<S, K, N>, stage: &Stage) {
-        let kick = Pack::splat(stage.kick);
+        let kick = SimdBatch::splat(stage.kick);
         if ACTION {
             m.z += kick * m.value;
         }
@@ -288,12 +288,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
         let Drift { length, damping, lift } = stage.drift;
         let v = velocity(&self.form, &m.p);
         if ACTION {
-            m.z = m.z + (Pack::splat(damping) * m.z + Pack::splat(lift) * m.p.dot(&v));
+            m.z = m.z + (SimdBatch::splat(damping) * m.z + SimdBatch::splat(lift) * m.p.dot(&v));
         }
         for d in 0..N {
-            m.q[d] += Pack::splat(length) * v[d];
+            m.q[d] += SimdBatch::splat(length) * v[d];
             let before = m.p[d];
-            let change = Pack::splat(damping) * before + m.carry[d];
+            let change = SimdBatch::splat(damping) * before + m.carry[d];
             m.p[d] = before + change;
             m.carry[d] = change - (m.p[d] - before);
         }
@@ -314,8 +314,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 #[inline(always)]
 pub(super) fn velocity<L, S: Simd, const K: usize, const N: usize>(
     form: &SeparableForm<L, N>,
-    p: &SVector<Pack<S, K>, N>,
-) -> SVector<Pack<S, K>, N> {
+    p: &SVector<SimdBatch<S, K>, N>,
+) -> SVector<SimdBatch<S, K>, N> {
     let Some(inverse) = &form.inverse else { return *p };
     SVector::from_fn(|i, _| {
         let mut sum = p[0] * inverse[(i, 0)];

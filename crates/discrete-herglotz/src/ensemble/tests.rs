@@ -1,4 +1,4 @@
-use super::pack::Pack;
+use super::simd_batch::SimdBatch;
 use super::*;
 use crate::gauss::instructions::Instructions;
 use contact_geom::systems::{Kepler, Pendulum};
@@ -25,8 +25,8 @@ impl WithSimd for Evaluate<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let mut out = Vec::new();
-        for x in self.0.chunks(Pack::<S, 2>::COUNT) {
-            let (sin, cos) = Pack::<S, 2>::from_lanes(|i| x[i.min(x.len() - 1)]).sin_cos();
+        for x in self.0.chunks(SimdBatch::<S, 2>::COUNT) {
+            let (sin, cos) = SimdBatch::<S, 2>::from_lanes(|i| x[i.min(x.len() - 1)]).sin_cos();
             out.extend((0..x.len()).map(|i| [sin.lanes()[i], cos.lanes()[i]]));
         }
         out
@@ -70,17 +70,17 @@ fn sines_of_all_widths_are_the_same() {
 fn ends<const N: usize>(
     lagrangian: &(impl Lagrangian<N> + Sync),
     start: impl Fn(usize) -> VelocityPoint<N> + Sync + Copy,
-    by: InLanes,
+    by: BatchKernel,
     set: Instructions,
 ) -> Vec<Member<N>> {
     let of = Ensemble::new(lagrangian, 0.0, 61, start).steps(Steps::Count(12)).threads(1).only(set);
     let of = match by {
-        InLanes::Splitting(scheme) => of.by(scheme),
-        InLanes::Gauss(gauss) => of.by(gauss),
+        BatchKernel::Splitting(scheme) => of.by(scheme),
+        BatchKernel::Gauss(gauss) => of.by(gauss),
     };
     let mut all = Vec::new();
     let tally = of.run(Until::Time(3.0), |member| all.push(member.clone())).unwrap();
-    assert_eq!((tally.in_lanes, tally.completed), (61, 61));
+    assert_eq!((tally.batch_kernel, tally.completed), (61, 61));
     all
 }
 
@@ -92,9 +92,9 @@ fn members_in_all_widths_are_the_same() {
     let orbits = |i: usize| VelocityPoint::new([1.0 + 0.003 * i as f64, 0.0], [0.1, 1.0], 0.0);
     let kepler = Kepler::<2>::default();
     for by in [
-        InLanes::Splitting(SplittingScheme::BLANES_CASAS_8),
-        InLanes::Splitting(SplittingScheme::KAHAN_LI_6),
-        InLanes::Gauss(GaussCollocation { stages: 5 }),
+        BatchKernel::Splitting(SplittingScheme::BLANES_CASAS_8),
+        BatchKernel::Splitting(SplittingScheme::KAHAN_LI_6),
+        BatchKernel::Gauss(GaussCollocation { stages: 5 }),
     ] {
         let sets = instruction_sets();
         let first = (ends(&pendulum, pendula, by, sets[0]), ends(&kepler, orbits, by, sets[0]));

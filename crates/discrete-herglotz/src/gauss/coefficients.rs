@@ -10,7 +10,7 @@ use std::array::from_fn;
 use std::sync::OnceLock;
 
 /// The largest number of stages.
-pub(crate) const MOST: usize = 16;
+pub(crate) const MAX_STAGES: usize = 16;
 
 /// Gauss collocation with `s` stages on `[0, 1]`.
 ///
@@ -19,30 +19,30 @@ pub(crate) const MOST: usize = 16;
 /// methods", BIT 48 (2008).
 pub(crate) struct Coefficients {
     /// The nodes.
-    pub c: [Quad; MOST],
+    pub c: [Quad; MAX_STAGES],
     /// The weights.
-    pub b: [Quad; MOST],
+    pub b: [Quad; MAX_STAGES],
     /// The integrals of the Lagrange polynomials from 0 to each node.
-    pub a: [[Quad; MOST]; MOST],
+    pub a: [[Quad; MAX_STAGES]; MAX_STAGES],
     /// The values at the next step's nodes of the polynomial through the values at this step's: `[i][j]` for node i.
-    pub ahead: [[f64; MOST]; MOST],
+    pub extrapolation: [[f64; MAX_STAGES]; MAX_STAGES],
     /// The weights of the stages in the last two coefficients of the polynomial through them, in Legendre polynomials: of
     /// `P_(s-1)(2 x - 1)` and the one before, where there is one.
-    pub last: [[f64; MOST]; 2],
+    pub last: [[f64; MAX_STAGES]; 2],
     /// The weights of the stages in the coefficients of the polynomial through them, in the same polynomials: `[j][k]` for stage j.
-    pub series: [[f64; MOST]; MOST],
+    pub series: [[f64; MAX_STAGES]; MAX_STAGES],
     /// The values at the step's start and end of the Lagrange polynomials of the nodes.
-    pub ends: [[f64; MOST]; 2],
+    pub ends: [[f64; MAX_STAGES]; 2],
 }
 
 /// The Legendre polynomials that any number of stages asks for.
-pub(super) const POLYNOMIALS: usize = MOST + 1;
+pub(super) const POLYNOMIALS: usize = MAX_STAGES + 1;
 
 impl Coefficients {
     /// The coefficients for a number of stages from 1 to 16, made once.
     pub fn of(s: usize) -> &'static Coefficients {
-        static TABLES: [OnceLock<Box<Coefficients>>; MOST] = [const { OnceLock::new() }; MOST];
-        TABLES[s.clamp(1, MOST) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MOST))))
+        static TABLES: [OnceLock<Box<Coefficients>>; MAX_STAGES] = [const { OnceLock::new() }; MAX_STAGES];
+        TABLES[s.clamp(1, MAX_STAGES) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MAX_STAGES))))
     }
 
     fn new(s: usize) -> Self {
@@ -56,7 +56,7 @@ struct Make {
 }
 
 /// Numbers for the nodes.
-type Row = ExactRow<MOST>;
+type Row = ExactRow<MAX_STAGES>;
 
 /// The first Legendre polynomials at points, and zeros.
 #[inline(always)]
@@ -116,7 +116,7 @@ impl WithSimd for Make {
         // The Lagrange polynomial of node j is b_j sum (2k+1) P_k(x_j) P_k, and the integral of P_k a difference of two.
         let a = from_fn(|i| {
             if i >= s {
-                return [Quad::zero(); MOST];
+                return [Quad::zero(); MAX_STAGES];
             }
             let mut row = Row::from_fn(|_| c.at(i));
             for k in 1..s {
@@ -126,7 +126,7 @@ impl WithSimd for Make {
             from_fn(|j| row.at(j))
         });
         // The values of the Lagrange polynomials from those of the Legendre polynomials at a point.
-        let values = |p: &dyn Fn(usize) -> Quad| -> [f64; MOST] {
+        let values = |p: &dyn Fn(usize) -> Quad| -> [f64; MAX_STAGES] {
             let mut row = Row::ZERO;
             for (k, at) in at.iter().enumerate().take(s) {
                 row.add(odd(k) * p(k), at);
@@ -135,7 +135,7 @@ impl WithSimd for Make {
             from_fn(|j| row.at(j).0)
         };
         let beyond = legendre_rows(s, &Row::from_fn(|i| nodes.at(i) + one + one));
-        let ahead = from_fn(|i| if i < s { values(&|k| beyond[k].at(i)) } else { [0.0; MOST] });
+        let extrapolation = from_fn(|i| if i < s { values(&|k| beyond[k].at(i)) } else { [0.0; MAX_STAGES] });
         // Gauss' weights integrate products with the Legendre polynomials exactly.
         let last = from_fn(|i| {
             let k = (s - 1).saturating_sub(i);
@@ -144,23 +144,23 @@ impl WithSimd for Make {
         let series = from_fn(|j| from_fn(|k| if j.max(k) < s { (odd(k) * b.at(j) * at[k].at(j)).0 } else { 0.0 }));
         // P_k(-1) = (-1)^k and P_k(1) = 1.
         let ends = [-one, one].map(|end| values(&|k| if k % 2 == 0 { one } else { end }));
-        Coefficients { c: from_fn(|i| c.at(i)), b: from_fn(|j| b.at(j)), a, ahead, last, series, ends }
+        Coefficients { c: from_fn(|i| c.at(i)), b: from_fn(|j| b.at(j)), a, extrapolation, last, series, ends }
     }
 }
 
 /// The values at some points of `[0, 1]` of the polynomials of degree `s - 1` that are 1 at one node and 0 at the others, and
 /// their integrals from 0: `[i][j]` for point i and node j.
-pub(crate) fn lagrange_rows(s: usize, points: &[f64; MOST]) -> [[[f64; MOST]; MOST]; 2] {
+pub(crate) fn lagrange_rows(s: usize, points: &[f64; MAX_STAGES]) -> [[[f64; MAX_STAGES]; MAX_STAGES]; 2] {
     Instructions::new().dispatch(Lagrange { s, points })
 }
 
 struct Lagrange<'a> {
     s: usize,
-    points: &'a [f64; MOST],
+    points: &'a [f64; MAX_STAGES],
 }
 
 impl WithSimd for Lagrange<'_> {
-    type Output = [[[f64; MOST]; MOST]; 2];
+    type Output = [[[f64; MAX_STAGES]; MAX_STAGES]; 2];
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
@@ -168,10 +168,10 @@ impl WithSimd for Lagrange<'_> {
         let g = Coefficients::of(s);
         let at = legendre_rows(s, &Row::from_fn(|j| Quad::from(2.0 * g.c[j].0 - 1.0)));
         let p = legendre_rows(s, &Row::from_fn(|i| Quad::from(2.0 * points[i] - 1.0)));
-        let mut rows = [[[0.0; MOST]; MOST]; 2];
+        let mut rows = [[[0.0; MAX_STAGES]; MAX_STAGES]; 2];
         for (i, x) in points.iter().enumerate() {
             let p = |k: usize| p[k].at(i).0;
-            let (mut value, mut rest) = ([0.0; MOST], [0.0; MOST]);
+            let (mut value, mut rest) = ([0.0; MAX_STAGES], [0.0; MAX_STAGES]);
             for (k, at) in at.iter().enumerate().take(s) {
                 let (factor, of_integral) = ((2 * k + 1) as f64 * p(k), if k > 0 { p(k + 1) - p(k - 1) } else { 0.0 });
                 for j in 0..s {
@@ -195,12 +195,12 @@ mod tests {
     /// Polynomials of degree `s - 1` are those through the nodes, and their integrals exact, to round-off times the size of the entries.
     #[test]
     fn between_the_nodes() {
-        let points: [f64; MOST] = from_fn(|i| (0.37 + 0.618 * i as f64).fract());
-        for s in 1..=MOST {
+        let points: [f64; MAX_STAGES] = from_fn(|i| (0.37 + 0.618 * i as f64).fract());
+        for s in 1..=MAX_STAGES {
             let (g, [value, integral]) = (Coefficients::of(s), lagrange_rows(s, &points));
             let degree = s as i32 - 1;
             for (i, x) in points.iter().enumerate() {
-                let apply = |row: &[f64; MOST]| -> (f64, f64) {
+                let apply = |row: &[f64; MAX_STAGES]| -> (f64, f64) {
                     let terms = (0..s).map(|j| row[j] * g.c[j].0.powi(degree));
                     (terms.clone().sum(), terms.map(f64::abs).sum())
                 };
@@ -228,7 +228,7 @@ mod tests {
     fn the_coefficients_are_those_of_gauss() {
         let power = |x: Quad, k: usize| (0..k).fold(Quad::one(), |p, _| p * x);
         let small = |x: Quad| x.0.abs() < 1e-30;
-        for s in 1..=MOST {
+        for s in 1..=MAX_STAGES {
             let g = Coefficients::of(s);
             for k in 0..2 * s {
                 let sum = (0..s).fold(Quad::zero(), |sum, j| sum + g.b[j] * power(g.c[j], k));
@@ -245,11 +245,11 @@ mod tests {
     /// Polynomials of degree `s - 1` are carried to the next step: to round-off times the size of the extrapolation's entries.
     #[test]
     fn extrapolation_is_that_of_the_polynomial() {
-        for s in 1..=MOST {
+        for s in 1..=MAX_STAGES {
             let g = Coefficients::of(s);
             for i in 0..s {
-                let size: f64 = g.ahead[i].iter().map(|e| e.abs()).sum();
-                let sum: f64 = (0..s).map(|j| g.ahead[i][j] * g.c[j].0.powi(s as i32 - 1)).sum();
+                let size: f64 = g.extrapolation[i].iter().map(|e| e.abs()).sum();
+                let sum: f64 = (0..s).map(|j| g.extrapolation[i][j] * g.c[j].0.powi(s as i32 - 1)).sum();
                 let expected = (1.0 + g.c[i].0).powi(s as i32 - 1);
                 assert!((sum - expected).abs() <= 4.0 * f64::EPSILON * (size + expected), "s = {s}, node {i}");
             }

@@ -3,11 +3,11 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use super::coefficients::{Coefficients, MOST};
-use super::compensated::{Twofold, exact_sum};
+use super::coefficients::{Coefficients, MAX_STAGES};
+use super::compensated::{Unevaluated, exact_sum};
 use super::double_double::{ExactRow, solve_exactly};
 use super::instructions::Instructions;
-use super::stages::{Exact, StageMap, Stages, Weights, padded};
+use super::stages::{DoubleDoubleStages, StageMap, Stages, Weights, padded};
 use crate::gauss::lanes::Lanes;
 use crate::{InputError, StepError};
 use contact_geom::linear;
@@ -28,9 +28,9 @@ pub(crate) struct Condensed {
     pub h: f64,
     pub gamma: f64,
     /// `B`: from the accelerations to the positions.
-    pub b: [Exact; MOST],
+    pub b: [DoubleDoubleStages; MAX_STAGES],
     /// `u`.
-    pub u: Exact,
+    pub u: DoubleDoubleStages,
     /// `D`: from the accelerations to the velocities.
     pub d: StageMap,
     /// `1 / rho_i`.
@@ -38,33 +38,33 @@ pub(crate) struct Condensed {
     /// The times of the stages after the step's start.
     pub times: Stages,
     /// `end_u`.
-    pub end_u: Twofold,
+    pub end_u: Unevaluated,
     pub end_b: Weights,
     /// The same in double-double precision, and `D`, `1 / rho`, `end_u`, `grow` and `end_v` likewise.
     pub exact: Box<ExactEnd>,
     /// `sigma_d - 1`.
-    pub grow: Twofold,
+    pub grow: Unevaluated,
     pub end_v: Weights,
     /// From the stages of one step to those of the next.
-    pub ahead: StageMap,
+    pub extrapolation: StageMap,
     /// See [`actions`](Self::actions).
     actions: OnceLock<Box<Actions>>,
 }
 
 /// What `gamma Z` of the stages is, `from_start z0 + from_values (L - gamma z)`, by columns; not finite at the pole of the collocation polynomial of z.
 pub(crate) struct Actions {
-    pub from_start: [f64; MOST],
-    pub from_values: [[f64; MOST]; MOST],
+    pub from_start: [f64; MAX_STAGES],
+    pub from_values: [[f64; MAX_STAGES]; MAX_STAGES],
 }
 
 /// The coefficients of a [`Condensed`] step that its linear case takes in double-double precision.
 pub(crate) struct ExactEnd {
-    pub d: [Exact; MOST],
-    pub inverse_rho: Exact,
+    pub d: [DoubleDoubleStages; MAX_STAGES],
+    pub inverse_rho: DoubleDoubleStages,
     pub end_u: Quad,
-    pub end_b: Exact,
+    pub end_b: DoubleDoubleStages,
     pub grow: Quad,
-    pub end_v: Exact,
+    pub end_v: DoubleDoubleStages,
 }
 
 thread_local! {
@@ -97,7 +97,7 @@ impl Condensed {
     pub fn new(s: usize, h: f64, gamma: f64) -> Result<Self, InputError> {
         let g = Coefficients::of(s);
         let (one, zero, step, rate) = (Quad::one(), Quad::zero(), Quad::from(h), Quad::from(gamma));
-        let mut rho: Exact = [one; MOST];
+        let mut rho: DoubleDoubleStages = [one; MAX_STAGES];
         if gamma != 0.0 {
             // (1 + gamma h A) rho = 1.
             let factor = rate * step;
@@ -123,13 +123,13 @@ impl Condensed {
         let exact = ExactEnd {
             d: velocity.map(|row| from_fn(|j| row.at(j))),
             inverse_rho: rho.map(|r| if gamma == 0.0 { one } else { one / r }),
-            end_u: positions[s].at(MOST),
+            end_u: positions[s].at(MAX_STAGES),
             end_b: from_fn(|k| positions[s].at(k)),
             grow: one_minus_rho / end_rho,
             end_v: from_fn(|j| if j < s { step * g.b[j] * rho[j] / end_rho } else { zero }),
         };
         let b = from_fn(|i| from_fn(|k| positions[i].at(k)));
-        let u = from_fn(|i| positions[i].at(MOST));
+        let u = from_fn(|i| positions[i].at(MAX_STAGES));
         Ok(Condensed {
             s,
             h,
@@ -143,7 +143,7 @@ impl Condensed {
             end_b: Weights::new(&exact.end_b),
             grow: exact.grow.into(),
             end_v: Weights::new(&exact.end_v),
-            ahead: StageMap::new(&g.ahead, s),
+            extrapolation: StageMap::new(&g.extrapolation, s),
             exact: Box::new(exact),
             actions: OnceLock::new(),
         })
@@ -154,24 +154,30 @@ impl Condensed {
         self.actions.get_or_init(|| {
             let (s, g) = (self.s, Coefficients::of(self.s));
             let entry = |i: usize, j: usize| if i < s && j < s { self.gamma * self.h * g.a[i][j].0 } else { 0.0 };
-            let left = SMatrix::<f64, MOST, MOST>::from_fn(|i, j| f64::from(u8::from(i == j)) - entry(i, j));
+            let left =
+                SMatrix::<f64, MAX_STAGES, MAX_STAGES>::from_fn(|i, j| f64::from(u8::from(i == j)) - entry(i, j));
             let solved = |column: &dyn Fn(usize) -> f64| {
-                let mut column = SVector::<f64, MOST>::from_fn(|i, _| if i < s { column(i) } else { 0.0 });
+                let mut column = SVector::<f64, MAX_STAGES>::from_fn(|i, _| if i < s { column(i) } else { 0.0 });
                 // Where there is no solution the step has an end, and nothing between.
                 match linear::solve(&mut left.clone_owned().view_mut((0, 0), (s, s)), &mut column.rows_mut(0, s)) {
                     Ok(_) => column.into(),
-                    Err(_) => [f64::NAN; MOST],
+                    Err(_) => [f64::NAN; MAX_STAGES],
                 }
             };
             Box::new(Actions {
                 from_start: solved(&|_| self.gamma),
-                from_values: from_fn(|j| if j < s { solved(&|i| entry(i, j)) } else { [0.0; MOST] }),
+                from_values: from_fn(|j| if j < s { solved(&|i| entry(i, j)) } else { [0.0; MAX_STAGES] }),
             })
         })
     }
 
     /// The positions of the stages, `q0 + u v0 + B a`.
-    pub fn positions<const N: usize>(&self, q: &[f64; N], v: &[f64; N], a: &[[f64; MOST]; N]) -> [[f64; MOST]; N] {
+    pub fn positions<const N: usize>(
+        &self,
+        q: &[f64; N],
+        v: &[f64; N],
+        a: &[[f64; MAX_STAGES]; N],
+    ) -> [[f64; MAX_STAGES]; N] {
         let at = |d: usize, i: usize| (0..self.s).fold(q[d] + self.u[i].0 * v[d], |x, j| x + self.b[i][j].0 * a[d][j]);
         // Beyond the last stage it is repeated.
         from_fn(|d| from_fn(|i| at(d, i.min(self.s - 1))))
@@ -185,12 +191,12 @@ impl Condensed {
         let s = self.s;
         let mut rows: LeftRows = from_fn(|i| {
             from_fn(|j| match j {
-                MOST => 1.0,
-                j if j > MOST => self.u[i].0,
+                MAX_STAGES => 1.0,
+                j if j > MAX_STAGES => self.u[i].0,
                 j => self.b[i][j].0,
             })
         });
-        let mut left: [[f64; MOST]; MOST] =
+        let mut left: [[f64; MAX_STAGES]; MAX_STAGES] =
             from_fn(|i| from_fn(|j| if i == j { 1.0 } else { 0.0 } + kappa * self.b[i][j].0));
         if kappa != 0.0 {
             for k in 0..s {
@@ -218,22 +224,22 @@ impl Condensed {
     #[inline(always)]
     fn left_out(&self, left: &Preconditioned) -> Left {
         let (s, kappa, head) = (self.s, left.kappa, &left.head);
-        let row = |i: usize| -> [f64; MOST + 2] {
+        let row = |i: usize| -> [f64; MAX_STAGES + 2] {
             from_fn(|j| match j {
-                MOST => head.q.0[i],
-                j if j > MOST => head.u.0[i],
+                MAX_STAGES => head.q.0[i],
+                j if j > MAX_STAGES => head.u.0[i],
                 j => head.b.0[j].0[i],
             })
         };
         let rows: LeftRows = from_fn(row);
-        let mut residual: LeftRows = [[0.0; MOST + 2]; MOST];
+        let mut residual: LeftRows = [[0.0; MAX_STAGES + 2]; MAX_STAGES];
         for i in 0..s {
             // What is to be had minus what there is, in two parts.
-            let (mut sum, mut lost) = (rows[i].map(|e| -e), [0.0; MOST + 2]);
-            for j in 0..MOST + 2 {
+            let (mut sum, mut lost) = (rows[i].map(|e| -e), [0.0; MAX_STAGES + 2]);
+            for j in 0..MAX_STAGES + 2 {
                 let (head, tail) = match j {
-                    MOST => (1.0, 0.0),
-                    j if j > MOST => (self.u[i].0, self.u[i].1),
+                    MAX_STAGES => (1.0, 0.0),
+                    j if j > MAX_STAGES => (self.u[i].0, self.u[i].1),
                     j => (self.b[i][j].0, self.b[i][j].1),
                 };
                 let (total, error) = exact_sum(sum[j], head);
@@ -243,7 +249,7 @@ impl Condensed {
                 let Quad(b, b_tail) = self.b[i][k];
                 let factor = -kappa * b;
                 let factor_tail = (-kappa).mul_add(b, -factor) - kappa * b_tail;
-                for j in 0..MOST + 2 {
+                for j in 0..MAX_STAGES + 2 {
                     let product = factor * rows[k][j];
                     let error = factor.mul_add(rows[k][j], -product);
                     let (total, rounding) = exact_sum(sum[j], product);
@@ -265,21 +271,21 @@ impl Condensed {
 }
 
 /// A matrix of stages, and beside it the column of what multiplies the velocity; padded to whole registers.
-type Wide = ExactRow<{ MOST + 8 }>;
+type Wide = ExactRow<{ MAX_STAGES + 8 }>;
 
 /// What a [`Condensed`] step multiplies its accelerations with.
 struct AccelerationProducts {
     /// `D`, and beside it `1 / rho`.
-    velocity: [Wide; MOST],
+    velocity: [Wide; MAX_STAGES],
     /// `B` and `u`, and in row `s` those of the step's end.
-    positions: [Wide; MOST + 1],
+    positions: [Wide; MAX_STAGES + 1],
 }
 
 /// The [`AccelerationProducts`] from the stages of the integrating factor, in the instructions of the processor.
 struct Multiply<'a> {
     s: usize,
     h: f64,
-    rho: &'a Exact,
+    rho: &'a DoubleDoubleStages,
 }
 
 impl WithSimd for Multiply<'_> {
@@ -290,15 +296,15 @@ impl WithSimd for Multiply<'_> {
         let Multiply { s, h, rho } = self;
         let (g, step, zero) = (Coefficients::of(s), Quad::from(h), Quad::zero());
         let factors = Wide::from_fn(|j| if j < s { step * rho[j] } else { zero });
-        let mut velocity = [Wide::ZERO; MOST];
+        let mut velocity = [Wide::ZERO; MAX_STAGES];
         for i in 0..s {
             let inverse = rho[i].recip();
-            let unit = Wide::from_fn(|j| if j == MOST { inverse } else { zero });
+            let unit = Wide::from_fn(|j| if j == MAX_STAGES { inverse } else { zero });
             let row = Wide::from_fn(|j| if j < s { g.a[i][j] } else { zero }).times(&factors);
             velocity[i].add(inverse, &row);
             velocity[i].add(Quad::one(), &unit);
         }
-        let mut positions = [Wide::ZERO; MOST + 1];
+        let mut positions = [Wide::ZERO; MAX_STAGES + 1];
         for i in 0..=s {
             for j in 0..s {
                 let weight = if i < s { g.a[i][j] } else { g.b[j] };
@@ -310,7 +316,7 @@ impl WithSimd for Multiply<'_> {
 }
 
 /// Rows of `left_b` with those of `left` and `left_u` at the end.
-type LeftRows = [[f64; MOST + 2]; MOST];
+type LeftRows = [[f64; MAX_STAGES + 2]; MAX_STAGES];
 
 /// The matrices of [`Condensed::preconditioned`], or what their rounding leaves out.
 #[repr(C)] // See `SeparableStages`: the matrix last.
@@ -323,7 +329,7 @@ pub(crate) struct Left {
 impl Left {
     fn new(rows: &LeftRows, s: usize) -> Self {
         let column = |j: usize| Stages(from_fn(|i| rows[i.min(s - 1)][j]));
-        Left { q: column(MOST), u: column(MOST + 1), b: StageMap(from_fn(column)) }
+        Left { q: column(MAX_STAGES), u: column(MAX_STAGES + 1), b: StageMap(from_fn(column)) }
     }
 
     /// What comes of the state, of the stages in the r-th register.
@@ -369,7 +375,7 @@ impl WithSimd for LeftOut<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contact_geom::larger;
+    use contact_geom::max_or_nan;
 
     /// A table that is kept serves the same stages, step and rate alone.
     #[test]
@@ -428,7 +434,10 @@ mod tests {
                     (0..s).fold(f(i), |sum, k| sum + Quad::from(kappa) * table.b[i][k] * f(k))
                 };
                 let mut see = |found: Quad, true_one: Quad, head: Quad| {
-                    worst = [larger(worst[0], (found - true_one).0.abs()), larger(worst[1], (head - true_one).0.abs())];
+                    worst = [
+                        max_or_nan(worst[0], (found - true_one).0.abs()),
+                        max_or_nan(worst[1], (head - true_one).0.abs()),
+                    ];
                 };
                 see(
                     product(&|k| twofold(left.head.q.0[k], tail.q.0[k])),

@@ -3,7 +3,7 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use super::coefficients::{Coefficients, MOST, POLYNOMIALS};
+use super::coefficients::{Coefficients, MAX_STAGES, POLYNOMIALS};
 use super::condensed::Condensed;
 use crate::run::saved::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
@@ -27,14 +27,19 @@ impl<const N: usize> StepStart<N> {
 
 /// The stages of a solved step: V, `rho L_q`, `rho L_z` and L, with 0 beyond the last stage.
 pub(super) struct Solved<const N: usize> {
-    pub v: [[f64; MOST]; N],
-    pub force: [[f64; MOST]; N],
-    pub rate: [f64; MOST],
-    pub l: [f64; MOST],
+    pub v: [[f64; MAX_STAGES]; N],
+    pub force: [[f64; MAX_STAGES]; N],
+    pub rate: [f64; MAX_STAGES],
+    pub l: [f64; MAX_STAGES],
 }
 
 impl<const N: usize> Solved<N> {
-    pub const ZERO: Self = Solved { v: [[0.0; MOST]; N], force: [[0.0; MOST]; N], rate: [0.0; MOST], l: [0.0; MOST] };
+    pub const ZERO: Self = Solved {
+        v: [[0.0; MAX_STAGES]; N],
+        force: [[0.0; MAX_STAGES]; N],
+        rate: [0.0; MAX_STAGES],
+        l: [0.0; MAX_STAGES],
+    };
 
     /// From the accelerations and the positions of a condensed step.
     pub fn from_accelerations(
@@ -42,7 +47,7 @@ impl<const N: usize> Solved<N> {
         table: &Condensed,
         mass: &SMatrix<f64, N, N>,
         (t, start): (f64, &StepStart<N>),
-        [a, x]: [&[[f64; MOST]; N]; 2],
+        [a, x]: [&[[f64; MAX_STAGES]; N]; 2],
         wants_z: bool,
     ) -> Self {
         let (s, mut solved) = (table.s, Self::ZERO);
@@ -62,7 +67,7 @@ impl<const N: usize> Solved<N> {
             }
             solved.rate[i] = rho * table.gamma;
             if wants_z {
-                let at = |of: &[[f64; MOST]; N]| SVector::from_fn(|d, _| of[d][i]);
+                let at = |of: &[[f64; MAX_STAGES]; N]| SVector::from_fn(|d, _| of[d][i]);
                 solved.l[i] = lagrangian.value(t + table.times.0[i], &at(x), &at(&solved.v), 0.0);
             }
         }
@@ -103,7 +108,7 @@ pub struct DenseStep<const N: usize> {
 
 impl<const N: usize> DenseStep<N> {
     pub(super) fn new(s: usize, t: f64, h: f64, start: PhasePoint<N>, solved: &Solved<N>) -> Self {
-        let series = |values: &[f64; MOST]| Series::through(values, s);
+        let series = |values: &[f64; MAX_STAGES]| Series::through(values, s);
         DenseStep {
             s,
             t,
@@ -186,9 +191,9 @@ impl<const N: usize> DenseStep<N> {
 }
 
 /// The factors of the recurrence `P_(k+1) = (2k + 1)/(k + 1) x P_k - k/(k + 1) P_(k-1)`.
-const RECURRENCE: [[f64; 2]; MOST] = {
-    let (mut factors, mut k) = ([[0.0; 2]; MOST], 0);
-    while k < MOST {
+const RECURRENCE: [[f64; 2]; MAX_STAGES] = {
+    let (mut factors, mut k) = ([[0.0; 2]; MAX_STAGES], 0);
+    while k < MAX_STAGES {
         factors[k] = [(2 * k + 1) as f64 / (k + 1) as f64, k as f64 / (k + 1) as f64];
         k += 1;
     }
@@ -200,7 +205,7 @@ fn polynomials(s: usize, fraction: f64) -> [f64; POLYNOMIALS] {
     let x = 2.0 * fraction - 1.0;
     let mut p = [1.0; POLYNOMIALS];
     p[1] = x;
-    for k in 1..s.min(MOST) {
+    for k in 1..s.min(MAX_STAGES) {
         let [first, second] = RECURRENCE[k];
         p[k + 1] = first * x * p[k] - second * p[k - 1];
     }
@@ -218,13 +223,14 @@ fn integrals(s: usize, p: &[f64; POLYNOMIALS], fraction: f64) -> [f64; POLYNOMIA
 }
 
 /// The most states between the parts of a step.
-const BETWEEN_PARTS: usize = MOST + 1;
+const BETWEEN_PARTS: usize = MAX_STAGES + 1;
 
 /// The integrals of the Legendre polynomials to the ends of the parts of a step, of which there are s + 2: `[k][i]` to the end of part i.
-fn integrals_to_parts(s: usize) -> &'static [[f64; BETWEEN_PARTS]; MOST] {
-    static TABLES: [OnceLock<Box<[[f64; BETWEEN_PARTS]; MOST]>>; MOST] = [const { OnceLock::new() }; MOST];
-    TABLES[s.clamp(1, MOST) - 1].get_or_init(|| {
-        let mut table = Box::new([[0.0; BETWEEN_PARTS]; MOST]);
+fn integrals_to_parts(s: usize) -> &'static [[f64; BETWEEN_PARTS]; MAX_STAGES] {
+    static TABLES: [OnceLock<Box<[[f64; BETWEEN_PARTS]; MAX_STAGES]>>; MAX_STAGES] =
+        [const { OnceLock::new() }; MAX_STAGES];
+    TABLES[s.clamp(1, MAX_STAGES) - 1].get_or_init(|| {
+        let mut table = Box::new([[0.0; BETWEEN_PARTS]; MAX_STAGES]);
         for i in 0..=s {
             let fraction = (i + 1) as f64 / (s + 2) as f64;
             let p = polynomials(s, fraction);
@@ -237,9 +243,9 @@ fn integrals_to_parts(s: usize) -> &'static [[f64; BETWEEN_PARTS]; MOST] {
 }
 
 /// `1 / (2 (2k + 1))`.
-const HALF_OF_ODD: [f64; MOST] = {
-    let (mut numbers, mut k) = ([0.0; MOST], 0);
-    while k < MOST {
+const HALF_OF_ODD: [f64; MAX_STAGES] = {
+    let (mut numbers, mut k) = ([0.0; MAX_STAGES], 0);
+    while k < MAX_STAGES {
         numbers[k] = 0.5 / (2 * k + 1) as f64;
         k += 1;
     }
@@ -248,12 +254,12 @@ const HALF_OF_ODD: [f64; MOST] = {
 
 /// The coefficients of a polynomial on `[0, 1]` in the Legendre polynomials of `2 x - 1`.
 #[derive(Clone, Copy, Debug)]
-struct Series([f64; MOST]);
+struct Series([f64; MAX_STAGES]);
 
 impl Series {
     /// The polynomial through values at the nodes: Gauss' weights integrate its products with the Legendre polynomials exactly.
-    fn through(values: &[f64; MOST], s: usize) -> Self {
-        let mut c = [0.0; MOST];
+    fn through(values: &[f64; MAX_STAGES], s: usize) -> Self {
+        let mut c = [0.0; MAX_STAGES];
         for (row, value) in Coefficients::of(s).series.iter().zip(values).take(s) {
             for (c, entry) in c.iter_mut().zip(row) {
                 *c += entry * value;
@@ -262,7 +268,7 @@ impl Series {
         Series(c)
     }
 
-    fn value(&self, p: &[f64; MOST + 1], s: usize) -> f64 {
+    fn value(&self, p: &[f64; MAX_STAGES + 1], s: usize) -> f64 {
         (0..s).fold(0.0, |sum, k| sum + self.0[k] * p[k])
     }
 }
@@ -270,12 +276,12 @@ impl Series {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contact_geom::larger;
+    use contact_geom::max_or_nan;
 
     /// The states between the parts are those of the curve, to some roundings of each of its terms.
     #[test]
     fn a_sketch_is_on_the_curve() {
-        for s in 1..=MOST {
+        for s in 1..=MAX_STAGES {
             let value = |i: usize, seed: f64| (1.3 * i as f64 + seed).sin();
             let stages = |seed: f64| from_fn(|i| if i < s { value(i, seed) } else { 0.0 });
             let mut solved = Solved::<2>::ZERO;
@@ -287,7 +293,8 @@ mod tests {
             assert_eq!(sketch.len() + 1, curve.parts());
             for (i, found) in sketch.iter().enumerate() {
                 let at = curve.at_fraction((i + 1) as f64 / curve.parts() as f64);
-                let off = larger((found.q - at.q).amax(), larger((found.p - at.p).amax(), (found.z - at.z).abs()));
+                let off =
+                    max_or_nan((found.q - at.q).amax(), max_or_nan((found.p - at.p).amax(), (found.z - at.z).abs()));
                 assert!(off <= 16.0 * s as f64 * f64::EPSILON, "{s} stages, part {i}: {off:e}");
             }
         }

@@ -3,19 +3,19 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use super::coefficients::MOST;
-use super::compensated::{Compensated, Twofold, add, finite};
+use super::coefficients::MAX_STAGES;
+use super::compensated::{CompensatedSum, Unevaluated, add, finite};
+use super::fixed_point::{AGE, FixedPointIteration, IterationOutcome, SLOW};
 use super::instructions::Instructions;
 use super::mass::Mass;
+use super::parametrization::{Extension, Parametrization, Values};
 use super::resolution::Tail;
 use super::simplified::{CorrectStages, StageNewton};
 use super::stages::{StageMap, Stages, blocks};
-use super::sweeps::{AGE, AfterSweep, SLOW, Sweeps};
 use super::table::StageTable;
-use super::time_transformation::{Extension, TimeTransformation, Values};
 use crate::gauss::lanes::{Lanes, branched};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Hessian, Lagrangian, PhasePoint, Triple, VelocityPoint};
+use contact_geom::{ChartVector, Derivatives, Hessian, Lagrangian, PhasePoint, VelocityPoint};
 use pulp::Simd;
 use std::array::from_fn;
 
@@ -28,7 +28,7 @@ const MOST_IN_LANES: usize = 8;
 /// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`. A sweep takes the right-hand sides
 /// from the gradients of L before, and the velocities from the momenta by `W^-1`.
 ///
-/// In the time of a clock they are those of `K = g (H + p_t)`: `Q = q0 + hA (g V)`, `Z = z0 + hA (g L)`, `t = t0 + hA g`,
+/// In a transformed time they are those of `K = g (H + p_t)`: `Q = q0 + hA (g V)`, `Z = z0 + hA (g L)`, `t = t0 + hA g`,
 /// `rho = 1 - hA (rho g L_z)`, `rho L_v = p0 + hA (rho g L_q - grad g (rho E + p_t0))`, since `rho p_t = p_t0`, the momentum of
 /// the time at the start, where L does not depend on t.
 ///
@@ -47,13 +47,13 @@ pub(super) struct General<'a, L, P, const N: usize> {
     /// The stages: velocities and `L_v`.
     pub(super) v: [Stages; N],
     pub(super) l_v: [Stages; N],
-    /// With the weights `h b`, and g where there is a clock: V, `rho L_q`, L and `rho L_z`.
+    /// With the weights `h b`, and g where there is a time transformation: V, `rho L_q`, L and `rho L_z`.
     pub(super) moved: [Stages; N],
     pub(super) force: [Stages; N],
     pub(super) l: Stages,
     pub(super) rate: Stages,
     /// `1 - rho`.
-    pub(super) falling: Stages,
+    pub(super) one_minus_rho_stages: Stages,
     pub(super) z_stages: Stages,
     pub(super) x: [Stages; N],
     pub lagrangian: &'a L,
@@ -62,9 +62,9 @@ pub(super) struct General<'a, L, P, const N: usize> {
     pub mass: Mass<N>,
     /// Whether the actions of the stages follow their positions within a sweep.
     pub(super) follows: bool,
-    pub q: [Compensated; N],
-    pub p: [Compensated; N],
-    pub z: Compensated,
+    pub q: [CompensatedSum; N],
+    pub p: [CompensatedSum; N],
+    pub z: CompensatedSum,
     /// `1 - rho` at the end of the last step.
     pub one_minus_rho: f64,
     pub(super) warm: bool,
@@ -74,9 +74,9 @@ pub(super) struct General<'a, L, P, const N: usize> {
     pub(super) age: u32,
     pub(super) tail: Tail,
     /// Above one where the last step has not resolved the motion, or its drag.
-    pub misfit: f64,
+    pub defect: f64,
     /// The same while it is not used.
-    parked: Option<Box<StageNewton<N>>>,
+    suspended_newton: Option<Box<StageNewton<N>>>,
     /// Whether the stages of the next step are solved: v, l and falling are theirs.
     pub(super) solved: bool,
     /// Whether these are a prediction of it.
@@ -86,7 +86,7 @@ pub(super) struct General<'a, L, P, const N: usize> {
     pub evaluations: u64,
 }
 
-impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a, L, P, N> {
+impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L, P, N> {
     /// From a state with a velocity that belongs to it, or a guess of it; `driven` says that z acts on the motion other than by a rate.
     pub fn new(
         lagrangian: &'a L,
@@ -104,7 +104,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             extension,
             table,
             mass,
-            // By a clock the times of the stages move too.
+            // In transformed time the times of the stages move too.
             follows: driven && P::PHYSICAL,
             q: [0.0.into(); N],
             p: [0.0.into(); N],
@@ -115,7 +115,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             force: [Stages::ZERO; N],
             l: Stages::ZERO,
             rate: Stages::ZERO,
-            falling: Stages::ZERO,
+            one_minus_rho_stages: Stages::ZERO,
             z_stages: Stages::ZERO,
             x: [Stages::ZERO; N],
             one_minus_rho: 0.0,
@@ -123,8 +123,8 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             newton: None,
             age: 0,
             tail,
-            misfit: 0.0,
-            parked: None,
+            defect: 0.0,
+            suspended_newton: None,
             solved: false,
             predicted: false,
             known: (*v).into(),
@@ -144,21 +144,21 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
 
     /// Guesses the next step to be a motion of constant velocity.
     pub fn guess(&mut self, v: &SVector<f64, N>) {
-        self.v = from_fn(|i| Stages([v[i]; MOST]));
+        self.v = from_fn(|i| Stages([v[i]; MAX_STAGES]));
         self.warm = false;
     }
 
     /// Has the sweeps corrected by Newton's method, with these derivatives of L from now on; `false` where that is not possible.
-    pub fn linearise(&mut self, gradient: &Triple<N>, hessian: &Hessian<N>) -> bool {
+    pub fn linearise(&mut self, gradient: &ChartVector<N>, hessian: &Hessian<N>) -> bool {
         if self.newton.is_none() {
-            self.newton = self.parked.take().or_else(|| Some(Box::new(StageNewton::new(&self.table))));
+            self.newton = self.suspended_newton.take().or_else(|| Some(Box::new(StageNewton::new(&self.table))));
         }
         self.newton.as_mut().is_some_and(|newton| newton.factorise(gradient, hessian))
     }
 
     /// Takes the sweeps as they are again.
-    pub fn park_newton(&mut self) {
-        self.parked = self.newton.take();
+    pub fn suspend_newton(&mut self) {
+        self.suspended_newton = self.newton.take();
     }
 
     /// Has the next step taken from stages that are solved: their velocities, actions' rates and factors.
@@ -176,7 +176,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
                 self.v[d].0[i..].fill(v[d]);
             }
             self.l.0[i] = self.table.weights.0[i] * l;
-            self.falling.0[i..].fill(1.0 - rho);
+            self.one_minus_rho_stages.0[i..].fill(1.0 - rho);
         }
         (self.warm, self.predicted) = (false, true);
     }
@@ -212,14 +212,14 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
         self.warm = false;
     }
 
-    /// The clock's rate at the state.
+    /// The rate dt/dtau at the state.
     pub fn rate(&self) -> f64 {
         self.extension.transformation.rate(&SVector::from(self.q.map(|q| q.value)))
     }
 
     /// What the velocities of the stages move the positions by.
     #[inline(always)]
-    fn stride<S: Simd>(&mut self) {
+    fn weighted_velocities<S: Simd>(&mut self) {
         for r in 0..blocks::<S>(self.table.s) {
             let mut weight = self.table.weights.block::<S>(r);
             if !P::PHYSICAL {
@@ -252,8 +252,8 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
 
     /// The positions and the actions of the stages from their velocities and Lagrangians.
     #[inline(always)]
-    fn place<S: Simd>(&mut self) {
-        self.stride::<S>();
+    fn stage_positions<S: Simd>(&mut self) {
+        self.weighted_velocities::<S>();
         let (m, s) = (&self.m, self.table.s);
         for ((q, moved), x) in self.q.iter().zip(&self.moved).zip(&mut self.x) {
             let q = Lanes::<S>::splat(q.value);
@@ -265,20 +265,20 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
 
     /// The guesses of a step: the last one's polynomials carried on.
     #[inline(always)]
-    fn carry<S: Simd>(&mut self) {
+    fn extrapolate<S: Simd>(&mut self) {
         let s = self.table.s;
         let renewed = 1.0 / (1.0 - self.one_minus_rho);
         let rates = if P::PHYSICAL { None } else { Some(&mut self.extension.g) };
-        let StageTable { ahead, ahead_weighted, .. } = &self.table;
+        let StageTable { extrapolation, extrapolation_weighted, .. } = &self.table;
         for x in self.v.iter_mut().chain(&mut self.l_v).chain(rates) {
             let before = *x;
-            ahead.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
+            extrapolation.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
         }
         // rho starts from 1 again.
         let scaled = self.force.iter_mut().chain([&mut self.rate]).map(|x| (x, renewed));
         for (x, factor) in scaled.chain([(&mut self.l, 1.0)]) {
             let before = *x;
-            ahead_weighted.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
+            extrapolation_weighted.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
             for r in 0..blocks::<S>(s) {
                 x.set(r, x.block::<S>(r) * factor);
             }
@@ -287,28 +287,30 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
 
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
-    pub fn step<S: Simd>(&mut self, t: f64) -> AfterSweep {
+    pub fn step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
         let (solved, predicted) = (std::mem::take(&mut self.solved), std::mem::take(&mut self.predicted));
         // Without a step before, from a motion of constant velocity.
         let mut cold = !self.warm || self.newton.is_some();
         if self.warm && !solved {
-            self.carry::<S>();
+            self.extrapolate::<S>();
             if self.newton.is_some() {
-                self.table.m.apply(&self.rate, self.table.s, &mut self.falling, |_| Lanes::<S>::splat(0.0));
+                self.table
+                    .m
+                    .apply(&self.rate, self.table.s, &mut self.one_minus_rho_stages, |_| Lanes::<S>::splat(0.0));
             }
         } else if !solved && !predicted {
             self.l = Stages::ZERO;
-            self.falling = Stages::ZERO;
+            self.one_minus_rho_stages = Stages::ZERO;
             if !P::PHYSICAL {
-                self.extension.g = Stages([self.rate(); MOST]);
+                self.extension.g = Stages([self.rate(); MAX_STAGES]);
             }
         }
         self.warm = false;
-        self.place::<S>();
+        self.stage_positions::<S>();
         if !self.invert_mass::<S>(t) {
-            return AfterSweep::NonFinite;
+            return IterationOutcome::NonFinite;
         }
-        let mut sweeps = Sweeps::until(1.0, 0.25);
+        let mut sweeps = FixedPointIteration::until(1.0, 0.25);
         // The momenta that are carried on are no L_v of the velocities that are: both may be those of the step before, and the next sweep tell.
         let mut carried = !cold && !solved;
         // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
@@ -322,7 +324,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             } else {
                 self.sweep::<S>()
             };
-            let of_clock = self.evaluate::<S>(t);
+            let of_transformed = self.evaluate::<S>(t);
             if solved {
                 let outcome = self.finish::<S>();
                 self.judge::<S>(f64::INFINITY);
@@ -333,11 +335,15 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
                 continue;
             }
             // `f64::max` would hide a NaN.
-            let change = if !P::PHYSICAL && (of_clock > change || of_clock.is_nan()) { of_clock } else { change };
+            let change = if !P::PHYSICAL && (of_transformed > change || of_transformed.is_nan()) {
+                of_transformed
+            } else {
+                change
+            };
             match sweeps.judge(change, 1.0) {
-                AfterSweep::Going => {}
-                AfterSweep::Done if carried => sweeps = Sweeps::until(1.0, 0.25),
-                AfterSweep::Done => {
+                IterationOutcome::Continue => {}
+                IterationOutcome::Done if carried => sweeps = FixedPointIteration::until(1.0, 0.25),
+                IterationOutcome::Done => {
                     let outcome = self.finish::<S>();
                     self.judge::<S>(sweeps.first());
                     self.age = self.age.saturating_add(1);
@@ -346,7 +352,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
                     }
                     return outcome;
                 }
-                AfterSweep::Slow { .. } if self.holds::<S>(t) => return self.finish::<S>(),
+                IterationOutcome::Slow { .. } if self.holds::<S>(t) => return self.finish::<S>(),
                 refused => return refused,
             }
             carried = false;
@@ -368,7 +374,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             rate: &self.rate,
             v: &mut self.v,
             z: &mut self.z_stages,
-            falling: &mut self.falling,
+            one_minus_rho_stages: &mut self.one_minus_rho_stages,
             moved: &mut self.moved,
             x: &mut self.x,
         })
@@ -376,39 +382,39 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
 
     /// The end of the step from its stages.
     #[inline(always)]
-    fn finish<S: Simd>(&mut self) -> AfterSweep {
+    fn finish<S: Simd>(&mut self) -> IterationOutcome {
         if !P::PHYSICAL {
             // With the rates of the last evaluation.
-            self.stride::<S>();
+            self.weighted_velocities::<S>();
         }
         let s = self.table.s;
         let (one_minus_rho, dz) = (self.rate.sum::<S>(s), self.l.sum::<S>(s));
         let mut deepest = Lanes::<S>::splat(f64::NEG_INFINITY);
         for r in 0..blocks::<S>(s) {
-            deepest = deepest.max(self.falling.block::<S>(r));
+            deepest = deepest.max(self.one_minus_rho_stages.block::<S>(r));
         }
-        let rho = 1.0 - deepest.largest();
+        let rho = 1.0 - deepest.max_abs_or_nan();
         if rho <= 0.0 {
-            return AfterSweep::StageFactor { rho };
+            return IterationOutcome::StageFactor { rho };
         }
         if one_minus_rho >= 1.0 {
-            return AfterSweep::SigmaVanished { sigma: 1.0 / (1.0 - one_minus_rho) };
+            return IterationOutcome::SigmaVanished { sigma: 1.0 / (1.0 - one_minus_rho) };
         }
         // sigma_d - 1, so that a small rate does not round the whole.
         let grow = one_minus_rho / (1.0 - one_minus_rho);
-        let single = |head| Twofold { head, tail: 0.0 };
-        let (mut dq, mut dp) = ([Twofold::default(); N], [Twofold::default(); N]);
+        let single = |head| Unevaluated { head, tail: 0.0 };
+        let (mut dq, mut dp) = ([Unevaluated::default(); N], [Unevaluated::default(); N]);
         for d in 0..N {
             dq[d] = single(self.moved[d].sum::<S>(s));
             let pushed = self.force[d].sum::<S>(s);
-            dp[d] = Twofold { head: pushed, tail: grow * (pushed + self.p[d].value) };
+            dp[d] = Unevaluated { head: pushed, tail: grow * (pushed + self.p[d].value) };
         }
         if branched() {
-            return AfterSweep::Branched;
+            return IterationOutcome::Branched;
         }
         // The largest change over lanes may hide a NaN; one of `one_minus_rho` is in `dp`.
         if !finite(&dq, &dp, single(dz)) {
-            return AfterSweep::NonFinite;
+            return IterationOutcome::NonFinite;
         }
         if !P::PHYSICAL {
             let mut dt = Stages::ZERO;
@@ -418,7 +424,7 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
             let dt = dt.sum::<S>(s);
             let runs = self.extension.g.0[..s].iter().all(|g| *g > 0.0);
             if !(runs && dt.is_finite()) {
-                return AfterSweep::NonFinite;
+                return IterationOutcome::NonFinite;
             }
             self.extension.t.add(single(dt));
             self.extension.p_t.add(single(grow * self.extension.p_t.value));
@@ -429,6 +435,6 @@ impl<'a, L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'a,
         self.one_minus_rho = one_minus_rho;
         self.known = from_fn(|d| self.v[d].0[s - 1]);
         self.warm = true;
-        AfterSweep::Done
+        IterationOutcome::Done
     }
 }

@@ -5,15 +5,15 @@
 
 use super::general::General;
 use super::pair::{Registers, over_registers};
+use super::parametrization::Parametrization;
 use super::stages::blocks;
-use super::time_transformation::TimeTransformation;
 use crate::gauss::lanes::{Lanes, vector};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, KernelDual, Lagrangian, Triple, VelocityPoint};
+use contact_geom::{ChartVector, Derivatives, KernelDual, Lagrangian, VelocityPoint};
 use pulp::Simd;
 use std::array::from_fn;
 
-impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, P, N> {
+impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, N> {
     /// The point of TQ x R at a block of stages.
     #[inline(always)]
     pub(super) fn point<S: Simd>(&self, r: usize) -> VelocityPoint<N, Lanes<S>> {
@@ -24,7 +24,7 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
         }
     }
 
-    /// Evaluates L and its gradient at the stages; returns the largest change of a clock's rates, relative to the largest, or 0 without one.
+    /// Evaluates L and its gradient at the stages; returns the largest change of the rates dt/dtau, relative to the largest, or 0 without one.
     #[inline(always)]
     pub(super) fn evaluate<S: Simd>(&mut self, t: f64) -> f64 {
         let m = blocks::<S>(self.table.s);
@@ -40,7 +40,8 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
         for r in 0..m {
             let at = self.table.times.block::<S>(r) + t;
             let (re, d) = self.lagrangian.with_gradient(at, &self.point::<S>(r));
-            let (mut weight, falling) = (self.table.weights.block::<S>(r), -self.falling.block::<S>(r));
+            let (mut weight, one_minus_rho_stages) =
+                (self.table.weights.block::<S>(r), -self.one_minus_rho_stages.block::<S>(r));
             let point = self.point::<S>(r);
             let q = vector::<_, N>(|i| {
                 let mut q = KernelDual::<Lanes<S>, SVector<Lanes<S>, N>>::constant(point.q[i]);
@@ -49,21 +50,21 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
             });
             let KernelDual { re: g, d: slope } = self.extension.transformation.rate(&q);
             let energy = point.v.dot(&d.y) - re;
-            let extended = energy.mul_add(falling, energy + self.extension.p_t.value);
-            let of_clock: [_; N] = from_fn(|i| slope[i] * extended * -weight);
+            let extended = energy.mul_add(one_minus_rho_stages, energy + self.extension.p_t.value);
+            let of_transformed: [_; N] = from_fn(|i| slope[i] * extended * -weight);
             weight *= g;
             dg = dg.max((g - self.extension.g.block(r)).abs());
             sg = sg.max(g.abs());
             self.extension.g.set(r, g);
             self.l.set(r, weight * re);
-            self.rate.set(r, weight * d.z.mul_add(falling, d.z));
+            self.rate.set(r, weight * d.z.mul_add(one_minus_rho_stages, d.z));
             for i in 0..N {
-                let push = d.x[i].mul_add(falling, d.x[i]);
-                self.force[i].set(r, push.mul_add(weight, of_clock[i]));
+                let push = d.x[i].mul_add(one_minus_rho_stages, d.x[i]);
+                self.force[i].set(r, push.mul_add(weight, of_transformed[i]));
                 self.l_v[i].set(r, d.y[i]);
             }
         }
-        dg.largest() / sg.largest()
+        dg.max_abs_or_nan() / sg.max_abs_or_nan()
     }
 
     /// L and its gradient at the blocks of stages that T holds, from the r-th on, in physical time.
@@ -77,19 +78,20 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
         let (l, d) = self.lagrangian.with_gradient(T::of(&self.table.times, r) + t, &point);
         for i in 0..T::COUNT {
             let of = |x: &SVector<T, N>| vector(|d| x[d].register(i));
-            self.weigh(r + i, l.register(i), &Triple { x: of(&d.x), y: of(&d.y), z: d.z.register(i) });
+            self.weigh(r + i, l.register(i), &ChartVector { x: of(&d.x), y: of(&d.y), z: d.z.register(i) });
         }
         r + T::COUNT
     }
 
     /// Takes L and its gradient at one block of stages, with the weights of physical time.
     #[inline(always)]
-    fn weigh<S: Simd>(&mut self, r: usize, l: Lanes<S>, d: &Triple<N, Lanes<S>>) {
-        let (weight, falling) = (self.table.weights.block::<S>(r), -self.falling.block::<S>(r));
+    fn weigh<S: Simd>(&mut self, r: usize, l: Lanes<S>, d: &ChartVector<N, Lanes<S>>) {
+        let (weight, one_minus_rho_stages) =
+            (self.table.weights.block::<S>(r), -self.one_minus_rho_stages.block::<S>(r));
         self.l.set(r, weight * l);
-        self.rate.set(r, weight * d.z.mul_add(falling, d.z));
+        self.rate.set(r, weight * d.z.mul_add(one_minus_rho_stages, d.z));
         for i in 0..N {
-            self.force[i].set(r, weight * d.x[i].mul_add(falling, d.x[i]));
+            self.force[i].set(r, weight * d.x[i].mul_add(one_minus_rho_stages, d.x[i]));
             self.l_v[i].set(r, d.y[i]);
         }
     }

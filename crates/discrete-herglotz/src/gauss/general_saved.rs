@@ -5,7 +5,7 @@ use super::simplified::StageNewton;
 use crate::run::saved::{load_option, save_option, saved};
 
 saved!([L, P, const N: usize] General<'_, L, P, N> {
-    v, l_v, moved, force, l, rate, falling, z_stages, x, extension, mass, q, p, z, one_minus_rho, warm, age, misfit, solved, known, evaluations,
+    v, l_v, moved, force, l, rate, one_minus_rho_stages, z_stages, x, extension, mass, q, p, z, one_minus_rho, warm, age, defect, solved, known, evaluations,
 } and save_newton, load_newton);
 
 impl<L, P, const N: usize> General<'_, L, P, N> {

@@ -1,38 +1,38 @@
 //! What the stages of a general step say once they are there: whether they satisfy their equations, and resolve the motion.
 
-use super::coefficients::MOST;
+use super::coefficients::MAX_STAGES;
 use super::dense::Solved;
 use super::general::General;
+use super::parametrization::Parametrization;
 use super::resolution::{FORETOLD, ROUNDINGS, of_sigma};
 use super::stages::{Stages, blocks};
-use super::time_transformation::TimeTransformation;
 use crate::gauss::lanes::Lanes;
 use crate::rules::step_equations::{inverted, kept_mass_matrix};
-use crate::run::watch::value_rounding;
+use crate::run::resolution_monitor::value_rounding;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, VelocityPoint, gradient_rounding, larger};
+use contact_geom::{Lagrangian, VelocityPoint, gradient_rounding, max_or_nan};
 use pulp::Simd;
 use std::array::from_fn;
 
 /// The change of the integrating factor in a step from which on it is compared with the drag's integral.
 const STRONG: f64 = 0.2;
 
-impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, P, N> {
+impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, N> {
     /// Judges how well a step has resolved the motion, from how far its start was off what the step before foretold.
     #[inline(always)]
     pub(super) fn judge<S: Simd>(&mut self, first: f64) {
-        self.misfit = 0.0;
+        self.defect = 0.0;
         if first > FORETOLD {
-            let clock = if const { P::PHYSICAL } { None } else { Some(&self.extension.g) };
-            self.misfit = self.tail.misfit::<S, N>(&self.v, clock, &self.x, self.table.h);
+            let rates = if const { P::PHYSICAL } { None } else { Some(&self.extension.g) };
+            self.defect = self.tail.defect::<S, N>(&self.v, rates, &self.x, self.table.h);
         }
         if first > FORETOLD || self.one_minus_rho.abs() > STRONG {
             let one = Lanes::<S>::splat(1.0);
             let mut integral = Lanes::<S>::splat(0.0);
             for r in 0..blocks::<S>(self.table.s) {
-                integral += self.rate.block::<S>(r) / (one - self.falling.block(r));
+                integral += self.rate.block::<S>(r) / (one - self.one_minus_rho_stages.block(r));
             }
-            self.misfit = larger(self.misfit, of_sigma(1.0 / (1.0 - self.one_minus_rho), integral.sum()));
+            self.defect = max_or_nan(self.defect, of_sigma(1.0 / (1.0 - self.one_minus_rho), integral.sum()));
         }
     }
 
@@ -52,10 +52,10 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
             (0..s).all(|i| {
                 let terms = (0..s).fold(start.abs(), |m, j| m + (self.table.m.0[j].0[i] * rates.0[j]).abs());
                 let off = start + sum.0[i] - sums(i);
-                off.abs() <= larger(8.0 * f64::EPSILON * larger(terms, sums(i).abs()), ROUNDINGS * rounding)
+                off.abs() <= max_or_nan(8.0 * f64::EPSILON * max_or_nan(terms, sums(i).abs()), ROUNDINGS * rounding)
             })
         };
-        let rho = self.falling.map(|falling| 1.0 - falling);
+        let rho = self.one_minus_rho_stages.map(|one_minus_rho_stages| 1.0 - one_minus_rho_stages);
         let of_action = value_rounding(of_value, &once.x, &x.q) * self.table.h.abs();
         let of_momentum = |d: usize| once.x[d] * self.table.h.abs() + once.y[d];
         holds(1.0, &self.rate.map(|rate| -rate), 0.0, &|i| rho.0[i])
@@ -87,13 +87,13 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
         }
     }
 
-    /// The same of a step by a clock, in its time: `g V` for the velocities.
-    pub fn solved_by_clock(&self) -> Solved<N> {
+    /// The same of a step in transformed time, in its time: `g V` for the velocities.
+    pub fn solved_in_transformed_time(&self) -> Solved<N> {
         Solved { v: from_fn(|d| self.unweighted(&self.moved[d])), ..self.solved() }
     }
 
     /// What was multiplied with the weights, with 0 beyond the last stage.
-    fn unweighted(&self, x: &Stages) -> [f64; MOST] {
+    fn unweighted(&self, x: &Stages) -> [f64; MAX_STAGES] {
         from_fn(|i| if i < self.table.s { x.0[i] / self.table.weights.0[i] } else { 0.0 })
     }
 }

@@ -4,8 +4,8 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::general::General;
+use super::parametrization::Parametrization;
 use super::stages::{blocks, over_groups};
-use super::time_transformation::TimeTransformation;
 use crate::gauss::lanes::{Lanes, vector};
 use contact_geom::{Lagrangian, Scalar};
 use pulp::Simd;
@@ -26,12 +26,12 @@ impl<S: Simd> Changes<S> {
     /// The largest change of a kind, in units of the largest value.
     #[inline(always)]
     fn relative(&self, kind: usize) -> f64 {
-        let change = self.change[kind].largest();
-        if change > 0.0 { change / self.size[kind].largest() } else { change }
+        let change = self.change[kind].max_abs_or_nan();
+        if change > 0.0 { change / self.size[kind].max_abs_or_nan() } else { change }
     }
 }
 
-impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, P, N> {
+impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, N> {
     /// New velocities, positions, actions and factors of the stages; returns the largest change, each in units of the
     /// largest of its kind.
     ///
@@ -53,25 +53,26 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> General<'_, L, 
     #[inline(always)]
     fn push<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S>) {
         let (s, zero, one) = (self.table.s, Lanes::<S>::splat(0.0), Lanes::<S>::splat(1.0));
-        let (mut falling, mut pushed) = ([zero; K], [[zero; K]; N]);
+        let (mut one_minus_rho_stages, mut pushed) = ([zero; K], [[zero; K]; N]);
         for d in 0..N {
             let mut p = [Lanes::splat(self.p[d].value); K];
             for k in 0..K {
                 p[k] -= self.l_v[d].block(r + k);
             }
             if d == 0 {
-                [falling, pushed[0]] = self.m.rows([&self.rate, &self.force[0]], s, [[zero; K], p], r);
+                [one_minus_rho_stages, pushed[0]] = self.m.rows([&self.rate, &self.force[0]], s, [[zero; K], p], r);
             } else {
                 [pushed[d]] = self.m.rows([&self.force[d]], s, [p], r);
             }
         }
         for k in 0..K {
-            let (r, falling) = (r + k, falling[k]);
-            let (before, rho) = (self.falling.block::<S>(r), one - falling);
-            seen.see(1, falling - before, rho);
-            self.falling.set(r, falling);
+            let (r, one_minus_rho_stages) = (r + k, one_minus_rho_stages[k]);
+            let (before, rho) = (self.one_minus_rho_stages.block::<S>(r), one - one_minus_rho_stages);
+            seen.see(1, one_minus_rho_stages - before, rho);
+            self.one_minus_rho_stages.set(r, one_minus_rho_stages);
             let inverse = rho.recip();
-            let excess = vector::<Lanes<S>, N>(|d| self.l_v[d].block::<S>(r).mul_add(falling, pushed[d][k]));
+            let excess =
+                vector::<Lanes<S>, N>(|d| self.l_v[d].block::<S>(r).mul_add(one_minus_rho_stages, pushed[d][k]));
             let mut weight = self.table.weights.block::<S>(r);
             if const { !P::PHYSICAL } {
                 weight *= self.extension.g.block(r);

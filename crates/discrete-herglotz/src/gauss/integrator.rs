@@ -1,8 +1,8 @@
 //! Contact Gauss collocation as an integrator.
 
-use super::clocked::OwnClock;
-use super::{ClockedStepper, GaussStepper, MOST};
-use crate::{Facts, InLanes, InputError, Integrator, Problem, Stepper, Wants};
+use super::transformed::OwnTransformation;
+use super::{GaussStepper, MAX_STAGES, TransformedStepper};
+use crate::{BatchKernel, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
 
 /// Contact [`Gauss`](crate::Gauss) collocation with 1 to 16 stages, of order twice their number, for every regular Lagrangian.
@@ -12,34 +12,34 @@ pub struct GaussCollocation {
     pub stages: usize,
 }
 
-/// The same with steps that are equal in the time of the clock which an autonomous Lagrangian states: short where its motion is fast, and the
+/// The same with steps that are equal in the transformed time that an autonomous Lagrangian states: short where its motion is fast, and the
 /// last one shorter, so that it ends where the span does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ClockedGauss {
+pub struct TransformedGauss {
     /// The number of stages.
     pub stages: usize,
 }
 
 /// Of either.
-pub(crate) fn facts(stages: usize, by_clock: bool) -> Facts {
-    Facts {
-        name: format!("{}gauss_{stages}", if by_clock { "clocked_" } else { "" }).into(),
+pub(crate) fn info(stages: usize, in_transformed_time: bool) -> MethodInfo {
+    MethodInfo {
+        name: format!("{}gauss_{stages}", if in_transformed_time { "transformed_" } else { "" }).into(),
         order: 2 * stages as u32,
         symmetric: true,
         explicit: false,
         exact_rate: false,
-        by_clock,
+        in_transformed_time,
         collocation: Some(stages),
         substeps: false,
         divides: false,
-        price: 1,
+        cost_per_evaluation: 1,
         source: "Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3, doi:10.1007/3-540-30666-8"
             .into(),
     }
 }
 
 fn check_stages(stages: usize) -> Result<(), InputError> {
-    if (1..=MOST).contains(&stages) { Ok(()) } else { Err(InputError::Stages { found: stages }) }
+    if (1..=MAX_STAGES).contains(&stages) { Ok(()) } else { Err(InputError::Stages { found: stages }) }
 }
 
 fn check_step(stages: usize, h: f64) -> Result<(), InputError> {
@@ -53,7 +53,7 @@ impl GaussCollocation {
         self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        Wants { action, watched }: Wants,
+        StepperOptions { action, watched }: StepperOptions,
     ) -> Result<GaussStepper<'a, L, N>, InputError> {
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
         check_step(self.stages, h)?;
@@ -62,22 +62,30 @@ impl GaussCollocation {
     }
 }
 
-impl ClockedGauss {
-    /// A stepper by the Lagrangian's own clock.
+impl TransformedGauss {
+    /// A stepper by the Lagrangian's own time transformation.
     pub(crate) fn run<'a, L: Lagrangian<N>, const N: usize>(
         self,
         problem: &Problem<'a, L, N>,
         h: f64,
-    ) -> Result<ClockedStepper<'a, L, OwnClock<'a, L>, N>, InputError> {
+    ) -> Result<TransformedStepper<'a, L, OwnTransformation<'a, L>, N>, InputError> {
         let Problem { lagrangian, t0, start, state, structure, .. } = *problem;
         check_step(self.stages, h)?;
-        ClockedStepper::new(lagrangian, (self.stages, h), OwnClock(lagrangian), Some(structure), t0, state, start.v)
+        TransformedStepper::new(
+            lagrangian,
+            (self.stages, h),
+            OwnTransformation(lagrangian),
+            Some(structure),
+            t0,
+            state,
+            start.v,
+        )
     }
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussCollocation {
-    fn facts(&self) -> Facts {
-        facts(self.stages, false)
+    fn info(&self) -> MethodInfo {
+        info(self.stages, false)
     }
 
     fn check(&self, _lagrangian: &L) -> Result<(), InputError> {
@@ -88,34 +96,43 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussColloca
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        wants: Wants,
+        wants: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         Ok(Box::new(self.run(problem, h, wants)?))
     }
 
-    fn in_lanes(&self) -> Option<InLanes> {
-        Some(InLanes::Gauss(*self))
+    fn batch_kernel(&self) -> Option<BatchKernel> {
+        Some(BatchKernel::Gauss(*self))
     }
 }
 
-impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for ClockedGauss {
-    fn facts(&self) -> Facts {
-        facts(self.stages, true)
+impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedGauss {
+    fn info(&self) -> MethodInfo {
+        info(self.stages, true)
     }
 
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
         check_stages(self.stages)?;
-        if const { !L::HAS_CLOCK } {
+        if const { !L::HAS_TIME_TRANSFORMATION } {
             return Err(InputError::Hypothesis {
-                hypothesis: "a Lagrangian that states a clock (`HAS_CLOCK`, `clock_rate`)",
+                hypothesis: "a Lagrangian that states a time transformation (`HAS_TIME_TRANSFORMATION`, `dt_dtau`)",
             });
         }
         if lagrangian.structure().autonomous { Ok(()) } else { Err(InputError::Unclaimed { claim: "autonomous" }) }
     }
 
-    fn stepper(&self, problem: &Problem<'a, L, N>, h: f64, _: Wants) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    fn stepper(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        _: StepperOptions,
+    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         Integrator::<'a, L, N>::check(self, problem.lagrangian)?;
-        // Compiled only where there is a clock; the check has refused the rest.
-        if const { L::HAS_CLOCK } { Ok(Box::new(self.run(problem, h)?)) } else { Err(InputError::NoIntegrator) }
+        // Compiled only where there is a time transformation; the check has refused the rest.
+        if const { L::HAS_TIME_TRANSFORMATION } {
+            Ok(Box::new(self.run(problem, h)?))
+        } else {
+            Err(InputError::NoIntegrator)
+        }
     }
 }

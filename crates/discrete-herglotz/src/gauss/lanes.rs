@@ -93,7 +93,7 @@ impl<S: Simd> Lanes<S> {
     }
 
     #[inline(always)]
-    pub fn largest(self) -> f64 {
+    pub fn max_abs_or_nan(self) -> f64 {
         token::<S>().reduce_max_f64s(self.0)
     }
 
@@ -115,7 +115,7 @@ impl<S: Simd> Lanes<S> {
     /// Whether all lanes are within the range of the argument reduction.
     #[inline(always)]
     fn reducible(self) -> bool {
-        self.abs().largest() < REDUCIBLE
+        self.abs().max_abs_or_nan() < REDUCIBLE
     }
 }
 

@@ -1,7 +1,7 @@
 //! Steps of contact Gauss collocation for a linear motion: one matrix, made once.
 
-use super::coefficients::MOST;
-use super::compensated::{Compensated, Twofold};
+use super::coefficients::MAX_STAGES;
+use super::compensated::{CompensatedSum, Unevaluated};
 use super::condensed::Condensed;
 use super::dense::StepStart;
 use super::double_double::solve_exactly;
@@ -15,7 +15,7 @@ use std::array::from_fn;
 /// The change of the action, a polynomial of degree two in the velocity and the position from a place, beside `grow z`. The place is the equilibrium, if
 /// there is one: elsewhere the terms of a motion that comes to rest would cancel, and leave their rounding.
 struct Action<const N: usize> {
-    place: SVector<f64, N>,
+    stage_positions: SVector<f64, N>,
     qq: SMatrix<f64, N, N>,
     qv: SMatrix<f64, N, N>,
     vv: SMatrix<f64, N, N>,
@@ -26,29 +26,30 @@ struct Action<const N: usize> {
 
 /// The state of a linear motion and the affine map that advances it, as changes: `q1 - q0`, `v1 - v0`.
 pub(super) struct Linear<const N: usize> {
-    qq: [[Twofold; N]; N],
-    qv: [[Twofold; N]; N],
-    vq: [[Twofold; N]; N],
-    vv: [[Twofold; N]; N],
-    shift_q: [Twofold; N],
-    shift_v: [Twofold; N],
-    grow: Twofold,
+    qq: [[Unevaluated; N]; N],
+    qv: [[Unevaluated; N]; N],
+    vq: [[Unevaluated; N]; N],
+    vv: [[Unevaluated; N]; N],
+    shift_q: [Unevaluated; N],
+    shift_v: [Unevaluated; N],
+    grow: Unevaluated,
     action: Option<Action<N>>,
     /// The accelerations of the stages, row `i N + d`, as affine functions of (q0, v0): for dense output.
     stages: Vec<Vec<f64>>,
-    pub q: [Compensated; N],
-    pub v: [Compensated; N],
-    pub z: Compensated,
+    pub q: [CompensatedSum; N],
+    pub v: [CompensatedSum; N],
+    pub z: CompensatedSum,
 }
 
 /// Where a force that is linear in the positions vanishes, from its slope and its value at the origin; the origin where there is no such place, or more than one.
 fn equilibrium<const N: usize>(slope: &SMatrix<f64, N, N>, at_origin: &SVector<f64, N>) -> SVector<f64, N> {
-    let mut place = -at_origin;
-    if place.iter().all(|x| *x == 0.0) {
+    let mut stage_positions = -at_origin;
+    if stage_positions.iter().all(|x| *x == 0.0) {
         return SVector::zeros();
     }
-    let solved = linear::solve(&mut slope.clone(), &mut place).is_ok() && place.iter().all(|x| x.is_finite());
-    if solved { place } else { SVector::zeros() }
+    let solved = linear::solve(&mut slope.clone(), &mut stage_positions).is_ok()
+        && stage_positions.iter().all(|x| x.is_finite());
+    if solved { stage_positions } else { SVector::zeros() }
 }
 
 impl<const N: usize> Linear<N> {
@@ -68,8 +69,8 @@ impl<const N: usize> Linear<N> {
         let at_origin = lagrangian.gradient(t, &origin);
         let (slope, constant) = (inverse_mass * qq, inverse_mass * at_origin.x);
         let unit = |d: usize, e: usize, x: Quad| if d == e { x } else { zero };
-        let place = equilibrium(&qq, &at_origin.x);
-        let there = VelocityPoint { q: place, v: SVector::zeros(), z: 0.0 };
+        let stage_positions = equilibrium(&qq, &at_origin.x);
+        let there = VelocityPoint { q: stage_positions, v: SVector::zeros(), z: 0.0 };
         let at_place = lagrangian.gradient(t, &there);
         let constant_at_place = inverse_mass * at_place.x;
         // The stages' accelerations: rows (i, d), a_id - sum slope B a = slope (q0 + u v0) + f; as right-hand sides the unit
@@ -105,7 +106,7 @@ impl<const N: usize> Linear<N> {
             };
             let velocity =
                 |i: usize, d: usize, side: usize| unit(side, N + d, exact.inverse_rho[i]) + sum(&exact.d[i], d, side);
-            let rest = lagrangian.value(t, &place, &origin.v, 0.0);
+            let rest = lagrangian.value(t, &stage_positions, &origin.v, 0.0);
             let form = |a: usize, b: usize| {
                 (0..s).fold(0.0, |total, i| {
                     let x = |side: usize| SVector::<f64, N>::from_fn(|d, _| position(i, d, side).0);
@@ -120,7 +121,7 @@ impl<const N: usize> Linear<N> {
                 })
             };
             Action {
-                place,
+                stage_positions,
                 qq: SMatrix::from_fn(&form),
                 qv: SMatrix::from_fn(|a, b| 2.0 * form(a, N + b)),
                 vv: SMatrix::from_fn(|a, b| form(N + a, N + b)),
@@ -184,7 +185,7 @@ impl<const N: usize> Linear<N> {
     fn step(&mut self) {
         let (q, v) = (self.q, self.v);
         if let Some(action) = &self.action {
-            let (q, v) = (SVector::from(q.map(|q| q.value)) - action.place, v.map(|v| v.value));
+            let (q, v) = (SVector::from(q.map(|q| q.value)) - action.stage_positions, v.map(|v| v.value));
             let mut change = action.constant;
             for i in 0..N {
                 let (mut of_q, mut of_v) = (action.q[i], action.v[i]);
@@ -194,10 +195,10 @@ impl<const N: usize> Linear<N> {
                 }
                 change += of_q * q[i] + of_v * v[i];
             }
-            self.z.add(Twofold { head: change, tail: 0.0 } + self.grow * self.z.value);
+            self.z.add(Unevaluated { head: change, tail: 0.0 } + self.grow * self.z.value);
         }
         for i in 0..N {
-            let row = |of_q: &[Twofold; N], of_v: &[Twofold; N], shift: Twofold| {
+            let row = |of_q: &[Unevaluated; N], of_v: &[Unevaluated; N], shift: Unevaluated| {
                 (0..N).fold(shift, |sum, j| sum.plus(of_q[j].times(q[j]).plus(of_v[j].times(v[j]))))
             };
             self.q[i].add(row(&self.qq[i], &self.qv[i], self.shift_q[i]));
@@ -211,7 +212,7 @@ impl<const N: usize> Linear<N> {
     }
 
     /// The accelerations of the stages of the step from a position and a velocity.
-    pub fn accelerations(&self, q: &[f64; N], v: &[f64; N]) -> [[f64; MOST]; N] {
+    pub fn accelerations(&self, q: &[f64; N], v: &[f64; N]) -> [[f64; MAX_STAGES]; N] {
         let side = |k: usize| {
             if k < N {
                 q[k]

@@ -1,14 +1,14 @@
 //! Contact Gauss collocation.
 
-mod account;
-mod beginning;
-mod clocked;
 pub(crate) mod coefficients;
 mod compensated;
 pub(crate) mod condensed;
+mod consistent_start;
 mod damping;
+mod defect_sample;
 mod dense;
 mod double_double;
+mod fixed_point;
 mod general;
 mod general_evaluation;
 mod general_saved;
@@ -18,10 +18,10 @@ pub(crate) mod instructions;
 mod integrator;
 pub(crate) mod lanes;
 mod linear;
-mod look;
 mod mass;
 mod modes;
 mod pair;
+mod parametrization;
 mod position_newton;
 pub(crate) mod resolution;
 mod separable;
@@ -31,25 +31,25 @@ mod stage_equations;
 mod stage_values;
 mod stages;
 mod stepper;
-mod sweeps;
 mod table;
-mod time_transformation;
+mod transformed;
+mod work_summary;
 
-pub use clocked::ClockedStepper;
+pub(crate) use defect_sample::{DefectSample, SAMPLE_SETS, UNDERFLOWN};
 pub use dense::DenseStep;
 pub(crate) use dense::StepStart;
-pub(crate) use integrator::facts;
-pub use integrator::{ClockedGauss, GaussCollocation};
-pub(crate) use look::{Look, SETS, UNDERFLOWN};
-pub(crate) use stepper::FEW;
+pub(crate) use integrator::info;
+pub use integrator::{GaussCollocation, TransformedGauss};
+pub(crate) use stepper::FEW_STAGES;
 pub use stepper::{GaussRoute, GaussStepper};
+pub use transformed::TransformedStepper;
 
-use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
-pub(crate) use coefficients::MOST;
+use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
+pub(crate) use coefficients::MAX_STAGES;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    Clock, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Triple,
-    seed,
+    ChartVector, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet,
+    TimeTransformation, seed,
 };
 use stage_equations::{Given, Products, StageEquations, Workspace};
 
@@ -83,7 +83,7 @@ pub struct Gauss<L> {
 
 impl<L> Gauss<L> {
     /// The largest number of stages.
-    pub const STAGES: usize = MOST;
+    pub const STAGES: usize = MAX_STAGES;
 
     /// The method with `stages` from 1 to 16 and the time step `h`.
     ///
@@ -93,7 +93,7 @@ impl<L> Gauss<L> {
     where
         L: Lagrangian<N>,
     {
-        if !(1..=MOST).contains(&stages) {
+        if !(1..=MAX_STAGES).contains(&stages) {
             return Err(InputError::Stages { found: stages });
         }
         if !(h != 0.0 && h.is_finite()) {
@@ -144,23 +144,31 @@ impl<L> Gauss<L> {
     }
 
     /// A stepper of variable steps from a state at a time, for autonomous Lagrangians: the method's step is one of the time tau
-    /// of a clock, `dt = g(q) dtau`. `guess` is a guess of the velocity at the start, from which it is found.
+    /// of a time transformation, `dt = g(q) dtau`. `guess` is a guess of the velocity at the start, from which it is found.
     ///
     /// # Errors
     /// Those of [`stepper`](Self::stepper); [`InputError::Unclaimed`] where the Lagrangian does not claim to be autonomous;
-    /// [`InputError::Clock`] where the clock's rate at the start is not positive and finite.
-    pub fn clocked_stepper<const N: usize, C>(
+    /// [`InputError::TimeTransformation`] where the rate dt/dtau at the start is not positive and finite.
+    pub fn transformed_stepper<const N: usize, C>(
         &self,
-        clock: C,
+        transformation: C,
         t0: f64,
         state: PhasePoint<N>,
         guess: SVector<f64, N>,
-    ) -> Result<ClockedStepper<'_, L, C, N>, InputError>
+    ) -> Result<TransformedStepper<'_, L, C, N>, InputError>
     where
         L: Lagrangian<N>,
-        C: Clock<N>,
+        C: TimeTransformation<N>,
     {
-        ClockedStepper::new(&self.lagrangian, (self.forward.s, self.forward.h), clock, None, t0, state, guess)
+        TransformedStepper::new(
+            &self.lagrangian,
+            (self.forward.s, self.forward.h),
+            transformation,
+            None,
+            t0,
+            state,
+            guess,
+        )
     }
 
     /// The stage equations of a step forward or backward in time.
@@ -176,7 +184,7 @@ impl<L> Gauss<L> {
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         forward: bool,
-    ) -> Result<Transition<N>, StepError>
+    ) -> Result<DiscreteStep<N>, StepError>
     where
         L: Lagrangian<N>,
     {
@@ -187,7 +195,7 @@ impl<L> Gauss<L> {
         let Workspace { x, l, .. } = &work;
         let end = equations.end(&given, x, l);
         let velocity = (0..self.stages()).fold(SVector::zeros(), |sum, j| sum + x.v[j] * self.forward.weight(j));
-        Transition {
+        DiscreteStep {
             end: PhasePoint { q: end.q, p: end.p, z: from.z + end.action },
             velocity,
             sigma: if forward { 1.0 / end.rho } else { end.rho },
@@ -235,7 +243,7 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Gauss<L> {
     /// By the derivatives of the step, from one linear system: the nested duals of [`value`](Self::value) are not needed.
     fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
         let (plain, mut work) = self.between(t, x)?;
-        let x: DiscretePoint<N, Dual<f64, Triple<N>>> = seed(&Triple::from(*x)).into();
+        let x: DiscretePoint<N, Dual<f64, ChartVector<N>>> = seed(&ChartVector::from(*x)).into();
         let given = Given::Ends { q0: x.q0, q1: x.q1, z0: x.z0 };
         let end = self.equations(t, true).lifted_end(&given, &plain, &mut work)?;
         let sigma = end.rho.recip();
@@ -259,7 +267,7 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Gauss<L> {
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         _solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         self.transition(t, from, guess, true)
     }
 
@@ -270,7 +278,7 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Gauss<L> {
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         _solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         self.transition(t + self.forward.h, from, guess, false)
     }
 }

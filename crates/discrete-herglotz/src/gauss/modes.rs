@@ -1,6 +1,6 @@
 //! The modes of Gauss collocation: coordinates of the stages in which it integrates each by itself.
 
-use super::coefficients::{Coefficients, MOST, POLYNOMIALS};
+use super::coefficients::{Coefficients, MAX_STAGES, POLYNOMIALS};
 use super::stages::{StageMap, Stages};
 use crate::gauss::lanes::Lanes;
 use contact_geom::legendre_polynomials;
@@ -35,14 +35,15 @@ pub(super) struct Mode {
 impl Modes {
     /// The modes for a number of stages from 1 to 16, made once.
     pub fn of(s: usize) -> &'static Modes {
-        static MODES: [OnceLock<Box<Modes>>; MOST] = [const { OnceLock::new() }; MOST];
-        MODES[s.clamp(1, MOST) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MOST))))
+        static MODES: [OnceLock<Box<Modes>>; MAX_STAGES] = [const { OnceLock::new() }; MAX_STAGES];
+        MODES[s.clamp(1, MAX_STAGES) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MAX_STAGES))))
     }
 
     fn new(s: usize) -> Self {
         let g = Coefficients::of(s);
         let at = g.c.map(|c| legendre_polynomials::<_, POLYNOMIALS>(s, c + c - Quad::one()));
-        let (mut modes, mut into, mut back) = (Vec::with_capacity(s), [[0.0; MOST]; MOST], [[0.0; MOST]; MOST]);
+        let (mut modes, mut into, mut back) =
+            (Vec::with_capacity(s), [[0.0; MAX_STAGES]; MAX_STAGES], [[0.0; MAX_STAGES]; MAX_STAGES]);
         let mut place = 0;
         for guess in eigenvalues(s).into_iter().filter(|value| value.im >= -1e-9 * value.re) {
             let (value, x) = eigenvector(s, guess);
@@ -122,13 +123,13 @@ fn eigenvalues(s: usize) -> Vec<Complex<f64>> {
 
 /// An eigenvalue of A from a guess with its eigenvector, in the Legendre polynomials; in twice the working precision, since the
 /// eigenvectors are nearly dependent for many stages.
-fn eigenvector(s: usize, guess: Complex<f64>) -> (Complex<Quad>, [Complex<Quad>; MOST + 1]) {
+fn eigenvector(s: usize, guess: Complex<f64>) -> (Complex<Quad>, [Complex<Quad>; MAX_STAGES + 1]) {
     let half = Complex::new(Quad::from(0.5), Quad::zero());
     let mut value = Complex::new(Quad::from(guess.re), Quad::from(guess.im));
-    let mut x = [Complex::zero(); MOST + 1];
+    let mut x = [Complex::zero(); MAX_STAGES + 1];
     // Newton's method on the last row: quadratic, from six digits.
     for _ in 0..6 {
-        let mut slope = [Complex::<Quad>::zero(); MOST + 1];
+        let mut slope = [Complex::<Quad>::zero(); MAX_STAGES + 1];
         x[0] = Complex::one();
         for k in 0..s {
             let (below, slope_below) = if k == 0 {
@@ -155,11 +156,11 @@ mod tests {
     /// maps, whose product is up to 1e8 and leaves to Newton's iteration seven digits in each sweep.
     #[test]
     fn modes_are_those_of_the_collocation() {
-        for s in 1..=MOST {
+        for s in 1..=MAX_STAGES {
             let (a, modes) = (&Coefficients::of(s).a, Modes::of(s));
-            let largest =
+            let max_abs_or_nan =
                 |map: &StageMap| map.0[..s].iter().flat_map(|c| &c.0[..s]).fold(0.0, |m: f64, e| m.max(e.abs()));
-            let bound = 1e3 * f64::EPSILON * (1.0 + largest(&modes.into) * largest(&modes.back));
+            let bound = 1e3 * f64::EPSILON * (1.0 + max_abs_or_nan(&modes.into) * max_abs_or_nan(&modes.back));
             for k in 0..s {
                 let mut x = Stages(from_fn(|i| if i == k { 1.0 } else { 0.0 }));
                 modes.enter::<pulp::Scalar>(&mut x);

@@ -1,6 +1,6 @@
 //! Several registers as one number.
 
-use super::coefficients::MOST;
+use super::coefficients::MAX_STAGES;
 use super::lanes::{Lanes, note_branch};
 use super::stages::Stages;
 use contact_geom::{Scalar, scalar_operators};
@@ -36,7 +36,7 @@ pub(crate) const fn by_two<S: Simd>() -> bool {
 
 /// Whether they are over four: where there may be as many.
 pub(crate) const fn by_four<S: Simd>() -> bool {
-    by_two::<S>() && 4 * S::F64_LANES <= MOST
+    by_two::<S>() && 4 * S::F64_LANES <= MAX_STAGES
 }
 
 impl<S: Simd> Registers<S> for Lanes<S> {

@@ -6,7 +6,7 @@ use crate::StepError;
 use crate::rules::step_equations::BLOCK;
 use crate::solve::DenseLu;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, KernelDual, Lagrangian, VelocityPoint, largest};
+use contact_geom::{Derivatives, KernelDual, Lagrangian, VelocityPoint, max_abs_or_nan};
 
 /// Solves `Q = q0 + u v0 + B a`, `a_i = M^-1 L_q(t_i, Q_i)`, for the positions Q of the stages: `s N` unknowns, of which a correction is
 /// `(1 - B a')^-1` times the residual. Made once for a run, so that no step allocates.
@@ -214,7 +214,7 @@ impl<const N: usize> PositionNewton<N> {
     /// The largest coordinate of the last iterate, and the largest distance from the start along one.
     fn extents(&self, start: &SVector<f64, N>) -> (f64, f64) {
         let of = |f: &dyn Fn(&SVector<f64, N>) -> SVector<f64, N>| {
-            largest(self.trial.iter().map(|x| largest(f(x).iter().copied())))
+            max_abs_or_nan(self.trial.iter().map(|x| max_abs_or_nan(f(x).iter().copied())))
         };
         (of(&|x| *x), of(&|x| x - start))
     }
@@ -222,7 +222,7 @@ impl<const N: usize> PositionNewton<N> {
 
 /// The largest component.
 fn extent(x: &[f64]) -> f64 {
-    largest(x.iter().copied())
+    max_abs_or_nan(x.iter().copied())
 }
 
 #[cfg(test)]
@@ -231,7 +231,7 @@ mod tests {
     use super::super::stage_equations::{Given, StageEquations};
     use super::*;
     use crate::{DiscreteLagrangian, Solver, Stepper};
-    use contact_geom::{PhasePoint, Scalar, Structure, larger};
+    use contact_geom::{PhasePoint, Scalar, Structure, max_or_nan};
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// Two coupled pendulums with masses that are not diagonal, and drag.
@@ -275,7 +275,7 @@ mod tests {
                 for (i, (a, q)) in positions.stages().enumerate() {
                     let force = inverse * work.l[i].d.x;
                     let differences = [q - equations.position(&given, &work.x, i), a - force];
-                    off = larger(off, largest(differences.iter().flatten().copied()));
+                    off = max_or_nan(off, max_abs_or_nan(differences.iter().flatten().copied()));
                 }
                 assert!(off <= 640.0 * f64::EPSILON * 4.0, "s = {s}, h = {h}: {off:e}");
             }

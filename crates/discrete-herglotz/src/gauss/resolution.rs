@@ -3,7 +3,7 @@
 use super::coefficients::Coefficients;
 use super::stages::{Stages, blocks};
 use crate::gauss::lanes::Lanes;
-use contact_geom::larger;
+use contact_geom::max_or_nan;
 use pulp::Simd;
 
 /// The relative error of `sigma_d` in a step from which on the step does not resolve the drag: a tenth. Gauss' method with one
@@ -46,7 +46,7 @@ impl Tail {
     /// polynomial. `time` turns them to lengths that are compared with the positions. Up to two stages do not tell: a step is then no
     /// worse than its order. All must be finite.
     #[inline(always)]
-    pub fn misfit<S: Simd, const N: usize>(
+    pub fn defect<S: Simd, const N: usize>(
         &self,
         values: &[Stages; N],
         factor: Option<&Stages>,
@@ -69,8 +69,8 @@ impl Tail {
                 size = size.max(value.abs());
                 width = width.max(x.block(r).abs());
             }
-            tail = larger(tail, last.sum().abs());
+            tail = max_or_nan(tail, last.sum().abs());
         }
-        if tail * time > MOVED * width.largest() { tail / (TAIL * size.largest()) } else { 0.0 }
+        if tail * time > MOVED * width.max_abs_or_nan() { tail / (TAIL * size.max_abs_or_nan()) } else { 0.0 }
     }
 }

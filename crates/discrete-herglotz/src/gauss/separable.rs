@@ -3,8 +3,9 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use super::compensated::{Compensated, Twofold, add, finite};
+use super::compensated::{CompensatedSum, Unevaluated, add, finite};
 use super::condensed::{Condensed, Preconditioned};
+use super::fixed_point::{AGE, FixedPointIteration, IterationOutcome, SLOW};
 use super::instructions::Instructions;
 use super::pair::{Registers, over_registers};
 use super::position_newton::{At, PositionNewton, curvature};
@@ -12,12 +13,11 @@ use super::resolution::{FORETOLD, ROUNDINGS, Tail};
 use super::simplified::SlopeNewton;
 use super::stage_values::StageValues;
 use super::stages::{Stages, blocks};
-use super::sweeps::{AGE, AfterSweep, SLOW, Sweeps};
 use crate::StepError;
 use crate::gauss::lanes::{Lanes, branched, vector};
 use crate::run::saved::{Saved, load_option, save_option, saved};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Lagrangian, VelocityPoint, gradient_rounding, largest};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, gradient_rounding, max_abs_or_nan};
 use pulp::Simd;
 use std::sync::Arc;
 
@@ -56,9 +56,9 @@ pub(super) struct SeparableStages<'a, L, const N: usize> {
     /// `M^-1`; `None` where M is the identity.
     inverse_mass: Option<Box<SMatrix<f64, N, N>>>,
     pub wants_z: bool,
-    pub q: [Compensated; N],
-    pub v: [Compensated; N],
-    pub z: Compensated,
+    pub q: [CompensatedSum; N],
+    pub v: [CompensatedSum; N],
+    pub z: CompensatedSum,
     /// Whether guesses are far from the solution.
     far: bool,
     /// Whether `rest` belongs to the step before.
@@ -66,7 +66,7 @@ pub(super) struct SeparableStages<'a, L, const N: usize> {
     /// Corrects the sweeps where they do not contract by themselves.
     pub newton: Option<Box<SlopeNewton<N>>>,
     /// The same while it is not used.
-    parked: Option<Box<SlopeNewton<N>>>,
+    suspended_newton: Option<Box<SlopeNewton<N>>>,
     /// Solves the steps for which that does not serve; made for the first step that the sweeps do not solve.
     positions: Option<Box<PositionNewton<N>>>,
     /// Whether the stages of the next step are solved, and `rest` is theirs.
@@ -77,7 +77,7 @@ pub(super) struct SeparableStages<'a, L, const N: usize> {
     age: u32,
     tail: Tail,
     /// Above one where the last step has not resolved the motion.
-    pub misfit: f64,
+    pub defect: f64,
     /// Steps since the start, and the one at which the slope of the force is looked at again.
     taken: usize,
     review: usize,
@@ -110,13 +110,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             far: false,
             warm: false,
             newton: None,
-            parked: None,
+            suspended_newton: None,
             positions: None,
             solved: false,
             unforetold: 0,
             age: 0,
             tail,
-            misfit: 0.0,
+            defect: 0.0,
             taken: 0,
             review: 1,
             evaluations: 0,
@@ -143,15 +143,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             let Some(mut left) = self.table.preconditioned(0.0) else { return false };
             left.refine(&self.table);
             self.left = left;
-            self.newton = self.parked.take().or_else(|| Some(Box::new(SlopeNewton::new(&self.table))));
+            self.newton = self.suspended_newton.take().or_else(|| Some(Box::new(SlopeNewton::new(&self.table))));
             self.forget();
         }
         true
     }
 
     /// Takes the sweeps as they are again.
-    pub fn park_newton(&mut self) {
-        self.parked = self.newton.take();
+    pub fn suspend_newton(&mut self) {
+        self.suspended_newton = self.newton.take();
         self.look_again();
     }
 
@@ -229,7 +229,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
 
     /// Takes one step from the time `t`; on failure the state is unchanged.
     #[inline(always)]
-    pub fn step<S: Simd>(&mut self, t: f64) -> AfterSweep {
+    pub fn step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
         if self.warm && self.newton.is_none() && self.taken >= self.review {
             self.review *= 2;
             self.look_again();
@@ -241,7 +241,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         if foretells {
             for d in 0..N {
                 let before = self.rest[d];
-                self.table.ahead.apply(&before, s, &mut self.rest[d], |_| Lanes::<S>::splat(0.0));
+                self.table.extrapolation.apply(&before, s, &mut self.rest[d], |_| Lanes::<S>::splat(0.0));
             }
         } else if !solved {
             self.rest = [Stages::ZERO; N];
@@ -264,7 +264,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         let (mut small, mut again) = (at_once.then_some(weight), true);
         self.far &= !tails;
         // With sweeps ahead changes fall so fast that to leave less costs nothing.
-        let mut sweeps = Sweeps::until(1.0 / 16.0, if const { N == 1 } { 1.0 / 256.0 } else { 1.0 / 64.0 });
+        let mut sweeps =
+            FixedPointIteration::until(1.0 / 16.0, if const { N == 1 } { 1.0 / 256.0 } else { 1.0 / 64.0 });
         // The positions and what the force adds there, of the sweep before.
         let mut before = [Stages::ZERO; 2];
         let outcome = loop {
@@ -286,37 +287,37 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             }
             let [change, size] = most;
             self.evaluations += s as u64;
-            let (mut change, size) = (change.largest(), size.largest());
+            let (mut change, size) = (change.max_abs_or_nan(), size.max_abs_or_nan());
             if solved {
-                break AfterSweep::Done;
+                break IterationOutcome::Done;
             }
             if self.newton.is_some() {
                 (change, sweeps.still) = self.correct();
             }
             match sweeps.judge(change, size) {
-                AfterSweep::Going if tails && change > NEAR * size => (due, self.far) = (true, true),
-                AfterSweep::Going => (again, due) = (again || due, false),
-                AfterSweep::Slow { .. } if self.is_rounding(t, change) => break AfterSweep::Done,
+                IterationOutcome::Continue if tails && change > NEAR * size => (due, self.far) = (true, true),
+                IterationOutcome::Continue => (again, due) = (again || due, false),
+                IterationOutcome::Slow { .. } if self.is_rounding(t, change) => break IterationOutcome::Done,
                 done => break done,
             }
             if const { N == 1 } && self.newton.is_none() {
-                let ahead = sweeps.go_ahead(change / size);
-                self.sweep_ahead::<S>(&mut before, ahead);
+                let extrapolation = sweeps.secant_step(change / size);
+                self.sweep_ahead::<S>(&mut before, extrapolation);
             }
         };
-        if const { N == 1 } && outcome == AfterSweep::Done && sweeps.ends_ahead() {
+        if const { N == 1 } && outcome == IterationOutcome::Done && sweeps.ends_ahead() {
             self.sweep_ahead::<S>(&mut before, true);
             let kappa = Lanes::<S>::splat(self.left.kappa);
             for r in 0..m {
                 self.a[0].set(r, self.rest[0].block::<S>(r) - kappa * self.x[0].block(r));
             }
         }
-        if let (AfterSweep::Done, Some(_)) = (outcome, &self.newton) {
+        if let (IterationOutcome::Done, Some(_)) = (outcome, &self.newton) {
             // Stiff forces magnify the round-off of the positions, and the correction takes it back.
             self.a = self.rest;
         }
-        let outcome = if outcome == AfterSweep::Done { self.finish::<S>(t) } else { outcome };
-        self.warm = outcome == AfterSweep::Done;
+        let outcome = if outcome == IterationOutcome::Done { self.finish::<S>(t) } else { outcome };
+        self.warm = outcome == IterationOutcome::Done;
         if !self.warm {
             // What an iteration leaves that does not contract is worse than nothing.
             self.rest = [Stages::ZERO; N];
@@ -327,16 +328,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         }
         let foretold = sweeps.first() <= FORETOLD && !solved;
         let h = self.table.h;
-        self.misfit = if foretold { 0.0 } else { self.tail.misfit::<S, N>(&self.a, None, &self.x, h * h) };
+        self.defect = if foretold { 0.0 } else { self.tail.defect::<S, N>(&self.a, None, &self.x, h * h) };
         if self.newton.is_some() {
             self.age = self.age.saturating_add(1);
             if sweeps.count() > SLOW && self.age > AGE {
                 self.renew(t);
             }
-            return AfterSweep::Done;
+            return IterationOutcome::Done;
         }
         self.taken += 1;
-        AfterSweep::Done
+        IterationOutcome::Done
     }
 
     /// Takes the forces of one block of stages; what they have changed by most, and the largest of what they consist of, are kept.
@@ -363,7 +364,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
         let x = VelocityPoint { q, v: SVector::zeros(), z: 0.0 };
         let (_, once) = gradient_rounding(self.lagrangian, t + self.table.times.0[i], &x);
         let of_acceleration = self.inverse_mass.as_ref().map_or(once.x, |inverse| inverse.abs() * once.x);
-        change <= ROUNDINGS * largest(of_acceleration.iter().copied())
+        change <= ROUNDINGS * max_abs_or_nan(of_acceleration.iter().copied())
     }
 
     /// Corrects a sweep by Newton's method. Returns the change, and whether the positions have not moved but for their round-off.
@@ -372,7 +373,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
     fn correct(&mut self) -> (f64, bool) {
         let Some(newton) = &mut self.newton else { return (f64::NAN, false) };
         let (change, moved) = newton.correct(Instructions::new(), &mut self.rest);
-        let width = largest(self.x.iter().flat_map(|x| &x.0[..self.table.s]).copied());
+        let width = max_abs_or_nan(self.x.iter().flat_map(|x| &x.0[..self.table.s]).copied());
         (change, moved <= 4.0 * f64::EPSILON * width)
     }
 
@@ -412,9 +413,10 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
 
     /// The end of the step from its accelerations.
     #[inline(always)]
-    fn finish<S: Simd>(&mut self, t: f64) -> AfterSweep {
+    fn finish<S: Simd>(&mut self, t: f64) -> IterationOutcome {
         let (table, s) = (&self.table, self.table.s);
-        let (mut dq, mut dv, mut dz) = ([Twofold::default(); N], [Twofold::default(); N], Twofold::default());
+        let (mut dq, mut dv, mut dz) =
+            ([Unevaluated::default(); N], [Unevaluated::default(); N], Unevaluated::default());
         if self.wants_z {
             dz = table.grow * self.z.value + table.end_v.sum::<S>(&self.action::<S>(t), s);
         }
@@ -424,16 +426,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
             dv[d] = table.end_v.sum::<S>(&self.a[d], s) + table.grow.times(v);
         }
         if branched() {
-            return AfterSweep::Branched;
+            return IterationOutcome::Branched;
         }
         // The largest change over lanes may hide a NaN.
         if !finite(&dq, &dv, dz) {
-            return AfterSweep::NonFinite;
+            return IterationOutcome::NonFinite;
         }
         add(&mut self.q, &dq);
         add(&mut self.v, &dv);
         self.z.add(dz);
-        AfterSweep::Done
+        IterationOutcome::Done
     }
 
     /// `L - gamma z` at the stages.
@@ -450,7 +452,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SeparableStages<'a, L, N> {
 }
 
 saved!([L, const N: usize] SeparableStages<'_, L, N> {
-    rest, x, a, base, q, v, z, far, warm, solved, unforetold, age, misfit, taken, review, evaluations,
+    rest, x, a, base, q, v, z, far, warm, solved, unforetold, age, defect, taken, review, evaluations,
 } and save_solution, load_solution);
 
 impl<L, const N: usize> SeparableStages<'_, L, N> {

@@ -16,7 +16,7 @@ use crate::run::saved::saved;
 use crate::solve::inverse::invert_complex;
 use contact_geom::nalgebra::linalg::try_invert_to;
 use contact_geom::nalgebra::{Complex, SMatrix, SVector};
-use contact_geom::{Hessian, Scalar, Triple, larger};
+use contact_geom::{ChartVector, Hessian, Scalar, max_or_nan};
 use pulp::{Simd, WithSimd};
 
 type Matrix<const N: usize> = SMatrix<Complex<f64>, N, N>;
@@ -99,17 +99,17 @@ impl<const N: usize> WithSimd for CorrectSlope<'_, N> {
                 far = far.max(moved.block::<S>(r).abs());
             }
         }
-        let mut largest = Lanes::<S>::splat(0.0);
+        let mut max_abs_or_nan = Lanes::<S>::splat(0.0);
         for (found, a) in found.iter_mut().zip(a) {
             modes.leave::<S>(found);
             for r in 0..blocks::<S>(*s) {
                 let change = found.block::<S>(r);
-                largest = largest.max(change.abs());
+                max_abs_or_nan = max_abs_or_nan.max(change.abs());
                 found.set(r, a.block::<S>(r) + change);
             }
             *a = *found;
         }
-        (largest.largest(), far.largest())
+        (max_abs_or_nan.max_abs_or_nan(), far.max_abs_or_nan())
     }
 }
 
@@ -140,7 +140,7 @@ struct Block<const N: usize> {
 
 impl<const N: usize> Block<N> {
     /// `None` where it is singular.
-    fn new(mu: Complex<f64>, g: &Triple<N>, hessian: &Hessian<N>) -> Option<Self> {
+    fn new(mu: Complex<f64>, g: &ChartVector<N>, hessian: &Hessian<N>) -> Option<Self> {
         let Hessian { qq, qv, vv, qz, vz, zz } = hessian;
         let with = |at: &SVector<f64, N>, slope: &SVector<f64, N>, factor: Complex<f64>| {
             Vector::<N>::from_fn(|d, _| factor * slope[d] + at[d])
@@ -175,7 +175,7 @@ impl<const N: usize> StageNewton<N> {
     }
 
     /// Takes the derivatives at another point; `false` where a mode's matrix is singular.
-    pub fn factorise(&mut self, gradient: &Triple<N>, hessian: &Hessian<N>) -> bool {
+    pub fn factorise(&mut self, gradient: &ChartVector<N>, hessian: &Hessian<N>) -> bool {
         self.blocks.clear();
         for mode in self.modes.iter() {
             match Block::new(mode.value * self.h, gradient, hessian) {
@@ -221,7 +221,7 @@ pub(super) struct CorrectStages<'a, const N: usize> {
     pub v: &'a mut [Stages; N],
     pub z: &'a mut Stages,
     /// `1 - rho`.
-    pub falling: &'a mut Stages,
+    pub one_minus_rho_stages: &'a mut Stages,
     /// The velocities with the weights, and the positions.
     pub moved: &'a mut [Stages; N],
     pub x: &'a mut [Stages; N],
@@ -233,7 +233,20 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> (f64, f64) {
-        let CorrectStages { newton, table, start: (q0, p0, z0), l_v, l, force, rate, v, z, falling, moved, x } = self;
+        let CorrectStages {
+            newton,
+            table,
+            start: (q0, p0, z0),
+            l_v,
+            l,
+            force,
+            rate,
+            v,
+            z,
+            one_minus_rho_stages,
+            moved,
+            x,
+        } = self;
         let (s, m) = (table.s, blocks::<S>(table.s));
         let (zero, one) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(1.0));
         let (mut dv, mut dz, mut drho) = ([Stages::ZERO; N], Stages::ZERO, Stages::ZERO);
@@ -243,13 +256,13 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
             table.m.apply(&force[d], s, &mut dv[d], |_| Lanes::<S>::splat(p0[d]));
         }
         for r in 0..m {
-            let falling = falling.block::<S>(r);
-            let inverse = (one - falling).recip();
-            drho.set(r, falling - drho.block::<S>(r));
+            let one_minus_rho_stages = one_minus_rho_stages.block::<S>(r);
+            let inverse = (one - one_minus_rho_stages).recip();
+            drho.set(r, one_minus_rho_stages - drho.block::<S>(r));
             dz.set(r, dz.block::<S>(r) - z.block(r));
             for d in 0..N {
                 let l_v = l_v[d].block::<S>(r);
-                dv[d].set(r, l_v.mul_add(falling, dv[d].block::<S>(r) - l_v) * inverse);
+                dv[d].set(r, l_v.mul_add(one_minus_rho_stages, dv[d].block::<S>(r) - l_v) * inverse);
             }
         }
         newton.solve::<S>(&mut dv, &mut dz, &mut drho);
@@ -257,10 +270,10 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
             drho.set(r, -drho.block::<S>(r));
         }
         // Factors are compared with 1.
-        let mut largest = [[zero, zero], [zero, zero], [zero, one]];
+        let mut max_abs_or_nan = [[zero, zero], [zero, zero], [zero, one]];
         let velocities = v.iter_mut().zip(&dv).map(|(v, dv)| (v, dv, 0));
-        for (to, change, kind) in velocities.chain([(z, &dz, 1), (falling, &drho, 2)]) {
-            let [of_change, size] = &mut largest[kind];
+        for (to, change, kind) in velocities.chain([(z, &dz, 1), (one_minus_rho_stages, &drho, 2)]) {
+            let [of_change, size] = &mut max_abs_or_nan[kind];
             for r in 0..m {
                 let change = change.block::<S>(r);
                 let sum = to.block::<S>(r) + change;
@@ -283,11 +296,11 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
             }
         }
         let mut change = 0.0;
-        for [of_change, size] in &largest {
-            let (of_change, size) = (of_change.largest(), size.largest());
-            change = larger(change, if of_change > 0.0 { of_change / size } else { of_change });
+        for [of_change, size] in &max_abs_or_nan {
+            let (of_change, size) = (of_change.max_abs_or_nan(), size.max_abs_or_nan());
+            change = max_or_nan(change, if of_change > 0.0 { of_change / size } else { of_change });
         }
-        (change, far.largest() / position.largest())
+        (change, far.max_abs_or_nan() / position.max_abs_or_nan())
     }
 }
 

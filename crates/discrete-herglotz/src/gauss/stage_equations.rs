@@ -2,14 +2,16 @@
 //! discrete Lagrangian. Of constant mass and constant rate [`PositionNewton`](super::position_newton::PositionNewton) has fewer
 //! unknowns.
 
-use super::coefficients::{Coefficients, MOST};
+use super::coefficients::{Coefficients, MAX_STAGES};
 use super::damping::{Damping, ITERATIONS, Verdict, chances};
 use crate::rules::step_equations::BLOCK;
 use crate::solve::DenseLu;
 use crate::solve::inverse::inverse;
 use crate::{ITERATION_LIMIT, StepError};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::{Derivatives, Dual, Hessian, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, seed};
+use contact_geom::{
+    ChartVector, Derivatives, Dual, Hessian, Lagrangian, PhasePoint, Scalar, VelocityPoint, max_or_nan, seed,
+};
 use std::array::from_fn;
 
 /// The products of the coefficients with a step, which may be negative.
@@ -17,9 +19,9 @@ use std::array::from_fn;
 pub(super) struct Products {
     pub s: usize,
     pub h: f64,
-    a: [[f64; MOST]; MOST],
-    b: [f64; MOST],
-    c: [f64; MOST],
+    a: [[f64; MAX_STAGES]; MAX_STAGES],
+    b: [f64; MAX_STAGES],
+    c: [f64; MAX_STAGES],
 }
 
 impl Products {
@@ -66,7 +68,7 @@ impl<const N: usize> StageUnknowns<N, f64> {
     /// The largest factor over the smallest, the start's 1 included: momenta are sums of terms with all of them, divided by
     /// one, and their round-off grows with this.
     fn spread(&self) -> f64 {
-        let over = |f: &dyn Fn(f64) -> f64| self.rho.iter().fold(1.0, |m, r| larger(m, f(*r)));
+        let over = |f: &dyn Fn(f64) -> f64| self.rho.iter().fold(1.0, |m, r| max_or_nan(m, f(*r)));
         over(&|r| r.abs()) * over(&|r| 1.0 / r.abs())
     }
 
@@ -104,7 +106,7 @@ pub(super) struct Workspace<const N: usize> {
     /// The guess, then the solution.
     pub x: StageUnknowns<N, f64>,
     /// L and its gradient at the stages of the solution.
-    pub l: Vec<Dual<f64, Triple<N>>>,
+    pub l: Vec<Dual<f64, ChartVector<N>>>,
     /// The last iterate, from which the solution is tried.
     from: StageUnknowns<N, f64>,
     jacobian: DMatrix<f64>,
@@ -135,7 +137,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
     }
 
     /// L and its gradient at the stages.
-    fn stages<T: Scalar>(&self, given: &Given<N, T>, x: &StageUnknowns<N, T>, l: &mut Vec<Dual<T, Triple<N, T>>>) {
+    fn stages<T: Scalar>(&self, given: &Given<N, T>, x: &StageUnknowns<N, T>, l: &mut Vec<Dual<T, ChartVector<N, T>>>) {
         l.clear();
         l.extend((0..self.products.s).map(|i| {
             let y = VelocityPoint { q: self.position(given, x, i), v: x.v[i], z: x.z[i] };
@@ -145,7 +147,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                 let (re, d) = self.lagrangian.with_gradient(t, &y);
                 return Dual { re, d };
             }
-            self.lagrangian.along(t, &seed(&Triple::from(y)).into())
+            self.lagrangian.along(t, &seed(&ChartVector::from(y)).into())
         }));
     }
 
@@ -172,7 +174,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         &self,
         given: &Given<N, T>,
         x: &StageUnknowns<N, T>,
-        l: &[Dual<T, Triple<N, T>>],
+        l: &[Dual<T, ChartVector<N, T>>],
         out: &mut DVector<T>,
     ) {
         let Products { s, a, b, .. } = self.products;
@@ -209,7 +211,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         &self,
         given: &Given<N, f64>,
         x: &StageUnknowns<N, f64>,
-        l: &[Dual<f64, Triple<N>>],
+        l: &[Dual<f64, ChartVector<N>>],
         out: &mut DMatrix<f64>,
     ) {
         let Products { s, a, b, c, .. } = self.products;
@@ -220,7 +222,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             let y = VelocityPoint { q: self.position(given, x, k), v: x.v[k], z: x.z[k] };
             let Hessian { qq, qv, vv, qz, vz, zz } = &self.lagrangian.hessian(self.t + c[k], &y);
             let (rho, g) = (x.rho[k], &l[k].d);
-            let weights: [f64; MOST] = from_fn(|i| a[i][k]);
+            let weights: [f64; MAX_STAGES] = from_fn(|i| a[i][k]);
             // What stage k adds to the equations of stage i, through its own velocity, action and factor.
             for i in 0..s {
                 let (own, w) = (if i == k { 1.0 } else { 0.0 }, a[i][k]);
@@ -289,7 +291,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
 
     /// The size of a correction: the largest, each in units of the largest of its kind. The momenta `L_v` of the stages are of the kind of
     /// that of the start, which vanishes where a motion starts at rest.
-    fn size<T: Scalar>(&self, x: &StageUnknowns<N, T>, l: &[Dual<T, Triple<N, T>>], change: &DVector<T>) -> f64 {
+    fn size<T: Scalar>(&self, x: &StageUnknowns<N, T>, l: &[Dual<T, ChartVector<N, T>>], change: &DVector<T>) -> f64 {
         let s = self.products.s;
         let mut worst = 0.0f64;
         let mut see = |change: f64, size: f64| {
@@ -300,13 +302,13 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
             }
         };
         let of = |range: std::ops::Range<usize>| {
-            change.iter().skip(range.start).take(range.len()).fold(0.0, |m, c| larger(m, c.extent()))
+            change.iter().skip(range.start).take(range.len()).fold(0.0, |m, c| max_or_nan(m, c.extent()))
         };
-        see(of(0..s * N), x.v.iter().flatten().fold(0.0, |m, v| larger(m, v.extent())));
-        see(of(s * N..s * (N + 1)), x.z.iter().fold(0.0, |m, z| larger(m, z.extent())));
-        see(of(s * (N + 1)..s * (N + 2)), x.rho.iter().fold(1.0, |m, r| larger(m, r.extent())));
+        see(of(0..s * N), x.v.iter().flatten().fold(0.0, |m, v| max_or_nan(m, v.extent())));
+        see(of(s * N..s * (N + 1)), x.z.iter().fold(0.0, |m, z| max_or_nan(m, z.extent())));
+        see(of(s * (N + 1)..s * (N + 2)), x.rho.iter().fold(1.0, |m, r| max_or_nan(m, r.extent())));
         let momenta = l.iter().flat_map(|l| l.d.y.iter()).chain(x.p0.iter());
-        see(of(s * (N + 2)..change.len()), momenta.fold(0.0, |m, p| larger(m, p.extent())));
+        see(of(s * (N + 2)..change.len()), momenta.fold(0.0, |m, p| max_or_nan(m, p.extent())));
         worst
     }
 
@@ -357,7 +359,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
                 }
             };
             // With half of the digits at the least. The round-off of a solution grows with the number of unknowns.
-            let round_off = f64::EPSILON * larger(1e3, 8.0 * residual.len() as f64);
+            let round_off = f64::EPSILON * max_or_nan(1e3, 8.0 * residual.len() as f64);
             let near = (round_off * x.spread()).min(f64::EPSILON.sqrt());
             if after <= f64::EPSILON || damping.ratio() >= 0.5 && after <= near {
                 return Ok(iterations);
@@ -377,7 +379,7 @@ impl<L: Lagrangian<N>, const N: usize> StageEquations<'_, L, N> {
         &self,
         given: &Given<N, T>,
         x: &StageUnknowns<N, T>,
-        l: &[Dual<T, Triple<N, T>>],
+        l: &[Dual<T, ChartVector<N, T>>],
     ) -> StepEnd<N, T> {
         let Products { b, .. } = self.products;
         let (q0, p0) = match given {

@@ -1,7 +1,7 @@
 //! Values at the stages of a collocation step, and linear maps between them, in vector lanes.
 
-use super::coefficients::MOST;
-use super::compensated::Twofold;
+use super::coefficients::MAX_STAGES;
+use super::compensated::Unevaluated;
 use crate::gauss::lanes::Lanes;
 use crate::run::saved::Saved;
 use pulp::Simd;
@@ -12,10 +12,10 @@ use std::array::from_fn;
 /// regular at the stages are so everywhere, or is multiplied by 0.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(crate) struct Stages(pub [f64; MOST]);
+pub(crate) struct Stages(pub [f64; MAX_STAGES]);
 
 impl Stages {
-    pub const ZERO: Stages = Stages([0.0; MOST]);
+    pub const ZERO: Stages = Stages([0.0; MAX_STAGES]);
 
     pub fn map(&self, f: impl Fn(f64) -> f64) -> Self {
         Stages(self.0.map(f))
@@ -58,10 +58,10 @@ pub(super) fn blocks<S: Simd>(s: usize) -> usize {
 }
 
 /// Numbers for the stages in double-double precision, with 0 beyond the last.
-pub(crate) type Exact = [Quad; MOST];
+pub(crate) type DoubleDoubleStages = [Quad; MAX_STAGES];
 
 /// The leading parts of numbers for the stages, the last one repeated beyond it.
-pub(super) fn padded(x: &Exact, s: usize) -> Stages {
+pub(super) fn padded(x: &DoubleDoubleStages, s: usize) -> Stages {
     Stages(from_fn(|i| x[i.min(s - 1)].0))
 }
 
@@ -73,20 +73,20 @@ pub(crate) struct Weights {
 }
 
 impl Weights {
-    pub fn new(x: &Exact) -> Self {
+    pub fn new(x: &DoubleDoubleStages) -> Self {
         Weights { head: Stages(x.map(|w| w.0)), tail: Stages(x.map(|w| w.1)) }
     }
 
     /// The weighted sum over the stages.
     #[inline(always)]
-    pub fn sum<S: Simd>(&self, x: &Stages, s: usize) -> Twofold {
+    pub fn sum<S: Simd>(&self, x: &Stages, s: usize) -> Unevaluated {
         let mut head = Lanes::<S>::splat(0.0);
         let mut tail = Lanes::<S>::splat(0.0);
         for r in 0..blocks::<S>(s) {
             head = self.head.block(r).mul_add(x.block(r), head);
             tail = self.tail.block(r).mul_add(x.block(r), tail);
         }
-        Twofold { head: head.sum(), tail: tail.sum() }
+        Unevaluated { head: head.sum(), tail: tail.sum() }
     }
 }
 
@@ -97,7 +97,7 @@ macro_rules! over_groups {
     };
     ($s:ident, $blocks:expr, $r:ident, $k:ident at most $most:literal => $work:expr) => {{
         let (blocks, mut at) = ($blocks, 0);
-        while const { $most >= 4 && 4 * $s::F64_LANES <= $crate::gauss::coefficients::MOST } && at + 4 <= blocks {
+        while const { $most >= 4 && 4 * $s::F64_LANES <= $crate::gauss::coefficients::MAX_STAGES } && at + 4 <= blocks {
             const $k: usize = 4;
             let $r = at;
             $work;
@@ -130,15 +130,15 @@ fn group<S: Simd, const K: usize>(of: &impl Fn(usize) -> Lanes<S>, r: usize) -> 
 
 /// A linear map between stage values, by columns.
 #[derive(Clone, Debug)]
-pub(crate) struct StageMap(pub [Stages; MOST]);
+pub(crate) struct StageMap(pub [Stages; MAX_STAGES]);
 
 impl StageMap {
     /// The map with these rows.
-    pub fn new(rows: &[[f64; MOST]; MOST], s: usize) -> Self {
+    pub fn new(rows: &[[f64; MAX_STAGES]; MAX_STAGES], s: usize) -> Self {
         StageMap(from_fn(|j| Stages(from_fn(|i| rows[i.min(s - 1)][j]))))
     }
 
-    pub fn from_exact(rows: &[Exact; MOST], s: usize) -> Self {
+    pub fn from_exact(rows: &[DoubleDoubleStages; MAX_STAGES], s: usize) -> Self {
         Self::new(&rows.map(|row| row.map(|e| e.0)), s)
     }
 
@@ -199,7 +199,7 @@ impl StageMap {
         r: usize,
     ) -> [[Lanes<S>; K]; D] {
         let (mut even, mut odd) = (start, [[Lanes::<S>::splat(0.0); K]; D]);
-        for pair in 0..s.min(MOST).div_ceil(2) {
+        for pair in 0..s.min(MAX_STAGES).div_ceil(2) {
             let (k, l) = (2 * pair, 2 * pair + 1);
             for d in 0..D {
                 let (a, b) = (Lanes::splat(x[d].0[k]), Lanes::splat(x[d].0[l]));

@@ -4,28 +4,28 @@ mod marks;
 mod retries;
 mod words;
 
-use super::account::account;
-use super::beginning::Beginning;
-use super::coefficients::{Coefficients, MOST};
+use super::coefficients::{Coefficients, MAX_STAGES};
 use super::condensed::Condensed;
+use super::consistent_start::ConsistentStart;
 use super::dense::{DenseStep, Solved, StepStart};
+use super::fixed_point::IterationOutcome;
 use super::general::General;
 use super::instructions::Instructions;
 use super::linear::Linear;
 use super::mass::Mass;
+use super::parametrization::{Extension, Physical};
 use super::resolution;
 use super::separable::SeparableStages;
 use super::stage_equations::{Products, Workspace};
-use super::sweeps::AfterSweep;
 use super::table::StageTable;
-use super::time_transformation::{Extension, Physical};
+use super::work_summary::work_summary;
 use crate::gauss::lanes::forget_branches;
 use crate::rules::step_equations::is_identity;
-use crate::run::watch::Watch;
-use crate::{Doubt, Halt, InputError, Item, StepError, Stepper, Suspicion};
+use crate::run::resolution_monitor::ResolutionMonitor;
+use crate::{InputError, PlanEntry, StepError, StepFailure, Stepper, SuspectInterval, UnresolvedStep};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure};
-pub(crate) use marks::FEW;
+pub(crate) use marks::FEW_STAGES;
 use marks::Sequence;
 use pulp::{Simd, WithSimd};
 use retries::{PAUSE, Tried};
@@ -60,7 +60,7 @@ enum Route<'a, L, const N: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Solution {
     /// By sweeps as they are.
-    Sweeps,
+    FixedPointIteration,
     /// By sweeps that simplified Newton iteration corrects.
     Simplified,
     /// By Newton's method with the derivatives at each stage, damped.
@@ -96,7 +96,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
     of_sigma: f64,
     /// Of steps that tell nothing between their nodes, and where doubts are wanted: the last mean velocities.
     sequence: Option<Box<Sequence<N>>>,
-    watch: Watch<N>,
+    watch: ResolutionMonitor<N>,
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
@@ -109,7 +109,8 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
         guess: SVector<f64, N>,
         wants_z: bool,
     ) -> Result<Self, InputError> {
-        let Beginning { start, structure, w, inverse } = Beginning::of(lagrangian, probed, t0, &state, guess)?;
+        let ConsistentStart { start, structure, w, inverse } =
+            ConsistentStart::of(lagrangian, probed, t0, &state, guess)?;
         let condensed = structure.separable && structure.has_constant_rate();
         let (mut mass, mut of_sigma) = (None, 0.0);
         let route = if condensed {
@@ -149,18 +150,18 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             from,
             solved: false,
             newton: true,
-            solution: Solution::Sweeps,
+            solution: Solution::FixedPointIteration,
             pause: 0,
             pauses: PAUSE,
             by_newton: None,
             newton_steps: 0,
             of_sigma,
-            sequence: (s <= FEW).then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
-            watch: Watch::new(&state.q, &start.v, h),
+            sequence: (s <= FEW_STAGES).then(|| Sequence::new(StepStart { q: state.q.into(), ..from })),
+            watch: ResolutionMonitor::new(&state.q, &start.v, h),
         })
     }
 
-    /// With [`Doubt`]s about steps of any number of stages.
+    /// With [`SuspectInterval`]s about steps of any number of stages.
     pub(crate) fn doubting(mut self) -> Self {
         if self.sequence.is_none() {
             self.sequence = Some(Sequence::new(self.values()));
@@ -193,7 +194,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
     fn curve(&self) -> Option<DenseStep<N>> {
         let (s, h) = (self.s, self.h);
         let t = self.t0 + self.k.checked_sub(1)? as f64 * h;
-        let condensed = |table: &Condensed, stages: [&[[f64; MOST]; N]; 2], wants_z| {
+        let condensed = |table: &Condensed, stages: [&[[f64; MAX_STAGES]; N]; 2], wants_z| {
             let mass = self.mass.as_deref().copied().unwrap_or_else(SMatrix::identity);
             Solved::from_accelerations(self.lagrangian, table, &mass, (t, &self.from), stages, wants_z)
         };
@@ -258,7 +259,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             Ok(()) => (steps, None),
             Err((taken, progress)) => (taken, Some(progress)),
         };
-        if self.solution != Solution::Sweeps {
+        if self.solution != Solution::FixedPointIteration {
             self.newton_steps += taken as u64;
             self.pause = self.pause.saturating_sub(taken);
         }
@@ -274,7 +275,7 @@ struct AdvanceGauss<'b, 'a, L, const N: usize> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
-    type Output = Result<(), (usize, AfterSweep)>;
+    type Output = Result<(), (usize, IterationOutcome)>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
@@ -285,7 +286,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
             let (taken, from) = linear.advance(steps);
             run.k += taken;
             run.from = from;
-            return if taken == steps { Ok(()) } else { Err((taken, AfterSweep::NonFinite)) };
+            return if taken == steps { Ok(()) } else { Err((taken, IterationOutcome::NonFinite)) };
         }
         for taken in 0..steps {
             // Dense output is of the last step.
@@ -294,20 +295,20 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
             }
             let t = t0 + run.k as f64 * h;
             let progress = match &mut *run.route {
-                Route::Linear(..) => AfterSweep::Done,
+                Route::Linear(..) => IterationOutcome::Done,
                 Route::Condensed(condensed) => condensed.step::<S>(t),
                 Route::General(general) => general.step::<S>(t),
             };
-            if progress != AfterSweep::Done {
+            if progress != IterationOutcome::Done {
                 return Err((taken, progress));
             }
-            let misfit = match &*run.route {
+            let defect = match &*run.route {
                 Route::Linear(..) => 0.0,
-                Route::Condensed(condensed) => condensed.misfit,
-                Route::General(general) => general.misfit,
+                Route::Condensed(condensed) => condensed.defect,
+                Route::General(general) => general.defect,
             };
-            if misfit > 1.0 && !run.is_at_rest(t + h) {
-                run.watch.note(run.k, misfit);
+            if defect > 1.0 && !run.is_at_rest(t + h) {
+                run.watch.note(run.k, defect);
             }
             if run.sequence.is_some() {
                 run.follow();
@@ -319,13 +320,13 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for AdvanceGauss<'_, '_, L, N> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
-    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let (mut done, mut tried) = (0, Tried::default());
         while done < steps {
             self.resume();
             let left = steps - done;
             let (taken, refused) = match self.solution {
-                Solution::Sweeps => self.sweep(left),
+                Solution::FixedPointIteration => self.sweep(left),
                 Solution::Simplified => self.sweep(self.pause.min(left)),
                 Solution::Newton => {
                     tried.newton = true;
@@ -347,7 +348,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
             }
             // The first reason: that of the last resort tells less, unless it is the integrating factor.
             let cause = if final_cause { refused } else { tried.refused.unwrap_or(refused) };
-            return Err(Halt { taken: done, cause });
+            return Err(StepFailure { taken: done, cause });
         }
         Ok(())
     }
@@ -381,8 +382,8 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
         !matches!(&*self.route, Route::General(_))
     }
 
-    fn account(&self) -> Vec<Item> {
-        account(self.route(), &self.lagrangian.structure())
+    fn work_summary(&self) -> Vec<PlanEntry> {
+        work_summary(self.route(), &self.lagrangian.structure())
     }
 
     /// The collocation polynomial. It costs nothing where it is not asked for.
@@ -417,11 +418,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
 
     /// What was seen along the steps; else what a look at the last step alone shows, between its nodes: a run that wants more asks
     /// more often.
-    fn suspicion(&self) -> Option<Suspicion> {
+    fn unresolved(&self) -> Option<UnresolvedStep> {
         self.mark()
     }
 
-    fn doubt(&mut self) -> Option<Doubt<N>> {
+    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
         self.watch.doubt.take()
     }
 }

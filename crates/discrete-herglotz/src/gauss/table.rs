@@ -1,6 +1,6 @@
 //! Coefficients of the general step of contact Gauss collocation.
 
-use super::coefficients::{Coefficients, MOST};
+use super::coefficients::{Coefficients, MAX_STAGES};
 use super::stages::{StageMap, Stages};
 use qd::Quad;
 use std::array::from_fn;
@@ -23,22 +23,22 @@ pub(super) struct StageTable {
     /// The times of the stages after the step's start.
     pub times: Stages,
     /// From the stages of one step to those of the next, and the same for what is multiplied with the weights.
-    pub ahead: &'static StageMap,
-    pub ahead_weighted: &'static StageMap,
+    pub extrapolation: &'static StageMap,
+    pub extrapolation_weighted: &'static StageMap,
 }
 
 /// What does not depend on the step.
 struct Maps {
     m: StageMap,
-    ahead: StageMap,
-    ahead_weighted: StageMap,
+    extrapolation: StageMap,
+    extrapolation_weighted: StageMap,
 }
 
 impl Maps {
     /// For a number of stages from 1 to 16, made once.
     fn of(s: usize) -> &'static Maps {
-        static TABLES: [OnceLock<Box<Maps>>; MOST] = [const { OnceLock::new() }; MOST];
-        TABLES[s.clamp(1, MOST) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MOST))))
+        static TABLES: [OnceLock<Box<Maps>>; MAX_STAGES] = [const { OnceLock::new() }; MAX_STAGES];
+        TABLES[s.clamp(1, MAX_STAGES) - 1].get_or_init(|| Box::new(Self::new(s.clamp(1, MAX_STAGES))))
     }
 
     fn new(s: usize) -> Self {
@@ -52,12 +52,12 @@ impl Maps {
             Ordering::Greater => ratio(i, j),
         };
         let weighted = |i: usize, j: usize| {
-            if i.max(j) < s { g.b[i].0 * g.ahead[i][j] / g.b[j].0 } else { 0.0 }
+            if i.max(j) < s { g.b[i].0 * g.extrapolation[i][j] / g.b[j].0 } else { 0.0 }
         };
         Maps {
             m: StageMap::new(&from_fn(|i| from_fn(|j| entry(i, j))), s),
-            ahead: StageMap::new(&g.ahead, s),
-            ahead_weighted: StageMap::new(&from_fn(|i| from_fn(|j| weighted(i, j))), s),
+            extrapolation: StageMap::new(&g.extrapolation, s),
+            extrapolation_weighted: StageMap::new(&from_fn(|i| from_fn(|j| weighted(i, j))), s),
         }
     }
 }
@@ -73,9 +73,9 @@ impl StageTable {
             weights[s - 1] = weights[0];
         }
         // Beyond the last stage it is repeated.
-        let mut times = [(step * g.c[s - 1]).0; MOST];
+        let mut times = [(step * g.c[s - 1]).0; MAX_STAGES];
         times.iter_mut().zip(&g.c).take(s).for_each(|(time, c)| *time = (step * *c).0);
-        let Maps { m, ahead, ahead_weighted } = Maps::of(s);
-        StageTable { s, h, m, weights: Stages(weights), times: Stages(times), ahead, ahead_weighted }
+        let Maps { m, extrapolation, extrapolation_weighted } = Maps::of(s);
+        StageTable { s, h, m, weights: Stages(weights), times: Stages(times), extrapolation, extrapolation_weighted }
     }
 }

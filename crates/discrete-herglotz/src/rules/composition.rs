@@ -1,11 +1,11 @@
 //! Symmetric compositions of discrete flows.
 
 use crate::rules::flow::account_of;
+use crate::run::resolution_monitor::{ResolutionMonitor, sharper, turning};
 use crate::run::saved::{Saved, saved};
-use crate::run::watch::{Watch, sharper, turning};
 use crate::{
-    DiscreteLagrangian, Doubt, Halt, InputError, Item, Solver, SplittingScheme, StepError, Stepper, Suspicion,
-    Transition,
+    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, Solver, SplittingScheme, StepError, StepFailure, Stepper,
+    SuspectInterval, UnresolvedStep,
 };
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
@@ -45,7 +45,7 @@ pub struct Composition<D, const N: usize> {
     change: SVector<f64, N>,
     /// The state before the last step.
     before: PhasePoint<N>,
-    watch: Watch<N>,
+    watch: ResolutionMonitor<N>,
 }
 
 /// One substep: its rule by index, and the earlier of its two times after the step's start.
@@ -119,7 +119,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             acceleration: SVector::zeros(),
             change: SVector::zeros(),
             before: state,
-            watch: Watch::new(&state.q, &SVector::zeros(), h),
+            watch: ResolutionMonitor::new(&state.q, &SVector::zeros(), h),
         };
         if let Some(first) = composition.substeps.first().copied() {
             let guess = SVector::zeros();
@@ -137,7 +137,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         substep: &Substep,
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         let (rule, at) = (&self.rules[substep.rule], self.time() + substep.start);
         if substep.back {
             rule.backward(at, from, guess, &mut self.solver)
@@ -164,7 +164,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         {
             // What turns the first mean velocity may lie in the step before.
             let t = self.t0 + step as f64 * self.h;
-            self.watch.doubt(sharpest, Doubt { step, steps: 2, t, from: self.before, to: state });
+            self.watch.doubt(sharpest, SuspectInterval { step, steps: 2, t, from: self.before, to: state });
         }
         self.before = self.state;
         (self.state, self.velocity, self.sigma) = (state, velocity, sigma);
@@ -177,7 +177,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
     /// Looks whether a substep resolves the motion: by its rule's factor, and by the second differences of the mean velocities
     /// along a time as long as the substep. The first step has nothing before it to compare with.
     #[inline(always)]
-    fn watch(&mut self, substep: &Substep, before: &SVector<f64, N>, next: &Transition<N>, sharpest: &mut f64) {
+    fn watch(&mut self, substep: &Substep, before: &SVector<f64, N>, next: &DiscreteStep<N>, sharpest: &mut f64) {
         let now = &next.velocity;
         let acceleration = (now - before) / substep.apart;
         let last = std::mem::replace(&mut self.acceleration, acceleration);
@@ -189,15 +189,15 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
             } else {
                 None
             };
-            if let Some(misfit) = found {
-                self.watch.note(self.taken, misfit);
+            if let Some(defect) = found {
+                self.watch.note(self.taken, defect);
             }
             if let Some(sharpness) = sharper([&change, now, &next.end.q], substep.length, self.watch.floor, *sharpest) {
                 *sharpest = sharpness;
             }
         }
-        if let Some(misfit) = self.rules[substep.rule].misfit([now; 4], &next.end, next.sigma) {
-            self.watch.note(self.taken, misfit);
+        if let Some(defect) = self.rules[substep.rule].defect([now; 4], &next.end, next.sigma) {
+            self.watch.note(self.taken, defect);
         }
     }
 }
@@ -207,7 +207,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
         self.rules.iter().all(|rule| rule.constant_rate())
     }
 
-    fn account(&self) -> Vec<Item> {
+    fn work_summary(&self) -> Vec<PlanEntry> {
         account_of(self.rules.iter().all(|rule| rule.is_explicit()), "substep")
     }
 
@@ -215,8 +215,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
         (self.taken > 0).then_some(self.velocity)
     }
 
-    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
-        (0..steps).try_for_each(|taken| self.step().map_err(|cause| Halt { taken, cause }))
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
+        (0..steps).try_for_each(|taken| self.step().map_err(|cause| StepFailure { taken, cause }))
     }
 
     fn state(&self) -> PhasePoint<N> {
@@ -245,11 +245,11 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
         self.load(&mut words).is_some() && words.is_empty()
     }
 
-    fn suspicion(&self) -> Option<Suspicion> {
+    fn unresolved(&self) -> Option<UnresolvedStep> {
         self.watch.first
     }
 
-    fn doubt(&mut self) -> Option<Doubt<N>> {
+    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
         self.watch.doubt.take()
     }
 }

@@ -1,9 +1,12 @@
 //! The discrete Hamiltonian flow at work on a motion.
 
+use crate::run::resolution_monitor::{ResolutionMonitor, at_rest, sharper};
 use crate::run::saved::{Saved, saved};
-use crate::run::watch::{Watch, at_rest, sharper};
 use crate::run::{check_time, start_of};
-use crate::{DiscreteLagrangian, Doubt, Halt, InputError, Item, Solver, StepError, Stepper, Suspicion, Transition};
+use crate::{
+    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, Solver, StepError, StepFailure, Stepper, SuspectInterval,
+    UnresolvedStep,
+};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, PhasePoint};
 
@@ -52,7 +55,7 @@ pub struct Flow<D, const N: usize> {
     evaluations: u64,
     /// The state before the last step.
     before: PhasePoint<N>,
-    watch: Watch<N>,
+    watch: ResolutionMonitor<N>,
 }
 
 impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
@@ -78,7 +81,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
         // A singular Lagrangian is the reason of what goes wrong, where something does.
         ld.check_start(t0, &state, &first.map_or(guess, |step| step.velocity))?;
         let first = first.map_err(InputError::first_step)?;
-        let (velocities, watch) = ([first.velocity; 3], Watch::new(&state.q, &first.velocity, ld.step_size()));
+        let (velocities, watch) =
+            ([first.velocity; 3], ResolutionMonitor::new(&state.q, &first.velocity, ld.step_size()));
         Ok(Flow { ld, t0, k: 0, state, velocities, solver, sigma: 1.0, evaluations: 0, before: state, watch })
     }
 
@@ -96,7 +100,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
 
     /// The first step so far that cannot have resolved the motion, where one was seen: as fewer than six steps in a period of
     /// the velocity, or a conformal factor beyond three.
-    pub fn suspicion(&self) -> Option<Suspicion> {
+    pub fn unresolved(&self) -> Option<UnresolvedStep> {
         self.watch.first
     }
 
@@ -130,8 +134,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
             iterations: next.iterations,
         };
         let velocities = [&earlier, &before, &latest, &next.velocity];
-        if let Some(misfit) = self.ld.misfit(velocities, &next.end, next.sigma) {
-            self.suspect(misfit, velocities, &next);
+        if let Some(defect) = self.ld.defect(velocities, &next.end, next.sigma) {
+            self.suspect(defect, velocities, &next);
         }
         // The first velocity has none before it.
         let (turn, h) = (next.velocity - latest * 2.0 + before, self.ld.step_size());
@@ -139,7 +143,8 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
             && let Some(step) = self.k.checked_sub(2).filter(|step| *step > 0)
         {
             // What turns mean velocities lies in this step or the last.
-            let doubt = Doubt { step, steps: 2, t: self.t0 + step as f64 * h, from: self.before, to: next.end };
+            let doubt =
+                SuspectInterval { step, steps: 2, t: self.t0 + step as f64 * h, from: self.before, to: next.end };
             self.watch.doubt(sharpness, doubt);
         }
         // Before the first step velocities changed as they do in the second, for all that is known.
@@ -159,11 +164,11 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Flow<D, N> {
     /// Notes the misfit of a step. What is at rest turns by its rounding, and has a misfit by its factor alone.
     #[cold]
     #[inline(never)]
-    fn suspect(&mut self, misfit: f64, velocities: [&SVector<f64, N>; 4], next: &Transition<N>) {
+    fn suspect(&mut self, defect: f64, velocities: [&SVector<f64, N>; 4], next: &DiscreteStep<N>) {
         let still = at_rest(velocities, self.ld.step_size(), self.watch.floor);
-        let of_factor = || self.ld.misfit([&SVector::zeros(); 4], &next.end, next.sigma);
-        if let Some(misfit) = if still { of_factor() } else { Some(misfit) } {
-            self.watch.note(self.k - 1, misfit);
+        let of_factor = || self.ld.defect([&SVector::zeros(); 4], &next.end, next.sigma);
+        if let Some(defect) = if still { of_factor() } else { Some(defect) } {
+            self.watch.note(self.k - 1, defect);
         }
     }
 
@@ -189,7 +194,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
         self.ld.constant_rate()
     }
 
-    fn account(&self) -> Vec<Item> {
+    fn work_summary(&self) -> Vec<PlanEntry> {
         account_of(self.ld.is_explicit(), "step")
     }
 
@@ -197,9 +202,9 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
         (self.k > 0).then_some(self.velocities[0])
     }
 
-    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
-            self.step().map_err(|cause| Halt { taken, cause })?;
+            self.step().map_err(|cause| StepFailure { taken, cause })?;
         }
         Ok(())
     }
@@ -230,29 +235,29 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
         self.load(&mut words).is_some() && words.is_empty()
     }
 
-    fn suspicion(&self) -> Option<Suspicion> {
+    fn unresolved(&self) -> Option<UnresolvedStep> {
         self.watch.first
     }
 
-    fn doubt(&mut self) -> Option<Doubt<N>> {
+    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
         self.watch.doubt.take()
     }
 }
 
 /// What the steps or substeps of discrete Lagrangians compute.
-pub(crate) fn account_of(explicit: bool, what: &str) -> Vec<Item> {
+pub(crate) fn account_of(explicit: bool, what: &str) -> Vec<PlanEntry> {
     let solved = if explicit {
         [
-            Item::skipped("Newton's method", "each step is explicit: forces only"),
-            Item::skipped("Jacobian", "no equation is solved"),
+            PlanEntry::skipped("Newton's method", "each step is explicit: forces only"),
+            PlanEntry::skipped("Jacobian", "no equation is solved"),
         ]
     } else {
         [
-            Item::computed("Newton's method", format!("each {what} is implicit in q1")),
-            Item::computed("Jacobian", "second derivatives of L at each iterate"),
+            PlanEntry::computed("Newton's method", format!("each {what} is implicit in q1")),
+            PlanEntry::computed("Jacobian", "second derivatives of L at each iterate"),
         ]
     };
-    let action = Item::computed("action z", "the flow of a discrete Lagrangian carries it");
+    let action = PlanEntry::computed("action z", "the flow of a discrete Lagrangian carries it");
     solved.into_iter().chain([action]).collect()
 }
 

@@ -1,20 +1,20 @@
 //! Discrete Lagrangians as integrators.
 
 use crate::{
-    Composition, DiscreteLagrangian, Discretised, Facts, Flow, InputError, Integrator, Method, Problem, Quadrature,
-    Rule, SplittingScheme, Stepper, Wants,
+    AnyDiscreteLagrangian, Composition, DiscreteLagrangian, Flow, InputError, Integrator, Method, MethodInfo, Problem,
+    Quadrature, Rule, SplittingScheme, Stepper, StepperOptions,
 };
 use contact_geom::Lagrangian;
 use std::borrow::Cow;
 use std::marker::PhantomData;
 
-/// What makes a discrete Lagrangian for each time step: a rule. Of a user's own, [`Discrete`] is one.
-pub trait Discretisation<'a, L, const N: usize> {
+/// What makes a discrete Lagrangian for each time step: a rule. Of a user's own, [`CustomMethod`] is one.
+pub trait DiscretizationMethod<'a, L, const N: usize> {
     /// The discrete Lagrangian.
-    type Discrete: DiscreteLagrangian<N> + 'a;
+    type DiscreteLagrangian: DiscreteLagrangian<N> + 'a;
 
     /// What is known of its flow.
-    fn facts(&self) -> Facts;
+    fn info(&self) -> MethodInfo;
 
     /// Whether a Lagrangian meets its hypotheses. By default all do.
     ///
@@ -28,7 +28,7 @@ pub trait Discretisation<'a, L, const N: usize> {
     ///
     /// # Errors
     /// An [`InputError`] where there is none.
-    fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::Discrete, InputError>;
+    fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::DiscreteLagrangian, InputError>;
 }
 
 /// An integrator by its discretisation. (For all of them at once another crate could make a second implementation.)
@@ -36,23 +36,23 @@ macro_rules! integrates {
     (<$($parameter:ident: $bound:path),*> $rule:ty) => {
         impl<'a, L: Lagrangian<N> + 'a, $($parameter: $bound,)* const N: usize> Integrator<'a, L, N> for $rule
         where
-            Self: Discretisation<'a, L, N>,
+            Self: DiscretizationMethod<'a, L, N>,
         {
-            fn facts(&self) -> Facts {
-                Discretisation::<'a, L, N>::facts(self)
+            fn info(&self) -> MethodInfo {
+                DiscretizationMethod::<'a, L, N>::info(self)
             }
 
             fn check(&self, lagrangian: &L) -> Result<(), InputError> {
-                Discretisation::<'a, L, N>::check(self, lagrangian)
+                DiscretizationMethod::<'a, L, N>::check(self, lagrangian)
             }
 
             fn stepper(
                 &self,
                 problem: &Problem<'a, L, N>,
                 h: f64,
-                _: Wants,
+                _: StepperOptions,
             ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-                let ld = Discretisation::<'a, L, N>::discretise(self, problem, h)?;
+                let ld = DiscretizationMethod::<'a, L, N>::discretise(self, problem, h)?;
                 Ok(Box::new(Flow::with_guess(ld, problem.t0, problem.state, problem.start.v)?))
             }
         }
@@ -60,40 +60,40 @@ macro_rules! integrates {
 }
 
 integrates!(<> Method);
-integrates!(<R: Rule> ByRule<R>);
-integrates!(<F: Sized> Discrete<F>);
+integrates!(<R: Rule> QuadratureMethod<R>);
+integrates!(<F: Sized> CustomMethod<F>);
 
-/// A quadrature rule as an integrator: `ByRule::<MidpointRule>::default()`. A program that names it compiles no other rule.
+/// A quadrature rule as an integrator: `QuadratureMethod::<MidpointRule>::default()`. A program that names it compiles no other rule.
 #[derive(Clone, Copy, Debug)]
-pub struct ByRule<R>(PhantomData<R>);
+pub struct QuadratureMethod<R>(PhantomData<R>);
 
-impl<R> Default for ByRule<R> {
+impl<R> Default for QuadratureMethod<R> {
     fn default() -> Self {
-        ByRule(PhantomData)
+        QuadratureMethod(PhantomData)
     }
 }
 
-impl<'a, L: Lagrangian<N> + 'a, R: Rule, const N: usize> Discretisation<'a, L, N> for ByRule<R> {
-    type Discrete = Quadrature<&'a L, R>;
+impl<'a, L: Lagrangian<N> + 'a, R: Rule, const N: usize> DiscretizationMethod<'a, L, N> for QuadratureMethod<R> {
+    type DiscreteLagrangian = Quadrature<&'a L, R>;
 
-    fn facts(&self) -> Facts {
-        Facts { symmetric: R::is_symmetric(), ..Facts::of_discrete::<N>(R::NAME, R::ORDER) }
+    fn info(&self) -> MethodInfo {
+        MethodInfo { symmetric: R::is_symmetric(), ..MethodInfo::of_discrete::<N>(R::NAME, R::ORDER) }
     }
 
-    fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::Discrete, InputError> {
+    fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::DiscreteLagrangian, InputError> {
         Quadrature::new(problem.lagrangian, h)
     }
 }
 
-impl<'a, L: Lagrangian<N> + 'a, const N: usize> Discretisation<'a, L, N> for Method {
-    type Discrete = Discretised<&'a L, N>;
+impl<'a, L: Lagrangian<N> + 'a, const N: usize> DiscretizationMethod<'a, L, N> for Method {
+    type DiscreteLagrangian = AnyDiscreteLagrangian<&'a L, N>;
 
-    fn facts(&self) -> Facts {
-        Facts {
+    fn info(&self) -> MethodInfo {
+        MethodInfo {
             symmetric: self.symmetric(),
             explicit: *self == Method::Strang,
             exact_rate: self.exact_rate(),
-            ..Facts::of_discrete::<N>(self.name(), self.order())
+            ..MethodInfo::of_discrete::<N>(self.name(), self.order())
         }
     }
 
@@ -101,7 +101,7 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> Discretisation<'a, L, N> for Met
         Method::check(*self, &lagrangian.structure())
     }
 
-    fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::Discrete, InputError> {
+    fn discretise(&self, problem: &Problem<'a, L, N>, h: f64) -> Result<Self::DiscreteLagrangian, InputError> {
         Method::discretise(*self, problem.lagrangian, h, problem.t0, &problem.state)
     }
 }
@@ -110,43 +110,43 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> Discretisation<'a, L, N> for Met
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
-/// use discrete_herglotz::{Discrete, Midpoint, Problem, Steps, Until};
+/// use discrete_herglotz::{CustomMethod, Midpoint, Problem, Steps, Until};
 /// let pendulum = Pendulum { gamma: -0.1 };
-/// let mine = Discrete::new("mine", 2, |h| Midpoint::new(&pendulum, h));
+/// let mine = CustomMethod::new("mine", 2, |h| Midpoint::new(&pendulum, h));
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;
 /// let outcome = problem.by(mine).steps(Steps::Size(0.1)).run(Until::Time(10.0))?;
 /// println!("q = {}", outcome.q[0]);
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Discrete<F> {
+pub struct CustomMethod<F> {
     name: Cow<'static, str>,
     order: u32,
     symmetric: bool,
     make: F,
 }
 
-impl<F> Discrete<F> {
+impl<F> CustomMethod<F> {
     /// With a name, the order of its flow, and what makes it for a time step.
     pub fn new(name: impl Into<Cow<'static, str>>, order: u32, make: F) -> Self {
-        Discrete { name: name.into(), order, symmetric: false, make }
+        CustomMethod { name: name.into(), order, symmetric: false, make }
     }
 
     /// The same, known to be its own adjoint.
     pub fn symmetric(self) -> Self {
-        Discrete { symmetric: true, ..self }
+        CustomMethod { symmetric: true, ..self }
     }
 }
 
-impl<'a, L, D, F, const N: usize> Discretisation<'a, L, N> for Discrete<F>
+impl<'a, L, D, F, const N: usize> DiscretizationMethod<'a, L, N> for CustomMethod<F>
 where
     D: DiscreteLagrangian<N> + 'a,
     F: Fn(f64) -> Result<D, InputError>,
 {
-    type Discrete = D;
+    type DiscreteLagrangian = D;
 
-    fn facts(&self) -> Facts {
-        Facts { symmetric: self.symmetric, ..Facts::of_discrete::<N>(self.name.clone(), self.order) }
+    fn info(&self) -> MethodInfo {
+        MethodInfo { symmetric: self.symmetric, ..MethodInfo::of_discrete::<N>(self.name.clone(), self.order) }
     }
 
     fn discretise(&self, _: &Problem<'a, L, N>, h: f64) -> Result<D, InputError> {
@@ -156,22 +156,24 @@ where
 
 /// A symmetric [`Composition`] of a rule that is symmetric and of order 2, as an integrator.
 #[derive(Clone, Copy, Debug)]
-pub struct Composed<D> {
+pub struct CompositionMethod<D> {
     rule: D,
     scheme: SplittingScheme,
 }
 
-impl<D> Composed<D> {
+impl<D> CompositionMethod<D> {
     /// The composition of this rule by the substeps of a scheme.
     pub fn new(rule: D, scheme: SplittingScheme) -> Self {
-        Composed { rule, scheme }
+        CompositionMethod { rule, scheme }
     }
 }
 
-impl<'a, L: Lagrangian<N>, D: Discretisation<'a, L, N>, const N: usize> Integrator<'a, L, N> for Composed<D> {
-    fn facts(&self) -> Facts {
-        let rule = self.rule.facts();
-        Facts {
+impl<'a, L: Lagrangian<N>, D: DiscretizationMethod<'a, L, N>, const N: usize> Integrator<'a, L, N>
+    for CompositionMethod<D>
+{
+    fn info(&self) -> MethodInfo {
+        let rule = self.rule.info();
+        MethodInfo {
             name: format!("{}_by_{}", rule.name, self.scheme.name()).into(),
             order: self.scheme.order(),
             symmetric: true,
@@ -182,14 +184,19 @@ impl<'a, L: Lagrangian<N>, D: Discretisation<'a, L, N>, const N: usize> Integrat
     }
 
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
-        let rule = self.rule.facts();
+        let rule = self.rule.info();
         if !rule.symmetric || rule.order != 2 || self.scheme.is_nystrom() {
             return Err(InputError::Hypothesis { hypothesis: "a composition of a symmetric rule of order 2" });
         }
         self.rule.check(lagrangian)
     }
 
-    fn stepper(&self, problem: &Problem<'a, L, N>, h: f64, _: Wants) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    fn stepper(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        _: StepperOptions,
+    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         let rule = |h| self.rule.discretise(problem, h);
         Ok(Box::new(Composition::new(rule, &self.scheme, h, problem.t0, problem.state)?))
     }

@@ -2,8 +2,8 @@
 
 use crate::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
 use crate::{
-    DiscreteLagrangian, InputError, LeftMidpoint, Midpoint, Quadrature, Rectangle, Rule, Solver, StepError, Strang,
-    Transition, Trapezoidal,
+    DiscreteLagrangian, DiscreteStep, InputError, LeftMidpoint, Midpoint, Quadrature, Rectangle, Rule, Solver,
+    StepError, Strang, Trapezoidal,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Structure};
@@ -163,15 +163,15 @@ impl Method {
         h: f64,
         t: f64,
         state: &PhasePoint<N>,
-    ) -> Result<Discretised<L, N>, InputError> {
+    ) -> Result<AnyDiscreteLagrangian<L, N>, InputError> {
         crate::run::check_time(t)?;
         state.check()?;
         Ok(match self {
-            Method::Rectangle => Discretised::Rectangle(Quadrature::new(lagrangian, h)?),
-            Method::LeftMidpoint => Discretised::LeftMidpoint(Quadrature::new(lagrangian, h)?),
-            Method::Midpoint => Discretised::Midpoint(Quadrature::new(lagrangian, h)?),
-            Method::Trapezoidal => Discretised::Trapezoidal(Quadrature::new(lagrangian, h)?),
-            Method::Strang => Discretised::Strang(Strang::new(lagrangian, h, t, state)?),
+            Method::Rectangle => AnyDiscreteLagrangian::Rectangle(Quadrature::new(lagrangian, h)?),
+            Method::LeftMidpoint => AnyDiscreteLagrangian::LeftMidpoint(Quadrature::new(lagrangian, h)?),
+            Method::Midpoint => AnyDiscreteLagrangian::Midpoint(Quadrature::new(lagrangian, h)?),
+            Method::Trapezoidal => AnyDiscreteLagrangian::Trapezoidal(Quadrature::new(lagrangian, h)?),
+            Method::Strang => AnyDiscreteLagrangian::Strang(Strang::new(lagrangian, h, t, state)?),
         })
     }
 }
@@ -183,7 +183,7 @@ impl Method {
 /// compiled into every program that names this type.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
-pub enum Discretised<L, const N: usize> {
+pub enum AnyDiscreteLagrangian<L, const N: usize> {
     /// By the rectangle rule.
     Rectangle(Rectangle<L>),
     /// By the paper's midpoint rule.
@@ -200,16 +200,16 @@ pub enum Discretised<L, const N: usize> {
 macro_rules! each {
     ($self:ident, $ld:ident => $result:expr) => {
         match $self {
-            Discretised::Rectangle($ld) => $result,
-            Discretised::LeftMidpoint($ld) => $result,
-            Discretised::Midpoint($ld) => $result,
-            Discretised::Trapezoidal($ld) => $result,
-            Discretised::Strang($ld) => $result,
+            AnyDiscreteLagrangian::Rectangle($ld) => $result,
+            AnyDiscreteLagrangian::LeftMidpoint($ld) => $result,
+            AnyDiscreteLagrangian::Midpoint($ld) => $result,
+            AnyDiscreteLagrangian::Trapezoidal($ld) => $result,
+            AnyDiscreteLagrangian::Strang($ld) => $result,
         }
     };
 }
 
-impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Discretised<L, N> {
+impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for AnyDiscreteLagrangian<L, N> {
     fn step_size(&self) -> f64 {
         each!(self, ld => DiscreteLagrangian::<N>::step_size(ld))
     }
@@ -222,8 +222,8 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Discretised<L, 
         each!(self, ld => ld.check_start(t, from, velocity))
     }
 
-    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
-        each!(self, ld => ld.misfit(velocities, to, sigma))
+    fn defect(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
+        each!(self, ld => ld.defect(velocities, to, sigma))
     }
 
     fn order(&self) -> Option<u32> {
@@ -252,7 +252,7 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Discretised<L, 
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         each!(self, ld => ld.forward(t, from, guess, solver))
     }
 
@@ -262,7 +262,7 @@ impl<const N: usize, L: Lagrangian<N>> DiscreteLagrangian<N> for Discretised<L, 
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         each!(self, ld => ld.backward(t, from, guess, solver))
     }
 }

@@ -13,9 +13,9 @@ mod trapezoidal;
 
 pub use composition::Composition;
 pub use flow::{Flow, FlowStep};
-pub use integrator::{ByRule, Composed, Discrete, Discretisation};
+pub use integrator::{CompositionMethod, CustomMethod, DiscretizationMethod, QuadratureMethod};
 pub use left_midpoint::{LeftMidpoint, LeftMidpointRule};
-pub use method::{Discretised, Method, RuleVisitor, UnknownMethod};
+pub use method::{AnyDiscreteLagrangian, Method, RuleVisitor, UnknownMethod};
 pub use midpoint::{Midpoint, MidpointRule};
 pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
 pub use rectangle::{Rectangle, RectangleRule};

@@ -1,13 +1,13 @@
 //! Discrete Lagrangians by quadrature of the action: what the rules of [`crate::rules`] share.
 
 use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
-use crate::run::watch::{factor_misfit, misfit, value_rounding};
-use crate::solve::newton::{Linearised, NewtonStart, largest, newton};
-use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
+use crate::run::resolution_monitor::{defect, factor_defect, value_rounding};
+use crate::solve::newton::{Linearised, NewtonStart, max_abs_or_nan, newton};
+use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
-    Border, Derivatives, DiscreteJet, DiscretePoint, Dual, GeometryError, Lagrangian, Module, PhasePoint, Regularity,
-    Scalar, SecondDiscreteJet, Triple, VelocityPoint, gradient_rounding,
+    AugmentedVector, ChartVector, Derivatives, DiscreteJet, DiscretePoint, Dual, GeometryError, Lagrangian, PhasePoint,
+    Regularity, Scalar, SecondDiscreteJet, TangentVector, VelocityPoint, gradient_rounding,
 };
 use std::marker::PhantomData;
 
@@ -168,7 +168,7 @@ impl<L, R: Rule> Quadrature<L, R> {
     }
 
     #[inline]
-    fn value_and_gradient<const N: usize>(&self, t: f64, x: &VelocityPoint<N>) -> (f64, Triple<N>)
+    fn value_and_gradient<const N: usize>(&self, t: f64, x: &VelocityPoint<N>) -> (f64, ChartVector<N>)
     where
         L: Lagrangian<N>,
     {
@@ -200,7 +200,7 @@ impl<L, R: Rule> Quadrature<L, R> {
             residual: from.p,
             right: SMatrix::zeros(),
             right_z: SVector::zeros(),
-            slope: Border::null(),
+            slope: AugmentedVector::null(),
         };
         for node in R::NODES {
             let node = directed::<ADJOINT>(node);
@@ -213,12 +213,12 @@ impl<L, R: Rule> Quadrature<L, R> {
             if const { N > BLOCK } {
                 frame.by_blocks(&self.lagrangian, N + usize::from(implicit), &mut sums);
             } else if implicit {
-                frame.accumulate::<Border<N>, N>(&self.lagrangian, 0, 0, &mut sums);
+                frame.accumulate::<AugmentedVector<N>, N>(&self.lagrangian, 0, 0, &mut sums);
             } else {
                 frame.accumulate::<SVector<f64, N>, N>(&self.lagrangian, 0, 0, &mut sums);
             }
         }
-        let size = largest(&from.p) + largest(&sums.right) * largest(u);
+        let size = max_abs_or_nan(&from.p) + max_abs_or_nan(&sums.right) * max_abs_or_nan(u);
         if !implicit {
             return Linearised {
                 residual: sums.residual,
@@ -233,7 +233,7 @@ impl<L, R: Rule> Quadrature<L, R> {
         Linearised {
             residual: sums.residual + sums.right_z * z_change,
             jacobian: sums.right + sums.right_z * z_slope.transpose(),
-            size: size + largest(&sums.right_z) * (from.z.abs() + (h * sums.value).abs()),
+            size: size + max_abs_or_nan(&sums.right_z) * (from.z.abs() + (h * sums.value).abs()),
             z_change,
             z_slope,
         }
@@ -248,11 +248,11 @@ impl<L, R: Rule> Quadrature<L, R> {
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError>
+    ) -> Result<DiscreteStep<N>, StepError>
     where
         L: Lagrangian<N>,
     {
-        let (resolution, impulse) = ((largest(&from.q) / h).abs(), largest(&from.p) * h.abs());
+        let (resolution, impulse) = ((max_abs_or_nan(&from.q) / h).abs(), max_abs_or_nan(&from.p) * h.abs());
         let start = NewtonStart { u: *guess, z: from.z, resolution, impulse };
         let rounding = |u: &SVector<f64, N>, z1: f64| {
             let x = VelocityPoint { q: from.q + u * (0.5 * h), v: *u, z: z1 };
@@ -280,14 +280,14 @@ impl<L, R: Rule> Quadrature<L, R> {
         let change = (force + from.p * (slope_0 + slope_1)) * h;
         if !Self::implicit(ADJOINT) {
             let end = PhasePoint { q, p: from.p + change, z: from.z + h * value };
-            return Ok(Transition { end, velocity: u, sigma, iterations: root.iterations });
+            return Ok(DiscreteStep { end, velocity: u, sigma, iterations: root.iterations });
         }
         let pivot = 1.0 - h * slope_1;
         // One more Newton step for z1, free here, so that its last digits are those of this evaluation.
         let z = root.z + (from.z - root.z + h * value) / pivot;
         // A quotient by the pivot, which is rounded alike in all steps, would stretch each change by the same part of its size.
         let end = PhasePoint { q, p: from.p + (change + change * (h * slope_1 / pivot)), z };
-        Ok(Transition { end, velocity: u, sigma: sigma / pivot, iterations: root.iterations })
+        Ok(DiscreteStep { end, velocity: u, sigma: sigma / pivot, iterations: root.iterations })
     }
 }
 
@@ -300,7 +300,7 @@ impl<L, R: Rule> Quadrature<L, R> {
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError>
+    ) -> Result<DiscreteStep<N>, StepError>
     where
         L: Lagrangian<N>,
     {
@@ -320,7 +320,8 @@ fn rounding_of_residual<L: Lagrangian<N>, const N: usize>(
 ) -> [f64; 2] {
     let (of_value, once) = gradient_rounding(lagrangian, t, x);
     let of_action = value_rounding(of_value, &once.x, &x.q);
-    [h.abs() * (largest(&once.x) + largest(p) * once.z) + largest(&once.y), h.abs() * of_action].map(|e| ROUNDINGS * e)
+    [h.abs() * (max_abs_or_nan(&once.x) + max_abs_or_nan(p) * once.z) + max_abs_or_nan(&once.y), h.abs() * of_action]
+        .map(|e| ROUNDINGS * e)
 }
 
 /// The node, or its mirror image for the adjoint rule.
@@ -352,7 +353,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
     /// units of the coordinates do not count, so W is scaled by its rows.
     fn check_start(&self, t: f64, from: &PhasePoint<N>, velocity: &SVector<f64, N>) -> Result<(), InputError> {
         let w = self.lagrangian.mass_matrix(t, &VelocityPoint { q: from.q, v: *velocity, z: from.z });
-        let rows: Vec<f64> = (0..N).map(|i| contact_geom::largest((0..N).map(|j| w[(i, j)])).sqrt()).collect();
+        let rows: Vec<f64> = (0..N).map(|i| contact_geom::max_abs_or_nan((0..N).map(|j| w[(i, j)])).sqrt()).collect();
         let scaled = Regularity::of(DMatrix::from_fn(N, N, |i, j| w[(i, j)] / (rows[i] * rows[j])));
         // Not `condition() >= 1/eps`: that would let a NaN pass.
         if scaled.condition() < 1.0 / f64::EPSILON {
@@ -363,8 +364,8 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
     }
 
     #[inline(always)]
-    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
-        factor_misfit(sigma).or_else(|| misfit(velocities, &to.q, self.h, 0.0))
+    fn defect(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
+        factor_defect(sigma).or_else(|| defect(velocities, &to.q, self.h, 0.0))
     }
 
     fn order(&self) -> Option<u32> {
@@ -456,7 +457,7 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         // Inlined into its loop a step of one unknown stays in registers (58 against 81 ns for the pendulum); with more
         // unknowns it spills there, and is faster on its own (162 against 209 ns for the double pendulum).
         if N == 1 {
@@ -473,8 +474,8 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         let back = self.step::<N, true>(t + self.h, -self.h, from, guess, solver)?;
-        Transition { sigma: 1.0 / back.sigma, ..back }.checked()
+        DiscreteStep { sigma: 1.0 / back.sigma, ..back }.checked()
     }
 }

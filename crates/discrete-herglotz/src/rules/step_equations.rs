@@ -4,7 +4,7 @@ use crate::Node;
 use crate::solve::unknowns::Unknowns;
 use contact_geom::linear::{self, SingularMatrix};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Border, Derivatives, Dual, Lagrangian, VelocityPoint};
+use contact_geom::{AugmentedVector, Derivatives, Dual, Lagrangian, VelocityPoint};
 
 /// The largest dimension whose directions are carried at once; larger ones go in blocks, so that the numbers stay small
 /// enough for the stack and for registers.
@@ -21,7 +21,7 @@ pub(crate) struct Sums<const N: usize> {
     /// The same for the direction of the end action.
     pub right_z: SVector<f64, N>,
     /// `sum w dL[r_j]`.
-    pub slope: Border<N>,
+    pub slope: AugmentedVector<N>,
 }
 
 /// One node with the point at which L is taken there.
@@ -107,7 +107,7 @@ pub(crate) fn rates_at<const N: usize>(
     if const { N > BLOCK } {
         return rates_by_blocks(lagrangian, t, at);
     }
-    let constant = |re: f64| -> Dual<f64, Border<N>> { Dual::constant(re) };
+    let constant = |re: f64| -> Dual<f64, AugmentedVector<N>> { Dual::constant(re) };
     let mut x = VelocityPoint { q: at.q.map(constant), v: at.v.map(constant), z: constant(at.z) };
     for i in 0..N {
         x.q[i].d.x[i] = 1.0;
@@ -124,7 +124,7 @@ fn rates_by_blocks<const N: usize>(
     t: f64,
     at: &VelocityPoint<N>,
 ) -> (f64, SVector<f64, N>, f64) {
-    let constant = |re: f64| -> Dual<f64, Border<BLOCK>> { Dual::constant(re) };
+    let constant = |re: f64| -> Dual<f64, AugmentedVector<BLOCK>> { Dual::constant(re) };
     let (mut value, mut force, mut rate) = (0.0, SVector::zeros(), 0.0);
     for start in (0..N).step_by(BLOCK) {
         let mut x = VelocityPoint { q: at.q.map(constant), v: at.v.map(constant), z: constant(at.z) };

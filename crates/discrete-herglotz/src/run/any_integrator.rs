@@ -1,9 +1,9 @@
 //! The table of integrators.
 
-use super::{Facts, Integrator, Problem, Wants};
+use super::{Integrator, MethodInfo, Problem, StepperOptions};
 use crate::{
-    ClockedGauss, Composed, DividedGauss, Gauss, GaussCollocation, InLanes, InputError, Method, SplittingScheme,
-    Stepper,
+    BatchKernel, CompositionMethod, DividedGauss, Gauss, GaussCollocation, InputError, Method, SplittingScheme,
+    Stepper, TransformedGauss,
 };
 use contact_geom::Lagrangian;
 use std::fmt::{Display, Formatter};
@@ -20,8 +20,8 @@ pub enum AnyIntegrator {
         /// The number of stages.
         stages: usize,
     },
-    /// [`ClockedGauss`].
-    Clocked {
+    /// [`TransformedGauss`].
+    TransformedGauss {
         /// The number of stages.
         stages: usize,
     },
@@ -42,14 +42,14 @@ macro_rules! each {
                 let $integrator = GaussCollocation { stages };
                 $result
             }
-            AnyIntegrator::Clocked { stages } => {
-                let $integrator = ClockedGauss { stages };
+            AnyIntegrator::TransformedGauss { stages } => {
+                let $integrator = TransformedGauss { stages };
                 $result
             }
             AnyIntegrator::Divided($integrator) => $result,
             AnyIntegrator::Splitting($integrator) => $result,
             AnyIntegrator::Composition(rule, scheme) => {
-                let $integrator = Composed::new(rule, scheme);
+                let $integrator = CompositionMethod::new(rule, scheme);
                 $result
             }
         }
@@ -58,23 +58,23 @@ macro_rules! each {
 
 impl AnyIntegrator {
     /// Every integrator by one name, but for those with a number of the user's own in it: quadrature rules, Gauss methods, splittings, the compositions of the symmetric midpoint rule, and
-    /// Gauss methods by a clock.
+    /// Gauss methods in transformed time.
     pub fn all() -> Vec<AnyIntegrator> {
         let discrete = Method::RULES.iter().copied().map(AnyIntegrator::Discrete);
         let gauss = (1..=Gauss::<()>::STAGES).map(|stages| AnyIntegrator::Gauss { stages });
         let splittings = SplittingScheme::ALL.into_iter().map(AnyIntegrator::Splitting);
         let compositions = SplittingScheme::ALL.into_iter().filter(|s| !s.is_nystrom() && s.order() > 2);
         let compositions = compositions.map(|scheme| AnyIntegrator::Composition(Method::Midpoint, scheme));
-        let clocked = (1..=Gauss::<()>::STAGES).map(|stages| AnyIntegrator::Clocked { stages });
-        discrete.chain(gauss).chain(splittings).chain(compositions).chain(clocked).collect()
+        let transformed = (1..=Gauss::<()>::STAGES).map(|stages| AnyIntegrator::TransformedGauss { stages });
+        discrete.chain(gauss).chain(splittings).chain(compositions).chain(transformed).collect()
     }
 
-    /// The order of the flow; by a clock, in steps of its time.
+    /// The order of the flow; in transformed time, in steps of its time.
     pub fn order(self) -> u32 {
         match self {
             AnyIntegrator::Discrete(method) => method.order(),
             AnyIntegrator::Gauss { stages }
-            | AnyIntegrator::Clocked { stages }
+            | AnyIntegrator::TransformedGauss { stages }
             | AnyIntegrator::Divided(DividedGauss { stages, .. }) => 2 * stages as u32,
             AnyIntegrator::Splitting(scheme) | AnyIntegrator::Composition(_, scheme) => scheme.order(),
         }
@@ -90,9 +90,9 @@ impl AnyIntegrator {
 }
 
 impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyIntegrator {
-    fn facts(&self) -> Facts {
-        let facts = each!(*self, integrator => Integrator::<'a, L, N>::facts(&integrator));
-        Facts { name: self.to_string().into(), ..facts }
+    fn info(&self) -> MethodInfo {
+        let info = each!(*self, integrator => Integrator::<'a, L, N>::info(&integrator));
+        MethodInfo { name: self.to_string().into(), ..info }
     }
 
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
@@ -103,17 +103,17 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyInte
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        wants: Wants,
+        wants: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         each!(*self, integrator => integrator.stepper(problem, h, wants))
     }
 
-    fn in_lanes(&self) -> Option<InLanes> {
-        each!(*self, integrator => Integrator::<'a, L, N>::in_lanes(&integrator))
+    fn batch_kernel(&self) -> Option<BatchKernel> {
+        each!(*self, integrator => Integrator::<'a, L, N>::batch_kernel(&integrator))
     }
 }
 
-/// The name in tables: `midpoint`, `gauss_8`, `clocked_gauss_8`, `kahan_li_8`, `midpoint_by_kahan_li_8`.
+/// The name in tables: `midpoint`, `gauss_8`, `transformed_gauss_8`, `kahan_li_8`, `midpoint_by_kahan_li_8`.
 impl Display for AnyIntegrator {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -121,7 +121,7 @@ impl Display for AnyIntegrator {
             AnyIntegrator::Discrete(Method::Strang) => f.pad("discrete_strang"),
             AnyIntegrator::Discrete(method) => f.pad(method.name()),
             AnyIntegrator::Gauss { stages } => f.pad(&format!("gauss_{stages}")),
-            AnyIntegrator::Clocked { stages } => f.pad(&format!("clocked_gauss_{stages}")),
+            AnyIntegrator::TransformedGauss { stages } => f.pad(&format!("transformed_gauss_{stages}")),
             AnyIntegrator::Divided(divided) => f.pad(&divided.name()),
             AnyIntegrator::Splitting(scheme) => f.pad(scheme.name()),
             AnyIntegrator::Composition(method, scheme) => f.pad(&format!("{method}_by_{}", scheme.name())),
@@ -143,8 +143,8 @@ impl FromStr for AnyIntegrator {
             Some(AnyIntegrator::Composition(rule.parse().ok()?, scheme))
         };
         let divided = || {
-            let (stages, misfit) = name.strip_prefix("divided_gauss_")?.split_once('_')?;
-            let divided = DividedGauss { stages: stages.parse().ok()?, most_misfit: misfit.parse().ok()? };
+            let (stages, defect) = name.strip_prefix("divided_gauss_")?.split_once('_')?;
+            let divided = DividedGauss { stages: stages.parse().ok()?, most_misfit: defect.parse().ok()? };
             Some(AnyIntegrator::Divided(divided))
         };
         named.or_else(composed).or_else(divided).ok_or_else(|| UnknownIntegrator { name: name.into() })

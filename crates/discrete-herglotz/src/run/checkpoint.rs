@@ -2,8 +2,8 @@
 
 use super::energy::EnergySums;
 use super::saved::{Saved, load_option, save_option, word};
-use super::{Moment, Needs, Observer, Stop};
-use crate::{InputError, Suspicion};
+use super::{Observer, OutputRequest, StepView, Stop};
+use crate::{InputError, UnresolvedStep};
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -37,18 +37,18 @@ pub enum CheckpointError {
 
 /// A run where it was interrupted, for [`Run::resume`](super::Run::resume).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Interrupted {
+pub struct ResumeState {
     /// What the run is; see [`Plan`](super::Plan).
     pub(super) fingerprint: u64,
     pub(super) taken: usize,
     pub(super) log_factor: f64,
-    pub(super) suspicion: Option<Suspicion>,
+    pub(super) unresolved: Option<UnresolvedStep>,
     pub(super) energy: EnergySums,
     /// The stepper's own.
     pub(super) words: Vec<u64>,
 }
 
-impl Interrupted {
+impl ResumeState {
     /// From the file of a [`Checkpoint`].
     ///
     /// # Errors
@@ -79,10 +79,10 @@ impl Interrupted {
         let (mut taken, mut log_factor) = (0, 0.0);
         Saved::load(&mut taken, &mut from)?;
         Saved::load(&mut log_factor, &mut from)?;
-        let suspicion = load_option(&mut from, || Suspicion { step: 0, misfit: 0.0 })?;
+        let unresolved = load_option(&mut from, || UnresolvedStep { step: 0, defect: 0.0 })?;
         let mut energy = EnergySums::default();
         Saved::load(&mut energy, &mut from)?;
-        Some(Interrupted { fingerprint, taken, log_factor, suspicion, energy, words: from.to_vec() })
+        Some(ResumeState { fingerprint, taken, log_factor, unresolved, energy, words: from.to_vec() })
     }
 
     /// As bytes, with their digest, for [`from_bytes`](Self::from_bytes): the contents of a checkpoint's file.
@@ -90,7 +90,7 @@ impl Interrupted {
         let mut body = vec![self.fingerprint];
         self.taken.save(&mut body);
         self.log_factor.save(&mut body);
-        save_option(self.suspicion.as_ref(), &mut body);
+        save_option(self.unresolved.as_ref(), &mut body);
         self.energy.save(&mut body);
         body.extend_from_slice(&self.words);
         let sum = digest(&body);
@@ -141,15 +141,15 @@ impl Checkpoint {
 }
 
 impl<const N: usize> Observer<N> for Checkpoint {
-    fn needs(&self) -> Needs {
-        Needs { saved: true, ..Needs::default() }
+    fn needs(&self) -> OutputRequest {
+        OutputRequest { saved: true, ..OutputRequest::default() }
     }
 
     fn next(&self, taken: usize) -> usize {
         (taken / self.every + 1) * self.every
     }
 
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if !at.k.is_multiple_of(self.every) && !at.last {
             return ControlFlow::Continue(());
         }

@@ -2,11 +2,12 @@
 
 use super::Plan;
 use super::jump::between;
-use crate::run::watch::size;
+use crate::run::resolution_monitor::size;
 use crate::{Stepper, legendre_inverse};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    Defect, Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint, gradient_rounding, larger, largest,
+    Defect, Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint, gradient_rounding, max_abs_or_nan,
+    max_or_nan,
 };
 
 /// The part of what a motion has covered, in any coordinate or momentum, that it moves at least between two looks.
@@ -143,7 +144,7 @@ impl<const N: usize> ClaimMonitor<N> {
         for (distance, (low, high)) in distance.iter().zip(self.low.iter().zip(&self.high)) {
             for i in 0..N {
                 if distance[i] != 0.0 {
-                    part = larger(part, distance[i].abs() / (high[i] - low[i]));
+                    part = max_or_nan(part, distance[i].abs() / (high[i] - low[i]));
                 }
             }
         }
@@ -163,7 +164,7 @@ impl<const N: usize> ClaimMonitor<N> {
         };
         let rounding = |part: usize| {
             let (_, r) = gradient_rounding(lagrangian, t, x);
-            let of = |part: &SVector<f64, N>, by: f64| largest(part.iter().copied()) / by;
+            let of = |part: &SVector<f64, N>, by: f64| max_abs_or_nan(part.iter().copied()) / by;
             ROUNDINGS * [of(&r.x, size(&x.q)), of(&r.y, size(&x.v)), r.z][part]
         };
         let mut found = None;
@@ -192,7 +193,7 @@ impl<const N: usize> ClaimMonitor<N> {
 
 /// The largest difference of two sets of numbers, and that relative to the largest of them; `None` where they are the same.
 fn difference(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
-    let apart = largest(a.iter().zip(b).map(|(a, b)| a - b));
-    let size = largest(a.iter().chain(b).copied());
+    let apart = max_abs_or_nan(a.iter().zip(b).map(|(a, b)| a - b));
+    let size = max_abs_or_nan(a.iter().chain(b).copied());
     (apart > DIFFERENT * size).then(|| (apart, apart / size))
 }

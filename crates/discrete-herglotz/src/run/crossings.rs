@@ -3,7 +3,7 @@
 use super::events::{Crossing, Event};
 use super::observer::Beside;
 use super::roots::{bracketed_root, bracketed_root_within};
-use super::{Course, LastStep, Motion, Near};
+use super::{LastStep, Motion, Near, RunInfo};
 use crate::StepError;
 use contact_geom::PhasePoint;
 
@@ -71,7 +71,7 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    pub(super) fn of(Course { t0, t_end, h, count }: &Course) -> Self {
+    pub(super) fn of(RunInfo { t0, t_end, h, count }: &RunInfo) -> Self {
         let span = t_end - t0;
         let h = h.unwrap_or(span / count.map_or(64.0, |count| count.max(1) as f64));
         // Of a long run a part, so that what counts as rounding stays far below a step.

@@ -1,6 +1,6 @@
 //! Rows as a CSV file, written while the run goes on.
 
-use super::{Course, Moment, Needs, Observer, Rows, Stop};
+use super::{Observer, OutputRequest, Rows, RunInfo, StepView, Stop};
 use crate::InputError;
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -39,7 +39,7 @@ impl<'f, W: Write, const N: usize> CsvRows<'f, W, N> {
         if last { Ok(self.writer.flush()?) } else { Ok(()) }
     }
 
-    fn written(&mut self, seen: ControlFlow<Stop<N>>, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn written(&mut self, seen: ControlFlow<Stop<N>>, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if let Err(error) = self.write(at.k, at.last || seen.is_break()) {
             self.error = Some(error);
             return ControlFlow::Break(Stop::here("a row that could not be written"));
@@ -49,11 +49,11 @@ impl<'f, W: Write, const N: usize> CsvRows<'f, W, N> {
 }
 
 impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
-    fn needs(&self) -> Needs {
+    fn needs(&self) -> OutputRequest {
         self.rows.needs()
     }
 
-    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         self.rows.prepare(course)
     }
 
@@ -61,12 +61,12 @@ impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
         self.rows.next(taken)
     }
 
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         let seen = self.rows.start(at);
         self.written(seen, at)
     }
 
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         let seen = self.rows.step(at);
         self.written(seen, at)
     }

@@ -1,11 +1,11 @@
 //! Steps of varying length for an accuracy, where equal steps would be too many.
 
-use super::accuracy::{Choice, first_guess, obstacle};
-use super::pilot::{Marks, PilotEnd, Pilots};
+use super::accuracy::{StepSelection, first_guess, obstacle};
 use super::track::Track;
+use super::trial_runs::{ComparisonGrid, TrialEnd, TrialRuns};
 use crate::switching::DividedGauss;
-use crate::{InputError, Obstacle};
-use contact_geom::{Lagrangian, larger};
+use crate::{InputError, SelectionFailure};
+use contact_geom::{Lagrangian, max_or_nan};
 use std::sync::Arc;
 
 /// The stages of the parts.
@@ -24,22 +24,22 @@ const ATTEMPTS: usize = 8;
 /// Chooses steps that are divided where the motion is fast, so that the errors of (q, p) and v are at most that wanted: a division and one
 /// of half the length must agree. The error of a part is about the square of its misfit, and the misfit of the half smaller by `2^s`.
 pub(super) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, 'p, L, N>,
-) -> Result<Choice<'p, L, N>, InputError> {
-    let (wanted, t0, span) = (pilots.wanted, pilots.request.problem.t0, pilots.request.span);
+    trials: &mut TrialRuns<'_, 'p, L, N>,
+) -> Result<StepSelection<'p, L, N>, InputError> {
+    let (wanted, t0, span) = (trials.wanted, trials.request.problem.t0, trials.request.span);
     let finer = f64::powi(0.5, STAGES as i32);
-    let count = first_guess(pilots.request, STAGES, wanted).clamp(STEPS[0], STEPS[1]);
-    let marks = Marks::of(count);
+    let count = first_guess(trials.request, STAGES, wanted).clamp(STEPS[0], STEPS[1]);
+    let marks = ComparisonGrid::of(count);
     let mut most_misfit = (0.3 * wanted.sqrt()).min(MISFITS[0]);
-    let (mut best, mut before, mut cause) = (f64::INFINITY, f64::NAN, Obstacle::Budget);
+    let (mut best, mut before, mut cause) = (f64::INFINITY, f64::NAN, SelectionFailure::Budget);
     let mut coarse: Option<Track<N>> = None;
     for _ in 0..ATTEMPTS {
         let integrator = DividedGauss { stages: STAGES, most_misfit };
         let mut track =
-            |most_misfit: f64| match pilots.divided(DividedGauss { most_misfit, ..integrator }, count, &marks)? {
-                PilotEnd::Followed(track) => Ok(Ok(track)),
-                PilotEnd::Halted { part, cause } => Ok(Err(Obstacle::Halted { t: t0 + part * span, cause })),
-                _ => Ok::<_, InputError>(Err(Obstacle::Budget)),
+            |most_misfit: f64| match trials.divided(DividedGauss { most_misfit, ..integrator }, count, &marks)? {
+                TrialEnd::Followed(track) => Ok(Ok(track)),
+                TrialEnd::Halted { part, cause } => Ok(Err(SelectionFailure::Halted { t: t0 + part * span, cause })),
+                _ => Ok::<_, InputError>(Err(SelectionFailure::Budget)),
             };
         let first = match coarse.take() {
             Some(track) => Ok(track),
@@ -56,11 +56,11 @@ pub(super) fn divided_steps<'p, L: Lagrangian<N>, const N: usize>(
                 break;
             }
         };
-        let error = larger(first.distance(&second), 0.5 * f64::EPSILON);
+        let error = max_or_nan(first.distance(&second), 0.5 * f64::EPSILON);
         // The finer of the two is nearer to the motion than they are to each other.
         if error <= 0.5 * wanted {
             let (h, error) = (span / count as f64, Some(error));
-            return Ok(Choice { integrator: Arc::new(integrator), count, h, error, ended: None });
+            return Ok(StepSelection { integrator: Arc::new(integrator), count, h, error, ended: None });
         }
         let distances = first.distances(&second);
         cause = obstacle(&distances, f64::log2(before / error), wanted, t0, span);

@@ -1,9 +1,9 @@
 //! Runs that an observer ends: where that is, for trial runs, and how it is reached in a step that cannot be taken as a whole.
 
-use super::accuracy::{Choice, first_guess};
+use super::accuracy::{StepSelection, first_guess};
 use super::energy::EnergySums;
-use super::{Course, Moment, Observer, Plan, Request, Stop, Terminal};
-use crate::{DividedGauss, Status, Stepper, Suspicion};
+use super::{Observer, Plan, Request, RunInfo, StepView, Stop, Terminal};
+use crate::{DividedGauss, Status, Stepper, UnresolvedStep};
 use contact_geom::{Lagrangian, PhasePoint};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -30,9 +30,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         let request = Request { integrator: None, needs: terminal.needs(), ..*self };
         let count = first_guess(self, SEARCH.stages, ERROR).max(FEWEST);
         let h = self.span / count as f64;
-        let choice = Choice { integrator: Arc::new(SEARCH), count, h, error: Some(ERROR), ended: None };
+        let choice = StepSelection { integrator: Arc::new(SEARCH), count, h, error: Some(ERROR), ended: None };
         let plan = Plan::new(&request, &choice).ok()?;
-        let budget = |at: &Moment<'_, N>| match at.stepper.evaluations() {
+        let budget = |at: &StepView<'_, N>| match at.stepper.evaluations() {
             spent if spent > BUDGET => ControlFlow::Break(Stop::here(SPENT)),
             _ => ControlFlow::Continue(()),
         };
@@ -44,13 +44,17 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     }
 }
 
-impl<'p, L: Lagrangian<N>, const N: usize> Choice<'p, L, N> {
+impl<'p, L: Lagrangian<N>, const N: usize> StepSelection<'p, L, N> {
     /// The same steps over so many times the span, as an observer ends the run where these end.
     pub(super) fn going_on(self, times: f64) -> Self {
         let count = (self.count as f64 * times * (1.0 - 4.0 * f64::EPSILON)).ceil();
-        // Steps by a clock are counted on the way.
-        let h = if self.integrator.facts().by_clock { self.h } else { self.h * (self.count as f64 * times / count) };
-        Choice { h, count: count as usize, ended: Some(self.count), ..self }
+        // Steps in transformed time are counted on the way.
+        let h = if self.integrator.info().in_transformed_time {
+            self.h
+        } else {
+            self.h * (self.count as f64 * times / count)
+        };
+        StepSelection { h, count: count as usize, ended: Some(self.count), ..self }
     }
 }
 
@@ -58,9 +62,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Choice<'p, L, N> {
 #[derive(Clone, Copy)]
 pub(super) struct Before<'s, const N: usize> {
     pub stepper: &'s dyn Stepper<N>,
-    pub course: Course,
+    pub course: RunInfo,
     /// The logarithm of the conformal factor, what was noted, and the energies.
-    pub noted: (f64, Option<Suspicion>, EnergySums),
+    pub noted: (f64, Option<UnresolvedStep>, EnergySums),
     pub taken: usize,
 }
 
@@ -74,7 +78,7 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
     ) -> Option<(Stop<N>, Option<f64>)> {
         let Before { stepper, course, noted, taken } = before;
         let from = (stepper.time(), stepper.state());
-        let whole = if self.facts.by_clock { self.t_end - from.0 } else { self.h };
+        let whole = if self.info.in_transformed_time { self.t_end - from.0 } else { self.h };
         let (mut possible, mut impossible) = (0.0, 1.0);
         let mut ending = None;
         let mut terminal = observers.terminal()?;
@@ -108,9 +112,9 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
         &'r self,
         part: &'r dyn Stepper<N>,
         from: (f64, PhasePoint<N>),
-        Before { noted: (log_factor, suspicion, energy), taken, .. }: Before<'_, N>,
-    ) -> Moment<'r, N> {
-        let noted = (log_factor + part.sigma().ln(), suspicion, energy);
-        Moment { in_failed_step: true, ..self.moment(part, Some(from), noted, (taken + 1, false)) }
+        Before { noted: (log_factor, unresolved, energy), taken, .. }: Before<'_, N>,
+    ) -> StepView<'r, N> {
+        let noted = (log_factor + part.sigma().ln(), unresolved, energy);
+        StepView { in_failed_step: true, ..self.moment(part, Some(from), noted, (taken + 1, false)) }
     }
 }

@@ -5,7 +5,7 @@ use super::noise::Noise;
 use super::saved::saved;
 use crate::{Stepper, legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, larger};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, max_or_nan};
 
 /// The shortest distance of two looks in long runs, in steps: a look costs about three of the cheapest.
 const APART: usize = 256;
@@ -33,8 +33,8 @@ const FIRST: f64 = 16.0;
 /// use discrete_herglotz::{EnergyDrift, EnergyLook};
 /// let look = |total: f64, taken: usize| EnergyLook { total, kinetic: 0.5, terms: 0.5, log_factor: 0.0, taken };
 /// let mut drift = EnergyDrift::new(2, &look(1.0, 0));
-/// assert_eq!(drift.misfit(&look(1.001, 100), |_| 0.0), None);
-/// assert!(drift.misfit(&look(2.0, 200), |_| 0.0).is_some_and(|misfit| misfit > 1.0));
+/// assert_eq!(drift.defect(&look(1.001, 100), |_| 0.0), None);
+/// assert!(drift.defect(&look(2.0, 200), |_| 0.0).is_some_and(|defect| defect > 1.0));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyDrift {
@@ -72,7 +72,7 @@ impl EnergyDrift {
 
     /// Looks: the drift, in units of the largest that steps have which resolve their motion, where that is above one. What
     /// rounding may have changed of the energies is asked for by the conformal factor since the start, and only where it matters.
-    pub fn misfit(&mut self, at: &EnergyLook, rounding: impl FnOnce(f64) -> f64) -> Option<f64> {
+    pub fn defect(&mut self, at: &EnergyLook, rounding: impl FnOnce(f64) -> f64) -> Option<f64> {
         let EnergyLook { total, kinetic, terms, log_factor, taken } = *at;
         if taken < self.first() {
             return None;
@@ -84,13 +84,13 @@ impl EnergyDrift {
         let scale = scale * grown.exp() + size;
         self.sums = EnergySums { scale, looks: looks + 1.0, log_factor, taken: taken as f64 };
         let drift = (total - self.start * log_factor.exp()).abs();
-        let allowed = allowed(self.order) * larger(scale / (looks + 1.0), size);
+        let allowed = allowed(self.order) * max_or_nan(scale / (looks + 1.0), size);
         if drift <= allowed || !drift.is_finite() || !allowed.is_finite() {
             return None;
         }
         // The roundings of all steps may add up.
         let rounding = (64.0 + taken as f64) * rounding(log_factor.exp());
-        (drift > rounding).then(|| drift / larger(allowed, f64::MIN_POSITIVE))
+        (drift > rounding).then(|| drift / max_or_nan(allowed, f64::MIN_POSITIVE))
     }
 }
 
@@ -142,7 +142,7 @@ impl<const N: usize> EnergyMonitor<N> {
             rate,
             every: APART.max(plan.count.div_ceil(LOOKS)),
             guess: problem.start.v,
-            drift: EnergyDrift::new(plan.facts.order, &start),
+            drift: EnergyDrift::new(plan.info.order, &start),
         })
     }
 
@@ -170,7 +170,7 @@ impl<const N: usize> EnergyMonitor<N> {
         let log_factor = self.rate.map_or(log_factor, |rate| rate * (t - problem.t0));
         self.guess = x.v;
         let start = (problem.t0, &problem.start, &problem.state);
-        self.drift.misfit(&EnergyLook { total, kinetic, terms, log_factor, taken }, |sigma| {
+        self.drift.defect(&EnergyLook { total, kinetic, terms, log_factor, taken }, |sigma| {
             rounding_of(problem.lagrangian, t, &x, state)
                 + rounding_of(problem.lagrangian, start.0, start.1, start.2) * sigma
                 + Noise::at(problem.lagrangian, t, &x).energy
@@ -197,13 +197,13 @@ pub(crate) fn may_drift<L: Lagrangian<N>, const N: usize>(
     let (Some(a), Some(b)) = (energies(lagrangian, t0, &x, from), energies(lagrangian, t, &y, to)) else {
         return false;
     };
-    let allowed = allowed(f64::from(order.max(1))) * larger(a.kinetic * sigma, b.kinetic);
+    let allowed = allowed(f64::from(order.max(1))) * max_or_nan(a.kinetic * sigma, b.kinetic);
     (b.total - a.total * sigma).abs() > MAY * allowed
 }
 
 /// The drift, relative to the kinetic energy, that a method of an order may have.
 fn allowed(order: f64) -> f64 {
-    larger(LEAST, STEP.powf(order))
+    max_or_nan(LEAST, STEP.powf(order))
 }
 
 /// The energy at a state, with the kinetic one, `v.Wv/2`.

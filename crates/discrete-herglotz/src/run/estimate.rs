@@ -14,7 +14,7 @@ impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
     /// or is interrupted.
     pub(super) fn distance_from_halves(&self, taken: usize, t: f64, (end, near): (&PhasePoint<N>, Near<N>)) -> f64 {
         let Ok(mut fine) = self.make_stepper(self.problem, 0.5 * self.h, false) else { return f64::INFINITY };
-        let steps = if self.facts.by_clock { usize::MAX } else { 2 * taken };
+        let steps = if self.info.in_transformed_time { usize::MAX } else { 2 * taken };
         let mut velocities = Velocities::new(self.problem, self.scales);
         let mut done = 0;
         while done < steps && (fine.time() - t) * self.h < 0.0 {

@@ -1,7 +1,7 @@
 //! Events: where functions of the state change sign along a run.
 
 use super::crossings::{LastSign, Pace, Way};
-use super::{Course, LastStep, Moment, Needs, Observer, Stop, Terminal};
+use super::{LastStep, Observer, OutputRequest, RunInfo, StepView, Stop, Terminal};
 use crate::{InputError, StepError};
 use contact_geom::PhasePoint;
 use std::cell::RefCell;
@@ -117,7 +117,7 @@ pub struct Events<'f, const N: usize> {
     /// The changes of sign so far, in the order of the run.
     pub crossings: Vec<Crossing<N>>,
     events: Vec<Event<'f, N>>,
-    needs: Needs,
+    needs: OutputRequest,
     seen: Vec<LastSign<N>>,
     pace: Pace,
     /// About the states inside of the last step.
@@ -131,12 +131,20 @@ impl<'f, const N: usize> Events<'f, N> {
     pub fn new(events: impl IntoIterator<Item = Event<'f, N>>) -> Self {
         let events = events.into_iter().collect();
         let (crossings, seen, sketch) = (Vec::new(), Vec::new(), Vec::new());
-        Events { crossings, events, needs: Needs::ACTION, seen, pace: Pace::of(&Course::NONE), sketch, rates: None }
+        Events {
+            crossings,
+            events,
+            needs: OutputRequest::ACTION,
+            seen,
+            pace: Pace::of(&RunInfo::NONE),
+            sketch,
+            rates: None,
+        }
     }
 
     /// The same for functions that do not depend on the action: where no one else asks for it, it is not computed.
     pub fn without_action(self) -> Self {
-        Events { needs: Needs { action: false, ..self.needs }, ..self }
+        Events { needs: OutputRequest { action: false, ..self.needs }, ..self }
     }
 
     /// The crossings in a step, in the order of the run, and why there are no more.
@@ -182,11 +190,11 @@ impl<'f, const N: usize> Events<'f, N> {
 }
 
 impl<const N: usize> Observer<N> for Events<'_, N> {
-    fn needs(&self) -> Needs {
+    fn needs(&self) -> OutputRequest {
         self.needs
     }
 
-    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         self.pace = Pace::of(course);
         self.seen.clear();
         self.crossings.clear();
@@ -194,7 +202,7 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
         Ok(())
     }
 
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         let way = Way { motion: at.motion, pace: self.pace, near: at.stepper.last_velocity() };
         for event in &mut self.events {
             match event.at(at.t, &at.state) {
@@ -211,7 +219,7 @@ impl<const N: usize> Observer<N> for Events<'_, N> {
         ControlFlow::Continue(())
     }
 
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         let Some(step) = at.last_step() else { return ControlFlow::Continue(()) };
         let from = step.span().0;
         let mut step = step.with_rates_at_start(self.rates.filter(|(t, _)| *t == from).map(|(_, rates)| rates));

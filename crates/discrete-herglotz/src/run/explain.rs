@@ -7,7 +7,7 @@ use std::fmt::{Display, Formatter};
 
 /// One line of a plan: something that could be computed, whether it is, and why.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Item {
+pub struct PlanEntry {
     /// What it is about.
     pub what: &'static str,
     /// Whether it is computed.
@@ -16,15 +16,15 @@ pub struct Item {
     pub why: Cow<'static, str>,
 }
 
-impl Item {
+impl PlanEntry {
     /// Something that is computed, and why or how.
     pub fn computed(what: &'static str, why: impl Into<Cow<'static, str>>) -> Self {
-        Item { what, computed: true, why: why.into() }
+        PlanEntry { what, computed: true, why: why.into() }
     }
 
     /// Something that is not computed, and why.
     pub fn skipped(what: &'static str, why: impl Into<Cow<'static, str>>) -> Self {
-        Item { what, computed: false, why: why.into() }
+        PlanEntry { what, computed: false, why: why.into() }
     }
 }
 
@@ -33,32 +33,38 @@ pub(crate) const DECOUPLED: &str = "L = L0 + gamma z: it does not act back, and 
 
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// What is computed, and what is not: by the steps, and beside them.
-    pub fn items(&self) -> Vec<Item> {
-        let mut items = self.account.clone();
+    pub fn items(&self) -> Vec<PlanEntry> {
+        let mut items = self.work_summary.clone();
         if self.needs.action {
             items.retain(|item| item.what != "action z");
-            items.push(Item::computed("action z", "requested"));
+            items.push(PlanEntry::computed("action z", "requested"));
         }
         let what = "conformal factor";
         items.push(match (self.needs.conformal_factor, self.constant_rate) {
-            (false, true) => Item::skipped(what, "sigma_d is the same in every step, and the product is not requested"),
-            (true, true) => Item::computed(what, "requested; sigma_d is the same in every step: a power at the end"),
-            (true, false) => Item::computed(what, "requested, and different in every step: a product along the run"),
+            (false, true) => {
+                PlanEntry::skipped(what, "sigma_d is the same in every step, and the product is not requested")
+            }
+            (true, true) => {
+                PlanEntry::computed(what, "requested; sigma_d is the same in every step: a power at the end")
+            }
+            (true, false) => {
+                PlanEntry::computed(what, "requested, and different in every step: a product along the run")
+            }
             (false, false) => {
-                Item::skipped(what, "the product is not requested; each step checks that its own is positive")
+                PlanEntry::skipped(what, "the product is not requested; each step checks that its own is positive")
             }
         });
         let structure = self.problem.structure;
         let what = "probes of the structure";
         items.push(if const { L::PROVED } {
-            Item::skipped(what, "it is proved from the formula of L")
+            PlanEntry::skipped(what, "it is proved from the formula of L")
         } else if structure == Structure::default() {
-            Item::skipped(what, "nothing is claimed of L")
+            PlanEntry::skipped(what, "nothing is claimed of L")
         } else {
-            Item::computed(what, "it is claimed: at the start, and along the run")
+            PlanEntry::computed(what, "it is claimed: at the start, and along the run")
         });
         let (what, autonomous) = ("time at the stages", structure.autonomous);
-        items.push(Item {
+        items.push(PlanEntry {
             what,
             computed: !autonomous,
             why: if autonomous { "L does not depend on it" } else { "L depends on it" }.into(),
@@ -69,10 +75,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
 
 impl<L: Lagrangian<N>, const N: usize> Display for Plan<'_, L, N> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        let Plan { problem, count, h, facts, t_end, .. } = self;
+        let Plan { problem, count, h, info, t_end, .. } = self;
         let (t0, items) = (problem.t0, self.items());
-        let of = if facts.by_clock { " of the clock's time" } else { "" };
-        writeln!(f, "{count} steps of {h}{of} by {}, t = {t0} .. {t_end}", facts.name)?;
+        let of = if info.in_transformed_time { " of the transformed time" } else { "" };
+        writeln!(f, "{count} steps of {h}{of} by {}, t = {t0} .. {t_end}", info.name)?;
         for (title, computed) in [("computed", true), ("skipped", false)] {
             writeln!(f, "{title}:")?;
             for item in items.iter().filter(|item| item.computed == computed) {

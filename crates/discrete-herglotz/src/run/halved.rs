@@ -1,11 +1,11 @@
 //! Steps against twice as many of half their length: whether given steps resolve the motion at all.
 
 use super::{Plan, Problem};
+use crate::run::resolution_monitor::{LEAST, rounding};
 use crate::run::step_error;
-use crate::run::watch::{LEAST, rounding};
-use crate::{Doubt, StepError, Stepper, legendre_inverse};
+use crate::{StepError, Stepper, SuspectInterval, legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint, larger, largest};
+use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint, max_abs_or_nan, max_or_nan};
 
 /// The difference from two halves, relative to the motion, from which on a step does not resolve it. Of the orders that there are
 /// a step then has an error of its own of a twentieth, or a fifteenth with order one.
@@ -16,7 +16,10 @@ const FIRST_STEPS: f64 = 16.0;
 
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// The misfit of some steps; above one where they do not resolve the motion. `None` where there is nothing to compare with.
-    pub(super) fn against_halves(&self, Doubt { steps, t, from, to, .. }: &Doubt<N>) -> Option<f64> {
+    pub(super) fn against_halves(
+        &self,
+        SuspectInterval { steps, t, from, to, .. }: &SuspectInterval<N>,
+    ) -> Option<f64> {
         let Problem { lagrangian, start, .. } = *self.problem;
         let end = t + *steps as f64 * self.h;
         // Of several velocities that of the motion.
@@ -24,7 +27,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let guess = if self.problem.structure.constant_mass { start.v } else { mean };
         let VelocityPoint { v, .. } = legendre_inverse(lagrangian, *t, from, &guess).ok()?;
         let at_end = |x: &PhasePoint<N>| legendre_inverse(lagrangian, end, x, &v).map(|x| x.v).ok();
-        if self.facts.by_clock {
+        if self.info.in_transformed_time {
             return None;
         }
         let Ok(fine) = self.advanced((*t, from), &v, 0.5 * self.h, (2 * steps, end), |_| ()) else {
@@ -33,20 +36,21 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         };
         let fine = fine.state();
         let (coarse_v, fine_v) = (at_end(to)?, at_end(&fine)?);
-        let size = |x: [&SVector<f64, N>; 3]| largest(x.into_iter().flat_map(|x| x.iter().copied()));
-        let apart = |a: &SVector<f64, N>, b: &SVector<f64, N>| largest((a - b).iter().copied());
+        let size = |x: [&SVector<f64, N>; 3]| max_abs_or_nan(x.into_iter().flat_map(|x| x.iter().copied()));
+        let apart = |a: &SVector<f64, N>, b: &SVector<f64, N>| max_abs_or_nan((a - b).iter().copied());
         let relative = |apart: f64, size: f64| if apart == 0.0 { 0.0 } else { apart / size };
         // From rest, steps of order one are off by what they move over their number.
         let moved =
-            if self.facts.order == 1 { FIRST_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
-        let width = larger(larger(size([&from.q, &to.q, &fine.q]), moved), rounding(&start.q, &start.v, self.h));
+            if self.info.order == 1 { FIRST_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
+        let width =
+            max_or_nan(max_or_nan(size([&from.q, &to.q, &fine.q]), moved), rounding(&start.q, &start.v, self.h));
         let of_v = apart(&coarse_v, &fine_v);
         let of_v =
             if of_v * self.h.abs() > LEAST * width { relative(of_v, size([&v, &coarse_v, &fine_v])) } else { 0.0 };
-        Some(larger(relative(apart(&to.q, &fine.q), width), of_v) / APART)
+        Some(max_or_nan(relative(apart(&to.q, &fine.q), width), of_v) / APART)
     }
 
-    /// A stepper after steps of another length, from a state with its velocity, so many or until a time; by a clock, steps of the
+    /// A stepper after steps of another length, from a state with its velocity, so many or until a time; in transformed time, steps of the
     /// same length in its time: they are cut where they pass the time that they are to reach.
     ///
     /// A few steps of a linear motion are worth no matrix, not even a cheap one, unless their stages cannot be solved for without it:
@@ -63,10 +67,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let by = |quadratic: bool| {
             let start = VelocityPoint { q: from.q, v: *v, z: from.z };
             // The tables of twice the working precision depend on the length of the step: a few steps are not worth them.
-            let separable = separable && (quadratic || self.facts.collocation.is_none());
+            let separable = separable && (quadratic || self.info.collocation.is_none());
             let structure = Structure { quadratic, separable, ..self.problem.structure };
             let problem = Problem { t0: t, start, state: *from, structure, ..*self.problem };
-            let h = if self.facts.by_clock { self.h } else { h };
+            let h = if self.info.in_transformed_time { self.h } else { h };
             let mut stepper = self.make_stepper(&problem, h, false).map_err(step_error)?;
             guess(&mut *stepper);
             stepper.advance_until(steps, t_end).map_err(|halt| halt.cause)?;
@@ -177,7 +181,7 @@ mod tests {
         let problem = Problem::new(&NearlyOne, 0.0, start).unwrap();
         for stages in [1, 2] {
             let run = problem.by(GaussCollocation { stages }).steps(Steps::Count(64));
-            assert_eq!(run.run(Until::Time(4.0)).unwrap().suspicion, None, "{stages} stages");
+            assert_eq!(run.run(Until::Time(4.0)).unwrap().unresolved, None, "{stages} stages");
             let plan = problem.by(GaussCollocation { stages }).steps(Steps::Count(64)).plan(Until::Time(4.0)).unwrap();
             let part = plan.advanced((0.0, &problem.state), &start.v, 0.03, (1, 0.03), |_| ()).unwrap();
             // By the whole step's matrix: to rounding through the inverse of the mass matrix.

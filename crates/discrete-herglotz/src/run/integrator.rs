@@ -1,15 +1,15 @@
 //! Integrators: what advances a run.
 
 use super::Problem;
-use crate::{InLanes, InputError, Stepper};
+use crate::{BatchKernel, InputError, Stepper};
 use std::borrow::Cow;
 
 /// What is known of an integrator.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Facts {
+pub struct MethodInfo {
     /// The name in tables, in lower case with underscores.
     pub name: Cow<'static, str>,
-    /// The order of the flow; by a clock, in steps of its time.
+    /// The order of the flow; in transformed time, in steps of its time.
     pub order: u32,
     /// Whether it is its own adjoint: a step back leads to where a step came from.
     pub symmetric: bool,
@@ -17,8 +17,8 @@ pub struct Facts {
     pub explicit: bool,
     /// Whether `sigma_d = e^(gamma h)` for a Lagrangian with the linear drag `gamma z`, as for the motion itself.
     pub exact_rate: bool,
-    /// Whether its steps are equal in the time of the clock that the Lagrangian states, and end where the span does.
-    pub by_clock: bool,
+    /// Whether its steps are equal in the transformed time that the Lagrangian states, and end where the span does.
+    pub in_transformed_time: bool,
     /// The number of stages, of contact Gauss collocation.
     pub collocation: Option<usize>,
     /// Whether a step consists of others, back and forth.
@@ -26,26 +26,26 @@ pub struct Facts {
     /// Whether it divides its steps where the motion is fast, and at kinks and jumps of the Lagrangian.
     pub divides: bool,
     /// What one of its [evaluations](Stepper::evaluations) costs, in evaluations of L at a stage of Gauss collocation.
-    pub price: u64,
+    pub cost_per_evaluation: u64,
     /// Where it is from: authors, journal, year.
     pub source: Cow<'static, str>,
 }
 
-impl Facts {
+impl MethodInfo {
     /// Those of an implicit method that is not known to be symmetric: the least that is true of a discrete Lagrangian in N coordinates.
     pub fn of_discrete<const N: usize>(name: impl Into<Cow<'static, str>>, order: u32) -> Self {
-        Facts {
+        MethodInfo {
             name: name.into(),
             order,
             symmetric: false,
             explicit: false,
             exact_rate: false,
-            by_clock: false,
+            in_transformed_time: false,
             collocation: None,
             substeps: false,
             divides: false,
             // Newton's method takes second derivatives.
-            price: 32 * N as u64,
+            cost_per_evaluation: 32 * N as u64,
             source: Cow::Borrowed(""),
         }
     }
@@ -53,20 +53,20 @@ impl Facts {
 
 /// What is asked of a stepper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Wants {
+pub struct StepperOptions {
     /// The action, also where it does not act back on the motion.
     pub action: bool,
-    /// That it watches whether its steps resolve the motion, where that has a price; see [`Stepper::suspicion`] and [`Stepper::doubt`].
+    /// That it watches whether its steps resolve the motion, where that has a price; see [`Stepper::unresolved`] and [`Stepper::doubt`].
     pub watched: bool,
 }
 
 /// A way to advance the motions of Lagrangians L in N coordinates: the rules, the splittings, the compositions and the collocation methods
 /// of this crate, the exact flow, and a user's own.
 ///
-/// Who has a [`DiscreteLagrangian`](crate::DiscreteLagrangian) needs no implementation: see [`Discrete`](crate::Discrete).
+/// Who has a [`DiscreteLagrangian`](crate::DiscreteLagrangian) needs no implementation: see [`CustomMethod`](crate::CustomMethod).
 pub trait Integrator<'a, L, const N: usize> {
     /// What is known of it.
-    fn facts(&self) -> Facts;
+    fn info(&self) -> MethodInfo;
 
     /// Whether a Lagrangian meets its hypotheses.
     ///
@@ -82,12 +82,12 @@ pub trait Integrator<'a, L, const N: usize> {
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        wants: Wants,
+        wants: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError>;
 
     /// What an [`Ensemble`](crate::Ensemble) has a kernel for that takes these steps for many motions at once; `None` where each has a
     /// stepper of its own.
-    fn in_lanes(&self) -> Option<InLanes> {
+    fn batch_kernel(&self) -> Option<BatchKernel> {
         None
     }
 }

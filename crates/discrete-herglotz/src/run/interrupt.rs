@@ -1,6 +1,6 @@
 //! Whether a run is to end before its time, as from outside.
 
-use super::{Moment, Needs, Observer, Stop};
+use super::{Observer, OutputRequest, StepView, Stop};
 use std::fmt::{Debug, Formatter};
 use std::ops::ControlFlow;
 
@@ -35,19 +35,19 @@ impl Debug for Interrupt<'_> {
 pub(crate) struct Asking<'a>(pub Interrupt<'a>);
 
 impl<const N: usize> Observer<N> for Asking<'_> {
-    fn needs(&self) -> Needs {
-        Needs::default()
+    fn needs(&self) -> OutputRequest {
+        OutputRequest::default()
     }
 
     fn next(&self, taken: usize) -> usize {
         (taken / BETWEEN + 1) * BETWEEN
     }
 
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         self.step(at)
     }
 
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         // A run at its end is finished.
         if !at.last && self.0.is_wanted() {
             return ControlFlow::Break(Stop::here(INTERRUPTION));

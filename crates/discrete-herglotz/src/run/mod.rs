@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod any_integrator;
+pub(crate) mod check_claims;
 mod checkpoint;
 mod claims;
 mod crossings;
@@ -21,36 +22,36 @@ mod momentum;
 mod noise;
 mod observer;
 mod outcome;
-mod pilot;
 mod plan;
 mod problem;
 mod progress;
 mod quotient;
+pub(crate) mod resolution_monitor;
 mod rest;
 mod roots;
 pub(crate) mod rows;
 pub(crate) mod saved;
 mod stepper;
 mod track;
+mod trial_runs;
 mod velocities;
-pub(crate) mod verified;
-pub(crate) mod watch;
 
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
+pub use check_claims::check_claims;
 pub(crate) use checkpoint::digest;
-pub use checkpoint::{Checkpoint, CheckpointError, Interrupted};
+pub use checkpoint::{Checkpoint, CheckpointError, ResumeState};
 #[cfg(feature = "csv")]
 pub use csv_rows::CsvRows;
 pub(crate) use energy::may_drift;
 pub use energy::{EnergyDrift, EnergyLook};
 pub use events::{Crossing, Event, Events};
 pub(crate) use explain::DECOUPLED;
-pub use explain::Item;
-pub use integrator::{Facts, Integrator, Wants};
+pub use explain::PlanEntry;
+pub use integrator::{Integrator, MethodInfo, StepperOptions};
 pub use interrupt::{INTERRUPTION, Interrupt};
 pub(crate) use jump::between;
 pub use momentum::{MomentumDecay, MomentumRow};
-pub use observer::{Course, LastStep, Moment, Needs, Observer, Stop, Terminal};
+pub use observer::{LastStep, Observer, OutputRequest, RunInfo, StepView, Stop, Terminal};
 pub use outcome::Outcome;
 pub use plan::Plan;
 pub(crate) use plan::{first, step_error};
@@ -58,26 +59,25 @@ pub use problem::{Problem, Start};
 pub(crate) use problem::{check_time, start_of};
 pub use progress::Progress;
 pub use quotient::Quotient;
+pub use resolution_monitor::SuspectInterval;
 pub(crate) use roots::bracketed_root;
 pub use rows::{Row, Rows};
-pub use stepper::{Halt, Stepper};
-pub use verified::verified;
-pub use watch::Doubt;
+pub use stepper::{StepFailure, Stepper};
 
 use crate::{DenseStep, GaussCollocation, InputError, StepError};
-use accuracy::Choice;
+use accuracy::StepSelection;
+use check_claims::check_claims_over;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, larger};
+use contact_geom::{Lagrangian, PhasePoint, max_or_nan};
 use std::sync::Arc;
-use verified::verified_over;
 
 /// The time steps of a run. They go back in time where the run does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steps {
-    /// Steps of this length, made a little shorter so that a whole number of them fills the span; of an integrator by a clock, steps
-    /// of this length in the clock's time, the last one shorter.
+    /// Steps of this length, made a little shorter so that a whole number of them fills the span; of an integrator in transformed time, steps
+    /// of this length in the transformed time, the last one shorter.
     Size(f64),
-    /// This many steps; not by a clock, which counts them itself.
+    /// This many steps; not in transformed time, which counts them itself.
     Count(usize),
 }
 
@@ -96,24 +96,24 @@ pub enum Until {
 type Shared<'p, L, const N: usize> = Arc<dyn Integrator<'p, L, N> + 'p>;
 
 /// How a step is chosen for an accuracy: in a program that asks for none it is not compiled.
-type Choose<'p, L, const N: usize> =
-    for<'e> fn(&Request<'p, L, N>, f64, Option<Terminal<'e, N>>) -> Result<Choice<'p, L, N>, InputError>;
+type ChooseSteps<'p, L, const N: usize> =
+    for<'e> fn(&Request<'p, L, N>, f64, Option<Terminal<'e, N>>) -> Result<StepSelection<'p, L, N>, InputError>;
 
 /// How long the steps of a run are to be.
-enum Length<'p, L, const N: usize> {
+enum StepControl<'p, L, const N: usize> {
     Given(Steps),
     /// So many steps of this length exactly.
     Exactly(usize, f64),
-    For(f64, Choose<'p, L, N>),
+    For(f64, ChooseSteps<'p, L, N>),
 }
 
-impl<L, const N: usize> Clone for Length<'_, L, N> {
+impl<L, const N: usize> Clone for StepControl<'_, L, N> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<L, const N: usize> Copy for Length<'_, L, N> {}
+impl<L, const N: usize> Copy for StepControl<'_, L, N> {}
 
 /// What is asked of a run, without its observers.
 struct Request<'p, L, const N: usize> {
@@ -121,7 +121,7 @@ struct Request<'p, L, const N: usize> {
     t_end: f64,
     span: f64,
     integrator: Option<Shared<'p, L, N>>,
-    needs: Needs,
+    needs: OutputRequest,
     /// What the errors of the coordinates are measured by, where that is given.
     scales: Option<SVector<f64, N>>,
 }
@@ -146,12 +146,12 @@ struct Request<'p, L, const N: usize> {
 pub struct Run<'p, 'o, L, const N: usize> {
     problem: &'p Problem<'p, L, N>,
     integrator: Option<Shared<'p, L, N>>,
-    length: Option<Length<'p, L, N>>,
-    needs: Needs,
+    length: Option<StepControl<'p, L, N>>,
+    needs: OutputRequest,
     scales: Option<SVector<f64, N>>,
     estimated: bool,
     observers: Vec<Box<dyn Observer<N> + 'o>>,
-    from: Option<Interrupted>,
+    from: Option<ResumeState>,
 }
 
 impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
@@ -160,7 +160,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
             problem,
             integrator: None,
             length: None,
-            needs: Needs::ACTION,
+            needs: OutputRequest::ACTION,
             scales: None,
             estimated: false,
             observers: Vec::new(),
@@ -175,20 +175,20 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
 
     /// The same by steps of a given length or number.
     pub fn steps(self, steps: Steps) -> Self {
-        Run { length: Some(Length::Given(steps)), ..self }
+        Run { length: Some(StepControl::Given(steps)), ..self }
     }
 
-    /// The same by steps of one length for the whole run, of time or of the time of the Lagrangian's clock, chosen by pilot runs so that the
+    /// The same by steps of one length for the whole run, of time or of the time of the Lagrangian's time transformation, chosen by trial runs so that the
     /// error of (q, p), relative to its size at the time or at the end, is at most this at every tenth of the span, and that of v, relative to the
-    /// largest speed of the motion. The pilot runs cost a small multiple of the run; what is narrower than the distance of their nodes, about the
+    /// largest speed of the motion. The trial runs cost a small multiple of the run; what is narrower than the distance of their nodes, about the
     /// step divided by four times the stages, may go unseen.
     ///
     /// Where an observer's event ends the run, the trial runs end there too.
     ///
     /// Where no integrator is named, it is contact Gauss collocation: with 8 stages, with 16 where it is to take many steps whose
-    /// accelerations alone are iterated, and by the clock that the Lagrangian states where that takes much fewer steps.
+    /// accelerations alone are iterated, and in the transformed time that the Lagrangian states where that takes much fewer steps.
     pub fn accuracy(self, wanted: f64) -> Self {
-        Run { length: Some(Length::For(wanted, accuracy::choose)), ..self }
+        Run { length: Some(StepControl::For(wanted, accuracy::choose)), ..self }
     }
 
     /// The same with a scale for each coordinate, where coordinates differ in size or unit: errors are those of `q_i / scales_i`, and of
@@ -206,12 +206,12 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
 
     /// Without the action in the outcome: where z does not act back on the motion, and no observer asks for it, it is not computed.
     pub fn without_action(self) -> Self {
-        Run { needs: Needs { action: false, ..self.needs }, ..self }
+        Run { needs: OutputRequest { action: false, ..self.needs }, ..self }
     }
 
     /// With the conformal factor of the motion in the outcome.
     pub fn with_conformal_factor(self) -> Self {
-        Run { needs: Needs { conformal_factor: true, ..self.needs }, ..self }
+        Run { needs: OutputRequest { conformal_factor: true, ..self.needs }, ..self }
     }
 
     /// With an estimate of its error in the outcome: of given steps by a run with twice as many of half their length, which costs
@@ -222,7 +222,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
 
     /// Goes on with the run where it was interrupted, to the last bit: problem, integrator, steps, end and requests must be the same. The
     /// observers see what follows, its start included.
-    pub fn resume(self, interrupted: Interrupted) -> Self {
+    pub fn resume(self, interrupted: ResumeState) -> Self {
         Run { from: Some(interrupted), ..self }
     }
 
@@ -239,12 +239,12 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
             (Until::Time(t), _) => (t, t - t0, length),
             (Until::After(span), _) => (t0 + span, span, length),
             (Until::Steps(0), _) => return Err(NO_STEP),
-            (Until::Steps(_), Length::Given(Steps::Size(h))) if !(h != 0.0 && h.is_finite()) => {
+            (Until::Steps(_), StepControl::Given(Steps::Size(h))) if !(h != 0.0 && h.is_finite()) => {
                 return Err(InputError::Step { h });
             }
-            (Until::Steps(count), Length::Given(Steps::Size(h))) => {
+            (Until::Steps(count), StepControl::Given(Steps::Size(h))) => {
                 let span = count as f64 * h;
-                (t0 + span, span, Length::Exactly(count, h))
+                (t0 + span, span, StepControl::Exactly(count, h))
             }
             (Until::Steps(_), _) => {
                 return Err(InputError::Hypothesis {
@@ -258,7 +258,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
             return Err(InputError::Scale { index, scale: scales[index] });
         }
         let request = Request { problem, t_end, span, integrator: self.integrator.clone(), needs, scales: self.scales };
-        let terminal = if let Length::For(..) = length { self.observers.terminal() } else { None };
+        let terminal = if let StepControl::For(..) = length { self.observers.terminal() } else { None };
         let mut plan = request.plan(length, terminal)?;
         plan.estimated = self.estimated;
         Ok(plan)
@@ -274,7 +274,11 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
-    fn plan(&self, length: Length<'p, L, N>, terminal: Option<Terminal<'_, N>>) -> Result<Plan<'p, L, N>, InputError> {
+    fn plan(
+        &self,
+        length: StepControl<'p, L, N>,
+        terminal: Option<Terminal<'_, N>>,
+    ) -> Result<Plan<'p, L, N>, InputError> {
         let Request { problem, span, .. } = *self;
         if !span.is_finite() {
             return Err(InputError::Span { span });
@@ -283,7 +287,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
             return self.plan_of_the_start(length);
         }
         // Beyond its rest no error relative to the motion can be told.
-        if let Length::For(..) = length
+        if let StepControl::For(..) = length
             && let Some(t_end) = self.time_of_rest()
         {
             let request = Request { t_end, span: t_end - problem.t0, integrator: self.integrator.clone(), ..*self };
@@ -293,26 +297,26 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
         }
         if let Some(integrator) = &self.integrator {
             integrator.check(problem.lagrangian)?;
-            let facts = integrator.facts();
-            if facts.by_clock {
-                self.clock_rate()?;
+            let info = integrator.info();
+            if info.in_transformed_time {
+                self.dt_dtau()?;
             }
             // A step for an accuracy is a root of that order.
-            if facts.order == 0 {
+            if info.order == 0 {
                 return Err(InputError::Hypothesis { hypothesis: "an order of at least one" });
             }
         }
-        // Pilot runs look at the equations of motion along the whole span.
-        let times = if let Length::For(..) = length { 4 } else { 16 };
-        verified_over(problem.lagrangian, problem.t0, span, &problem.start, times)?;
+        // trial runs look at the equations of motion along the whole span.
+        let times = if let StepControl::For(..) = length { 4 } else { 16 };
+        check_claims_over(problem.lagrangian, problem.t0, span, &problem.start, times)?;
         let choice = match length {
-            Length::For(wanted, choose) => choose(self, wanted, terminal)?,
-            Length::Given(steps) => self.given(steps)?,
-            Length::Exactly(count, h) => Choice { h, ..self.given(Steps::Count(count))? },
+            StepControl::For(wanted, choose) => choose(self, wanted, terminal)?,
+            StepControl::Given(steps) => self.given(steps)?,
+            StepControl::Exactly(count, h) => StepSelection { h, ..self.given(Steps::Count(count))? },
         };
         check_count(choice.count as f64)?;
         let plan = Plan::new(self, &choice)?;
-        // Pilot runs have looked already.
+        // trial runs have looked already.
         if plan.error().is_none() {
             plan.probe_first_steps()?;
         }
@@ -320,29 +324,34 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
     }
 
     /// The plan of a run that ends where it starts: no step is taken.
-    fn plan_of_the_start(&self, length: Length<'p, L, N>) -> Result<Plan<'p, L, N>, InputError> {
+    fn plan_of_the_start(&self, length: StepControl<'p, L, N>) -> Result<Plan<'p, L, N>, InputError> {
         let (integrator, error) = match (length, &self.integrator) {
-            (Length::For(wanted, _), _) if !(wanted > 0.0 && wanted.is_finite()) => {
+            (StepControl::For(wanted, _), _) if !(wanted > 0.0 && wanted.is_finite()) => {
                 return Err(InputError::Tolerance { wanted });
             }
-            (Length::For(..), None) => (Arc::new(GaussCollocation { stages: 8 }) as Shared<'p, L, N>, Some(0.0)),
-            (Length::For(..), Some(integrator)) => (integrator.clone(), Some(0.0)),
-            (Length::Given(steps), _) => (self.given(steps)?.integrator, None),
-            (Length::Exactly(count, _), _) => (self.given(Steps::Count(count))?.integrator, None),
+            (StepControl::For(..), None) => (Arc::new(GaussCollocation { stages: 8 }) as Shared<'p, L, N>, Some(0.0)),
+            (StepControl::For(..), Some(integrator)) => (integrator.clone(), Some(0.0)),
+            (StepControl::Given(steps), _) => (self.given(steps)?.integrator, None),
+            (StepControl::Exactly(count, _), _) => (self.given(Steps::Count(count))?.integrator, None),
         };
         integrator.check(self.problem.lagrangian)?;
         // Its stepper has a step, though it takes none.
-        let h = f64::EPSILON * larger(self.problem.t0.abs(), 1.0);
-        Plan::new(self, &Choice { integrator, count: 0, h, error, ended: None })
+        let h = f64::EPSILON * max_or_nan(self.problem.t0.abs(), 1.0);
+        Plan::new(self, &StepSelection { integrator, count: 0, h, error, ended: None })
     }
 
     /// Given steps of a named integrator.
-    fn given(&self, steps: Steps) -> Result<Choice<'p, L, N>, InputError> {
+    fn given(&self, steps: Steps) -> Result<StepSelection<'p, L, N>, InputError> {
         let Some(integrator) = self.integrator.clone() else { return Err(InputError::NoIntegrator) };
-        let rate = if integrator.facts().by_clock { Some(self.clock_rate()?) } else { None };
+        let rate = if integrator.info().in_transformed_time { Some(self.dt_dtau()?) } else { None };
         let span = self.span;
-        let of =
-            |count: usize, integrator| Choice { integrator, count, h: span / count as f64, error: None, ended: None };
+        let of = |count: usize, integrator| StepSelection {
+            integrator,
+            count,
+            h: span / count as f64,
+            error: None,
+            ended: None,
+        };
         match (steps, rate) {
             (Steps::Count(0), _) => Err(NO_STEP),
             (Steps::Count(_), Some(_)) => Err(InputError::Hypothesis { hypothesis: SIZED }),
@@ -353,20 +362,20 @@ impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
                 let count = (span.abs() / (h * rate.unwrap_or(1.0)) * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0);
                 check_count(count)?;
                 let choice = of(count as usize, integrator);
-                Ok(if rate.is_some() { Choice { h: h.copysign(span), ..choice } } else { choice })
+                Ok(if rate.is_some() { StepSelection { h: h.copysign(span), ..choice } } else { choice })
             }
         }
     }
 
-    /// The rate of the Lagrangian's clock at the start.
-    fn clock_rate(&self) -> Result<f64, InputError> {
-        let rate = self.problem.lagrangian.clock_rate(&self.problem.start.q);
-        if rate > 0.0 && rate.is_finite() { Ok(rate) } else { Err(InputError::Clock { rate }) }
+    /// The rate of the Lagrangian's time transformation at the start.
+    fn dt_dtau(&self) -> Result<f64, InputError> {
+        let rate = self.problem.lagrangian.dt_dtau(&self.problem.start.q);
+        if rate > 0.0 && rate.is_finite() { Ok(rate) } else { Err(InputError::TimeTransformation { rate }) }
     }
 
     /// The same for the final (q, p) alone.
     fn bare(&self) -> Self {
-        Request { needs: Needs::default(), integrator: self.integrator.clone(), ..*self }
+        Request { needs: OutputRequest::default(), integrator: self.integrator.clone(), ..*self }
     }
 }
 
@@ -401,9 +410,9 @@ pub(crate) trait Motion<const N: usize> {
 /// Runs have steps.
 const NO_STEP: InputError = InputError::Count { what: "the number of steps", least: 1, found: 0 };
 
-/// What an integrator by a clock needs.
+/// What an integrator in transformed time needs.
 const SIZED: &str =
-    "steps of a given size in the time of its clock, or for a wanted accuracy, since it counts them itself";
+    "steps of a given size in its transformed time, or for a wanted accuracy, since it counts them itself";
 
 /// The largest number of steps: `t0 + k h` then still tells times a thousandth of a step apart.
 const MOST_STEPS: f64 = (1u64 << 42) as f64;

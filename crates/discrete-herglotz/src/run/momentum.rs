@@ -1,6 +1,6 @@
 //! Momenta of symmetries along a run.
 
-use super::{Moment, Needs, Observer, Stop};
+use super::{Observer, OutputRequest, StepView, Stop};
 use contact_geom::OneParameterGroup;
 use std::ops::ControlFlow;
 
@@ -38,16 +38,16 @@ impl<G> MomentumDecay<G> {
 }
 
 impl<const N: usize, G: OneParameterGroup<N>> Observer<N> for MomentumDecay<G> {
-    fn needs(&self) -> Needs {
-        Needs { conformal_factor: true, ..Needs::default() }
+    fn needs(&self) -> OutputRequest {
+        OutputRequest { conformal_factor: true, ..OutputRequest::default() }
     }
 
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         self.rows.clear();
         self.step(at)
     }
 
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         let momentum = self.group.momentum(&at.state.q, &at.state.p);
         let factor = at.log_factor.unwrap_or(f64::NAN).exp();
         let predicted = self.rows.first().map_or(momentum, |row| row.momentum * factor);

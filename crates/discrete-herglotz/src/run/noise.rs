@@ -3,7 +3,7 @@
 use super::Request;
 use crate::legendre_inverse;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, largest};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, max_abs_or_nan};
 
 /// The displacement of a motion at an equilibrium by the rounding of its forces alone. Forces that cancel there are rounded like the terms
 /// that cancel, as in `1 - exp(-x)` beside `x = 0`: however small the motion would become, this much is left of it.
@@ -32,7 +32,7 @@ impl Noise {
                 energy += squared;
             }
         }
-        Noise { displacement: squares.sqrt(), force: largest(of_gradient.x.iter().copied()), energy }
+        Noise { displacement: squares.sqrt(), force: max_abs_or_nan(of_gradient.x.iter().copied()), energy }
     }
 }
 

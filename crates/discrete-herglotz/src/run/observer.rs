@@ -1,9 +1,9 @@
 //! What looks at a run while it goes on.
 
 use super::energy::EnergySums;
-use super::{Interrupted, Motion};
+use super::{Motion, ResumeState};
 use crate::gauss::DenseStep;
-use crate::{InputError, StepError, Stepper, Suspicion};
+use crate::{InputError, StepError, Stepper, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use std::ops::ControlFlow;
@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 /// What an observer asks of a run beside times, positions and momenta. What no observer asks for, and the outcome does not want either, is
 /// not computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Needs {
+pub struct OutputRequest {
     /// The action z.
     pub action: bool,
     /// The conformal factor of the motion, the product of the `sigma_d`.
@@ -20,13 +20,13 @@ pub struct Needs {
     pub saved: bool,
 }
 
-impl Needs {
+impl OutputRequest {
     /// The action alone.
-    pub const ACTION: Needs = Needs { action: true, conformal_factor: false, saved: false };
+    pub const ACTION: OutputRequest = OutputRequest { action: true, conformal_factor: false, saved: false };
 
     /// What either asks for.
     pub fn and(self, other: Self) -> Self {
-        Needs {
+        OutputRequest {
             action: self.action || other.action,
             conformal_factor: self.conformal_factor || other.conformal_factor,
             saved: self.saved || other.saved,
@@ -36,36 +36,36 @@ impl Needs {
 
 /// What a run will be.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Course {
+pub struct RunInfo {
     /// The time of its start.
     pub t0: f64,
     /// The time of its end; before that of the start where the run goes back.
     pub t_end: f64,
     /// The length of its steps, where all are equal; negative where the run goes back.
     pub h: Option<f64>,
-    /// The number of its steps, where that is known before: of a clock it shows at the end.
+    /// The number of its steps, where that is known before: of a time transformation it shows at the end.
     pub count: Option<usize>,
 }
 
-impl Course {
+impl RunInfo {
     /// Of an observer that has not been told its own.
-    pub(super) const NONE: Course = Course { t0: 0.0, t_end: 0.0, h: None, count: None };
+    pub(super) const NONE: RunInfo = RunInfo { t0: 0.0, t_end: 0.0, h: None, count: None };
 }
 
 /// What a run does with its states: it is shown the start, at least the steps that it asks for, and the last one.
 ///
-/// Closures of [`Moment`] observe every step; pairs, triples and vectors of observers observe one after the other.
+/// Closures of [`StepView`] observe every step; pairs, triples and vectors of observers observe one after the other.
 pub trait Observer<const N: usize> {
     /// What it asks of the run. By default the action.
-    fn needs(&self) -> Needs {
-        Needs::ACTION
+    fn needs(&self) -> OutputRequest {
+        OutputRequest::ACTION
     }
 
     /// Is told what the run will be, before work starts.
     ///
     /// # Errors
     /// An [`InputError`] where it cannot observe such a run.
-    fn prepare(&mut self, _course: &Course) -> Result<(), InputError> {
+    fn prepare(&mut self, _course: &RunInfo) -> Result<(), InputError> {
         Ok(())
     }
 
@@ -76,12 +76,12 @@ pub trait Observer<const N: usize> {
     }
 
     /// Sees the start, with no step before it.
-    fn start(&mut self, _at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, _at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         ControlFlow::Continue(())
     }
 
     /// Sees the end of a step that it has asked for, or another observer, or of the last one; `Break` ends the run.
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>>;
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>>;
 
     /// What ends trial runs where this one ends its run, and does nothing else; `None`, the default, where it ends none. What lies beyond is
     /// then no reason to refuse an accuracy.
@@ -123,7 +123,7 @@ impl<const N: usize> Stop<N> {
 }
 
 /// The end of a step, or the start of a run.
-pub struct Moment<'r, const N: usize> {
+pub struct StepView<'r, const N: usize> {
     /// The number of steps taken.
     pub k: usize,
     /// The time.
@@ -136,7 +136,7 @@ pub struct Moment<'r, const N: usize> {
     pub log_factor: Option<f64>,
     /// Whether the run ends here.
     pub last: bool,
-    pub(super) suspicion: Option<Suspicion>,
+    pub(super) unresolved: Option<UnresolvedStep>,
     pub(super) energy: EnergySums,
     pub(super) before: Option<(f64, PhasePoint<N>)>,
     pub(super) motion: &'r dyn Motion<N>,
@@ -145,7 +145,7 @@ pub struct Moment<'r, const N: usize> {
     pub(super) in_failed_step: bool,
 }
 
-impl<'r, const N: usize> Moment<'r, N> {
+impl<'r, const N: usize> StepView<'r, N> {
     /// The velocity, the inverse of the Legendre transformation at the state.
     ///
     /// # Errors
@@ -164,20 +164,20 @@ impl<'r, const N: usize> Moment<'r, N> {
 
     /// The run as it would go on from here, for [`Run::resume`](super::Run::resume); `None` where its stepper cannot be saved, or the run
     /// cannot go on.
-    pub fn interrupted(&self) -> Option<Interrupted> {
+    pub fn interrupted(&self) -> Option<ResumeState> {
         if self.in_failed_step {
             return None;
         }
         let (fingerprint, words) = (self.motion.fingerprint(), self.stepper.save()?);
-        let (taken, suspicion, energy) = (self.k, self.suspicion, self.energy);
-        Some(Interrupted { fingerprint, taken, log_factor: self.log_factor.unwrap_or(0.0), suspicion, energy, words })
+        let (taken, unresolved, energy) = (self.k, self.unresolved, self.energy);
+        Some(ResumeState { fingerprint, taken, log_factor: self.log_factor.unwrap_or(0.0), unresolved, energy, words })
     }
 
     /// The moment at a time of the last step: see [`LastStep::at`].
     pub(super) fn inside(&self, t: f64) -> Result<Self, StepError> {
         let (state, sigma) = self.last_step().ok_or(StepError::NonFinite)?.reach(t)?;
         let log_factor = self.log_factor.map(|of_end| of_end - self.sigma.ln() + sigma.ln());
-        Ok(Moment { t, state, sigma, log_factor, before: None, ..*self })
+        Ok(StepView { t, state, sigma, log_factor, before: None, ..*self })
     }
 
     /// The energy `E_L = v.p - L`.
@@ -350,8 +350,8 @@ impl<const N: usize> LastStep<'_, N> {
     }
 }
 
-impl<const N: usize, F: FnMut(&Moment<'_, N>) -> ControlFlow<Stop<N>>> Observer<N> for F {
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+impl<const N: usize, F: FnMut(&StepView<'_, N>) -> ControlFlow<Stop<N>>> Observer<N> for F {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         self(at)
     }
 }
@@ -360,21 +360,21 @@ impl<const N: usize, F: FnMut(&Moment<'_, N>) -> ControlFlow<Stop<N>>> Observer<
 macro_rules! one_after_the_other {
     ($($name:ident $field:tt),+) => {
         impl<const N: usize, $($name: Observer<N>),+> Observer<N> for ($($name,)+) {
-            fn needs(&self) -> Needs {
-                Needs::default()$(.and(self.$field.needs()))+
+            fn needs(&self) -> OutputRequest {
+                OutputRequest::default()$(.and(self.$field.needs()))+
             }
-            fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+            fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
                 $(self.$field.prepare(course)?;)+
                 Ok(())
             }
             fn next(&self, taken: usize) -> usize {
                 usize::MAX$(.min(self.$field.next(taken)))+
             }
-            fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+            fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
                 $(self.$field.start(at)?;)+
                 ControlFlow::Continue(())
             }
-            fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+            fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
                 $(self.$field.step(at)?;)+
                 ControlFlow::Continue(())
             }
@@ -389,19 +389,19 @@ one_after_the_other!(A 0, B 1);
 one_after_the_other!(A 0, B 1, C 2);
 
 impl<const N: usize, O: Observer<N>> Observer<N> for Vec<O> {
-    fn needs(&self) -> Needs {
-        self.iter().fold(Needs::default(), |needs, observer| needs.and(observer.needs()))
+    fn needs(&self) -> OutputRequest {
+        self.iter().fold(OutputRequest::default(), |needs, observer| needs.and(observer.needs()))
     }
-    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         self.iter_mut().try_for_each(|observer| observer.prepare(course))
     }
     fn next(&self, taken: usize) -> usize {
         self.iter().map(|observer| observer.next(taken)).min().unwrap_or(usize::MAX)
     }
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         self.iter_mut().try_for_each(|observer| observer.start(at))
     }
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         self.iter_mut().try_for_each(|observer| observer.step(at))
     }
     fn terminal(&self) -> Option<Terminal<'_, N>> {
@@ -413,19 +413,19 @@ impl<const N: usize, O: Observer<N>> Observer<N> for Vec<O> {
 pub(super) struct Borrowed<'o, O>(pub &'o mut O);
 
 impl<const N: usize, O: Observer<N>> Observer<N> for Borrowed<'_, O> {
-    fn needs(&self) -> Needs {
+    fn needs(&self) -> OutputRequest {
         self.0.needs()
     }
-    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         self.0.prepare(course)
     }
     fn next(&self, taken: usize) -> usize {
         self.0.next(taken)
     }
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         self.0.start(at)
     }
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         self.0.step(at)
     }
     fn terminal(&self) -> Option<Terminal<'_, N>> {
@@ -434,19 +434,19 @@ impl<const N: usize, O: Observer<N>> Observer<N> for Borrowed<'_, O> {
 }
 
 impl<const N: usize> Observer<N> for Box<dyn Observer<N> + '_> {
-    fn needs(&self) -> Needs {
+    fn needs(&self) -> OutputRequest {
         (**self).needs()
     }
-    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         (**self).prepare(course)
     }
     fn next(&self, taken: usize) -> usize {
         (**self).next(taken)
     }
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         (**self).start(at)
     }
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         (**self).step(at)
     }
     fn terminal(&self) -> Option<Terminal<'_, N>> {

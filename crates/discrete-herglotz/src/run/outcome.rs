@@ -1,7 +1,7 @@
 //! What a run has led to.
 
 use super::Start;
-use crate::{Status, Suspicion};
+use crate::{Status, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 
@@ -11,7 +11,7 @@ pub struct Outcome<const N: usize> {
     /// How the run ended.
     pub status: Status,
     /// The first step that cannot have resolved the motion, where one was seen: what follows it may be wrong.
-    pub suspicion: Option<Suspicion>,
+    pub unresolved: Option<UnresolvedStep>,
     /// The steps taken.
     pub steps: usize,
     /// The time reached.

@@ -1,19 +1,19 @@
 //! The plan of a run: the route, and the one loop of all runs.
 
-use super::accuracy::Choice;
+use super::accuracy::StepSelection;
 use super::checkpoint::digest;
 use super::claims::ClaimMonitor;
 use super::ended::Before;
 use super::energy::{EnergyMonitor, EnergySums};
 use super::rest::REST;
 use super::{
-    Course, Facts, Interrupted, Item, Moment, Motion, Near, Needs, Observer, Outcome, Problem, Request, Shared, Stop,
-    Wants,
+    MethodInfo, Motion, Near, Observer, Outcome, OutputRequest, PlanEntry, Problem, Request, ResumeState, RunInfo,
+    Shared, StepView, StepperOptions, Stop,
 };
-use crate::gauss::FEW;
-use crate::run::verified::refuted;
+use crate::gauss::FEW_STAGES;
+use crate::run::check_claims::violated_claim;
 use crate::switching::{has_switching_functions, of_integrator};
-use crate::{DenseStep, Doubt, InputError, Status, StepError, Stepper, Suspicion, legendre_inverse};
+use crate::{DenseStep, InputError, Status, StepError, Stepper, SuspectInterval, UnresolvedStep, legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
@@ -40,7 +40,7 @@ const MATRIX: (usize, usize) = (32, 1024);
 /// A problem for so many steps of an integrator: where they are too few for the matrix of a linear motion its stages are solved like those of others.
 pub(super) fn for_steps<'p, L, const N: usize>(
     problem: &Problem<'p, L, N>,
-    integrator: &Facts,
+    integrator: &MethodInfo,
     steps: usize,
 ) -> Problem<'p, L, N> {
     let unknowns = integrator.collocation.unwrap_or(0) * N;
@@ -53,7 +53,7 @@ pub(super) fn for_steps<'p, L, const N: usize>(
 const PASSED: usize = 2;
 
 /// The earlier of two.
-pub(crate) fn first(a: Option<Suspicion>, b: Option<Suspicion>) -> Option<Suspicion> {
+pub(crate) fn first(a: Option<UnresolvedStep>, b: Option<UnresolvedStep>) -> Option<UnresolvedStep> {
     a.into_iter().chain(b).min_by_key(|s| s.step)
 }
 
@@ -63,9 +63,9 @@ fn stepper_of<'p, L: Lagrangian<N>, const N: usize>(
     switches: bool,
     problem: &Problem<'p, L, N>,
     h: f64,
-    wants: Wants,
+    wants: StepperOptions,
 ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-    if const { L::HAS_SWITCHING_FUNCTIONS } && switches && !integrator.facts().divides {
+    if const { L::HAS_SWITCHING_FUNCTIONS } && switches && !integrator.info().divides {
         return of_integrator(integrator.clone(), problem, h, wants);
     }
     integrator.stepper(problem, h, wants)
@@ -83,12 +83,12 @@ pub struct Plan<'p, L, const N: usize> {
     ended: Option<usize>,
     error: Option<f64>,
     integrator: Shared<'p, L, N>,
-    pub(super) facts: Facts,
-    pub(super) needs: Needs,
+    pub(super) info: MethodInfo,
+    pub(super) needs: OutputRequest,
     /// What errors of the coordinates are measured by, where that is given.
     pub(super) scales: Option<SVector<f64, N>>,
     /// What its steps compute and skip, as the stepper says.
-    pub(super) account: Vec<Item>,
+    pub(super) work_summary: Vec<PlanEntry>,
     /// Whether `sigma_d` is the same in all steps.
     pub(super) constant_rate: bool,
     /// Whether the Lagrangian states switching functions.
@@ -101,16 +101,17 @@ pub struct Plan<'p, L, const N: usize> {
 
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// Finds the route of a request.
-    pub(super) fn new(request: &Request<'p, L, N>, choice: &Choice<'p, L, N>) -> Result<Self, InputError> {
+    pub(super) fn new(request: &Request<'p, L, N>, choice: &StepSelection<'p, L, N>) -> Result<Self, InputError> {
         let Request { problem, t_end, needs, scales, .. } = *request;
-        let Choice { integrator, count, h, error, ended } = choice.clone();
+        let StepSelection { integrator, count, h, error, ended } = choice.clone();
         let switches = has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?;
-        let facts = integrator.facts();
-        if switches && facts.by_clock {
-            let hypothesis = "a Lagrangian without kinks and jumps, since its steps are equal in the time of a clock";
+        let info = integrator.info();
+        if switches && info.in_transformed_time {
+            let hypothesis = "a Lagrangian without kinks and jumps, since its steps are equal in transformed time";
             return Err(InputError::Hypothesis { hypothesis });
         }
-        let stepper = stepper_of(&integrator, switches, &for_steps(problem, &facts, count), h, Wants::default())?;
+        let stepper =
+            stepper_of(&integrator, switches, &for_steps(problem, &info, count), h, StepperOptions::default())?;
         Ok(Plan {
             problem,
             t_end,
@@ -118,10 +119,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             count,
             ended,
             error,
-            facts,
+            info,
             needs,
             scales,
-            account: stepper.account(),
+            work_summary: stepper.work_summary(),
             constant_rate: stepper.has_constant_rate(),
             switches,
             integrator,
@@ -130,12 +131,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         })
     }
 
-    /// The time step, negative where the run goes back; by a clock, in its time.
+    /// The time step, negative where the run goes back; in transformed time, in its time.
     pub fn step_size(&self) -> f64 {
         self.h
     }
 
-    /// The number of steps; by a clock with steps of a given size, as many as its rate at the start lets expect. An
+    /// The number of steps; in transformed time with steps of a given size, as many as its rate at the start lets expect. An
     /// observer may end the run before.
     pub fn count(&self) -> usize {
         self.count
@@ -147,23 +148,23 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     }
 
     /// What is known of the integrator, where none was named the one that was chosen.
-    pub fn integrator(&self) -> &Facts {
-        &self.facts
+    pub fn integrator(&self) -> &MethodInfo {
+        &self.info
     }
 
-    /// The error of (q, p) and v that the pilot runs found, or predict; `None` where no accuracy was asked for.
+    /// The error of (q, p) and v that the trial runs found, or predict; `None` where no accuracy was asked for.
     pub fn error(&self) -> Option<f64> {
         self.error
     }
 
-    /// A stepper at the start, to be driven by hand: by a clock with [`Stepper::advance_until`], which ends where the span
+    /// A stepper at the start, to be driven by hand: in transformed time with [`Stepper::advance_until`], which ends where the span
     /// does. A splitting's does not watch whether its steps resolve the motion:
-    /// that costs up to a third of its time, and is for runs whose steps were not found by pilot runs.
+    /// that costs up to a third of its time, and is for runs whose steps were not found by trial runs.
     ///
     /// # Errors
     /// Those of the method's start.
     pub fn stepper(&self) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-        self.make_stepper(&for_steps(self.problem, &self.facts, self.count), self.h, false)
+        self.make_stepper(&for_steps(self.problem, &self.info, self.count), self.h, false)
     }
 
     /// A stepper at a start, by steps of h.
@@ -173,12 +174,12 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         h: f64,
         watched: bool,
     ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
-        stepper_of(&self.integrator, self.switches, problem, h, Wants { action: self.needs.action, watched })
+        stepper_of(&self.integrator, self.switches, problem, h, StepperOptions { action: self.needs.action, watched })
     }
 
     /// Whether steps look at themselves between the nodes of their many stages.
     pub(super) fn many_stages(&self) -> bool {
-        self.facts.collocation.is_some_and(|stages| stages > FEW)
+        self.info.collocation.is_some_and(|stages| stages > FEW_STAGES)
     }
 
     /// Whether a time is the end of the span, or beyond it.
@@ -198,50 +199,50 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     pub(super) fn observed_by(
         &self,
         observers: &mut Vec<Box<dyn Observer<N> + '_>>,
-        from: Option<&Interrupted>,
+        from: Option<&ResumeState>,
     ) -> Result<Outcome<N>, InputError> {
-        let by_clock = self.facts.by_clock;
-        let h = (!by_clock).then_some(self.h);
-        let count = (!by_clock || self.error.is_some()).then_some(self.expected());
-        let problem = for_steps(self.problem, &self.facts, self.count);
+        let in_transformed_time = self.info.in_transformed_time;
+        let h = (!in_transformed_time).then_some(self.h);
+        let count = (!in_transformed_time || self.error.is_some()).then_some(self.expected());
+        let problem = for_steps(self.problem, &self.info, self.count);
         let mut stepper = self.make_stepper(&problem, self.h, self.error.is_none())?;
         if self.needs.saved && stepper.save().is_none() {
             return Err(InputError::Unsaved);
         }
         let t_end = self.rests_until.unwrap_or(self.t_end);
-        let course = Course { t0: self.problem.t0, t_end, h, count };
+        let course = RunInfo { t0: self.problem.t0, t_end, h, count };
         observers.prepare(&course)?;
         // The logarithm of the product of the sigma_d; in single steps only where they differ.
         let (mut log_factor, single) = (0.0, self.needs.conformal_factor && !self.constant_rate);
-        let (mut taken, mut status, mut suspicion) = (0, Status::Completed, None);
+        let (mut taken, mut status, mut unresolved) = (0, Status::Completed, None);
         let (mut energy, mut claims) = (EnergyMonitor::of(self), ClaimMonitor::of(self));
         if let Some(from) = from {
             if from.fingerprint != self.fingerprint() || !stepper.restore(&from.words) {
                 return Err(InputError::AnotherRun);
             }
-            (taken, log_factor, suspicion) = (from.taken, from.log_factor, from.suspicion);
+            (taken, log_factor, unresolved) = (from.taken, from.log_factor, from.unresolved);
             energy.iter_mut().for_each(|energy| energy.drift.sums = from.energy);
         }
-        // Steps that pilot runs have found are judged already; those of many stages are looked at between their nodes, and are compared
+        // Steps that trial runs have found are judged already; those of many stages are looked at between their nodes, and are compared
         // with halves in doubt alone.
-        let doubts = self.error.is_none() && !by_clock;
+        let doubts = self.error.is_none() && !in_transformed_time;
         // Those of other methods than Gauss' were compared with a reference that was looked at; where a motion is proved to be linear a transient that
         // ends within a step is nothing that the order does not show.
         let linear = const { L::PROVED } && self.problem.structure.quadratic;
-        let judged = self.error.is_some() && (self.facts.collocation.is_none() || linear);
-        let seen_by = |stepper: &dyn Stepper<N>| if judged { None } else { stepper.suspicion() };
+        let judged = self.error.is_some() && (self.info.collocation.is_none() || linear);
+        let seen_by = |stepper: &dyn Stepper<N>| if judged { None } else { stepper.unresolved() };
         let halves = doubts && !self.many_stages();
-        let most = if by_clock { usize::MAX } else { self.count };
-        let ended = |taken: usize, t: f64| taken == most || by_clock && self.is_over(t);
+        let most = if in_transformed_time { usize::MAX } else { self.count };
+        let ended = |taken: usize, t: f64| taken == most || in_transformed_time && self.is_over(t);
         // A run may be resumed at its end.
         let mut over = ended(taken, stepper.time());
         let sums =
             |energy: &Option<EnergyMonitor<N>>| energy.as_ref().map(|energy| energy.drift.sums).unwrap_or_default();
-        let start = self.moment(&*stepper, None, (log_factor, suspicion, sums(&energy)), (taken, over));
+        let start = self.moment(&*stepper, None, (log_factor, unresolved, sums(&energy)), (taken, over));
         let mut stop = observers.start(&start).break_value();
         while !over && stop.is_none() {
             // One mark is enough.
-            let halved = if halves && suspicion.is_none() { halved_step(taken, most) } else { usize::MAX };
+            let halved = if halves && unresolved.is_none() { halved_step(taken, most) } else { usize::MAX };
             let next_seen = observers.next(taken).max(taken + 1);
             let next_look = if taken == halved { taken + 1 } else { halved };
             // The step that is seen is taken by itself, so that observers can look into it.
@@ -260,8 +261,8 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             if taken == halved
                 && let (Some((t, from)), None) = (before, cause)
             {
-                let step = Doubt { step: taken, steps: 1, t, from, to: stepper.state() };
-                suspicion = first(suspicion, self.settled(&step));
+                let step = SuspectInterval { step: taken, steps: 1, t, from, to: stepper.state() };
+                unresolved = first(unresolved, self.unresolved_within(&step));
             }
             taken += done;
             if self.constant_rate {
@@ -270,7 +271,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
                 log_factor += done as f64 * stepper.sigma().ln();
             }
             if let Some(cause) = cause {
-                let noted = (log_factor, suspicion, sums(&energy));
+                let noted = (log_factor, unresolved, sums(&energy));
                 if let Some((end, there)) =
                     self.end_within_a_step(observers, Before { stepper: &*stepper, course, noted, taken })
                 {
@@ -284,13 +285,13 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             let probed = over || taken == next_probe(taken - 1);
             // Before the step is seen, so that it is not forgotten by who saves the run there.
             if probed {
-                if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
+                if let Some(Defect { claim, size }) = self.violated_claim(&*stepper) {
                     status = Status::FalseClaim { step: taken, claim, size };
                     break;
                 }
-                let doubt = stepper.doubt().filter(|_| doubts && suspicion.is_none());
-                suspicion = first(suspicion, doubt.and_then(|doubt| self.settled(&doubt)));
-                suspicion = first(suspicion, seen_by(&*stepper));
+                let doubt = stepper.doubt().filter(|_| doubts && unresolved.is_none());
+                unresolved = first(unresolved, doubt.and_then(|doubt| self.unresolved_within(&doubt)));
+                unresolved = first(unresolved, seen_by(&*stepper));
             }
             if let Some(claims) = &mut claims
                 && (taken >= next_claims || over)
@@ -302,13 +303,13 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             }
             if let Some(energy) = &mut energy
                 && (taken >= next_energy || over)
-                && let Some(misfit) = energy.look(self, &*stepper, (log_factor, taken))
+                && let Some(defect) = energy.look(self, &*stepper, (log_factor, taken))
             {
-                suspicion = first(suspicion, Some(Suspicion { step: taken - 1, misfit }));
+                unresolved = first(unresolved, Some(UnresolvedStep { step: taken - 1, defect }));
             }
             // Trial runs have seen nothing of what follows.
             if self.ended.is_some_and(|ended| taken > ended + PASSED) {
-                suspicion = first(suspicion, Some(Suspicion { step: taken - 1, misfit: f64::INFINITY }));
+                unresolved = first(unresolved, Some(UnresolvedStep { step: taken - 1, defect: f64::INFINITY }));
             }
             let at_rest = if over {
                 self.rests_until.is_some()
@@ -319,11 +320,11 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
             if taken >= next_seen || over {
                 let before = if done == 1 { before } else { None };
                 let end =
-                    self.moment(&*stepper, before, (log_factor, suspicion, sums(&energy)), (taken, over && !at_rest));
+                    self.moment(&*stepper, before, (log_factor, unresolved, sums(&energy)), (taken, over && !at_rest));
                 stop = observers.step(&end).break_value();
                 // It ends within the step.
                 if let Some(Stop { at: Some((t, _)), .. }) = stop
-                    && let Ok(Moment { log_factor: Some(there), .. }) = end.inside(t)
+                    && let Ok(StepView { log_factor: Some(there), .. }) = end.inside(t)
                 {
                     log_factor = there;
                 }
@@ -343,10 +344,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
                 None => Status::Stopped { step: taken, t, by },
             };
         }
-        let Needs { action, conformal_factor, .. } = self.needs;
+        let OutputRequest { action, conformal_factor, .. } = self.needs;
         Ok(Outcome {
             status,
-            suspicion: first(suspicion, seen_by(&*stepper)),
+            unresolved: first(unresolved, seen_by(&*stepper)),
             steps: taken,
             t,
             q: state.q,
@@ -365,20 +366,20 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         &'r self,
         stepper: &'r dyn Stepper<N>,
         before: Option<(f64, PhasePoint<N>)>,
-        (log_factor, suspicion, energy): (f64, Option<Suspicion>, EnergySums),
+        (log_factor, unresolved, energy): (f64, Option<UnresolvedStep>, EnergySums),
         (k, last): (usize, bool),
-    ) -> Moment<'r, N> {
+    ) -> StepView<'r, N> {
         let log_factor = self.needs.conformal_factor.then_some(log_factor);
         let (t, state, sigma) = (stepper.time(), stepper.state(), stepper.sigma());
         let motion = self;
-        Moment {
+        StepView {
             k,
             t,
             state,
             sigma,
             log_factor,
             last,
-            suspicion,
+            unresolved,
             energy,
             before,
             motion,
@@ -405,9 +406,9 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     }
 
     /// The first claim that is false at the state of a stepper.
-    fn refuted(&self, stepper: &dyn Stepper<N>) -> Option<Defect> {
+    fn violated_claim(&self, stepper: &dyn Stepper<N>) -> Option<Defect> {
         let guess = stepper.last_velocity().unwrap_or(self.problem.start.v);
-        refuted(self.problem.lagrangian, stepper.time(), &stepper.state(), &guess)
+        violated_claim(self.problem.lagrangian, stepper.time(), &stepper.state(), &guess)
     }
 
     /// Probes the claims along the first steps.
@@ -426,7 +427,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
                 Ok(done) if done > 0 => taken += done,
                 _ => break,
             }
-            if let Some(Defect { claim, size }) = self.refuted(&*stepper) {
+            if let Some(Defect { claim, size }) = self.violated_claim(&*stepper) {
                 return Err(InputError::FalseClaim { claim, size });
             }
         }
@@ -460,8 +461,8 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
         let numbers = [*t0, self.t_end, self.h, start.z, value, slope.z];
         let vectors = [&start.q, &start.v, &state.p, &slope.x, &slope.y];
         let numbers = numbers.iter().chain(vectors.into_iter().flat_map(|x| x.iter())).map(|x| x.to_bits());
-        let name = self.facts.name.bytes().map(u64::from);
-        let Needs { action, conformal_factor, .. } = self.needs;
+        let name = self.info.name.bytes().map(u64::from);
+        let OutputRequest { action, conformal_factor, .. } = self.needs;
         let counts = [N as u64, self.count as u64, action.into(), conformal_factor.into()];
         digest(&numbers.chain(name).chain(counts).collect::<Vec<u64>>())
     }

@@ -1,15 +1,15 @@
 //! Problems: a Lagrangian with a start.
 
 use super::{Integrator, Interrupt, Run, Steps};
-use crate::run::verified::verified;
+use crate::run::check_claims::check_claims;
 use crate::{
     DiscreteLagrangian, Ensemble, GaussCollocation, InputError, StepError, discrete_regularity, legendre_inverse,
     legendre_minus,
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    Derivatives, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Regularity, Structure, VelocityPoint, largest,
-    legendre,
+    Derivatives, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Regularity, Structure, VelocityPoint, legendre,
+    max_abs_or_nan,
 };
 
 /// Where a motion starts.
@@ -90,7 +90,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
             }
         };
         check_regular(lagrangian, t0, &start)?;
-        let structure = verified(lagrangian, t0, &start)?;
+        let structure = check_claims(lagrangian, t0, &start)?;
         let state = state.unwrap_or_else(|| legendre(lagrangian, t0, &start));
         Ok(Problem { lagrangian, t0, start, state, structure, interrupt: None })
     }
@@ -208,11 +208,11 @@ fn check_regular<const N: usize>(
         return Err(InputError::Undefined);
     }
     // In units of the coordinates in which its rows are of size one: masses may differ by any factor.
-    let unit = SVector::<f64, N>::from_fn(|i, _| largest(w.row(i).iter().copied()).sqrt());
+    let unit = SVector::<f64, N>::from_fn(|i, _| max_abs_or_nan(w.row(i).iter().copied()).sqrt());
     let scaled = DMatrix::from_fn(N, N, |i, j| w[(i, j)] / (unit[i] * unit[j]));
-    let Regularity { smallest, largest } = Regularity::of(scaled);
+    let Regularity { smallest, max_abs_or_nan } = Regularity::of(scaled);
     // A matrix of zeros has no such units, and counts as singular.
-    if smallest > 4.0 * N as f64 * f64::EPSILON * largest {
+    if smallest > 4.0 * N as f64 * f64::EPSILON * max_abs_or_nan {
         return Ok(());
     }
     Err(InputError::FirstStep(StepError::Singular { pivot: smallest }))

@@ -1,6 +1,6 @@
 //! The progress of a run.
 
-use super::{Course, Moment, Needs, Observer, Stop};
+use super::{Observer, OutputRequest, RunInfo, StepView, Stop};
 use crate::InputError;
 use std::ops::ControlFlow;
 
@@ -20,13 +20,13 @@ const STRIDE: usize = 1 << 10;
 /// ```
 pub struct Progress<F> {
     tell: F,
-    course: Course,
+    course: RunInfo,
 }
 
 impl<F: FnMut(f64)> Progress<F> {
     /// Told to this function.
     pub fn new(tell: F) -> Self {
-        Progress { tell, course: Course::NONE }
+        Progress { tell, course: RunInfo::NONE }
     }
 
     fn stride(&self) -> usize {
@@ -35,11 +35,11 @@ impl<F: FnMut(f64)> Progress<F> {
 }
 
 impl<const N: usize, F: FnMut(f64)> Observer<N> for Progress<F> {
-    fn needs(&self) -> Needs {
-        Needs::default()
+    fn needs(&self) -> OutputRequest {
+        OutputRequest::default()
     }
 
-    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         self.course = *course;
         Ok(())
     }
@@ -48,13 +48,13 @@ impl<const N: usize, F: FnMut(f64)> Observer<N> for Progress<F> {
         (taken / self.stride() + 1).saturating_mul(self.stride())
     }
 
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         self.step(at)
     }
 
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if at.last || at.k.is_multiple_of(self.stride()) {
-            let Course { t0, t_end, .. } = self.course;
+            let RunInfo { t0, t_end, .. } = self.course;
             (self.tell)(if at.last { 1.0 } else { (at.t - t0) / (t_end - t0) });
         }
         ControlFlow::Continue(())

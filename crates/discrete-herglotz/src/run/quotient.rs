@@ -1,6 +1,6 @@
 //! Quotients of dissipated quantities along a run.
 
-use super::{Moment, Needs, Observer, Stop};
+use super::{Observer, OutputRequest, StepView, Stop};
 use contact_geom::PhasePoint;
 use std::ops::ControlFlow;
 
@@ -41,22 +41,22 @@ impl<'f, const N: usize> Quotient<'f, N> {
     /// The largest change since the start, relative to the quotient there; NaN where a quotient is none.
     pub fn largest_change(&self) -> f64 {
         let Some((_, first)) = self.rows.first() else { return 0.0 };
-        contact_geom::largest(self.rows.iter().map(|(_, quotient)| (quotient - first) / first))
+        contact_geom::max_abs_or_nan(self.rows.iter().map(|(_, quotient)| (quotient - first) / first))
     }
 }
 
 impl<const N: usize> Observer<N> for Quotient<'_, N> {
     /// The quantities may have the action in them.
-    fn needs(&self) -> Needs {
-        Needs::ACTION
+    fn needs(&self) -> OutputRequest {
+        OutputRequest::ACTION
     }
 
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         self.rows.clear();
         self.step(at)
     }
 
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         let quotient = (self.above)(at.t, &at.state) / (self.below)(at.t, &at.state);
         self.rows.push((at.t, quotient));
         ControlFlow::Continue(())

@@ -2,10 +2,10 @@
 
 use super::accuracy::first_guess;
 use super::{Plan, Request};
-use crate::run::watch::size;
-use crate::{GaussCollocation, Integrator, Wants};
+use crate::run::resolution_monitor::size;
+use crate::{GaussCollocation, Integrator, StepperOptions};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, larger};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, max_or_nan};
 
 /// Who ends a run that has come to rest.
 pub(super) const REST: &str = "rest";
@@ -44,7 +44,7 @@ impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
 
     /// Whether a motion from this problem's start is at rest in a state: see [`SMALLEST`]. The action, where it is requested, is steady too.
     pub(super) fn is_at_rest(&self, t: f64, state: &PhasePoint<N>) -> bool {
-        if larger(size(&state.q), size(&state.p)) >= SMALLEST || self.starts_at_rest() {
+        if max_or_nan(size(&state.q), size(&state.p)) >= SMALLEST || self.starts_at_rest() {
             return false;
         }
         let origin = VelocityPoint { q: SVector::zeros(), v: SVector::zeros(), z: state.z };
@@ -59,7 +59,7 @@ impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
     /// What begins so small has no motion that is seen.
     fn starts_at_rest(&self) -> bool {
         let state = &self.problem.state;
-        larger(size(&state.q), size(&state.p)) < SMALLEST
+        max_or_nan(size(&state.q), size(&state.p)) < SMALLEST
     }
 
     /// The time at which the motion comes to rest, where that is within the span: by steps of eight stages, for a motion that has long
@@ -75,7 +75,7 @@ impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
         }
         let gauss = GaussCollocation { stages: 8 };
         let h = self.span / first_guess(self, gauss.stages, 1e-3) as f64;
-        let wants = Wants { action: self.needs.action, watched: false };
+        let wants = StepperOptions { action: self.needs.action, watched: false };
         let mut stepper = Integrator::stepper(&gauss, problem, h, wants).ok()?;
         for _ in 0..SEARCHED / STRIDE {
             stepper.advance(STRIDE).ok()?;
@@ -94,7 +94,7 @@ impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
 impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
     /// Whether the run has come to rest in a state.
     pub(super) fn is_at_rest(&self, t: f64, state: &PhasePoint<N>) -> bool {
-        if larger(size(&state.q), size(&state.p)) >= SMALLEST {
+        if max_or_nan(size(&state.q), size(&state.p)) >= SMALLEST {
             return false;
         }
         let span = self.t_end - self.problem.t0;

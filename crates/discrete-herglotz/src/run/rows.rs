@@ -1,6 +1,6 @@
 //! Rows: the states of a motion at steps or at times.
 
-use super::{Course, Moment, Needs, Observer, Stop};
+use super::{Observer, OutputRequest, RunInfo, StepView, Stop};
 use crate::{InputError, StepError};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
@@ -42,7 +42,7 @@ type Column<'f, const N: usize> = (String, Box<dyn FnMut(f64, &PhasePoint<N>) ->
 
 /// Which states are recorded.
 #[derive(Clone, Debug)]
-enum When {
+enum RowTimes {
     /// The start, every so many steps, and the end.
     Every(usize),
     /// These times, in the order of the run, of which so many are recorded.
@@ -53,16 +53,16 @@ enum When {
 pub struct Rows<'f, const N: usize> {
     /// The rows so far.
     pub rows: Vec<Row<N>>,
-    when: When,
+    when: RowTimes,
     columns: Vec<Column<'f, N>>,
-    needs: Needs,
+    needs: OutputRequest,
     velocity: bool,
     energy: bool,
-    course: Course,
+    course: RunInfo,
 }
 
 /// The largest number of rows: a few gigabytes.
-const MOST: usize = 1 << 26;
+const MAX_ROWS: usize = 1 << 26;
 
 impl<'f, const N: usize> Rows<'f, N> {
     /// The start, the state after each `stride` steps, and the end.
@@ -73,7 +73,7 @@ impl<'f, const N: usize> Rows<'f, N> {
         if stride == 0 {
             return Err(InputError::Count { what: "the steps between two rows", least: 1, found: 0 });
         }
-        Ok(Self::when(When::Every(stride)))
+        Ok(Self::when(RowTimes::Every(stride)))
     }
 
     /// The states at these times exactly, ascending, or descending for a run that goes back; a run is refused that does not reach the
@@ -89,19 +89,19 @@ impl<'f, const N: usize> Rows<'f, N> {
         let out_of_order = times.windows(2).position(out_of_order).map(|index| index + 1);
         match times.iter().position(|t| !t.is_finite()).or(out_of_order) {
             Some(index) => Err(InputError::Times { index, t: times[index] }),
-            None => Ok(Self::when(When::At { times, recorded: 0 })),
+            None => Ok(Self::when(RowTimes::At { times, recorded: 0 })),
         }
     }
 
-    fn when(when: When) -> Self {
+    fn when(when: RowTimes) -> Self {
         Rows {
             rows: Vec::new(),
             when,
             columns: Vec::new(),
-            needs: Needs::ACTION,
+            needs: OutputRequest::ACTION,
             velocity: false,
             energy: false,
-            course: Course::NONE,
+            course: RunInfo::NONE,
         }
     }
 
@@ -113,12 +113,12 @@ impl<'f, const N: usize> Rows<'f, N> {
 
     /// Without the action, so that a run of which no one else wants it need not compute it.
     pub fn without_action(self) -> Self {
-        Rows { needs: Needs { action: false, ..self.needs }, ..self }
+        Rows { needs: OutputRequest { action: false, ..self.needs }, ..self }
     }
 
     /// With the conformal factor.
     pub fn with_conformal_factor(self) -> Self {
-        Rows { needs: Needs { conformal_factor: true, ..self.needs }, ..self }
+        Rows { needs: OutputRequest { conformal_factor: true, ..self.needs }, ..self }
     }
 
     /// With the energy, which costs an inverse Legendre transformation and a value of L a row.
@@ -143,10 +143,10 @@ impl<'f, const N: usize> Rows<'f, N> {
         one("t", true).into_iter().chain(vectors).chain(numbers.into_iter().flatten()).chain(columns).collect()
     }
 
-    fn record(&mut self, at: &Moment<'_, N>) -> Result<(), StepError> {
+    fn record(&mut self, at: &StepView<'_, N>) -> Result<(), StepError> {
         let v = if self.velocity { Some(at.velocity()?) } else { None };
         let energy = if self.energy { Some(at.energy()?) } else { None };
-        let Moment { t, state, log_factor, .. } = *at;
+        let StepView { t, state, log_factor, .. } = *at;
         let columns = self.columns.iter_mut().map(|(_, f)| f(t, &state)).collect();
         let z = self.needs.action.then_some(state.z);
         let log_factor = log_factor.filter(|_| self.needs.conformal_factor);
@@ -155,11 +155,11 @@ impl<'f, const N: usize> Rows<'f, N> {
     }
 
     /// Records the rows up to a moment.
-    fn record_up_to(&mut self, at: &Moment<'_, N>) -> Result<(), StepError> {
+    fn record_up_to(&mut self, at: &StepView<'_, N>) -> Result<(), StepError> {
         let (times, recorded) = match &self.when {
-            When::Every(stride) if at.k.is_multiple_of(*stride) || at.last => return self.record(at),
-            When::Every(_) => return Ok(()),
-            When::At { times, recorded } => (times, *recorded),
+            RowTimes::Every(stride) if at.k.is_multiple_of(*stride) || at.last => return self.record(at),
+            RowTimes::Every(_) => return Ok(()),
+            RowTimes::At { times, recorded } => (times, *recorded),
         };
         let backward = self.course.t_end < self.course.t0;
         let passed = |t: f64| if backward { t >= at.t } else { t <= at.t };
@@ -171,9 +171,9 @@ impl<'f, const N: usize> Rows<'f, N> {
             } else if passed(t) {
                 self.record(&at.inside(t)?)?;
             } else {
-                self.record(&Moment { t, ..*at })?;
+                self.record(&StepView { t, ..*at })?;
             }
-            if let When::At { recorded, .. } = &mut self.when {
+            if let RowTimes::At { recorded, .. } = &mut self.when {
                 *recorded += 1;
             }
         }
@@ -182,22 +182,22 @@ impl<'f, const N: usize> Rows<'f, N> {
 }
 
 impl<const N: usize> Observer<N> for Rows<'_, N> {
-    fn needs(&self) -> Needs {
+    fn needs(&self) -> OutputRequest {
         // The energy has L, and with it z.
-        Needs { action: self.needs.action || self.energy, ..self.needs }
+        OutputRequest { action: self.needs.action || self.energy, ..self.needs }
     }
 
-    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         self.course = *course;
         self.rows.clear();
-        if let When::At { recorded, .. } = &mut self.when {
+        if let RowTimes::At { recorded, .. } = &mut self.when {
             *recorded = 0;
         }
-        let Course { t0, t_end, count, .. } = *course;
+        let RunInfo { t0, t_end, count, .. } = *course;
         let rows = match &self.when {
-            // By a clock the number of steps shows at the end.
-            When::Every(stride) => count.map_or(2, |count| count / stride + 2),
-            When::At { times, .. } => {
+            // In transformed time the number of steps shows at the end.
+            RowTimes::Every(stride) => count.map_or(2, |count| count / stride + 2),
+            RowTimes::At { times, .. } => {
                 let inside = |t: f64| (t0.min(t_end)..=t0.max(t_end)).contains(&t);
                 let forward = times.windows(2).all(|pair| pair[0] < pair[1]) == (t0 < t_end) || times.len() < 2;
                 if let Some(index) = times.iter().position(|t| !inside(*t) || !forward) {
@@ -212,8 +212,8 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
 
     fn next(&self, taken: usize) -> usize {
         match &self.when {
-            When::Every(stride) => (taken / stride + 1) * stride,
-            When::At { times, recorded } => {
+            RowTimes::Every(stride) => (taken / stride + 1) * stride,
+            RowTimes::At { times, recorded } => {
                 let Some(t) = times.get(*recorded) else { return usize::MAX };
                 // The step in which it lies, or the one before by rounding, which then records nothing.
                 let step =
@@ -223,9 +223,9 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
         }
     }
 
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         let backward = self.course.t_end < self.course.t0;
-        if let When::At { times, recorded } = &mut self.when
+        if let RowTimes::At { times, recorded } = &mut self.when
             && at.k > 0
         {
             // A run that goes on: the times up to here were recorded by the one before it.
@@ -234,8 +234,8 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
         self.step(at)
     }
 
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
-        if self.rows.len() >= MOST {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if self.rows.len() >= MAX_ROWS {
             return ControlFlow::Break(Stop::here("the rows, which are too many"));
         }
         match self.record_up_to(at) {
@@ -247,10 +247,10 @@ impl<const N: usize> Observer<N> for Rows<'_, N> {
 
 /// Refuses more rows at a time than are kept.
 pub(crate) fn check(rows: usize) -> Result<(), InputError> {
-    if rows > MOST { Err(too_many(rows)) } else { Ok(()) }
+    if rows > MAX_ROWS { Err(too_many(rows)) } else { Ok(()) }
 }
 
 fn too_many(count: usize) -> InputError {
-    let (found, most, remedy) = (count as f64, MOST as f64, "record fewer rows");
+    let (found, most, remedy) = (count as f64, MAX_ROWS as f64, "record fewer rows");
     InputError::TooMany { what: "the number of rows", found, most, remedy }
 }

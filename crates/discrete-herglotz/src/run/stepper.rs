@@ -1,6 +1,6 @@
 //! A method at work on one motion.
 
-use crate::{DenseStep, Doubt, Item, StepError, Suspicion};
+use crate::{DenseStep, PlanEntry, StepError, SuspectInterval, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use thiserror::Error;
@@ -14,15 +14,15 @@ pub trait Stepper<const N: usize> {
     /// Takes `steps` steps with nothing observed between them.
     ///
     /// # Errors
-    /// [`Halt`] where a step cannot be taken: the state is then that before it.
-    fn advance(&mut self, steps: usize) -> Result<(), Halt>;
+    /// [`StepFailure`] where a step cannot be taken: the state is then that before it.
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure>;
 
-    /// Takes `steps` steps, or fewer where a method whose steps vary with a clock reaches the time `t_end` before; returns how many.
+    /// Takes `steps` steps, or fewer where a method whose steps vary with a time transformation reaches the time `t_end` before; returns how many.
     /// Steps of one length end where they end.
     ///
     /// # Errors
     /// As [`advance`](Self::advance).
-    fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, Halt> {
+    fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, StepFailure> {
         let _ = t_end;
         self.advance(steps).map(|()| steps)
     }
@@ -59,7 +59,7 @@ pub trait Stepper<const N: usize> {
     }
 
     /// What its steps compute and what they skip, the action among it: as it is where that is not requested.
-    fn account(&self) -> Vec<Item> {
+    fn work_summary(&self) -> Vec<PlanEntry> {
         Vec::new()
     }
 
@@ -75,12 +75,12 @@ pub trait Stepper<const N: usize> {
     }
 
     /// The first step so far that cannot have resolved the motion, where one was seen.
-    fn suspicion(&self) -> Option<Suspicion> {
+    fn unresolved(&self) -> Option<UnresolvedStep> {
         None
     }
 
     /// The last steps since the last call that are in doubt: they may not have resolved the motion.
-    fn doubt(&mut self) -> Option<Doubt<N>> {
+    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
         None
     }
 }
@@ -88,7 +88,7 @@ pub trait Stepper<const N: usize> {
 /// Steps that ended before the last of them.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[error("halted after {taken} steps: {cause}")]
-pub struct Halt {
+pub struct StepFailure {
     /// The steps taken before.
     pub taken: usize,
     /// Why the next could not be taken.

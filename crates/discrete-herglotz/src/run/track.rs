@@ -1,7 +1,7 @@
 //! A motion as trial runs see it at some marks, and how far two of them are apart.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, larger};
+use contact_geom::{PhasePoint, max_or_nan};
 
 /// The smallest number.
 const SMALLEST: f64 = f64::from_bits(1);
@@ -20,16 +20,16 @@ pub(super) struct Track<const N: usize> {
     /// What the rounding of forces may have moved them by, where they have decayed as far as that; else 0.
     pub noise: Vec<f64>,
     /// The largest misfit that was seen between the nodes of its steps.
-    pub misfit: f64,
+    pub defect: f64,
     /// What it has cost without the looks, in evaluations of L at one stage.
     pub cost: u64,
-    /// The span in the time of its clock.
+    /// The span in its transformed time.
     pub tau: f64,
 }
 
 /// A 2-norm that neither overflows nor underflows.
 pub(super) fn norm<const N: usize, const M: usize>(x: &[SVector<f64, N>; M]) -> f64 {
-    let size = contact_geom::largest(x.iter().flat_map(|x| x.iter().copied()));
+    let size = contact_geom::max_abs_or_nan(x.iter().flat_map(|x| x.iter().copied()));
     if !(size > 0.0 && size.is_finite()) {
         return size;
     }
@@ -43,12 +43,12 @@ pub(super) fn in_units<const N: usize>(x: &SVector<f64, N>, scales: Option<&SVec
 
 /// The distance of a state from another beyond the noise, relative to the size of that, or to one that is given where it is larger.
 fn relative<const N: usize>(a: &[SVector<f64, N>; 2], b: &[SVector<f64, N>; 2], noise: f64, least: f64) -> f64 {
-    let (apart, size) = (norm(&[a[0] - b[0], a[1] - b[1]]), larger(norm(b), least));
+    let (apart, size) = (norm(&[a[0] - b[0], a[1] - b[1]]), max_or_nan(norm(b), least));
     if apart <= noise {
         return 0.0;
     }
     // Numbers are known to no less than half of the smallest one.
-    if apart == 0.0 && size == 0.0 { 0.0 } else { larger(apart, SMALLEST) / size }
+    if apart == 0.0 && size == 0.0 { 0.0 } else { max_or_nan(apart, SMALLEST) / size }
 }
 
 impl<const N: usize> Track<N> {
@@ -60,7 +60,7 @@ impl<const N: usize> Track<N> {
             speed: f64::INFINITY,
             scales: None,
             noise: vec![0.0],
-            misfit: 0.0,
+            defect: 0.0,
             cost: 0,
             tau: 0.0,
         }
@@ -91,7 +91,7 @@ impl<const N: usize> Track<N> {
             None => relative(a, b, of.noise[j], least),
             Some(_) => norm(&[in_units(&(a[0] - b[0]), scales)]),
         };
-        larger(of_state, norm(&[in_units(&v, scales)]) / of.speed)
+        max_or_nan(of_state, norm(&[in_units(&v, scales)]) / of.speed)
     }
 
     /// Whether the motion ends with numbers that have lost digits since they are too small.
@@ -101,6 +101,6 @@ impl<const N: usize> Track<N> {
 
     /// The largest of the [`distances`](Self::distances).
     pub fn distance(&self, of: &Self) -> f64 {
-        contact_geom::largest(self.distances(of))
+        contact_geom::max_abs_or_nan(self.distances(of))
     }
 }

@@ -4,9 +4,9 @@ use super::noise::all_together;
 use super::track::{in_units, norm};
 use super::{Near, Problem, Request};
 use crate::rules::step_equations::inverted;
-use crate::{InputError, Obstacle, legendre_inverse};
+use crate::{InputError, SelectionFailure, legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, larger};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, max_or_nan};
 
 /// The velocities of one run, and what their errors are relative to.
 pub(super) struct Velocities<'r, 'p, L, const N: usize> {
@@ -30,7 +30,7 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
     /// Takes in the end of a step: the mean velocity of the step is one of the motion's.
     pub fn pass(&mut self, t: f64, q: &SVector<f64, N>) {
         let (t_before, q_before) = std::mem::replace(&mut self.before, (t, *q));
-        self.reach = larger(self.reach, norm(&[in_units(q, self.scales.as_ref())]));
+        self.reach = max_or_nan(self.reach, norm(&[in_units(q, self.scales.as_ref())]));
         if t != t_before {
             self.take_in(&((q - q_before) / (t - t_before)));
         }
@@ -46,7 +46,7 @@ impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
     }
 
     fn take_in(&mut self, v: &SVector<f64, N>) {
-        self.speed = larger(self.speed, norm(&[in_units(v, self.scales.as_ref())]));
+        self.speed = max_or_nan(self.speed, norm(&[in_units(v, self.scales.as_ref())]));
     }
 
     /// The largest speed of a run of so many steps; infinite where the motion moves by no more than the rounding of its positions, so that its
@@ -66,7 +66,7 @@ impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
         let rounding = inverted(&lagrangian.hessian(*t0, start).vv)
             .map_or(0.0, |inverse| (inverse.abs() * state.p.abs()).norm() * f64::EPSILON / start.v.norm());
         if rounding > wanted && rounding.is_finite() {
-            return InputError::Accuracy { wanted, reached: rounding, cause: Obstacle::RoundOff };
+            return InputError::Accuracy { wanted, reached: rounding, cause: SelectionFailure::RoundOff };
         }
         refused
     }

@@ -1,7 +1,7 @@
 //! Newton's method for the implicit part of a step.
 
 use crate::{Solver, StepError};
-use contact_geom::larger;
+use contact_geom::max_or_nan;
 use contact_geom::nalgebra::{SMatrix, SVector};
 
 /// The iterations that a step may take.
@@ -44,14 +44,14 @@ pub(crate) struct Root<const N: usize> {
 /// The largest absolute component. A plain loop: nalgebra's `amax` goes through lane-wise comparisons, and costs a tenth of
 /// a small step.
 #[inline(always)]
-pub(crate) fn largest<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> f64 {
-    let mut largest = 0.0;
+pub(crate) fn max_abs_or_nan<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> f64 {
+    let mut max_abs_or_nan = 0.0;
     for column in &m.data.0 {
         for &c in column {
-            largest = f64::max(largest, c.abs());
+            max_abs_or_nan = f64::max(max_abs_or_nan, c.abs());
         }
     }
-    largest
+    max_abs_or_nan
 }
 
 /// Whether the correction of a Newton iteration after this one is within a tolerance: convergence is quadratic, so from two
@@ -83,7 +83,7 @@ pub(crate) fn newton<const N: usize>(
     let mut residual_size = f64::INFINITY;
     for iterations in 1..=ITERATION_LIMIT {
         let mut at = linearise(&u, z)?;
-        residual_size = largest(&at.residual);
+        residual_size = max_abs_or_nan(&at.residual);
         // `amax` ignores a NaN; the sum does not.
         if !(at.residual.sum() + at.jacobian.sum() + at.z_change).is_finite() {
             if last_size == f64::INFINITY {
@@ -100,8 +100,8 @@ pub(crate) fn newton<const N: usize>(
         let z_change = at.z_change + at.z_slope.dot(&change);
         u += change;
         z += z_change;
-        let u_size = largest(&u);
-        let (size, z_size) = (largest(&change), z_change.abs());
+        let u_size = max_abs_or_nan(&u);
+        let (size, z_size) = (max_abs_or_nan(&change), z_change.abs());
         let predicted = last_size.is_finite()
             && last_correction(size, last_size, f64::EPSILON * u_size)
             && last_correction(z_size, last_z_size, f64::EPSILON * z.abs());
@@ -112,13 +112,14 @@ pub(crate) fn newton<const N: usize>(
         let exact = residual_size <= round_off * at.size + f64::MIN_POSITIVE && at.z_change.abs() <= round_off * action;
         // Where no z solves its equation (beyond a pole of the motion) its corrections stagnate too, but are as large as z: half
         // of the digits tell that from what a potential's own cancellation leaves.
-        let settled =
+        let unresolved_within =
             z_size <= round_off * action || (z_size >= 0.5 * last_z_size && z_size <= f64::EPSILON.sqrt() * action);
         let rounded = |u: &SVector<f64, N>| {
             let [of_residual, of_z] = rounding(u, z);
-            residual_size <= of_residual && z_size <= larger(of_z, round_off * action)
+            residual_size <= of_residual && z_size <= max_or_nan(of_z, round_off * action)
         };
-        let stagnant = size >= 0.5 * last_size && (settled && size <= round_off * (resolution + u_size) || rounded(&u));
+        let stagnant =
+            size >= 0.5 * last_size && (unresolved_within && size <= round_off * (resolution + u_size) || rounded(&u));
         if predicted || exact || stagnant {
             return Ok(Root { u, z, iterations });
         }

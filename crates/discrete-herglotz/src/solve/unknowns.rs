@@ -1,10 +1,10 @@
 //! The directions of a step's unknowns, as modules that duals carry.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Border, Module};
+use contact_geom::{AugmentedVector, TangentVector};
 
 /// A module of `LEN` directions that can be reached by index: a block of the unknowns of a step.
-pub(crate) trait Unknowns: Module<f64> {
+pub(crate) trait Unknowns: TangentVector<f64> {
     /// The number of directions.
     const LEN: usize;
     /// The element with `value` in direction `i`.
@@ -29,7 +29,7 @@ impl<const M: usize> Unknowns for SVector<f64, M> {
 }
 
 /// The mean velocity and the end action: rules implicit in z.
-impl<const M: usize> Unknowns for Border<M> {
+impl<const M: usize> Unknowns for AugmentedVector<M> {
     const LEN: usize = M + 1;
     #[inline(always)]
     fn unit(i: usize, value: f64) -> Self {

@@ -2,8 +2,8 @@
 
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::separable::SeparableForm;
-use crate::run::watch::misfit;
-use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
+use crate::run::resolution_monitor::defect;
+use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 
@@ -87,8 +87,8 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> DiscreteLagrangian<N> for 
     }
 
     #[inline(always)]
-    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
-        misfit(velocities, &to.q, self.h, 0.0)
+    fn defect(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
+        defect(velocities, &to.q, self.h, 0.0)
     }
 
     fn order(&self) -> Option<u32> {
@@ -103,9 +103,9 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> DiscreteLagrangian<N> for 
         from: &PhasePoint<N>,
         _guess: &SVector<f64, N>,
         _solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         let (end, velocity, sigma) = self.step(t, from, self.h, &self.forth);
-        Transition { end, velocity, sigma, iterations: 0 }.checked()
+        DiscreteStep { end, velocity, sigma, iterations: 0 }.checked()
     }
 
     /// The step with `-h`, by symmetry.
@@ -116,8 +116,8 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> DiscreteLagrangian<N> for 
         from: &PhasePoint<N>,
         _guess: &SVector<f64, N>,
         _solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         let (end, velocity, factor) = self.step(t + self.h, from, -self.h, &self.back);
-        Transition { end, velocity, sigma: 1.0 / factor, iterations: 0 }.checked()
+        DiscreteStep { end, velocity, sigma: 1.0 / factor, iterations: 0 }.checked()
     }
 }

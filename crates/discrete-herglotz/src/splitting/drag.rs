@@ -83,7 +83,7 @@ pub(crate) struct Drift {
 mod tests {
     use crate::{Splitting, SplittingScheme, Stepper};
     use contact_geom::nalgebra::SVector;
-    use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, Triple, VelocityPoint};
+    use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
     use std::cell::Cell;
 
     /// `v^2/2 - q^2/2 + cos(t) z/10` with its derivatives in closed form, which counts what it is asked for.
@@ -97,9 +97,9 @@ mod tests {
         fn value<T: Scalar>(&self, t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
             (v[0] * v[0] - q[0] * q[0]) * 0.5 + t.cos() * z * 0.1
         }
-        fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<1, T>) -> Option<Triple<1, T>> {
+        fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<1, T>) -> Option<ChartVector<1, T>> {
             self.gradients.set(self.gradients.get() + 1);
-            Some(Triple { x: -x.q, y: x.v, z: t.cos() * 0.1 })
+            Some(ChartVector { x: -x.q, y: x.v, z: t.cos() * 0.1 })
         }
         fn closed_force<T: Scalar>(&self, _t: T, x: &VelocityPoint<1, T>) -> Option<SVector<T, 1>> {
             Some(-x.q)

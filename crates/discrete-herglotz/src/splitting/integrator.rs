@@ -2,24 +2,24 @@
 
 use super::separable::SeparableForm;
 use super::{ActionSplitting, Splitting, SplittingScheme};
-use crate::{Facts, InLanes, InputError, Integrator, Problem, Stepper, Wants};
+use crate::{BatchKernel, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
 use std::borrow::Cow;
 
 /// For `v.Mv/2 - V(t, q) + f(z)`; a Runge-Kutta-Nyström scheme for `f(z) = gamma z`.
 impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingScheme {
-    fn facts(&self) -> Facts {
-        Facts {
+    fn info(&self) -> MethodInfo {
+        MethodInfo {
             name: Cow::Borrowed(self.name()),
             order: self.order(),
             symmetric: true,
             explicit: true,
             exact_rate: true,
-            by_clock: false,
+            in_transformed_time: false,
             collocation: None,
             substeps: true,
             divides: false,
-            price: 4,
+            cost_per_evaluation: 4,
             source: Cow::Borrowed(self.source()),
         }
     }
@@ -40,7 +40,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        Wants { action, watched }: Wants,
+        StepperOptions { action, watched }: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         let Problem { lagrangian, t0, state, structure, .. } = *problem;
         if !structure.is_affine_in_z() {
@@ -54,7 +54,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for SplittingSch
         Ok(Box::new(if action { splitting } else { splitting.without_action() }))
     }
 
-    fn in_lanes(&self) -> Option<InLanes> {
-        Some(InLanes::Splitting(*self))
+    fn batch_kernel(&self) -> Option<BatchKernel> {
+        Some(BatchKernel::Splitting(*self))
     }
 }

@@ -5,7 +5,7 @@ use super::motion::{CompensatedState, Reached, SplittingRun};
 use super::separable::SeparableForm;
 use crate::run::DECOUPLED;
 use crate::run::saved::Saved;
-use crate::{Doubt, Halt, InputError, Item, SplittingScheme, Stepper, Suspicion};
+use crate::{InputError, PlanEntry, SplittingScheme, StepFailure, Stepper, SuspectInterval, UnresolvedStep};
 use contact_geom::{Lagrangian, PhasePoint};
 
 /// A splitting at work on `L = v.Mv/2 - V(t, q) + gamma(t) z`.
@@ -116,7 +116,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Splitting<'a, L, N> {
         if self.form.has_tiny_steps(*h, state, &motion.force) { self.compensated() } else { self }
     }
 
-    /// With a look at each drift whether it resolves the motion, for [`suspicion`](Stepper::suspicion). It costs a sixth of the
+    /// With a look at each drift whether it resolves the motion, for [`unresolved`](Stepper::unresolved). It costs a sixth of the
     /// time of a Kepler orbit, a third of a pendulum's and up to twice an oscillator's more, so it is for motions that are not known.
     pub fn watched(self) -> Self {
         Splitting { watched: true, ..self }
@@ -146,7 +146,7 @@ impl SubstepTable {
 }
 
 impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
-    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let Splitting { form, drag, table, progress, action, compensated, watched } = self;
         let maps = StepMaps { form, drag, table };
         match (*action, *compensated) {
@@ -179,8 +179,8 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
         matches!(self.drag, Drag::Constant(_))
     }
 
-    fn account(&self) -> Vec<Item> {
-        super::account(Item::skipped("action z", DECOUPLED))
+    fn work_summary(&self) -> Vec<PlanEntry> {
+        super::work_summary(PlanEntry::skipped("action z", DECOUPLED))
     }
 
     fn save(&self) -> Option<Vec<u64>> {
@@ -193,11 +193,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
         self.progress.load(&mut words).is_some() && words.is_empty()
     }
 
-    fn suspicion(&self) -> Option<Suspicion> {
+    fn unresolved(&self) -> Option<UnresolvedStep> {
         self.progress.watch.first
     }
 
-    fn doubt(&mut self) -> Option<Doubt<N>> {
+    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
         self.progress.watch.doubt.take()
     }
 }
@@ -215,7 +215,7 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
         progress: &mut SplittingRun<N>,
         steps: usize,
         watched: bool,
-    ) -> Result<(), Halt> {
+    ) -> Result<(), StepFailure> {
         match (self.drag, watched) {
             (Drag::Constant(_), false) => {
                 progress.advance(steps, |at, n| self.run::<ACTION, COMPENSATED, false, false>(at, n))

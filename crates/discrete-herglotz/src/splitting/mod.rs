@@ -22,14 +22,14 @@ pub use nonlinear_drag::ActionSplitting;
 pub use scheme::SplittingScheme;
 pub use strang::Strang;
 
-use crate::Item;
+use crate::PlanEntry;
 
 /// What the steps of splittings compute, with what is said of the action.
-fn account(action: Item) -> Vec<Item> {
+fn work_summary(action: PlanEntry) -> Vec<PlanEntry> {
     vec![
-        Item::skipped("Newton's method", "each step is explicit: forces only"),
-        Item::skipped("Jacobian", "no equation is solved"),
-        Item::skipped("shared kicks", "the last force of a step is the first of the next"),
+        PlanEntry::skipped("Newton's method", "each step is explicit: forces only"),
+        PlanEntry::skipped("Jacobian", "no equation is solved"),
+        PlanEntry::skipped("shared kicks", "the last force of a step is the first of the next"),
         action,
     ]
 }

@@ -1,21 +1,21 @@
 //! What every splitting moves: sums that may carry their rounding, a state of them, and a run in chunks.
 
+use crate::run::resolution_monitor::{ResolutionMonitor, sharper, turning};
 use crate::run::saved::saved;
-use crate::run::watch::{Watch, sharper, turning};
-use crate::{Doubt, Halt, StepError};
+use crate::{StepError, StepFailure, SuspectInterval};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, Triple, larger};
+use contact_geom::{ChartVector, PhasePoint, max_or_nan};
 
 /// A vector that many small changes are added to, with what rounding has taken from the compensated ones so far.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sum<const N: usize> {
+pub(super) struct CompensatedVector<const N: usize> {
     pub(super) value: SVector<f64, N>,
     carry: SVector<f64, N>,
 }
 
-impl<const N: usize> Sum<N> {
+impl<const N: usize> CompensatedVector<N> {
     pub(super) fn new(value: SVector<f64, N>) -> Self {
-        Sum { value, carry: SVector::zeros() }
+        CompensatedVector { value, carry: SVector::zeros() }
     }
 
     /// Adds `change(i, value_i)` to each component; compensated by Kahan's sum.
@@ -37,9 +37,9 @@ impl<const N: usize> Sum<N> {
 /// Where a run goes on from, with the value and the derivative of the next kick: those at the last position.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CompensatedState<const N: usize> {
-    pub(super) q: Sum<N>,
-    pub(super) p: Sum<N>,
-    pub(super) z: Sum<1>,
+    pub(super) q: CompensatedVector<N>,
+    pub(super) p: CompensatedVector<N>,
+    pub(super) z: CompensatedVector<1>,
     pub(super) force: SVector<f64, N>,
     pub(super) value: f64,
     /// What the last drift changed of the force, times its length: the second difference of the momentum.
@@ -50,10 +50,10 @@ pub(super) struct CompensatedState<const N: usize> {
 
 impl<const N: usize> CompensatedState<N> {
     pub(super) fn new(state: PhasePoint<N>, (value, force): (f64, SVector<f64, N>)) -> Self {
-        let z = Sum::new(SVector::<f64, 1>::new(state.z));
+        let z = CompensatedVector::new(SVector::<f64, 1>::new(state.z));
         CompensatedState {
-            q: Sum::new(state.q),
-            p: Sum::new(state.p),
+            q: CompensatedVector::new(state.q),
+            p: CompensatedVector::new(state.p),
             z,
             force,
             value,
@@ -77,7 +77,7 @@ impl<const N: usize> CompensatedState<N> {
     }
 
     /// Looks at a drift over the time s, between the momentum and the force before it and those that the motion holds, as a
-    /// [`Watch`] does at steps as long as the drift.
+    /// [`ResolutionMonitor`] does at steps as long as the drift.
     #[inline(always)]
     pub(super) fn look<const DOUBTS: bool>(
         &mut self,
@@ -90,8 +90,8 @@ impl<const N: usize> CompensatedState<N> {
         let before = std::mem::replace(&mut self.change, now);
         if now.dot(&before) < 0.0 {
             let momenta = [momentum, &self.p.value, &(self.p.value + self.force * s)];
-            if let Some(misfit) = turning([&before, &now], momenta, &self.q.value, s, seen.floor) {
-                seen.misfit = larger(seen.misfit, misfit);
+            if let Some(defect) = turning([&before, &now], momenta, &self.q.value, s, seen.floor) {
+                seen.defect = max_or_nan(seen.defect, defect);
             }
         }
         if DOUBTS && let Some(sharpness) = sharper([&now, &self.p.value, &self.q.value], s, seen.floor, seen.sharpest) {
@@ -104,7 +104,7 @@ impl<const N: usize> CompensatedState<N> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DriftLooks {
     /// The largest misfit; 0 where none is above one.
-    misfit: f64,
+    defect: f64,
     /// The sharpness of the sharpest turn, or what none is beyond.
     sharpest: f64,
     /// What is moved at most by rounding.
@@ -133,12 +133,12 @@ pub(super) struct SplittingRun<const N: usize> {
     pub(super) motion: CompensatedState<N>,
     /// The state after the steps taken: that of the motion, completed where the next step has a part of the last.
     pub(super) state: PhasePoint<N>,
-    pub(super) watch: Watch<N>,
+    pub(super) watch: ResolutionMonitor<N>,
 }
 
 impl<const N: usize> SplittingRun<N> {
     pub(super) fn new(h: f64, t0: f64, forces: usize, state: PhasePoint<N>, kick: (f64, SVector<f64, N>)) -> Self {
-        let watch = Watch::new(&state.q, &SVector::zeros(), h);
+        let watch = ResolutionMonitor::new(&state.q, &SVector::zeros(), h);
         SplittingRun { h, t0, taken: 0, forces, motion: CompensatedState::new(state, kick), state, watch }
     }
 
@@ -156,33 +156,37 @@ impl<const N: usize> SplittingRun<N> {
     /// Nothing, so far.
     #[inline(always)]
     pub(super) fn seen(&self) -> DriftLooks {
-        DriftLooks { misfit: 0.0, sharpest: self.watch.sharpest, floor: self.watch.floor }
+        DriftLooks { defect: 0.0, sharpest: self.watch.sharpest, floor: self.watch.floor }
     }
 
     /// Takes steps in chunks; one that ends with what is not finite step by step up to the last that is, and one with the first
     /// misfit, or with a doubt, step by step up to that.
-    pub(super) fn advance(&mut self, steps: usize, after: impl Fn(&Self, usize) -> Reached<N>) -> Result<(), Halt> {
+    pub(super) fn advance(
+        &mut self,
+        steps: usize,
+        after: impl Fn(&Self, usize) -> Reached<N>,
+    ) -> Result<(), StepFailure> {
         let (mut taken, mut longest) = (0, CHUNK);
         while taken < steps {
             let chunk = longest.min(steps - taken);
-            let Reached { motion, state, seen: DriftLooks { misfit, sharpest, .. } } = after(self, chunk);
+            let Reached { motion, state, seen: DriftLooks { defect, sharpest, .. } } = after(self, chunk);
             // What is not finite in the motion is not finite in its state, or in the next.
-            let finite = Triple::from(state).is_finite() && motion.sigma.is_finite();
-            let misfit = (misfit > 0.0 && self.watch.first.is_none()).then_some(misfit);
+            let finite = ChartVector::from(state).is_finite() && motion.sigma.is_finite();
+            let defect = (defect > 0.0 && self.watch.first.is_none()).then_some(defect);
             let sharper = sharpest > self.watch.sharpest;
-            if chunk > 1 && (!finite || misfit.is_some() || sharper) {
+            if chunk > 1 && (!finite || defect.is_some() || sharper) {
                 longest = 1;
                 continue;
             }
             if !finite {
-                return Err(Halt { taken, cause: StepError::NonFinite });
+                return Err(StepFailure { taken, cause: StepError::NonFinite });
             }
-            if let Some(misfit) = misfit {
-                self.watch.note(self.taken, misfit);
+            if let Some(defect) = defect {
+                self.watch.note(self.taken, defect);
                 longest = CHUNK;
             } else if sharper {
                 let (t, from) = (self.time_after(0), self.state);
-                self.watch.doubt(sharpest, Doubt { step: self.taken, steps: 1, t, from, to: state });
+                self.watch.doubt(sharpest, SuspectInterval { step: self.taken, steps: 1, t, from, to: state });
                 longest = CHUNK;
             }
             (self.motion, self.state) = (motion, state);
@@ -193,6 +197,6 @@ impl<const N: usize> SplittingRun<N> {
     }
 }
 
-saved!([const N: usize] Sum<N> { value, carry });
+saved!([const N: usize] CompensatedVector<N> { value, carry });
 saved!([const N: usize] CompensatedState<N> { q, p, z, force, value, change, sigma });
 saved!([const N: usize] SplittingRun<N> { taken, motion, state, watch });

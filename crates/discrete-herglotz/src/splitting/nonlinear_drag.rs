@@ -4,7 +4,7 @@ use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope}
 use super::motion::{CompensatedState, Reached, SplittingRun};
 use super::separable::SeparableForm;
 use crate::run::saved::Saved;
-use crate::{Doubt, Halt, InputError, Item, SplittingScheme, Stepper, Suspicion};
+use crate::{InputError, PlanEntry, SplittingScheme, StepFailure, Stepper, SuspectInterval, UnresolvedStep};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
 
@@ -117,7 +117,7 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
 }
 
 impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplitting<'_, L, F, N> {
-    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let ActionSplitting { form, table, progress, compensated, doubting } = self;
         match (*compensated, *doubting) {
             (false, false) => progress.advance(steps, |at, n| run::<L, F::Map, N, false, false>(form, table, at, n)),
@@ -143,8 +143,8 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
         self.progress.evaluations()
     }
 
-    fn account(&self) -> Vec<Item> {
-        super::account(Item::computed("action z", "it drives the motion"))
+    fn work_summary(&self) -> Vec<PlanEntry> {
+        super::work_summary(PlanEntry::computed("action z", "it drives the motion"))
     }
 
     fn save(&self) -> Option<Vec<u64>> {
@@ -157,11 +157,11 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> Stepper<N> for ActionSplit
         self.progress.load(&mut words).is_some() && words.is_empty()
     }
 
-    fn suspicion(&self) -> Option<Suspicion> {
+    fn unresolved(&self) -> Option<UnresolvedStep> {
         self.progress.watch.first
     }
 
-    fn doubt(&mut self) -> Option<Doubt<N>> {
+    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
         self.progress.watch.doubt.take()
     }
 }

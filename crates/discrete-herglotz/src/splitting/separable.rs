@@ -1,7 +1,7 @@
 //! Lagrangians `v.Mv/2 - V(t, q) + f(z)`, as splittings read them.
 
 use crate::rules::step_equations::{inverted, is_identity, kept_mass_matrix};
-use crate::run::verified::PROBE;
+use crate::run::check_claims::PROBE;
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Defect, Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
@@ -30,7 +30,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         h: f64,
         t: f64,
         state: &PhasePoint<N>,
-        verified: bool,
+        check_claims: bool,
     ) -> Result<Self, InputError> {
         if N == 0 {
             return Err(InputError::Dimension);
@@ -44,7 +44,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if !structure.separable {
             return Err(InputError::Unclaimed { claim: "separable" });
         }
-        for x in probes(state).into_iter().filter(|_| !verified) {
+        for x in probes(state).into_iter().filter(|_| !check_claims) {
             // A state beside the given one may be outside of the domain.
             let mut defects = structure.defects(&lagrangian, t, &x).into_iter().flatten();
             if let Some(Defect { claim, size }) = defects.find(|d| d.size > PROBE) {
@@ -169,7 +169,7 @@ pub(super) fn without_symmetry(i: usize) -> f64 {
 mod tests {
     use crate::{Ensemble, Problem, SplittingScheme, Steps, Until};
     use contact_geom::nalgebra::SVector;
-    use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, larger};
+    use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, max_or_nan};
 
     /// `v.v/2 + c f(t) q0 - b q1^2/2`: the first coordinate is pushed by next to nothing, from the start on or later.
     struct Whisper {
@@ -224,7 +224,7 @@ mod tests {
                 assert_eq!(ends.len(), 4);
                 for (q, p) in ends {
                     // A rounding of the end, and of t; the sums have none beside it.
-                    let off = larger((q[0] - (1.0 + v * t + added[0])).abs(), (p[0] - (v + added[1])).abs());
+                    let off = max_or_nan((q[0] - (1.0 + v * t + added[0])).abs(), (p[0] - (v + added[1])).abs());
                     let name = scheme.name();
                     assert!(off <= 2.0 * f64::EPSILON * (1.0 + v * t), "{name}, v = {v}, {later}, {spring}: {off:e}");
                 }

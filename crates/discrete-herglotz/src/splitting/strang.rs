@@ -2,8 +2,8 @@
 
 use super::drag::{Drag, Drift};
 use super::separable::SeparableForm;
-use crate::run::watch::misfit;
-use crate::{DiscreteLagrangian, InputError, Solver, StepError, Transition};
+use crate::run::resolution_monitor::defect;
+use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 
@@ -60,7 +60,7 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
 
     /// Kick, drift, kick over a step from `t`, forward or back.
     #[inline(always)]
-    fn step(&self, t: f64, from: &PhasePoint<N>, forward: bool) -> Result<Transition<N>, StepError> {
+    fn step(&self, t: f64, from: &PhasePoint<N>, forward: bool) -> Result<DiscreteStep<N>, StepError> {
         let h = if forward { self.h } else { -self.h };
         let drift = self.drift(t, forward);
         let PhasePoint { mut q, mut p, mut z } = *from;
@@ -76,7 +76,7 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
         p += p * drift.damping + force * (0.5 * h);
         let velocity = v * (drift.length / h);
         let sigma = if forward { 1.0 + drift.damping } else { 1.0 / (1.0 + drift.damping) };
-        Transition { end: PhasePoint { q, p, z }, velocity, sigma, iterations: 0 }.checked()
+        DiscreteStep { end: PhasePoint { q, p, z }, velocity, sigma, iterations: 0 }.checked()
     }
 }
 
@@ -96,8 +96,8 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
     }
 
     #[inline(always)]
-    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
-        misfit(velocities, &to.q, self.h, 0.0)
+    fn defect(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
+        defect(velocities, &to.q, self.h, 0.0)
     }
 
     fn order(&self) -> Option<u32> {
@@ -120,7 +120,7 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
         from: &PhasePoint<N>,
         _guess: &SVector<f64, N>,
         _solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         self.step(t, from, true)
     }
 
@@ -132,7 +132,7 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for Strang<L, N> {
         from: &PhasePoint<N>,
         _guess: &SVector<f64, N>,
         _solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         self.step(t + self.h, from, false)
     }
 }

@@ -3,7 +3,7 @@
 use super::surfaces::{Surfaces, TimedState};
 use crate::StepError;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Lagrangian, VelocityPoint, larger, largest, linear};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, linear, max_abs_or_nan, max_or_nan};
 
 /// The distance from the surface at which one side is read, relative to the position and to what a step moves: far beyond the rounding of a position,
 /// and so near that what is continuous differs by little.
@@ -72,13 +72,13 @@ impl<'a, L: Lagrangian<N>, const N: usize> OneSided<'a, L, N> {
             let mut change = self.momentum(&v) - p;
             linear::solve(&mut self.mass(&v), &mut change).map_err(|e| StepError::Singular { pivot: e.pivot })?;
             v -= change;
-            let size = largest(change.iter().copied());
+            let size = max_abs_or_nan(change.iter().copied());
             if !size.is_finite() {
                 return Err(StepError::NonFinite);
             }
             // Down to the rounding of the extrapolation, where changes do not fall any more.
-            if size <= f64::EPSILON * largest(v.iter().copied())
-                || (size >= before && size <= 1e-10 * largest(v.iter().copied()))
+            if size <= f64::EPSILON * max_abs_or_nan(v.iter().copied())
+                || (size >= before && size <= 1e-10 * max_abs_or_nan(v.iter().copied()))
             {
                 return Ok((v, p.dot(&v) - self.value(&v)));
             }
@@ -118,7 +118,7 @@ pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
     reach: f64,
 ) -> Result<Corner<N>, StepError> {
     let (x, side) = (at.point(), surfaces.side(index));
-    let scale = |q: f64| if larger(q.abs(), reach) > 0.0 { larger(q.abs(), reach) } else { 1.0 };
+    let scale = |q: f64| if max_or_nan(q.abs(), reach) > 0.0 { max_or_nan(q.abs(), reach) } else { 1.0 };
     let mut of = |along: &dyn Fn(f64) -> (f64, VelocityPoint<N>), distance: f64| {
         slope(lagrangian, surfaces, index, along, distance)
     };
@@ -128,13 +128,13 @@ pub(super) fn corner<L: Lagrangian<N>, const N: usize>(
     let faster =
         |i: usize, by: f64| VelocityPoint { v: SVector::from_fn(|j, _| x.v[j] + if i == j { by } else { 0.0 }), ..x };
     let unit = |v: f64| if v == 0.0 { 1.0 } else { v.abs() };
-    let along_v = largest((0..N).map(|i| of(&|by| (at.t, faster(i, by)), DIFFERENCE * unit(x.v[i]))));
+    let along_v = max_abs_or_nan((0..N).map(|i| of(&|by| (at.t, faster(i, by)), DIFFERENCE * unit(x.v[i]))));
     let along_z = of(&|by| (at.t, VelocityPoint { z: x.z + by, ..x }), DIFFERENCE * unit(x.z));
     let rate_t = of(&|by| (at.t + by, x), DIFFERENCE * unit(at.t));
 
     let size = normal.norm();
     let beside = |toward: f64, of: f64| {
-        let length = BESIDE * scale(largest(x.q.iter().copied()));
+        let length = BESIDE * scale(max_abs_or_nan(x.q.iter().copied()));
         OneSided::new(lagrangian, at, &(normal * (toward * side * length * of / size)))
     };
     if size == 0.0 {
@@ -201,7 +201,7 @@ fn conditions<L: Lagrangian<N>, const N: usize>(
         let change = (energy_here - energy + lambda * rate_t) / rate;
         let size = (change * normal.norm()).abs();
         lambda -= change;
-        let scale = larger(largest(p.iter().copied()), (lambda * normal.norm()).abs());
+        let scale = max_or_nan(max_abs_or_nan(p.iter().copied()), (lambda * normal.norm()).abs());
         if size <= f64::EPSILON * scale || (size >= before && size <= 1e-10 * scale) {
             return Ok(Some(at.state.p + normal * lambda));
         }
@@ -219,7 +219,7 @@ fn jumps_along<L: Lagrangian<N>, const N: usize>(
     surfaces: &mut Surfaces,
 ) -> bool {
     let x = at.point();
-    let speed = largest(x.v.iter().copied());
+    let speed = max_abs_or_nan(x.v.iter().copied());
     let length = |of: f64| BESIDE * of * if speed > 0.0 { speed } else { 1.0 };
     let moved = |by: f64| VelocityPoint { v: x.v.map(|v| v + by), z: x.z + by, ..x };
     let here = |by: f64| lagrangian.value(at.t, &x.q, &moved(by).v, moved(by).z);
@@ -230,9 +230,9 @@ fn jumps_along<L: Lagrangian<N>, const N: usize>(
     }
     let jump = |of: f64| {
         let [a, b] = [length(of), -length(of)].map(|by| lagrangian.gradient(at.t, &moved(by)).y);
-        larger(largest((a - b).iter().copied()), (here(length(of)) - here(-length(of))).abs())
+        max_or_nan(max_abs_or_nan((a - b).iter().copied()), (here(length(of)) - here(-length(of))).abs())
     };
     let (wide, near) = (jump(1.0), jump(0.125));
-    let terms = here(0.0).abs() + largest(at.state.p.iter().copied());
+    let terms = here(0.0).abs() + max_abs_or_nan(at.state.p.iter().copied());
     near > ROUNDINGS * f64::EPSILON * terms && near >= 0.7 * wide
 }

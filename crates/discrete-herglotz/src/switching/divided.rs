@@ -1,8 +1,8 @@
 //! Contact Gauss collocation with steps that are divided where the motion is fast.
 
 use super::{Reach, SwitchingStepper};
-use crate::gauss::facts;
-use crate::{Facts, GaussCollocation, InputError, Integrator, Problem, Stepper, Wants};
+use crate::gauss::info;
+use crate::{GaussCollocation, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
 
 /// Contact Gauss collocation, each of whose steps is divided into parts where its curve does not solve Herglotz' equations between the nodes up to
@@ -40,7 +40,7 @@ impl DividedGauss {
         self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        wants: Wants,
+        wants: StepperOptions,
     ) -> Result<impl Stepper<N> + use<'a, L, N>, InputError> {
         let gauss = GaussCollocation { stages: self.stages };
         let make = move |problem: &Problem<'a, L, N>, h: f64, _: bool| gauss.run(problem, h, wants);
@@ -49,9 +49,9 @@ impl DividedGauss {
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for DividedGauss {
-    fn facts(&self) -> Facts {
-        let facts = facts(self.stages, false);
-        Facts { name: self.name().into(), divides: true, ..facts }
+    fn info(&self) -> MethodInfo {
+        let info = info(self.stages, false);
+        MethodInfo { name: self.name().into(), divides: true, ..info }
     }
 
     fn check(&self, lagrangian: &L) -> Result<(), InputError> {
@@ -67,7 +67,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for DividedGauss
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        wants: Wants,
+        wants: StepperOptions,
     ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         Ok(Box::new(self.run(problem, h, wants)?))
     }

@@ -7,11 +7,11 @@ use crate::run::bracketed_root;
 use crate::run::saved::{Saved, load_option, save_option, saved};
 use crate::run::{first, step_error};
 use crate::{
-    DenseStep, Doubt, Gauss, GaussCollocation, GaussStepper, Halt, InputError, Integrator, Item, Problem, StepError,
-    Stepper, Suspicion, Wants, legendre_inverse,
+    DenseStep, Gauss, GaussCollocation, GaussStepper, InputError, Integrator, PlanEntry, Problem, StepError,
+    StepFailure, Stepper, StepperOptions, SuspectInterval, UnresolvedStep, legendre_inverse,
 };
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, larger, largest};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
 use std::sync::Arc;
 
 /// The parts that a step may have: beyond that the Lagrangian switches without end.
@@ -35,7 +35,7 @@ pub(crate) trait AsStepper<const N: usize> {
     fn add_rests(&mut self, _rests: &StepStart<N>) {}
 
     /// The largest misfit of its last step between the nodes, relative to the momenta; 0 where that is not known.
-    fn misfit(&self) -> f64 {
+    fn defect(&self) -> f64 {
         0.0
     }
 }
@@ -56,11 +56,11 @@ impl<L: Lagrangian<N>, const N: usize> AsStepper<N> for GaussStepper<'_, L, N> {
     fn add_rests(&mut self, rests: &StepStart<N>) {
         GaussStepper::add_rests(self, rests);
     }
-    fn misfit(&self) -> f64 {
+    fn defect(&self) -> f64 {
         self.look(1).map_or(0.0, |look| {
             // A jump that has no gradient at either side is seen in the values of L alone.
             let of_value = if look.kinetic > 0.0 { look.of_value / look.kinetic } else { 0.0 };
-            if look.is_underflown() { of_value } else { larger(look.misfit, of_value) }
+            if look.is_underflown() { of_value } else { max_or_nan(look.defect, of_value) }
         })
     }
 
@@ -96,16 +96,16 @@ pub(crate) fn of_integrator<'a, L: Lagrangian<N>, const N: usize>(
     integrator: Arc<dyn Integrator<'a, L, N> + 'a>,
     problem: &Problem<'a, L, N>,
     h: f64,
-    wants: Wants,
+    wants: StepperOptions,
 ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
-    let facts = integrator.facts();
-    let inside = facts.collocation.is_some() || facts.order > HIGHEST;
-    let reach = match (inside, facts.substeps) {
+    let info = integrator.info();
+    let inside = info.collocation.is_some() || info.order > HIGHEST;
+    let reach = match (inside, info.substeps) {
         (true, _) => Reach::Inside,
         (false, true) => Reach::Beside(SUBSTEPS),
         (false, false) => Reach::Beside(AT_ENDS),
     };
-    let parts = GaussCollocation { stages: (facts.order.div_ceil(2) as usize).clamp(1, Gauss::<()>::STAGES) };
+    let parts = GaussCollocation { stages: (info.order.div_ceil(2) as usize).clamp(1, Gauss::<()>::STAGES) };
     let make = move |problem: &Problem<'a, L, N>, h: f64, is_part: bool| {
         if is_part && !inside { parts.stepper(problem, h, wants) } else { integrator.stepper(problem, h, wants) }
     };
@@ -133,7 +133,7 @@ pub(crate) struct SwitchingStepper<'a, L, S, M, const N: usize> {
     sigma: f64,
     /// The evaluations of the steppers before `base`.
     spent: u64,
-    unresolved: Option<Suspicion>,
+    unresolved: Option<UnresolvedStep>,
     /// The steppers of the parts of the last step, where it had some and they are kept.
     parts: Option<Vec<S>>,
     switched: bool,
@@ -189,8 +189,8 @@ where
         if self.most_misfit == f64::INFINITY {
             return false;
         }
-        let misfit = step.misfit();
-        misfit.is_nan() || misfit > self.most_misfit
+        let defect = step.defect();
+        defect.is_nan() || defect > self.most_misfit
     }
 
     /// The steppers of the last step: of its parts where it had some, else that of all steps.
@@ -252,7 +252,7 @@ where
             }
         }
         // What was noted before this step; the step itself has crossed a surface.
-        let earlier = self.base.stepper().suspicion().map(|s| Suspicion { step: s.step + self.before, ..s });
+        let earlier = self.base.stepper().unresolved().map(|s| UnresolvedStep { step: s.step + self.before, ..s });
         self.unresolved = first(self.unresolved, earlier.filter(|s| s.step < self.k));
         self.spent += self.base.stepper().evaluations();
         if let Some(parts) = &mut self.parts {
@@ -280,7 +280,7 @@ where
     fn in_parts(&mut self, from: TimedState<N>, t_end: f64) -> Result<(TimedState<N>, f64), StepError> {
         let (mut at, mut sigma, mut at_a_place) = (from, 1.0, 0);
         let span = t_end - from.t;
-        let spacing = 4.0 * f64::EPSILON * larger(larger(from.t.abs(), t_end.abs()), span.abs());
+        let spacing = 4.0 * f64::EPSILON * max_or_nan(max_or_nan(from.t.abs(), t_end.abs()), span.abs());
         let (mut longest, mut too_long, mut switches) = (span.abs(), false, false);
         for _ in 0..MOST_PARTS {
             let rest = t_end - at.t;
@@ -309,7 +309,7 @@ where
             let Some(change) = change else {
                 sigma *= stepper.stepper().sigma();
                 self.keep(stepper);
-                (at, longest, at_a_place) = (to, larger(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
+                (at, longest, at_a_place) = (to, max_or_nan(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
                 continue;
             };
             let Some(Part { stepper, to }) = self.locate(&curve, &change, spacing) else {
@@ -348,7 +348,7 @@ where
 
     /// The state at a zero, on the side where the motion goes on.
     fn through(&mut self, at: TimedState<N>, index: usize, span: f64) -> Result<TimedState<N>, StepError> {
-        let reach = largest(at.v.iter().map(|v| v * span));
+        let reach = max_abs_or_nan(at.v.iter().map(|v| v * span));
         let lagrangian = self.problem.lagrangian;
         let p = match corner(lagrangian, &mut self.surfaces, index, &at, reach)? {
             Corner::Continuous => {
@@ -428,9 +428,9 @@ where
     S: AsStepper<N>,
     M: Fn(&Problem<'a, L, N>, f64, bool) -> Result<S, InputError>,
 {
-    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
-            self.step().map_err(|cause| Halt { taken, cause })?;
+            self.step().map_err(|cause| StepFailure { taken, cause })?;
             self.k += 1;
         }
         Ok(())
@@ -460,9 +460,9 @@ where
         if self.switched { None } else { self.base.stepper().dense() }
     }
 
-    fn account(&self) -> Vec<Item> {
-        let mut items = self.base.stepper().account();
-        items.push(Item::computed(
+    fn work_summary(&self) -> Vec<PlanEntry> {
+        let mut items = self.base.stepper().work_summary();
+        items.push(PlanEntry::computed(
             "switching functions",
             "L has kinks or jumps: steps end on those that the motion meets",
         ));
@@ -484,14 +484,14 @@ where
         self.load(&mut words).is_some() && self.base.stepper_mut().restore(words)
     }
 
-    fn suspicion(&self) -> Option<Suspicion> {
-        let of_base = self.base.stepper().suspicion().map(|s| Suspicion { step: s.step + self.before, ..s });
+    fn unresolved(&self) -> Option<UnresolvedStep> {
+        let of_base = self.base.stepper().unresolved().map(|s| UnresolvedStep { step: s.step + self.before, ..s });
         first(self.unresolved, of_base)
     }
 
-    fn doubt(&mut self) -> Option<Doubt<N>> {
+    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
         let doubt = self.base.stepper_mut().doubt()?;
-        Some(Doubt { step: doubt.step + self.before, ..doubt })
+        Some(SuspectInterval { step: doubt.step + self.before, ..doubt })
     }
 }
 
@@ -512,7 +512,7 @@ where
         self.surfaces.sides.load(from)?;
         let mut numbers = (self.sigma, self.spent);
         numbers.load(from)?;
-        self.unresolved = load_option(from, || Suspicion { step: 0, misfit: 0.0 })?;
+        self.unresolved = load_option(from, || UnresolvedStep { step: 0, defect: 0.0 })?;
         self.base = self.stepper_at(&states[0], self.h, false).ok()?;
         ([self.k, self.before], [self.origin, self.here], (self.sigma, self.spent)) = (counts, states, numbers);
         Some(())

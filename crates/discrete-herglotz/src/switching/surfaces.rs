@@ -6,7 +6,7 @@ use crate::run::between;
 use crate::run::bracketed_root;
 use crate::{DenseStep, InputError};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, largest};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan};
 use std::convert::Infallible;
 
 /// The parts in which a step without a curve of its own is searched for changes of sign.
@@ -46,7 +46,7 @@ pub fn jumps_between<const N: usize>(
     };
     let curve = StepCurve { from: of(from), to: of(to), dense: None };
     let mut surfaces = Surfaces::at(lagrangian, from.0, &from.1);
-    let reach = curve.span() * largest(from.1.v.iter().copied());
+    let reach = curve.span() * max_abs_or_nan(from.1.v.iter().copied());
     let parts = curve.parts();
     for part in 1..=parts {
         let ends = [part - 1, part].map(|part| part as f64 / parts as f64);

@@ -4,7 +4,7 @@ use crate::rules::step_equations::BLOCK;
 use crate::solve::newton::{Linearised, NewtonStart, newton};
 use crate::{InputError, Solver, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, Triple, seed};
+use contact_geom::{ChartVector, DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, seed};
 
 /// A discrete Lagrangian `L_d : Q x Q x R -> R` with the action's recursion `z1 = z0 + L_d(q0, q1, z0)`; paper, section 3.
 ///
@@ -33,7 +33,7 @@ pub trait DiscreteLagrangian<const N: usize> {
     /// it is below one, and where nothing is known, as by default: a discrete Lagrangian may be exact for long steps.
     /// `velocities` are the mean velocities of the last four steps, the latest last, `to` and `sigma` the latest one's end.
     #[inline(always)]
-    fn misfit(&self, _velocities: [&SVector<f64, N>; 4], _to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
+    fn defect(&self, _velocities: [&SVector<f64, N>; 4], _to: &PhasePoint<N>, _sigma: f64) -> Option<f64> {
         None
     }
 
@@ -80,7 +80,7 @@ pub trait DiscreteLagrangian<const N: usize> {
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>| DiscretePoint { q0: from.q, q1: from.q + u * h, z0: from.z };
         let start =
@@ -103,7 +103,7 @@ pub trait DiscreteLagrangian<const N: usize> {
         let x = point(&root.u);
         let jet = self.jet(t, &x)?;
         let end = PhasePoint { q: x.q1, p: jet.d2, z: from.z + jet.value };
-        Transition { end, velocity: root.u, sigma: jet.sigma(), iterations: root.iterations }.checked()
+        DiscreteStep { end, velocity: root.u, sigma: jet.sigma(), iterations: root.iterations }.checked()
     }
 
     /// The step `(q1, p1, z1) -> (q0, p0, z0)` of the inverse flow; `t` is the time at `(q0, p0, z0)`.
@@ -118,7 +118,7 @@ pub trait DiscreteLagrangian<const N: usize> {
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         let h = self.step_size();
         let point = |u: &SVector<f64, N>, z0: f64| DiscretePoint { q0: from.q - u * h, q1: from.q, z0 };
         let start =
@@ -145,7 +145,7 @@ pub trait DiscreteLagrangian<const N: usize> {
         let jet = self.jet(t, &x)?;
         let sigma = jet.sigma();
         let end = PhasePoint { q: x.q0, p: -jet.d1 / sigma, z: root.z };
-        Transition { end, velocity: root.u, sigma, iterations: root.iterations }.checked()
+        DiscreteStep { end, velocity: root.u, sigma, iterations: root.iterations }.checked()
     }
 }
 
@@ -160,8 +160,8 @@ impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
         (**self).check_start(t, from, velocity)
     }
     #[inline(always)]
-    fn misfit(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
-        (**self).misfit(velocities, to, sigma)
+    fn defect(&self, velocities: [&SVector<f64, N>; 4], to: &PhasePoint<N>, sigma: f64) -> Option<f64> {
+        (**self).defect(velocities, to, sigma)
     }
     fn order(&self) -> Option<u32> {
         (**self).order()
@@ -186,7 +186,7 @@ impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         (**self).forward(t, from, guess, solver)
     }
     #[inline]
@@ -196,14 +196,14 @@ impl<const N: usize, D: DiscreteLagrangian<N>> DiscreteLagrangian<N> for &D {
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         (**self).backward(t, from, guess, solver)
     }
 }
 
 /// One step of a discrete Hamiltonian flow, forward or backward.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Transition<const N: usize> {
+pub struct DiscreteStep<const N: usize> {
     /// The state that the step leads to.
     pub end: PhasePoint<N>,
     /// The mean velocity `(q1 - q0) / h`, kept apart because the difference of the positions loses its digits.
@@ -214,14 +214,14 @@ pub struct Transition<const N: usize> {
     pub iterations: u32,
 }
 
-impl<const N: usize> Transition<N> {
+impl<const N: usize> DiscreteStep<N> {
     /// Refuses a step that is not finite or not conformally contact.
     ///
     /// # Errors
     /// [`StepError::NonFinite`], [`StepError::SigmaVanished`].
     #[inline(always)]
     pub fn checked(self) -> Result<Self, StepError> {
-        if !(Triple::from(self.end).is_finite() && self.sigma.is_finite()) {
+        if !(ChartVector::from(self.end).is_finite() && self.sigma.is_finite()) {
             return Err(StepError::NonFinite);
         }
         if self.sigma <= 0.0 {
@@ -241,7 +241,7 @@ pub fn derived_jet<const N: usize>(
     x: &DiscretePoint<N>,
 ) -> Result<DiscreteJet<N>, StepError> {
     if const { N > BLOCK } {
-        let (mut value, mut d) = (0.0, Triple { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 });
+        let (mut value, mut d) = (0.0, ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 0.0 });
         for start in blocks::<N>() {
             let l = ld.value(t, &lifted(x, start))?;
             value = l.re;
@@ -256,7 +256,7 @@ pub fn derived_jet<const N: usize>(
         }
         return Ok(DiscreteJet::new(value, d.x, d.y, d.z));
     }
-    let l = ld.value(t, &seed(&Triple::from(*x)).into())?;
+    let l = ld.value(t, &seed(&ChartVector::from(*x)).into())?;
     Ok(DiscreteJet::new(l.re, l.d.x, l.d.y, l.d.z))
 }
 
@@ -272,7 +272,7 @@ pub fn derived_second_jet<const N: usize>(
     if const { N > BLOCK } {
         return second_jet_by_blocks(ld, t, x);
     }
-    let l: Dual<Dual<f64, Triple<N>>, _> = ld.value(t, &seed(&seed(&Triple::from(*x))).into())?;
+    let l: Dual<Dual<f64, ChartVector<N>>, _> = ld.value(t, &seed(&seed(&ChartVector::from(*x))).into())?;
     Ok(SecondDiscreteJet {
         first: DiscreteJet::new(l.re.re, l.re.d.x, l.re.d.y, l.re.d.z),
         d11: SMatrix::from_fn(|i, j| l.d.x[i].d.x[j]),

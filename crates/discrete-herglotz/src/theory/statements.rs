@@ -14,9 +14,9 @@ use crate::{
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    ContactForm, Darboux, DiscretePoint, Dual, EtaMinus, EtaPlus, GeometryError, Larger, Largest, OneParameterGroup,
-    PhasePoint, Scalar, SecondDiscreteJet, Smooth, Statement, Symmetry, Triple, conformality,
-    conformality_with_jacobian, generic, larger, seed,
+    ChartVector, ContactForm, Darboux, DiscretePoint, Dual, EtaMinus, EtaPlus, GeometryError, MaxAbsOrNan, MaxOrNan,
+    OneParameterGroup, PhasePoint, Scalar, SecondDiscreteJet, Smooth, Statement, Symmetry, conformality,
+    conformality_with_jacobian, generic, max_or_nan, seed,
 };
 
 /// The statements of section 3 that [`residual`] evaluates.
@@ -80,19 +80,19 @@ fn worst<const N: usize>(
     let mut worst = None;
     for group in symmetries {
         let r = residual(group)?;
-        worst = Some(worst.map_or(r, |w: f64| w.larger(r)));
+        worst = Some(worst.map_or(r, |w: f64| w.max_or_nan(r)));
     }
     Ok(worst)
 }
 
 /// The difference of two elements relative to the larger of them.
-fn relative<const N: usize>(a: impl Into<Triple<N>>, b: impl Into<Triple<N>>) -> f64 {
+fn relative<const N: usize>(a: impl Into<ChartVector<N>>, b: impl Into<ChartVector<N>>) -> f64 {
     let (a, b) = (a.into(), b.into());
-    a.minus(b).largest() / a.largest().larger(b.largest())
+    a.minus(b).max_abs_or_nan() / a.max_abs_or_nan().max_or_nan(b.max_abs_or_nan())
 }
 
 fn relative_vector<const N: usize>(a: SVector<f64, N>, b: SVector<f64, N>, size: f64) -> f64 {
-    (a - b).largest() / size
+    (a - b).max_abs_or_nan() / size
 }
 
 fn jets<const N: usize>(
@@ -110,13 +110,13 @@ struct Transform<'a, D> {
 }
 
 impl<const N: usize, D: DiscreteLagrangian<N>> Smooth<N> for Transform<'_, D> {
-    fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
+    fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
         let l = self.ld.value(self.t, &seed(x).into())?;
         Ok(if self.plus {
-            Triple { x: x.y, y: l.d.y, z: x.z + l.re }
+            ChartVector { x: x.y, y: l.d.y, z: x.z + l.re }
         } else {
             let sigma = l.d.z + 1.0;
-            Triple { x: x.x, y: l.d.x.map(|d| -d / sigma), z: x.z }
+            ChartVector { x: x.x, y: l.d.x.map(|d| -d / sigma), z: x.z }
         })
     }
 }
@@ -127,7 +127,7 @@ fn pulled_back<const N: usize>(
     t: f64,
     x: &DiscretePoint<N>,
     plus: bool,
-) -> Result<(Triple<N>, DMatrix<f64>), GeometryError> {
+) -> Result<(ChartVector<N>, DMatrix<f64>), GeometryError> {
     let (image, jacobian) = Transform { ld, t, plus }.with_jacobian(&(*x).into())?;
     let d_eta = jacobian.transpose() * Darboux.d_eta(&image)? * &jacobian;
     Ok((pull(&jacobian, &Darboux.eta(&image)?), d_eta))
@@ -135,10 +135,10 @@ fn pulled_back<const N: usize>(
 
 fn form_residual<const N: usize>(
     closed: &impl ContactForm<N>,
-    (eta, d_eta): (Triple<N>, DMatrix<f64>),
-    x: &Triple<N>,
+    (eta, d_eta): (ChartVector<N>, DMatrix<f64>),
+    x: &ChartVector<N>,
 ) -> Result<f64, GeometryError> {
-    Ok(relative(closed.eta(x)?, eta).larger((closed.d_eta(x)? - &d_eta).largest() / d_eta.largest()))
+    Ok(relative(closed.eta(x)?, eta).max_or_nan((closed.d_eta(x)? - &d_eta).max_abs_or_nan() / d_eta.max_abs_or_nan()))
 }
 
 /// Statement 1 on Q x Q x R: the contact condition for eta+ and eta-, in closed form and by the volume.
@@ -149,24 +149,27 @@ fn volume<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscreteP
     };
     let (minus, plus) = (EtaMinus(jets(ld, t)), EtaPlus(jets(ld, t)));
     Ok(of(minus.volume(&point)?, generic::volume(&minus, &point)?)
-        .larger(of(plus.volume(&point)?, generic::volume(&plus, &point)?)))
+        .max_or_nan(of(plus.volume(&point)?, generic::volume(&plus, &point)?)))
 }
 
 /// Statement 2 on Q x Q x R: Reeb fields, flat and sharp of eta+ and eta-, closed against generic and by definition.
 fn reeb<const N: usize>(ld: &impl DiscreteLagrangian<N>, t: f64, x: &DiscretePoint<N>) -> Result<f64, GeometryError> {
-    fn of<const N: usize>(form: &impl ContactForm<N>, x: &Triple<N>) -> Result<f64, GeometryError> {
+    fn of<const N: usize>(form: &impl ContactForm<N>, x: &ChartVector<N>) -> Result<f64, GeometryError> {
         let (eta, reeb) = (form.eta(x)?, form.reeb(x)?);
-        let mut worst =
-            relative(reeb, generic::reeb(form, x)?).larger((eta.dot(&reeb) - 1.0).abs() / eta.largest().larger(1.0));
-        worst = worst.larger(form.flat(x, &reeb)?.minus(eta).largest() / (form.d_eta(x)?.largest() * reeb.largest()));
-        for j in 0..Triple::<N>::DIMENSION {
-            let e = Triple::from_fn(|i| f64::from(u8::from(i == j)));
-            worst = worst.larger(relative(form.sharp(x, &form.flat(x, &e)?)?, e));
+        let mut worst = relative(reeb, generic::reeb(form, x)?)
+            .max_or_nan((eta.dot(&reeb) - 1.0).abs() / eta.max_abs_or_nan().max_or_nan(1.0));
+        worst = worst.max_or_nan(
+            form.flat(x, &reeb)?.minus(eta).max_abs_or_nan()
+                / (form.d_eta(x)?.max_abs_or_nan() * reeb.max_abs_or_nan()),
+        );
+        for j in 0..ChartVector::<N>::DIMENSION {
+            let e = ChartVector::from_fn(|i| f64::from(u8::from(i == j)));
+            worst = worst.max_or_nan(relative(form.sharp(x, &form.flat(x, &e)?)?, e));
         }
         Ok(worst)
     }
     let point = (*x).into();
-    Ok(of(&EtaMinus(jets(ld, t)), &point)?.larger(of(&EtaPlus(jets(ld, t)), &point)?))
+    Ok(of(&EtaMinus(jets(ld, t)), &point)?.max_or_nan(of(&EtaPlus(jets(ld, t)), &point)?))
 }
 
 /// A path of so many steps near the points of `x`, no faster than they are: not a solution.
@@ -208,13 +211,17 @@ fn action_differential<const N: usize>(
     for steps in [1, 2, 3, most] {
         let path = wiggly_path(x, steps)?;
         let (formula, derived) = (path.action_differential(ld, t, x.z0)?, differentiated(ld, t, &path, x.z0)?);
-        let size = ld.jet(t, x)?.d1.largest().larger(derived.iter().map(Largest::largest).fold(0.0, larger));
+        let size = ld
+            .jet(t, x)?
+            .d1
+            .max_abs_or_nan()
+            .max_or_nan(derived.iter().map(MaxAbsOrNan::max_abs_or_nan).fold(0.0, max_or_nan));
         for (a, b) in formula.iter().zip(&derived) {
-            worst = worst.larger(relative_vector(*a, *b, size));
+            worst = worst.max_or_nan(relative_vector(*a, *b, size));
         }
         let z = path.actions(ld, t, x.z0)?;
         let end = discrete_action(ld, t, path.points(), x.z0)?;
-        worst = worst.larger((z[steps] - end).abs() / (1.0 + end.abs()));
+        worst = worst.max_or_nan((z[steps] - end).abs() / (1.0 + end.abs()));
     }
     Ok(worst)
 }
@@ -231,8 +238,8 @@ fn two_steps<const N: usize>(
     let second = ld.jet(t + ld.step_size(), &DiscretePoint { q0: q[1], q1: q[2], z0: x.z0 + first.value })?;
     let remark = [first.d1 * (1.0 + second.dz), second.d1 + first.d2 * (1.0 + second.dz), second.d2];
     let derived = differentiated(ld, t, &path, x.z0)?;
-    let size = remark.iter().map(Largest::largest).fold(first.d2.largest(), larger);
-    Ok(remark.iter().zip(&derived).map(|(a, b)| relative_vector(*a, *b, size)).fold(0.0, larger))
+    let size = remark.iter().map(MaxAbsOrNan::max_abs_or_nan).fold(first.d2.max_abs_or_nan(), max_or_nan);
+    Ok(remark.iter().zip(&derived).map(|(a, b)| relative_vector(*a, *b, size)).fold(0.0, max_or_nan))
 }
 
 /// Statement 15: a path is critical for A_d with fixed ends exactly if it solves the discrete Herglotz equations.
@@ -252,23 +259,23 @@ fn principle<const N: usize>(
         points.push(step.q1);
     }
     let solution = DiscretePath::new(points).map_err(|_| GeometryError::Undefined { what: "the path" })?;
-    let size = ld.jet(t, x)?.d1.largest().larger(ld.jet(t, x)?.d2.largest());
+    let size = ld.jet(t, x)?.d1.max_abs_or_nan().max_or_nan(ld.jet(t, x)?.d2.max_abs_or_nan());
     // A rounded point of the path changes its neighbours' residuals by D12 times the rounding.
     let second = ld.second_jet(t, x)?;
-    let largest = solution.points().iter().map(Largest::largest).fold(0.0, larger);
-    let size_of_solution = size.larger(second.d12.largest() * largest);
+    let max_abs_or_nan = solution.points().iter().map(MaxAbsOrNan::max_abs_or_nan).fold(0.0, max_or_nan);
+    let size_of_solution = size.max_or_nan(second.d12.max_abs_or_nan() * max_abs_or_nan);
     let differential = differentiated(ld, t, &solution, x.z0)?;
-    let mut worst = differential[1..3].iter().map(|d| d.largest() / size_of_solution).fold(0.0, larger);
+    let mut worst = differential[1..3].iter().map(|d| d.max_abs_or_nan() / size_of_solution).fold(0.0, max_or_nan);
 
     let path = wiggly_path(x, 5)?;
     let (differential, residuals) = (differentiated(ld, t, &path, x.z0)?, path.herglotz_residuals(ld, t, x.z0)?);
     let z = path.actions(ld, t, x.z0)?;
     let mut later = 1.0;
     for k in (1..5).rev() {
-        worst = worst.larger(relative_vector(
+        worst = worst.max_or_nan(relative_vector(
             differential[k],
             residuals[k - 1] * later,
-            size.larger(differential[k].largest()),
+            size.max_or_nan(differential[k].max_abs_or_nan()),
         ));
         let at = DiscretePoint { q0: path.points()[k], q1: path.points()[k + 1], z0: z[k] };
         let sigma = ld.jet(t + k as f64 * h, &at)?.sigma();
@@ -304,9 +311,9 @@ fn momentum_matching<const N: usize>(
     let next = discrete_flow(ld, t, x)?;
     let (plus, minus) = (legendre_plus(ld, t, x)?, legendre_minus(ld, t + h, &next)?);
     // q2 is rounded, and p1 depends on it by W/h.
-    let slope = ld.second_jet(t + h, &next)?.d12.largest();
-    let size = Triple::from(plus).largest().larger(slope * next.q1.largest());
-    let matching = Triple::from(plus).minus(minus.into()).largest() / size;
+    let slope = ld.second_jet(t + h, &next)?.d12.max_abs_or_nan();
+    let size = ChartVector::from(plus).max_abs_or_nan().max_or_nan(slope * next.q1.max_abs_or_nan());
+    let matching = ChartVector::from(plus).minus(minus.into()).max_abs_or_nan() / size;
     // Away from the solution the mismatch of the momenta is the residual divided by sigma.
     let mut off = next;
     off.q1 += (next.q1 - next.q0) * 0.1;
@@ -314,9 +321,9 @@ fn momentum_matching<const N: usize>(
         DiscretePath::new(vec![x.q0, x.q1, off.q1]).map_err(|_| GeometryError::Undefined { what: "the path" })?;
     let residual = path.herglotz_residuals(ld, t, x.z0)?[0] / ld.jet(t + h, &off)?.sigma();
     let mismatch = plus.p - legendre_minus(ld, t + h, &off)?.p;
-    let distinguishes = mismatch.largest() > 1e-6 * slope * (off.q1 - next.q1).largest();
-    let equations = relative_vector(mismatch, residual, plus.p.largest().larger(residual.largest()));
-    Ok(if distinguishes { matching.larger(equations) } else { f64::INFINITY })
+    let distinguishes = mismatch.max_abs_or_nan() > 1e-6 * slope * (off.q1 - next.q1).max_abs_or_nan();
+    let equations = relative_vector(mismatch, residual, plus.p.max_abs_or_nan().max_or_nan(residual.max_abs_or_nan()));
+    Ok(if distinguishes { matching.max_or_nan(equations) } else { f64::INFINITY })
 }
 
 /// Statement 19: the flow exists where F-L_d is a local diffeomorphism: its solve and the inverses return the point.
@@ -328,7 +335,7 @@ fn flow_exists<const N: usize>(
     let guess = (x.q1 - x.q0) / ld.step_size();
     let minus = legendre_minus_inverse(ld, t, &legendre_minus(ld, t, x)?, &guess)?;
     let plus = legendre_plus_inverse(ld, t, &legendre_plus(ld, t, x)?, &guess)?;
-    Ok(relative(minus, *x).larger(relative(plus, *x)))
+    Ok(relative(minus, *x).max_or_nan(relative(plus, *x)))
 }
 
 /// Statement 20: the three expressions of Phi~_d agree.
@@ -343,11 +350,13 @@ fn three_expressions<const N: usize>(
     let direct = by(HamiltonianFlow::Direct)?;
     let step = ld.forward(t, &state, &guess, &mut crate::Solver::default())?;
     // p is recovered from rounded positions, of which it depends by W/h.
-    let size = Triple::from(direct).largest().larger(ld.second_jet(t, x)?.d12.largest() * x.q1.largest());
-    let distance = |a: PhasePoint<N>| Triple::from(a).minus(direct.into()).largest() / size;
+    let size = ChartVector::from(direct)
+        .max_abs_or_nan()
+        .max_or_nan(ld.second_jet(t, x)?.d12.max_abs_or_nan() * x.q1.max_abs_or_nan());
+    let distance = |a: PhasePoint<N>| ChartVector::from(a).minus(direct.into()).max_abs_or_nan() / size;
     Ok(distance(by(HamiltonianFlow::ThroughPlus)?)
-        .larger(distance(by(HamiltonianFlow::ThroughMinus)?))
-        .larger(distance(step.end)))
+        .max_or_nan(distance(by(HamiltonianFlow::ThroughMinus)?))
+        .max_or_nan(distance(step.end)))
 }
 
 /// Statement 21: eta+ and eta- in closed form are the pullbacks of Darboux' form; the jets that they are made of, and the
@@ -361,21 +370,33 @@ fn contact_forms<const N: usize>(
     let minus = form_residual(&EtaMinus(jets(ld, t)), pulled_back(ld, t, x, false)?, &point)?;
     let plus = form_residual(&EtaPlus(jets(ld, t)), pulled_back(ld, t, x, true)?, &point)?;
     let (first, derived) = (ld.jet(t, x)?, derived_jet(ld, t, x)?);
-    let of = |jet: contact_geom::DiscreteJet<N>| Triple { x: jet.d1, y: jet.d2, z: jet.dz };
+    let of = |jet: contact_geom::DiscreteJet<N>| ChartVector { x: jet.d1, y: jet.d2, z: jet.dz };
     let (second, derived_second) = (ld.second_jet(t, x)?, derived_second_jet(ld, t, x)?);
-    let blocks = (second.d11 - derived_second.d11).largest().larger((second.d12 - derived_second.d12).largest());
-    let blocks =
-        blocks.larger((second.d22 - derived_second.d22).largest()).larger((second.d1z - derived_second.d1z).largest());
-    let blocks =
-        blocks.larger((second.d2z - derived_second.d2z).largest()).larger((second.dzz - derived_second.dzz).abs());
-    let size = derived_second.d11.largest().larger(derived_second.d12.largest()).larger(derived_second.d22.largest());
+    let blocks = (second.d11 - derived_second.d11)
+        .max_abs_or_nan()
+        .max_or_nan((second.d12 - derived_second.d12).max_abs_or_nan());
+    let blocks = blocks
+        .max_or_nan((second.d22 - derived_second.d22).max_abs_or_nan())
+        .max_or_nan((second.d1z - derived_second.d1z).max_abs_or_nan());
+    let blocks = blocks
+        .max_or_nan((second.d2z - derived_second.d2z).max_abs_or_nan())
+        .max_or_nan((second.dzz - derived_second.dzz).abs());
+    let size = derived_second
+        .d11
+        .max_abs_or_nan()
+        .max_or_nan(derived_second.d12.max_abs_or_nan())
+        .max_or_nan(derived_second.d22.max_abs_or_nan());
     let jacobian = |plus| -> Result<f64, GeometryError> {
         let closed = if plus { second.legendre_plus_jacobian() } else { second.legendre_minus_jacobian() };
         let (_, derived) = Transform { ld, t, plus }.with_jacobian(&point)?;
-        Ok((&closed - &derived).largest() / derived.largest())
+        Ok((&closed - &derived).max_abs_or_nan() / derived.max_abs_or_nan())
     };
-    let transforms = jacobian(false)?.larger(jacobian(true)?);
-    Ok(minus.larger(plus).larger(transforms).larger(relative(of(first), of(derived))).larger(blocks / size))
+    let transforms = jacobian(false)?.max_or_nan(jacobian(true)?);
+    Ok(minus
+        .max_or_nan(plus)
+        .max_or_nan(transforms)
+        .max_or_nan(relative(of(first), of(derived)))
+        .max_or_nan(blocks / size))
 }
 
 /// Statement 22: `eta+ = sigma_d eta-` and `Phi_d* eta- = eta+`.
@@ -395,15 +416,16 @@ fn forms_are_related<const N: usize>(
     let jacobian = discrete_flow_jacobian(ld, t, x, &image)?;
     let next = EtaMinus(jets(ld, t + h));
     let pullback = pull(&jacobian, &next.eta(&image.into())?);
-    let size = next.eta(&image.into())?.largest() * jacobian.largest();
-    let related = pullback.minus(plus.eta(&point)?).largest() / size.larger(plus.eta(&point)?.largest());
-    Ok(proportional.larger(related).larger(relative(plus.eta(&point)?, minus.eta(&point)?.scale(sigma))))
+    let size = next.eta(&image.into())?.max_abs_or_nan() * jacobian.max_abs_or_nan();
+    let related =
+        pullback.minus(plus.eta(&point)?).max_abs_or_nan() / size.max_or_nan(plus.eta(&point)?.max_abs_or_nan());
+    Ok(proportional.max_or_nan(related).max_or_nan(relative(plus.eta(&point)?, minus.eta(&point)?.scale(sigma))))
 }
 
 /// A covector pulled back along a Jacobian.
-fn pull<const N: usize>(jacobian: &DMatrix<f64>, covector: &Triple<N>) -> Triple<N> {
+fn pull<const N: usize>(jacobian: &DMatrix<f64>, covector: &ChartVector<N>) -> ChartVector<N> {
     let image = jacobian.tr_mul(&covector.to_vector());
-    Triple::from_fn(|i| image[i])
+    ChartVector::from_fn(|i| image[i])
 }
 
 /// Statement 23: `Phi_d* eta+ = (sigma_d o Phi_d) eta+` and `Phi_d* eta- = sigma_d eta-`.
@@ -418,13 +440,13 @@ fn discrete_flow_is_conformal<const N: usize>(
     let (sigma, sigma_after) = (ld.jet(t, x)?.sigma(), ld.jet(t + h, &image)?.sigma());
     let (from, to) = ((*x).into(), image.into());
     // Relative to the terms of the pullback, which may cancel.
-    let of = |before: Triple<N>, after: Triple<N>, sigma: f64| {
-        let size = (after.largest() * jacobian.largest()).larger(before.largest());
-        pull(&jacobian, &after).minus(before.scale(sigma)).largest() / size
+    let of = |before: ChartVector<N>, after: ChartVector<N>, sigma: f64| {
+        let size = (after.max_abs_or_nan() * jacobian.max_abs_or_nan()).max_or_nan(before.max_abs_or_nan());
+        pull(&jacobian, &after).minus(before.scale(sigma)).max_abs_or_nan() / size
     };
     let minus = of(EtaMinus(jets(ld, t)).eta(&from)?, EtaMinus(jets(ld, t + h)).eta(&to)?, sigma);
     let plus = of(EtaPlus(jets(ld, t)).eta(&from)?, EtaPlus(jets(ld, t + h)).eta(&to)?, sigma_after);
-    Ok(minus.larger(plus))
+    Ok(minus.max_or_nan(plus))
 }
 
 /// Statement 24: `Phi~_d* eta = (sigma_d o (F-L_d)^-1) eta`.
@@ -437,15 +459,15 @@ fn hamiltonian_flow_is_conformal<const N: usize>(
     let jacobian = hamiltonian_flow_jacobian(ld, t, x)?;
     let measured = conformality_with_jacobian(&Darboux, &Darboux, &from.into(), &to.into(), &jacobian)?;
     let sigma = ld.jet(t, x)?.sigma();
-    let size = (1.0 + to.p.largest()) * jacobian.largest();
-    Ok((measured.defect * measured.pullback.largest()).larger((measured.sigma - sigma).abs()) / size)
+    let size = (1.0 + to.p.max_abs_or_nan()) * jacobian.max_abs_or_nan();
+    Ok((measured.defect * measured.pullback.max_abs_or_nan()).max_or_nan((measured.sigma - sigma).abs()) / size)
 }
 
 /// The lift of a group element to Q x Q x R.
 struct Diagonal<'a, const N: usize>(&'a Symmetry<N>);
 
 impl<const N: usize> Smooth<N> for Diagonal<'_, N> {
-    fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
+    fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
         Ok(self.0.on_discrete(T::from(0.6), x))
     }
 }
@@ -463,16 +485,20 @@ fn momentum_is_dissipated<const N: usize>(
         conformality(&minus, &minus, &Diagonal(group), &point)?,
         conformality(&plus, &plus, &Diagonal(group), &point)?,
     );
-    let contact =
-        on_minus.defect.larger(on_plus.defect).larger((on_minus.sigma - 1.0).abs()).larger((on_plus.sigma - 1.0).abs());
+    let contact = on_minus
+        .defect
+        .max_or_nan(on_plus.defect)
+        .max_or_nan((on_minus.sigma - 1.0).abs())
+        .max_or_nan((on_plus.sigma - 1.0).abs());
     let h = ld.step_size();
     let image = discrete_flow(ld, t, x)?;
     let (before, after) = (discrete_momentum(ld, group, t, x)?, discrete_momentum(ld, group, t + h, &image)?);
     // p1 from rounded positions: W/h times their rounding, times the generator.
-    let xi = group.generator(&image.q0).largest();
-    let size = before.abs().larger(xi * ld.second_jet(t + h, &image)?.d12.largest() * image.q1.largest());
+    let xi = group.generator(&image.q0).max_abs_or_nan();
+    let size =
+        before.abs().max_or_nan(xi * ld.second_jet(t + h, &image)?.d12.max_abs_or_nan() * image.q1.max_abs_or_nan());
     let sign = (before + minus.eta(&point)?.x.dot(&group.generator(&x.q0))).abs() / size;
-    Ok(contact.larger(sign).larger((after - ld.jet(t, x)?.sigma() * before).abs() / size))
+    Ok(contact.max_or_nan(sign).max_or_nan((after - ld.jet(t, x)?.sigma() * before).abs() / size))
 }
 
 /// Statement 39, its second half: sigma_d is positive for these steps; zero or infinite.

@@ -3,7 +3,7 @@
 use crate::map::exact_lagrangian::seeded;
 use crate::{ContactExponential, ExactError, herglotz_flow};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, Regularity, VelocityPoint, largest};
+use contact_geom::{Dual, Lagrangian, Regularity, VelocityPoint, max_abs_or_nan};
 
 /// A time at which a motion meets a conjugate point: motions with slightly different initial velocities meet there again, to
 /// first order.
@@ -37,7 +37,7 @@ impl Fold {
         let entry = |i: usize, j: usize| if i < N { dq[(i, j)] } else { dv[(i - N, j)] * time };
         let columns = DMatrix::from_fn(2 * N, N, entry);
         // Each variation in its own unit.
-        let sizes: Vec<f64> = columns.column_iter().map(|c| largest(c.iter().copied())).collect();
+        let sizes: Vec<f64> = columns.column_iter().map(|c| max_abs_or_nan(c.iter().copied())).collect();
         if sizes.iter().any(|s| !(*s > f64::MIN_POSITIVE / f64::EPSILON && s.is_finite())) {
             return Fold { sign: 0.0, sine: 0.0, decayed: true };
         }

@@ -3,7 +3,9 @@
 use crate::numerics::flow::flow_between_jumps;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, legendre};
-use discrete_herglotz::{Facts, Halt, InputError, Integrator, Item, Problem, StepError, Stepper, Wants};
+use discrete_herglotz::{
+    InputError, Integrator, MethodInfo, PlanEntry, Problem, StepError, StepFailure, Stepper, StepperOptions,
+};
 
 /// The flow of the Herglotz field as an [`Integrator`]: its steps, of whatever length, are those of [`herglotz_flow`](crate::herglotz_flow), to round-off; they
 /// end on the jumps of L that it states.
@@ -23,15 +25,25 @@ use discrete_herglotz::{Facts, Halt, InputError, Integrator, Item, Problem, Step
 pub struct ExactFlow;
 
 impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for ExactFlow {
-    fn facts(&self) -> Facts {
-        Facts { symmetric: true, explicit: true, exact_rate: true, ..Facts::of_discrete::<N>("exact", u32::MAX) }
+    fn info(&self) -> MethodInfo {
+        MethodInfo {
+            symmetric: true,
+            explicit: true,
+            exact_rate: true,
+            ..MethodInfo::of_discrete::<N>("exact", u32::MAX)
+        }
     }
 
     fn check(&self, _lagrangian: &L) -> Result<(), InputError> {
         Ok(())
     }
 
-    fn stepper(&self, problem: &Problem<'a, L, N>, h: f64, _: Wants) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
+    fn stepper(
+        &self,
+        problem: &Problem<'a, L, N>,
+        h: f64,
+        _: StepperOptions,
+    ) -> Result<Box<dyn Stepper<N> + 'a>, InputError> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
@@ -53,10 +65,10 @@ struct Run<'a, L, const N: usize> {
 }
 
 impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Run<'_, L, N> {
-    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
             let motion = flow_between_jumps(self.lagrangian, self.time(), &self.x, self.h)
-                .map_err(|error| Halt { taken, cause: StepError::from(error) })?;
+                .map_err(|error| StepFailure { taken, cause: StepError::from(error) })?;
             (self.x, self.b) = (motion.end, motion.b);
             self.evaluations += motion.evaluations;
             self.k += 1;
@@ -101,11 +113,11 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Run<'_, L, N> {
         true
     }
 
-    fn account(&self) -> Vec<Item> {
+    fn work_summary(&self) -> Vec<PlanEntry> {
         vec![
-            Item::computed("panels", "as many in a step as round-off asks for, with a look between their nodes"),
-            Item::skipped("Newton's method", "Herglotz' field is integrated"),
-            Item::computed("action z", "Herglotz' field has it"),
+            PlanEntry::computed("panels", "as many in a step as round-off asks for, with a look between their nodes"),
+            PlanEntry::skipped("Newton's method", "Herglotz' field is integrated"),
+            PlanEntry::computed("action z", "Herglotz' field has it"),
         ]
     }
 }

@@ -5,11 +5,11 @@ use crate::{ContactExponential, ExactError, Motion, herglotz_flow};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Triple,
+    ChartVector, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet,
     VelocityPoint,
 };
 use discrete_herglotz::{
-    DiscreteLagrangian, ITERATION_LIMIT, InputError, Solver, StepError, Transition, last_correction,
+    DiscreteLagrangian, DiscreteStep, ITERATION_LIMIT, InputError, Solver, StepError, last_correction,
 };
 
 /// The exact discrete Lagrangian `L_h^e(q0, q1, z0) = int_0^h L o phi_t o R_h^(e-) dt = z(h) - z0`, the action along the motion from
@@ -121,7 +121,7 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         duration: f64,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         let v = self.velocity(t, from, guess)?;
         let start = VelocityPoint { q: from.q, v, z: from.z };
         let motion: Motion<N> = herglotz_flow(&self.exponential.lagrangian, t, &start, duration)?;
@@ -129,7 +129,7 @@ impl<L: Lagrangian<N>, const N: usize> ExactLagrangian<L, N> {
         let p = self.momentum(t + duration, &end);
         let forward = if duration > 0.0 { motion.b } else { -motion.b };
         let end = PhasePoint { q: end.q, p, z: end.z };
-        Transition { end, velocity: motion.displacement / duration, sigma: forward.exp(), iterations: 1 }.checked()
+        DiscreteStep { end, velocity: motion.displacement / duration, sigma: forward.exp(), iterations: 1 }.checked()
     }
 }
 
@@ -168,23 +168,23 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ExactLagrangian
         // The variations of v0 with q0, q1 and z0.
         let (v_q0, v_q1, v_z0) = (-inverse * by_q0, inverse, -inverse * by_z0);
         // The variation of what depends on the start, with the start's velocity varying so.
-        let total = |d: &Triple<N>| Triple {
+        let total = |d: &ChartVector<N>| ChartVector {
             x: d.x + v_q0.transpose() * d.y,
             y: v_q1.transpose() * d.y,
             z: d.z + v_z0.dot(&d.y),
         };
         let lagrangian = &self.exponential.lagrangian;
-        let of_start = |x: &VelocityPoint<N, Dual<f64, Triple<N>>>, t| {
+        let of_start = |x: &VelocityPoint<N, Dual<f64, ChartVector<N>>>, t| {
             let p = lagrangian.gradient(Dual::from(t), x).y;
-            SVector::<Triple<N>, N>::from_fn(|i, _| total(&p[i].d))
+            SVector::<ChartVector<N>, N>::from_fn(|i, _| total(&p[i].d))
         };
-        let p0 = of_start(&contact_geom::seed(&Triple::from(retraction.start)).into(), t);
+        let p0 = of_start(&contact_geom::seed(&ChartVector::from(retraction.start)).into(), t);
         let p1 = of_start(&varied.end, t + h);
         let b = total(&varied.b.d);
         let first = self.jet_of(t, &retraction);
         let sigma = first.sigma();
         // D1 = -sigma p0, and d sigma = sigma db.
-        let d1 = |i: usize| Triple {
+        let d1 = |i: usize| ChartVector {
             x: p0[i].x * -sigma + b.x * first.d1[i],
             y: p0[i].y * -sigma + b.y * first.d1[i],
             z: p0[i].z * -sigma + b.z * first.d1[i],
@@ -207,7 +207,7 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ExactLagrangian
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         _solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         self.along(t, from, guess, self.exponential.h)
     }
 
@@ -218,7 +218,7 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ExactLagrangian
         from: &PhasePoint<N>,
         guess: &SVector<f64, N>,
         _solver: &mut Solver<N>,
-    ) -> Result<Transition<N>, StepError> {
+    ) -> Result<DiscreteStep<N>, StepError> {
         let h = self.exponential.h;
         self.along(t + h, from, guess, -h)
     }

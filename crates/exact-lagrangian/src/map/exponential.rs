@@ -2,7 +2,7 @@
 
 use crate::{ExactError, Motion, herglotz_flow};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
-use contact_geom::{DiscretePoint, Lagrangian, Regularity, Scalar, Triple, VelocityPoint, seed};
+use contact_geom::{ChartVector, DiscretePoint, Lagrangian, Regularity, Scalar, VelocityPoint, seed};
 use contact_geom::{Dual, GeometryError, Smooth};
 use discrete_herglotz::InputError;
 
@@ -26,7 +26,7 @@ pub struct ContactExponential<L> {
 }
 
 /// What a small change of a motion's start does to its end: the motion over duals along all coordinates.
-pub(crate) type Varied<const N: usize> = Motion<N, Dual<f64, Triple<N>>>;
+pub(crate) type Varied<const N: usize> = Motion<N, Dual<f64, ChartVector<N>>>;
 
 /// The exponential map's value and derivatives at a point of TQ x R.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,7 +123,7 @@ impl<L> ContactExponential<L> {
     where
         L: Lagrangian<N>,
     {
-        herglotz_flow(&self.lagrangian, t, &seed(&Triple::from(*x)).into(), self.h)
+        herglotz_flow(&self.lagrangian, t, &seed(&ChartVector::from(*x)).into(), self.h)
     }
 }
 
@@ -139,7 +139,7 @@ pub struct HerglotzFlow<'a, L> {
 }
 
 impl<const N: usize, L: Lagrangian<N>> Smooth<N> for HerglotzFlow<'_, L> {
-    fn at<T: Scalar>(&self, x: &Triple<N, T>) -> Result<Triple<N, T>, GeometryError> {
+    fn at<T: Scalar>(&self, x: &ChartVector<N, T>) -> Result<ChartVector<N, T>, GeometryError> {
         Ok(herglotz_flow(self.lagrangian, self.t, &(*x).into(), self.duration)?.end.into())
     }
 }

@@ -2,7 +2,7 @@
 
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{DiscretePoint, Triple};
+use contact_geom::{ChartVector, DiscretePoint};
 use discrete_herglotz::{DiscreteLagrangian, ITERATION_LIMIT, StepError, last_correction};
 
 /// Two steps through a point `q1` in between, and the action's change over both.
@@ -67,7 +67,7 @@ pub fn compose<const N: usize>(
         residual = change.amax();
         solve(&mut matrix, &mut change).map_err(|e| StepError::Singular { pivot: e.pivot })?;
         q1 += change;
-        let (now, size) = (change.amax(), Triple { x: q0, y: q1, z: 0.0 }.amax().max(q2.amax()));
+        let (now, size) = (change.amax(), ChartVector { x: q0, y: q1, z: 0.0 }.amax().max(q2.amax()));
         if !now.is_finite() {
             return Err(StepError::NonFinite);
         }

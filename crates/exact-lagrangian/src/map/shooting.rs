@@ -8,7 +8,7 @@ use crate::numerics::panel::{End, Floor, Problem, Rates, State, collocate};
 use crate::{ContactExponential, ExactError, Motion, Retraction, RetractionRoute};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{DiscretePoint, Dual, Lagrangian, VelocityPoint, larger};
+use contact_geom::{DiscretePoint, Dual, Lagrangian, VelocityPoint, max_or_nan};
 use discrete_herglotz::last_correction;
 
 /// The Newton iterations that a retraction may take.
@@ -44,8 +44,8 @@ fn fold<const N: usize>(shot: &Shot<N>, time: f64) -> Fold {
 /// How far from singular the slope is that has this inverse, in units of what the motion makes of velocities: like the sine of its
 /// [`Fold`], without allocation and exactly that for `N = 1`.
 fn regularity<const N: usize>(shot: &Shot<N>, inverse: &SMatrix<f64, N, N>, time: f64) -> f64 {
-    let entries = |i: usize, j: usize| larger(shot.displacement[i].d[j].abs(), (shot.end.v[i].d[j] * time).abs());
-    let size = (0..N * N).fold(0.0, |size, k| larger(size, entries(k / N, k % N)));
+    let entries = |i: usize, j: usize| max_or_nan(shot.displacement[i].d[j].abs(), (shot.end.v[i].d[j] * time).abs());
+    let size = (0..N * N).fold(0.0, |size, k| max_or_nan(size, entries(k / N, k % N)));
     smallest(inverse) / size
 }
 

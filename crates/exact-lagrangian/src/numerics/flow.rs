@@ -6,7 +6,7 @@ mod tests;
 use crate::ExactError;
 use crate::numerics::panel::{Floor, Panel, Problem, Rate, Rates, Refused, SMALLEST, Size, State, collocate};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{GeometryError, Lagrangian, Scalar, Triple, VelocityPoint, herglotz_rates, larger};
+use contact_geom::{ChartVector, GeometryError, Lagrangian, Scalar, VelocityPoint, herglotz_rates, max_or_nan};
 use discrete_herglotz::jumps_between;
 
 /// The evaluations of the vector field that a motion, or the search for one between two points, may take, about a second's: over
@@ -202,7 +202,7 @@ impl Work {
 
 /// The factor by which a panel of order `2 nodes` should be made longer.
 fn stretch<const N: usize, T>(panel: &Panel<N, T>, accuracy: f64) -> f64 {
-    0.9 * (accuracy / larger(panel.error, 1e-300)).powf(0.5 / panel.nodes as f64)
+    0.9 * (accuracy / max_or_nan(panel.error, 1e-300)).powf(0.5 / panel.nodes as f64)
 }
 
 /// The same state but for the last digit of each coordinate, up and down in turn.
@@ -274,7 +274,7 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
         } else {
             longest.copysign(rest)
         };
-        let reached = || Triple {
+        let reached = || ChartVector {
             x: SVector::<f64, N>::from_fn(|i, _| at.q[i].re()),
             y: SVector::from_fn(|i, _| at.v[i].re()),
             z: at.z.re(),
@@ -300,7 +300,7 @@ pub(crate) fn integrate<T: Scalar, const N: usize>(
         match outcome {
             Ok(panel) if panel.error <= accuracy => {
                 panels += 1;
-                scale = larger(scale, h.abs());
+                scale = max_or_nan(scale, h.abs());
                 let before = at;
                 sums.add(&panel);
                 at = sums.state();

@@ -1,7 +1,7 @@
 //! One panel of a motion: collocation at Gauss points, solved by iteration to round-off.
 
 use crate::numerics::gauss::{Gauss, MOST, PROBES, Probe, collocations};
-use contact_geom::larger;
+use contact_geom::max_or_nan;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{GeometryError, Scalar};
 
@@ -137,7 +137,7 @@ impl Size {
             size if size.is_finite() => size / scale.0[i],
             _ => f64::INFINITY,
         };
-        larger(quotient(0), quotient(1))
+        max_or_nan(quotient(0), quotient(1))
     }
 
     /// The same multiple of both.
@@ -149,7 +149,7 @@ impl Size {
     /// The larger of each.
     #[inline]
     pub fn or(self, other: Size) -> Size {
-        Size([larger(self.0[0], other.0[0]), larger(self.0[1], other.0[1])])
+        Size([max_or_nan(self.0[0], other.0[0]), max_or_nan(self.0[1], other.0[1])])
     }
 }
 
@@ -210,9 +210,9 @@ impl Sweep {
 
     /// The largest relative change: of the velocity in units of the velocity, of the rates of z and b in units of them.
     #[inline]
-    fn largest(&self, h: f64, floor: &[Size; 3]) -> f64 {
+    fn max_abs_or_nan(&self, h: f64, floor: &[Size; 3]) -> f64 {
         let over = |i: usize| self.changes[i].over(self.scales[i], floor[i]);
-        larger(larger(over(0) * h.abs(), over(1)), over(2))
+        max_or_nan(max_or_nan(over(0) * h.abs(), over(1)), over(2))
     }
 }
 
@@ -249,16 +249,16 @@ pub(crate) fn collocate<const N: usize, T: Scalar>(
     let mut contraction = 0.0;
     let sizes = if problem.narrow.is_some() { 2 } else { collocations().len() };
     for (k, g) in collocations()[..sizes].iter().enumerate() {
-        let largest = k + 1 == sizes;
-        let (mut panel, seen) = sweeps(rates, problem, g, &mut nodes[..g.s], v0, largest, evaluations)?;
-        contraction = larger(panel.contraction, contraction);
+        let max_abs_or_nan = k + 1 == sizes;
+        let (mut panel, seen) = sweeps(rates, problem, g, &mut nodes[..g.s], v0, max_abs_or_nan, evaluations)?;
+        contraction = max_or_nan(panel.contraction, contraction);
         panel.contraction = contraction;
         if panel.error <= problem.accuracy {
             let start = problem.end.is_none().then_some(&guess);
             panel.last = between_nodes(rates, problem, g, &nodes[..g.s], &panel, &seen, start, evaluations)?;
             return Ok(panel);
         }
-        if largest {
+        if max_abs_or_nan {
             return Ok(panel);
         }
         let coarse = nodes;
@@ -288,34 +288,34 @@ fn between_nodes<const N: usize, T: Scalar>(
 ) -> Result<Rate<N, T>, Refused> {
     let Problem { t, h, from, accuracy, .. } = *problem;
     let sizes =
-        |r: &Rate<N, T>| [r.a.iter().map(|a| a.pivot_size()).fold(0.0, larger), r.z.pivot_size(), r.b.pivot_size()];
+        |r: &Rate<N, T>| [r.a.iter().map(|a| a.pivot_size()).fold(0.0, max_or_nan), r.z.pivot_size(), r.b.pivot_size()];
     let most = |rates: &[Rate<N, T>]| {
-        rates.iter().map(sizes).fold([0.0; 3], |m: [f64; 3], e| std::array::from_fn(|i| larger(m[i], e[i])))
+        rates.iter().map(sizes).fold([0.0; 3], |m: [f64; 3], e| std::array::from_fn(|i| max_or_nan(m[i], e[i])))
     };
-    let (largest, tails) = (most(nodes), most(&g.tail.map(|row| Rate::sum(nodes, &row))));
+    let (max_abs_or_nan, tails) = (most(nodes), most(&g.tail.map(|row| Rate::sum(nodes, &row))));
     let floor = problem.floor.over(h, 64.0);
-    let position = from.q.iter().map(|q| q.pivot_size()).fold(0.0, larger);
+    let position = from.q.iter().map(|q| q.pivot_size()).fold(0.0, max_or_nan);
     // What a change of a rate must exceed to matter: the polynomial's own error, and what changes the state by roundings.
     let state = [seen.scales[0].0[0], from.z.pivot_size(), 1.0];
     let allowed: [f64; 3] = std::array::from_fn(|i| {
-        let rounding = larger(1e4 * accuracy * largest[i], 32.0 * accuracy * state[i] / h.abs());
-        larger(16.0 * tails[i], rounding) + floor[i].0[0]
+        let rounding = max_or_nan(1e4 * accuracy * max_abs_or_nan[i], 32.0 * accuracy * state[i] / h.abs());
+        max_or_nan(16.0 * tails[i], rounding) + floor[i].0[0]
     });
-    let misfit = |found: &Rate<N, T>, row: &[f64; MOST]| {
+    let defect = |found: &Rate<N, T>, row: &[f64; MOST]| {
         let continued = Rate::sum(nodes, row);
         Rate { a: found.a - continued.a, z: found.z - continued.z, b: found.b - continued.b }
     };
-    let within = |misfit: &Rate<N, T>, bounds: &[f64; 3]| sizes(misfit).iter().zip(bounds).all(|(m, bound)| m <= bound);
+    let within = |defect: &Rate<N, T>, bounds: &[f64; 3]| sizes(defect).iter().zip(bounds).all(|(m, bound)| m <= bound);
     if let Some(start) = start
-        && !within(&misfit(start, &g.start), &allowed)
+        && !within(&defect(start, &g.start), &allowed)
     {
         return Err(Refused::Hidden(0.0));
     }
-    let moved = panel.displacement.iter().map(|d| d.pivot_size()).fold(0.0, larger);
-    let still = largest[0] == 0.0;
+    let moved = panel.displacement.iter().map(|d| d.pivot_size()).fold(0.0, max_or_nan);
+    let still = max_abs_or_nan[0] == 0.0;
     // Of a motion of many panels also the change of the velocity tells: it may have come to rest.
-    let faster = if problem.part.abs() < 0.5 { largest[0] * h.abs() / state[0] } else { 0.0 };
-    let share = if still { 1.0 } else { larger(moved / larger(position, moved), faster).min(1.0) };
+    let faster = if problem.part.abs() < 0.5 { max_abs_or_nan[0] * h.abs() / state[0] } else { 0.0 };
+    let share = if still { 1.0 } else { max_or_nan(moved / max_or_nan(position, moved), faster).min(1.0) };
     let places = if still { g.probes.len() } else { PROBES };
     let wanted = (places as f64 * problem.part.abs() * share * share) as usize;
     let count = wanted.max(g.s + 2).min(g.probes.len());
@@ -331,7 +331,7 @@ fn between_nodes<const N: usize, T: Scalar>(
             b: from.b + b * h,
         };
         let rate = rates.at(t + c * h, &x).map_err(Refused::Undefined)?;
-        let apart = misfit(&rate, value);
+        let apart = defect(&rate, value);
         if !within(&apart, &allowed) {
             return Err(Refused::Hidden(*c));
         }
@@ -344,7 +344,8 @@ fn between_nodes<const N: usize, T: Scalar>(
     }
     // In the mean the polynomial's own error vanishes, up to an order beyond the panel's, and so does its first moment. Not so those
     // of a force which is too small to be seen beside it, and too fast for the nodes; that both do by chance is unlikely.
-    let mean = std::array::from_fn(|i| 16.0 * accuracy * larger(largest[i], state[i] / h.abs()) + floor[i].0[0]);
+    let mean =
+        std::array::from_fn(|i| 16.0 * accuracy * max_or_nan(max_abs_or_nan[i], state[i] / h.abs()) + floor[i].0[0]);
     if !missed.iter().all(|missed| within(missed, &mean)) {
         return Err(Refused::Hidden(0.0));
     }
@@ -404,7 +405,7 @@ fn sweeps<const N: usize, T: Scalar>(
             let units = [*v, z.times(1.0 / h.abs()), b.times(1.0 / h.abs())];
             seen.scales = std::array::from_fn(|i| seen.scales[i].or(units[i]));
         }
-        let change = seen.largest(h, &nothing);
+        let change = seen.max_abs_or_nan(h, &nothing);
         if !change.is_finite() {
             // After a first guess of zero rates a scale may be zero; one sweep later a value is not a number.
             if sweep > 1 {
@@ -423,7 +424,8 @@ fn sweeps<const N: usize, T: Scalar>(
         let predicted = change * expected <= 0.5 * accuracy;
         // After few sweeps a larger change may still be one that is on its way.
         let noise = if sweep < 6 { 16.0 } else { 4096.0 } * f64::EPSILON;
-        let stagnant = before.is_finite() && ratio >= 1.0 && (change <= noise || seen.largest(h, &rounding) == 0.0);
+        let stagnant =
+            before.is_finite() && ratio >= 1.0 && (change <= noise || seen.max_abs_or_nan(h, &rounding) == 0.0);
         let unresolved = !last && error > *accuracy && change <= 0.1 * error.sqrt();
         if predicted || stagnant || unresolved {
             let (mean, twice) = (Rate::sum(nodes, &g.b), Rate::sum(nodes, &g.end).a);
@@ -472,11 +474,11 @@ fn estimate<const N: usize, T: Scalar>(problem: &Problem<N, T>, nodes: &[Rate<N,
         let tail = tails[i].over(scales[i], floor[i]);
         let fall = tails[i].over(middle[i], floor[i]);
         // Below some roundings the coefficients do not fall.
-        if tail <= 64.0 * f64::EPSILON { tail * tail } else { tail * larger(tail, (fall * fall).min(1.0)) }
+        if tail <= 64.0 * f64::EPSILON { tail * tail } else { tail * max_or_nan(tail, (fall * fall).min(1.0)) }
     });
     let velocity = match relative[0] {
         0.0 => 0.0,
         tail => tail * accelerations.over(seen.scales[0], Size::default()) * h.abs(),
     };
-    larger(larger(velocity, relative[1]), relative[2]) / (2 * g.s + 1) as f64
+    max_or_nan(max_or_nan(velocity, relative[1]), relative[2]) / (2 * g.s + 1) as f64
 }

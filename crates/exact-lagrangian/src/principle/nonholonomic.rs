@@ -6,8 +6,8 @@ use crate::{ExactError, Motion};
 use contact_geom::linear::solve;
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{
-    Border, Derivatives, Dual, GeometryError, Lagrangian, Module, Regularity, Scalar, Triple, VelocityPoint, larger,
-    seed,
+    AugmentedVector, ChartVector, Derivatives, Dual, GeometryError, Lagrangian, Regularity, Scalar, TangentVector,
+    VelocityPoint, max_or_nan, seed,
 };
 
 /// A point `(q, z, v, w)` of T(Q x R); on `M_L` where `w = L(q, v, z)`.
@@ -93,7 +93,7 @@ impl<L> NonHolonomic<L> {
         L: Lagrangian<N>,
     {
         // Along the velocities, and along the drift (q, z, t)' = (v, w, 1) of T(Q x R).
-        let moving = |re: T, drift: T| Dual { re, d: Border::<N, T> { x: Module::null(), z: drift } };
+        let moving = |re: T, drift: T| Dual { re, d: AugmentedVector::<N, T> { x: TangentVector::null(), z: drift } };
         let mut y = VelocityPoint {
             q: SVector::<_, N>::from_fn(|i, _| moving(x.q[i], x.v[i])),
             v: x.v.map(|v| moving(v, T::zero())),
@@ -148,7 +148,7 @@ impl<L> NonHolonomic<L> {
             let Motion { end, b: w, .. } = integrate(self, t0 + from, &state, to - from, ACCURACY, &mut work)?;
             at = ExtendedPoint { q: end.q, z: end.z, v: end.v, w };
             let on = self.lift(t0 + to, &end).w.re();
-            defect = larger(defect, (w.re() - on).abs() / (1.0 + on.abs()));
+            defect = max_or_nan(defect, (w.re() - on).abs() / (1.0 + on.abs()));
         }
         Ok(ExtendedMotion { end: at, defect })
     }
@@ -167,7 +167,7 @@ impl<L> NonHolonomic<L> {
     where
         L: Lagrangian<N>,
     {
-        let start = self.lift(t, &seed(&Triple::from(*x)).into());
+        let start = self.lift(t, &seed(&ChartVector::from(*x)).into());
         let end = self.flow(t, &start, h)?.end;
         Ok(DMatrix::from_fn(2 * N + 2, 2 * N + 1, |i, j| match i {
             _ if i < N => f64::from(u8::from(i == j)),

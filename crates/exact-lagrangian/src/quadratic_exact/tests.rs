@@ -3,7 +3,7 @@
 use super::*;
 use crate::herglotz_flow;
 use contact_geom::systems::{Chain, ChargedParticle, Ends, FreeParticle, HarmonicOscillator, Pendulum, UniformField};
-use contact_geom::{Derivatives, GeometryError, Larger, Largest, Structure};
+use contact_geom::{Derivatives, GeometryError, MaxAbsOrNan, MaxOrNan, Structure};
 
 const GAMMAS: [f64; 12] = [-40.0, -2.5, -2.0 - 1e-12, -2.0, -2.0 + 1e-12, -1.999, -1e-9, 0.0, 1e-15, 0.3, 2.0, 2.5];
 const STEPS: [f64; 5] = [1e-8, 1e-5, 1e-3, 0.1, 0.8];
@@ -35,19 +35,24 @@ impl Units {
             (ld.motion(start), ld.jet(0.0, &x))
         });
         let Ok((motion, Ok(jet))) = found else { unreachable!("{h}: {found:?}") };
-        let size = start.q.largest().larger(start.v.largest()).larger(end.q.largest()).larger(end.v.largest());
-        let of_motion = ((motion.q - end.q).largest().larger((motion.v - end.v).largest()) / size)
-            .larger((motion.z - end.z).abs() / end.z.abs().larger(size * size));
+        let size = start
+            .q
+            .max_abs_or_nan()
+            .max_or_nan(start.v.max_abs_or_nan())
+            .max_or_nan(end.q.max_abs_or_nan())
+            .max_or_nan(end.v.max_abs_or_nan());
+        let of_motion = ((motion.q - end.q).max_abs_or_nan().max_or_nan((motion.v - end.v).max_abs_or_nan()) / size)
+            .max_or_nan((motion.z - end.z).abs() / end.z.abs().max_or_nan(size * size));
         let (p0, p1) = (lagrangian.gradient(0.0, start).y, lagrangian.gradient(0.0, end).y);
         // A rounding of q0 moves the momenta by about p/|q1 - q0| times it, and the action by p times it.
-        let ill = start.q.largest() / (end.q - start.q).largest();
-        let largest = p0.largest().larger(p1.largest());
-        let of_momenta =
-            (jet.d1 / jet.sigma() + p0).largest().larger((jet.d2 - p1).largest()) / ((1.0 + ill) * largest);
+        let ill = start.q.max_abs_or_nan() / (end.q - start.q).max_abs_or_nan();
+        let max_abs_or_nan = p0.max_abs_or_nan().max_or_nan(p1.max_abs_or_nan());
+        let of_momenta = (jet.d1 / jet.sigma() + p0).max_abs_or_nan().max_or_nan((jet.d2 - p1).max_abs_or_nan())
+            / ((1.0 + ill) * max_abs_or_nan);
         let of_value = (jet.value - action).abs() / (action.abs() + ill * p1.dot(&(end.q - start.q)).abs());
-        self.motion = self.motion.larger(of_motion / EPS);
-        self.value = self.value.larger(of_value / EPS);
-        self.momenta = self.momenta.larger(of_momenta / EPS);
+        self.motion = self.motion.max_or_nan(of_motion / EPS);
+        self.value = self.value.max_or_nan(of_value / EPS);
+        self.momenta = self.momenta.max_or_nan(of_momenta / EPS);
     }
 
     fn assert_below(&self, motion: f64, value: f64, momenta: f64, what: &str) {
@@ -110,7 +115,7 @@ fn the_value_away_from_the_origin_keeps_all_digits_of_the_displacement() {
         let (Ok(ld), Some(v)) = (ld, v0) else { unreachable!("{gamma}, {h}") };
         let action = system.solution(h, &VelocityPoint { q: q0, v, z: 0.0 }).z;
         let Ok(found) = ld.value(0.0, &DiscretePoint { q0, q1, z0: 0.0 }) else { unreachable!("{gamma}, {h}") };
-        worst = worst.larger((found - action).abs() / (action.abs() * EPS));
+        worst = worst.max_or_nan((found - action).abs() / (action.abs() * EPS));
     }
     println!("away from the origin: {worst}");
     assert!(worst <= 16.0, "{worst}");
@@ -127,7 +132,7 @@ fn the_small_part_that_the_start_has_in_the_displacement_is_not_lost() {
         let by_velocity = system.solution(h, &VelocityPoint::new([0.0], [1.0], 0.0)).q[0];
         let Ok(jet) = ld.jet(0.0, &DiscretePoint::new([1.0], [1.0 + step], 0.0)) else { unreachable!("{gamma}, {h}") };
         let v0 = (step - of_start) / by_velocity;
-        worst = worst.larger((jet.d1[0] / jet.sigma() + v0).abs() / (v0 * EPS));
+        worst = worst.max_or_nan((jet.d1[0] / jet.sigma() + v0).abs() / (v0 * EPS));
     }
     println!("part of the start: {worst}");
     assert!(worst <= 16.0, "{worst}");
@@ -185,13 +190,13 @@ fn fast_oscillations_and_strong_drags_keep_their_digits_over_long_steps() {
         let end = system.solution(h, &start);
         let Ok(ld) = QuadraticExact::new(&system, h) else { unreachable!() };
         let (found, size) = (ld.motion(&start), end.q[0].hypot(end.v[0]));
-        let error = (found.q - end.q).largest().larger((found.v - end.v).largest()) / size;
-        oscillator.motion = oscillator.motion.larger(error / (EPS * (1.0 + h)));
+        let error = (found.q - end.q).max_abs_or_nan().max_or_nan((found.v - end.v).max_abs_or_nan()) / size;
+        oscillator.motion = oscillator.motion.max_or_nan(error / (EPS * (1.0 + h)));
         // Between positions it is the same motion, as far as the action is above the smallest number.
         if gamma * h >= -300.0 {
             let Ok(jet) = ld.jet(0.0, &DiscretePoint { q0: start.q, q1: end.q, z0: start.z }) else { unreachable!() };
-            let off = (jet.d2 - end.v).largest() / size;
-            oscillator.momenta = oscillator.momenta.larger(off / (EPS * (1.0 + h)));
+            let off = (jet.d2 - end.v).max_abs_or_nan() / size;
+            oscillator.momenta = oscillator.momenta.max_or_nan(off / (EPS * (1.0 + h)));
         }
     }
     for (gamma, h) in [-40.0, -1e3, -1e6].into_iter().flat_map(|gamma| [0.1, 0.8, 10.0].map(|h| (gamma, h))) {
@@ -200,11 +205,11 @@ fn fast_oscillations_and_strong_drags_keep_their_digits_over_long_steps() {
         let end = system.solution(h, &start);
         let Ok(ld) = QuadraticExact::new(&system, h) else { unreachable!("{gamma}, {h}") };
         let found = ld.motion(&start);
-        strong.motion = strong.motion.larger(((found.q - end.q) / (end.q[0] * EPS)).largest());
+        strong.motion = strong.motion.max_or_nan(((found.q - end.q) / (end.q[0] * EPS)).max_abs_or_nan());
         // What decays is known to the rounding of the exponent; below the smallest normal number, not relative to itself.
         let decayed =
-            [(found.v[0], end.v[0]), (found.z, end.z)].map(|(a, b)| (a - b).abs() / b.larger(f64::MIN_POSITIVE));
-        strong.value = strong.value.larger(decayed[0].larger(decayed[1]) / (EPS * (1.0 + (gamma * h).abs())));
+            [(found.v[0], end.v[0]), (found.z, end.z)].map(|(a, b)| (a - b).abs() / b.max_or_nan(f64::MIN_POSITIVE));
+        strong.value = strong.value.max_or_nan(decayed[0].max_or_nan(decayed[1]) / (EPS * (1.0 + (gamma * h).abs())));
     }
     // In units of the rounded phase, and of the size of the slow motion that is left.
     oscillator.assert_below(8.0, 0.0, 8.0, "phase");

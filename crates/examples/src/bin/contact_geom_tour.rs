@@ -8,8 +8,8 @@ use clap::Parser;
 use contact_examples::{Failure, finish, print};
 use contact_geom::systems::{CoupledInZ, Pendulum, System};
 use contact_geom::{
-    ContactForm, Darboux, DarbouxField, DiscretePoint, EtaMinus, EtaPlus, GeometryError, LagrangianForm, PhasePoint,
-    Scalar, Smooth, SmoothFunction, Triple, conformality, conformality_with_jacobian, legendre,
+    ChartVector, ContactForm, Darboux, DarbouxField, DiscretePoint, EtaMinus, EtaPlus, GeometryError, LagrangianForm,
+    PhasePoint, Scalar, Smooth, SmoothFunction, conformality, conformality_with_jacobian, legendre,
 };
 use discrete_herglotz::{
     DiscreteLagrangian, Flow, LeftMidpoint, Midpoint, hamiltonian_flow_jacobian, legendre_minus_inverse,
@@ -26,8 +26,8 @@ fn main() -> ExitCode {
 }
 
 /// One line for a form: its components, its Reeb field, and its volume.
-fn describe(name: &str, form: &impl ContactForm<1>, x: &Triple<1>) -> Result<String, GeometryError> {
-    let row = |c: Triple<1>| format!("({:8.5}, {:8.5}, {:8.5})", c.x[0], c.y[0], c.z);
+fn describe(name: &str, form: &impl ContactForm<1>, x: &ChartVector<1>) -> Result<String, GeometryError> {
+    let row = |c: ChartVector<1>| format!("({:8.5}, {:8.5}, {:8.5})", c.x[0], c.y[0], c.z);
     let (eta, reeb, volume) = (form.eta(x)?, form.reeb(x)?, form.volume(x)?);
     Ok(format!("  {name:<22} {}   {}   {volume:8.5}\n", row(eta), row(reeb)))
 }
@@ -60,7 +60,7 @@ fn forms_and_reeb_fields() -> Result<(), Failure> {
 struct Hamiltonian(Pendulum);
 
 impl SmoothFunction<1> for Hamiltonian {
-    fn value<T: Scalar>(&self, _t: T, x: &Triple<1, T>) -> T {
+    fn value<T: Scalar>(&self, _t: T, x: &ChartVector<1, T>) -> T {
         x.y[0] * x.y[0] * 0.5 - x.x[0].cos() + 1.0 - x.z * self.0.gamma
     }
 }
@@ -72,7 +72,7 @@ struct RungeKutta<F> {
 }
 
 impl<F: Smooth<1>> Smooth<1> for RungeKutta<F> {
-    fn at<T: Scalar>(&self, x: &Triple<1, T>) -> Result<Triple<1, T>, GeometryError> {
+    fn at<T: Scalar>(&self, x: &ChartVector<1, T>) -> Result<ChartVector<1, T>, GeometryError> {
         let h = T::from(self.h);
         let k1 = self.field.at(x)?;
         let k2 = self.field.at(&x.plus(k1.scale(h * 0.5)))?;
@@ -90,7 +90,7 @@ struct Strang {
 }
 
 impl Smooth<1> for Strang {
-    fn at<T: Scalar>(&self, x: &Triple<1, T>) -> Result<Triple<1, T>, GeometryError> {
+    fn at<T: Scalar>(&self, x: &ChartVector<1, T>) -> Result<ChartVector<1, T>, GeometryError> {
         let damping = (self.gamma * self.h * 0.5).exp();
         let half = 0.5 * self.h;
         let (mut q, mut p, mut z) = (x.x[0], x.y[0] * damping, x.z * damping);
@@ -100,7 +100,7 @@ impl Smooth<1> for Strang {
         z += p * p * half;
         z += (q.cos() - 1.0) * half;
         p -= q.sin() * half;
-        Ok(Triple { x: [q].into(), y: [p * damping].into(), z: z * damping })
+        Ok(ChartVector { x: [q].into(), y: [p * damping].into(), z: z * damping })
     }
 }
 

@@ -9,7 +9,7 @@ use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, f
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Symmetry};
 use discrete_herglotz::{
-    AnyIntegrator, Method, Moment, MomentumDecay, MomentumRow, Problem, Row, Rows, Status, Steps, Until,
+    AnyIntegrator, Method, MomentumDecay, MomentumRow, Problem, Row, Rows, Status, StepView, Steps, Until,
 };
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
@@ -52,12 +52,12 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut states = Rows::every(5)?;
     let mut momentum = MomentumDecay::new(Symmetry::rotation(0, 1)?);
     let mut smallest = f64::INFINITY;
-    let mut factor = |at: &Moment<'_, 2>| {
+    let mut factor = |at: &StepView<'_, 2>| {
         smallest = smallest.min(at.sigma);
         ControlFlow::Continue(())
     };
     let bar = ProgressBar::new(steps as u64);
-    let mut progress = |at: &Moment<'_, 2>| {
+    let mut progress = |at: &StepView<'_, 2>| {
         if at.k.is_multiple_of(100) {
             bar.set_position(at.k as u64);
         }

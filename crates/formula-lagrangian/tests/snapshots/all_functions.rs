@@ -1,7 +1,7 @@
 //! A Lagrangian of the coordinates x, y, made from its formula by formula-lagrangian.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, Scalar, Structure, Triple, VelocityPoint};
+use contact_geom::{Lagrangian, Scalar, Structure, ChartVector, VelocityPoint};
 
 /// The Lagrangian with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,7 +114,7 @@ impl Lagrangian<2> for AllFunctions {
     }
 
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<2, T>) -> Option<Triple<2, T>> {
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<2, T>) -> Option<ChartVector<2, T>> {
         let a1: T = Scalar::sin(x.q[0]);
         let a3: T = Scalar::cos(x.q[1]);
         let a7: T = x.q[0] * 0.5;
@@ -275,7 +275,7 @@ impl Lagrangian<2> for AllFunctions {
         let a267: T = a3 * a96;
         let a268: T = a262 + a267;
         let (l_q, l_v) = (SVector::from([a268, a266]), SVector::from([a120, a105]));
-        Some(Triple { x: l_q, y: l_v, z: a117 })
+        Some(ChartVector { x: l_q, y: l_v, z: a117 })
     }
 
     fn structure(&self) -> Structure {

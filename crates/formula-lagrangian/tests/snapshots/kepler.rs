@@ -1,7 +1,7 @@
 //! A Lagrangian of the coordinates x, y, made from its formula by formula-lagrangian.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, Scalar, Structure, Triple, VelocityPoint};
+use contact_geom::{Lagrangian, Scalar, Structure, ChartVector, VelocityPoint};
 
 /// The Lagrangian with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +31,7 @@ impl Lagrangian<2> for DampedKepler {
     }
 
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<2, T>) -> Option<Triple<2, T>> {
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<2, T>) -> Option<ChartVector<2, T>> {
         let a10: T = x.q[0] * x.q[0];
         let a12: T = x.q[1] * x.q[1];
         let a13: T = a10 + a12;
@@ -44,7 +44,7 @@ impl Lagrangian<2> for DampedKepler {
         let a29: T = x.q[1] * a27;
         let a31: T = x.q[0] * a27;
         let (l_q, l_v) = (SVector::from([a31, a29]), SVector::from([x.v[0], x.v[1]]));
-        Some(Triple { x: l_q, y: l_v, z: T::from(self.gamma) })
+        Some(ChartVector { x: l_q, y: l_v, z: T::from(self.gamma) })
     }
 
     fn structure(&self) -> Structure {

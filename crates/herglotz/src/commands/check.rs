@@ -36,7 +36,7 @@ impl Check {
 
 fn of_json(check: &runtime_herglotz::Check, momenta: &[String]) -> serde_json::Value {
     let place = |place: &runtime_herglotz::Place| {
-        let of = |(name, m): (&String, &runtime_herglotz::MomentumThere)| serde_json::json!({ "momentum": name, "value": json(m.momentum), "predicted": json(m.predicted) });
+        let of = |(name, m): (&String, &runtime_herglotz::MomentumSample)| serde_json::json!({ "momentum": name, "value": json(m.momentum), "predicted": json(m.predicted) });
         serde_json::json!({
             "t": json(place.t),
             "sigma_d": json(place.sigma),
@@ -46,7 +46,7 @@ fn of_json(check: &runtime_herglotz::Check, momenta: &[String]) -> serde_json::V
             "momenta": momenta.iter().zip(&place.momenta).map(of).collect::<Vec<_>>(),
         })
     };
-    let stated = |stated: &runtime_herglotz::Stated| {
+    let stated = |stated: &runtime_herglotz::StatementResidual| {
         let statement = stated.statement;
         let (number, title) = (statement.number(), statement.title());
         serde_json::json!({

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::output::Directory;
 use herglotz::Scene;
-use runtime_herglotz::{Interrupted, Plan};
+use runtime_herglotz::{Plan, ResumeState};
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
@@ -17,10 +17,10 @@ pub(crate) struct Checkpoint {
     scene: String,
     pub integrator: String,
     pub count: usize,
-    pub by_clock: bool,
+    pub in_transformed_time: bool,
     pub taken: usize,
     pub written: Written,
-    /// The bytes of [`Interrupted`].
+    /// The bytes of [`ResumeState`].
     state: Vec<u8>,
 }
 
@@ -49,8 +49,8 @@ impl Checkpoint {
     }
 
     /// The state from which the run goes on.
-    pub fn state(&self, directory: &Directory) -> Result<Interrupted, Failure> {
-        let read = Interrupted::from_bytes(&self.state);
+    pub fn state(&self, directory: &Directory) -> Result<ResumeState, Failure> {
+        let read = ResumeState::from_bytes(&self.state);
         read.map_err(|error| Failure::Input(format!("{}: {error}", directory.file(FILE).display())))
     }
 
@@ -66,7 +66,7 @@ pub(crate) struct Saves {
     scene: String,
     integrator: String,
     count: usize,
-    by_clock: bool,
+    in_transformed_time: bool,
     every: Duration,
     last: Instant,
 }
@@ -79,7 +79,7 @@ impl Saves {
             scene: scene.fingerprint(),
             integrator: plan.integrator.name.to_string(),
             count: plan.steps,
-            by_clock: plan.integrator.by_clock,
+            in_transformed_time: plan.integrator.in_transformed_time,
             every,
             last: Instant::now(),
         }
@@ -91,13 +91,13 @@ impl Saves {
     }
 
     /// Saves the state after so many steps.
-    pub fn save(&mut self, taken: usize, written: Written, state: &Interrupted) -> Result<(), Failure> {
-        let Saves { scene, integrator, count, by_clock, .. } = &*self;
+    pub fn save(&mut self, taken: usize, written: Written, state: &ResumeState) -> Result<(), Failure> {
+        let Saves { scene, integrator, count, in_transformed_time, .. } = &*self;
         let checkpoint = Checkpoint {
             scene: scene.clone(),
             integrator: integrator.clone(),
             count: *count,
-            by_clock: *by_clock,
+            in_transformed_time: *in_transformed_time,
             taken,
             written,
             state: state.to_bytes(),

@@ -48,7 +48,7 @@ impl Run {
             let start: serde_json::Map<_, _> = start.iter().map(|(name, x)| ((*name).to_owned(), json(*x))).collect();
             print_json(&serde_json::json!({
                 "status": found.status.to_string(),
-                "suspicion": found.suspicion.map(|suspicion| suspicion.to_string()),
+                "unresolved": found.unresolved.map(|unresolved| unresolved.to_string()),
                 "integrator": by.to_string(),
                 "step_size": step_size,
                 "steps": steps,
@@ -87,8 +87,8 @@ impl Run {
             ));
             print(&lines.join("\n"))?;
         }
-        if let Some(suspicion) = found.suspicion {
-            eprintln!("warning: {suspicion}");
+        if let Some(unresolved) = found.unresolved {
+            eprintln!("warning: {unresolved}");
         }
         if found.is_found() { Ok(()) } else { Err(Failure::Run(found.status.to_string())) }
     }

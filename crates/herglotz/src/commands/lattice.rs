@@ -6,7 +6,7 @@ use crate::output::{Directory, Table, json, print, print_json, short};
 use crate::plot;
 use herglotz::LatticeScene;
 use indicatif::ProgressBar;
-use runtime_herglotz::{Outcome, Status, Watch};
+use runtime_herglotz::{Outcome, RunMonitor, Status};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,7 +21,7 @@ struct Writer {
     failure: Option<Failure>,
 }
 
-impl Watch for Writer {
+impl RunMonitor for Writer {
     fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
         self.count += 1;
         if let Some(drawn) = &mut self.drawn {

@@ -29,7 +29,7 @@ fn kind(integrator: AnyIntegrator) -> &'static str {
         AnyIntegrator::Discrete(_) => "a discrete Lagrangian, each step by Newton's method",
         AnyIntegrator::Gauss { .. } => "contact Gauss collocation",
         AnyIntegrator::Divided(_) => "contact Gauss collocation, in steps that are divided where the motion is fast",
-        AnyIntegrator::Clocked { .. } => "contact Gauss collocation, in equal steps of a clock",
+        AnyIntegrator::TransformedGauss { .. } => "contact Gauss collocation, in equal steps of a time transformation",
         AnyIntegrator::Splitting(_) => "a splitting with exact rate, for v.Mv/2 - V(t, q) + f(z)",
         AnyIntegrator::Composition(..) => "a composition of a symmetric discrete Lagrangian",
     }

@@ -9,7 +9,8 @@ use clap::Args;
 use herglotz::{EndsScene, LatticeScene, Scene};
 use indicatif::{ProgressBar, ProgressStyle};
 use runtime_herglotz::{
-    AnyIntegrator, Crossing, Interrupted, Outcome, Plan, RuntimeError, Status, Steps, Watch, Way, velocity_name,
+    AnyIntegrator, Crossing, Outcome, Plan, ResumeState, RunMonitor, RuntimeError, Status, StepControl, Steps,
+    velocity_name,
 };
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -60,7 +61,7 @@ struct Writer {
     bar: ProgressBar,
     stop: Arc<AtomicBool>,
     interrupt_at: Option<f64>,
-    interrupted: Option<Interrupted>,
+    interrupted: Option<ResumeState>,
     saves: Saves,
     failure: Option<Failure>,
 }
@@ -84,7 +85,7 @@ impl Writer {
     }
 }
 
-impl Watch for Writer {
+impl RunMonitor for Writer {
     fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
         if std::mem::take(&mut self.skip) {
             return ControlFlow::Continue(());
@@ -113,7 +114,7 @@ impl Watch for Writer {
         if wanted && part < 1.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    fn interrupted(&mut self, at: Interrupted) {
+    fn interrupted(&mut self, at: ResumeState) {
         self.interrupted = Some(at);
     }
 
@@ -121,7 +122,7 @@ impl Watch for Writer {
         self.saves.is_due()
     }
 
-    fn checkpoint(&mut self, taken: usize, at: Interrupted) -> ControlFlow<()> {
+    fn checkpoint(&mut self, taken: usize, at: ResumeState) -> ControlFlow<()> {
         let saved = self.written().and_then(|written| self.saves.save(taken, written, &at));
         self.keep(saved)
     }
@@ -181,14 +182,14 @@ impl Run {
         let saved = if self.resume { Some(Checkpoint::read(&directory, &scene)?) } else { None };
         let plan = match &saved {
             // The steps are known: they are not looked for once more.
-            Some(saved) if !saved.by_clock => {
+            Some(saved) if !saved.in_transformed_time => {
                 motion.way = steps(&saved.integrator, saved.count).unwrap_or(motion.way);
                 scene.system.plan(&motion).map_err(explain)?
             }
             _ => scene.system.plan(&motion).map_err(explain)?,
         };
         // The same steps, found once.
-        if !plan.integrator.by_clock {
+        if !plan.integrator.in_transformed_time {
             motion.way = steps(&plan.integrator.name, plan.steps).unwrap_or(motion.way);
         }
         let from = saved.as_ref().map(|saved| saved.state(&directory)).transpose()?;
@@ -296,7 +297,7 @@ impl Run {
             let end: serde_json::Map<_, _> = end.iter().map(|(name, x)| (name.clone(), json(*x))).collect();
             print_json(&serde_json::json!({
                 "status": status,
-                "suspicion": outcome.suspicion.map(|suspicion| suspicion.to_string()),
+                "unresolved": outcome.unresolved.map(|unresolved| unresolved.to_string()),
                 "integrator": plan.integrator.name,
                 "step_size": plan.step_size,
                 "steps": steps,
@@ -324,8 +325,8 @@ impl Run {
             lines.extend(end.iter().map(|(name, x)| format!("  {name} = {}", short(*x))));
             print(&lines.join("\n"))?;
         }
-        if let Some(suspicion) = outcome.suspicion {
-            eprintln!("warning: {suspicion}");
+        if let Some(unresolved) = outcome.unresolved {
+            eprintln!("warning: {unresolved}");
         }
         match outcome.status {
             _ if interrupted => {
@@ -338,9 +339,9 @@ impl Run {
 }
 
 /// So many steps by the integrator of a name.
-fn steps(integrator: &str, count: usize) -> Option<Way> {
+fn steps(integrator: &str, count: usize) -> Option<StepControl> {
     let by: AnyIntegrator = integrator.parse().ok()?;
-    Some(Way::Steps { by, steps: Steps::Count(count) })
+    Some(StepControl::Steps { by, steps: Steps::Count(count) })
 }
 
 /// The state at the end with its names.

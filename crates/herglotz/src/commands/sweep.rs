@@ -8,7 +8,7 @@ use crate::plot;
 use clap::Args;
 use herglotz::Scene;
 use indicatif::ProgressBar;
-use runtime_herglotz::{Column, Ending, Ensemble, EnsembleWatch, Event, MemberEnd, Status, Varied};
+use runtime_herglotz::{Column, Ending, Ensemble, EnsembleMonitor, Event, MemberEnd, Status, Varied};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -54,9 +54,9 @@ struct Writer<'s> {
 
 /// How a member ended: a word, and why.
 fn words(ending: &Ending) -> (&'static str, String) {
-    let why = ending.suspicion.map(|suspicion| suspicion.to_string()).unwrap_or_default();
+    let why = ending.unresolved.map(|unresolved| unresolved.to_string()).unwrap_or_default();
     match ending.status {
-        Status::Completed if ending.suspicion.is_some() => ("suspicious", why),
+        Status::Completed if ending.unresolved.is_some() => ("unresolved", why),
         Status::Completed => ("completed", why),
         status @ Status::Stopped { .. } => ("stopped", status.to_string()),
         status @ Status::FalseClaim { .. } => ("unreliable", status.to_string()),
@@ -76,7 +76,7 @@ impl Writer<'_> {
     }
 }
 
-impl EnsembleWatch for Writer<'_> {
+impl EnsembleMonitor for Writer<'_> {
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()> {
         let values = self.scene.members().values(member.index);
         let mut row = vec![member.index.to_string()];
@@ -191,16 +191,16 @@ impl Sweep {
                 }
             }
         }
-        let runtime_herglotz::Tally { completed, stopped, failed, suspicious, .. } = tally;
+        let runtime_herglotz::Tally { completed, stopped, failed, unresolved, .. } = tally;
         if self.json {
             let told = serde_json::json!({
-                "members": written, "completed": completed, "stopped": stopped, "failed": failed, "suspicious": suspicious,
+                "members": written, "completed": completed, "stopped": stopped, "failed": failed, "unresolved": unresolved,
             });
             print_json(&told)?;
         } else {
             let stopped = if stopped > 0 { format!(", {stopped} stopped by an event") } else { String::new() };
             print(&format!(
-                "{written} members: {completed} completed ({suspicious} suspicious), {failed} failed{stopped}"
+                "{written} members: {completed} completed ({unresolved} unresolved), {failed} failed{stopped}"
             ))?;
         }
         if stop.load(Ordering::Relaxed) && written < members.count() {

@@ -1,7 +1,7 @@
 //! Scenes of paths between given ends.
 
-use super::at::{At, Named, Numbers, Span};
 use super::file::{SystemTable, place_of_table};
+use super::location::{Location, Named, Numbers, Span};
 use super::start::Ends;
 use super::{SceneError, check_used, check_version, entry, formula, integrator};
 use runtime_herglotz::{
@@ -17,17 +17,17 @@ use serde::Deserialize;
 pub(crate) struct EndsFile {
     /// The version of the format: 1.
     #[expect(dead_code, reason = "it is looked at before all else is read")]
-    pub version: Option<At<i64>>,
+    pub version: Option<Location<i64>>,
     /// The Lagrangian: a formula of one to eight coordinates, or one of the catalogue.
-    pub system: At<SystemTable>,
+    pub system: Location<SystemTable>,
     /// Where the path starts: a number for each coordinate `x`; of the action `z` and the time `t`, which are 0 otherwise. An array of
     /// coordinates has a list, or one number for all its entries. A system of the catalogue has a start of its own.
     #[serde(default)]
-    pub start: Option<At<Named<Numbers>>>,
+    pub start: Option<Location<Named<Numbers>>>,
     /// Where it ends: a number for each coordinate `x`, and the time `t`.
-    pub ends: At<Named<Numbers>>,
+    pub ends: Location<Named<Numbers>>,
     /// By what steps.
-    pub run: At<EndsRun>,
+    pub run: Location<EndsRun>,
 }
 
 /// By what steps a path is found.
@@ -35,9 +35,9 @@ pub(crate) struct EndsFile {
 #[serde(deny_unknown_fields, expecting = "a table with `steps` and `integrator`")]
 pub(crate) struct EndsRun {
     /// The number of steps, of one length.
-    pub steps: At<usize>,
+    pub steps: Location<usize>,
     /// The integrator whose discrete Lagrangian it is: `gauss_4` without it; any of Gauss', or a rule as `midpoint`.
-    pub integrator: Option<At<String>>,
+    pub integrator: Option<Location<String>>,
 }
 
 /// A scene of a path between ends that has been read and checked.
@@ -90,15 +90,15 @@ impl EndsScene {
         let entry = entry(text, table)?;
         let formula = formula(text, table, entry)?;
         check_used(text, &formula, table, &[])?;
-        let system_at = table.lagrangian.as_ref().map_or(table.span(), At::span);
-        let system = System::new(&formula).map_err(|error| super::want::of_formula(text, system_at, &error))?;
-        let start_at = start.as_ref().map_or(table.span(), At::span);
+        let system_at = table.lagrangian.as_ref().map_or(table.span(), Location::span);
+        let system = System::new(&formula).map_err(|error| super::output::of_formula(text, system_at, &error))?;
+        let start_at = start.as_ref().map_or(table.span(), Location::span);
         let given = Ends::read(text, &formula, (start.as_deref(), start_at), (ends, ends.span()), entry)?;
         let by = match &run.integrator {
             Some(name) => integrator(text, name)?,
             None => AnyIntegrator::Gauss { stages: 4 },
         };
-        let integrator_at = run.integrator.as_ref().map_or(run.span(), At::span);
+        let integrator_at = run.integrator.as_ref().map_or(run.span(), Location::span);
         if *run.steps < 2 {
             let message = format!("`steps` is {}, where at least 2 are needed", *run.steps);
             return Err(SceneError::at(text, run.steps.span(), message));
@@ -106,7 +106,7 @@ impl EndsScene {
         let [t0, t1] = given.t;
         if t0 == t1 {
             let message = format!("the path ends at {t1}, at which it starts; give a later `t`, or an earlier one");
-            return Err(SceneError::at(text, ends.get("t").map_or(ends.span(), At::span), message));
+            return Err(SceneError::at(text, ends.get("t").map_or(ends.span(), Location::span), message));
         }
         system.check_integrator(by).map_err(|error| SceneError::at(text, integrator_at, in_words(&error)))?;
         let problem = BoundaryProblem { z0: given.z0, ..BoundaryProblem::new(given.q, (t0, t1), by, *run.steps) };

@@ -1,6 +1,6 @@
 //! What is wrong with a scene, and where.
 
-use super::at::Span;
+use super::location::Span;
 use runtime_herglotz::{ParseError, nearest_name};
 use std::fmt::{Display, Formatter};
 

@@ -1,6 +1,6 @@
 //! The scene file as it is written. The documentation of these types is that of the schema, which editors show.
 
-use super::at::{At, Named, Numbers, Span};
+use super::location::{Location, Named, Numbers, Span};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
@@ -14,7 +14,7 @@ pub(crate) const VERSION: i64 = 1;
 
 /// Where a text has a table of this name, which tells the kind of a scene; what is wrong with the scene is said by its reader.
 pub(crate) fn place_of_table(text: &str, name: &str) -> Option<Span> {
-    toml::from_str::<BTreeMap<String, At<IgnoredAny>>>(text).ok()?.get(name).map(At::span)
+    toml::from_str::<BTreeMap<String, Location<IgnoredAny>>>(text).ok()?.get(name).map(Location::span)
 }
 
 /// A motion of a Lagrangian, and what is to be recorded of it.
@@ -24,16 +24,16 @@ pub(crate) fn place_of_table(text: &str, name: &str) -> Option<Span> {
 pub(crate) struct File {
     /// The version of the format: 1.
     #[expect(dead_code, reason = "it is looked at before all else is read")]
-    pub version: Option<At<i64>>,
+    pub version: Option<Location<i64>>,
     /// The Lagrangian: a formula, or one of the catalogue.
-    pub system: At<SystemTable>,
+    pub system: Location<SystemTable>,
     /// Where the motion starts: a number for each coordinate `x`, and for its velocity `x'` or its momentum `p_x`; of the action `z` and
     /// the time `t`, which are 0 otherwise. An array of coordinates has a list, or one number for all its
     /// entries. A system of the catalogue has a start of its own.
     #[serde(default)]
-    pub start: Option<At<Named<Numbers>>>,
+    pub start: Option<Location<Named<Numbers>>>,
     /// How long, and how.
-    pub run: At<RunTable>,
+    pub run: Location<RunTable>,
     /// What is recorded.
     #[serde(default)]
     pub want: WantTable,
@@ -48,11 +48,11 @@ pub(crate) struct File {
 #[serde(deny_unknown_fields, expecting = "a table with `coordinates` and `lagrangian`, or with `catalogue`")]
 pub(crate) struct SystemTable {
     /// The name of a system of the catalogue; see `herglotz list systems`.
-    pub catalogue: Option<At<String>>,
+    pub catalogue: Option<Location<String>>,
     /// The names of the coordinates; `"q[3]"` is an array of three.
-    pub coordinates: Option<At<Vec<At<String>>>>,
+    pub coordinates: Option<Location<Vec<Location<String>>>>,
     /// L over the coordinates `x`, the velocities `x'`, `z`, `t` and the parameters.
-    pub lagrangian: Option<At<String>>,
+    pub lagrangian: Option<Location<String>>,
     /// The parameters with their values.
     #[serde(default)]
     pub parameters: Named<f64>,
@@ -63,18 +63,18 @@ pub(crate) struct SystemTable {
 #[serde(deny_unknown_fields, expecting = "a table with `time` and `accuracy`, or `time`, `integrator` and `step`")]
 pub(crate) struct RunTable {
     /// The time at which the motion ends; before that of the start it goes back.
-    pub time: At<f64>,
+    pub time: Location<f64>,
     /// The relative error of (q, p) and v; the step is chosen for it, and the integrator unless one is named.
-    pub accuracy: Option<At<f64>>,
+    pub accuracy: Option<Location<f64>>,
     /// The integrator; see `herglotz list integrators`.
-    pub integrator: Option<At<String>>,
+    pub integrator: Option<Location<String>>,
     /// The length of a step.
-    pub step: Option<At<f64>>,
+    pub step: Option<Location<f64>>,
     /// The number of steps, instead of their length.
-    pub steps: Option<At<usize>>,
+    pub steps: Option<Location<usize>>,
     /// The size of each coordinate, in the order of the coordinates, where they differ much: errors are those of each coordinate and velocity in
     /// units of its own.
-    pub scales: Option<At<Vec<f64>>>,
+    pub scales: Option<Location<Vec<f64>>>,
 }
 
 /// What is recorded.
@@ -82,13 +82,13 @@ pub(crate) struct RunTable {
 #[serde(deny_unknown_fields, expecting = "a table with `rows` and `events`")]
 pub(crate) struct WantTable {
     /// The rows of rows.csv; without it, 1000 of the whole state.
-    pub rows: Option<At<RowsTable>>,
+    pub rows: Option<Location<RowsTable>>,
     /// Functions of the state whose changes of sign are written to events.csv.
     #[serde(default)]
     pub events: Vec<EventTable>,
     /// Columns that are angles, of rows or of events, by name: pictures show them from -pi to pi, tables as they are.
     #[serde(default)]
-    pub wrap: Vec<At<String>>,
+    pub wrap: Vec<Location<String>>,
     /// Whether the conformal factor of the whole motion is in the summary.
     #[serde(default)]
     pub conformal_factor: bool,
@@ -102,15 +102,15 @@ pub(crate) struct WantTable {
 #[serde(deny_unknown_fields, expecting = "a table with `every`, `at` or `every_step`, and `columns`")]
 pub(crate) struct RowsTable {
     /// The time between two rows.
-    pub every: Option<At<f64>>,
+    pub every: Option<Location<f64>>,
     /// The times of the rows, in the order of the motion.
-    pub at: Option<At<Vec<At<f64>>>>,
+    pub at: Option<Location<Vec<Location<f64>>>>,
     /// The number of steps between two rows.
-    pub every_step: Option<At<usize>>,
+    pub every_step: Option<Location<usize>>,
     /// `t`, coordinates, velocities, `z`, momenta `p_x`, `energy`, `sigma`, `log_factor`, and any expressions of these, with a name
     /// (`E = ...`) or without; without it, the whole state. `energy` is `v L_v - L`, which holds all of L, its terms in z too (`-gamma*z` for
     /// a drag `gamma*z`); `log_factor` is the integral of `L_z`, `sigma` its exponential: the conformal factor.
-    pub columns: Option<At<Vec<At<String>>>>,
+    pub columns: Option<Location<Vec<Location<String>>>>,
 }
 
 /// A function of the state whose changes of sign are found.
@@ -118,7 +118,7 @@ pub(crate) struct RowsTable {
 #[serde(deny_unknown_fields, expecting = "a table with `when`")]
 pub(crate) struct EventTable {
     /// The function, an expression as those of columns: with `energy` and `p_x`, and with `sigma` and `log_factor` where `L_z` is constant.
-    pub when: At<String>,
+    pub when: Location<String>,
     /// Which changes count.
     #[serde(default)]
     pub direction: DirectionName,
@@ -126,11 +126,11 @@ pub(crate) struct EventTable {
     #[serde(default)]
     pub terminal: bool,
     /// The time from which they count, in the sense of the motion, so that transients are left out; from the start without it.
-    pub from: Option<At<f64>>,
+    pub from: Option<Location<f64>>,
     /// What events.csv has beside the state there: expressions as those of the columns of rows, with a name (`E = ...`) or without. They are
     /// empty for other events.
     #[serde(default)]
-    pub columns: Vec<At<String>>,
+    pub columns: Vec<Location<String>>,
 }
 
 /// Which changes of sign count, in the sense of the motion.
@@ -151,7 +151,7 @@ pub(crate) enum DirectionName {
 #[schemars(untagged, inline)]
 pub(crate) enum Values {
     /// These.
-    List(Vec<At<f64>>),
+    List(Vec<Location<f64>>),
     /// Between two.
     Range(RangeTable),
 }
@@ -161,11 +161,11 @@ pub(crate) enum Values {
 #[serde(deny_unknown_fields, expecting = "a table with `from`, `to` and `count`")]
 pub(crate) struct RangeTable {
     /// The first.
-    pub from: At<f64>,
+    pub from: Location<f64>,
     /// The last.
-    pub to: At<f64>,
+    pub to: Location<f64>,
     /// How many.
-    pub count: At<usize>,
+    pub count: Location<usize>,
     /// How they are spaced.
     #[serde(default)]
     pub spacing: Spacing,
@@ -210,7 +210,7 @@ impl<'de> Deserialize<'de> for Values {
 
 /// Parameters and values of the start, with the values that they take.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Swept(pub Vec<(At<String>, At<Values>)>);
+pub(crate) struct Swept(pub Vec<(Location<String>, Location<Values>)>);
 
 /// The key of a table in it of values of the start.
 const START: &str = "start";
@@ -227,11 +227,12 @@ impl<'de> Deserialize<'de> for Swept {
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Swept, A::Error> {
                 let mut all = Vec::new();
-                while let Some(key) = map.next_key::<At<String>>()? {
+                while let Some(key) = map.next_key::<Location<String>>()? {
                     if *key == START {
                         let of_start: Named<Values> = map.next_value()?;
-                        let named =
-                            |(key, values): (At<String>, _)| (At::new(format!("{START}.{}", *key), key.span()), values);
+                        let named = |(key, values): (Location<String>, _)| {
+                            (Location::new(format!("{START}.{}", *key), key.span()), values)
+                        };
                         all.extend(of_start.0.into_iter().map(named));
                     } else {
                         all.push((key, map.next_value()?));

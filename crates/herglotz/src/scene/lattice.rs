@@ -1,12 +1,12 @@
 //! Scenes of lattices: any number of equal sites.
 
-use super::at::{At, Named, Span};
 use super::file::{RowsTable, RunTable, place_of_table};
-use super::want::{RowTimes, of_formula};
+use super::location::{Location, Named, Span};
+use super::output::{RowTimes, of_formula};
 use super::{SceneError, check_version, finite, way};
 use runtime_herglotz::{
-    AnyIntegrator, Assembled, AssembledMotion, Boundary, Formula, FormulaError, Lattice, Rate, RuntimeError, Start,
-    Steps, Way, velocity_name,
+    AnyIntegrator, Assembled, AssembledMotion, Boundary, Formula, FormulaError, InitialVelocity, Lattice, RuntimeError,
+    Start, StepControl, Steps, velocity_name,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -18,15 +18,15 @@ use serde::Deserialize;
 pub(crate) struct LatticeFile {
     /// The version of the format: 1.
     #[expect(dead_code, reason = "it is looked at before all else is read")]
-    pub version: Option<At<i64>>,
+    pub version: Option<Location<i64>>,
     /// The lattice.
-    pub lattice: At<LatticeTable>,
+    pub lattice: Location<LatticeTable>,
     /// Where the motion starts: a number for all sites, a list with one for each, or a formula in the index `i` of a site (`i`, `j`, `k` in several
     /// directions), counted from 0, and the number `n` of sites; for each coordinate `x`, and for its velocity `x'` or its momentum `p_x`. A
     /// velocity is 0 otherwise, as the action `z` and the time `t`.
-    pub start: At<Named<Profile>>,
+    pub start: Location<Named<Profile>>,
     /// How long, and how.
-    pub run: At<RunTable>,
+    pub run: Location<RunTable>,
     /// What is recorded.
     #[serde(default)]
     pub want: LatticeWant,
@@ -37,16 +37,16 @@ pub(crate) struct LatticeFile {
 #[serde(deny_unknown_fields, expecting = "a table with `sites`, `site` and `bond`")]
 pub(crate) struct LatticeTable {
     /// The number of sites, or their numbers along each direction.
-    pub sites: At<Sizes>,
+    pub sites: Location<Sizes>,
     /// What the first and the last site along each direction are bound to: each other, walls at 0, or nothing.
     #[serde(default)]
     pub boundary: BoundaryName,
     /// The names of the components at a site, 1 to 3 of them; `x` without it.
-    pub coordinates: Option<At<Vec<At<String>>>>,
+    pub coordinates: Option<Location<Vec<Location<String>>>>,
     /// The Lagrangian of a site, `m*x'^2/2 - V(t, x) + gamma*z`. The drag is that of the whole lattice, and counts once.
-    pub site: At<String>,
+    pub site: Location<String>,
     /// That of a bond, of the coordinates `xl` before it and `xr` after it.
-    pub bond: Option<At<String>>,
+    pub bond: Option<Location<String>>,
     /// The parameters with their values.
     #[serde(default)]
     pub parameters: Named<f64>,
@@ -94,7 +94,7 @@ pub(crate) enum Profile {
 #[serde(deny_unknown_fields, expecting = "a table with `rows`")]
 pub(crate) struct LatticeWant {
     /// The rows of rows.csv, of the whole state; without it, 1000.
-    pub rows: Option<At<RowsTable>>,
+    pub rows: Option<Location<RowsTable>>,
 }
 
 /// A scene of a lattice that has been read and checked.
@@ -179,15 +179,15 @@ impl LatticeScene {
             },
             parameters: parameters.clone(),
         };
-        let names = table.coordinates.as_ref().map_or(table.span(), At::span);
+        let names = table.coordinates.as_ref().map_or(table.span(), Location::span);
         let parameters_at = table.parameters.0.first().map_or(table.span(), |(name, _)| name.span());
         let places = [
             ("site", table.site.span()),
-            ("bond", table.bond.as_ref().map_or(table.span(), At::span)),
+            ("bond", table.bond.as_ref().map_or(table.span(), Location::span)),
             ("sites", table.sites.span()),
             ("coordinates", names),
             ("parameters", parameters_at),
-            ("integrator", run.integrator.as_ref().map_or(run.span(), At::span)),
+            ("integrator", run.integrator.as_ref().map_or(run.span(), Location::span)),
         ];
         let explain = |error: RuntimeError| explain(text, &places, table.span(), &error);
         let system = lattice.system().map_err(explain)?;
@@ -252,7 +252,7 @@ fn explain(text: &str, places: &[(&'static str, Span)], otherwise: Span, error: 
 }
 
 /// The integrator and its steps.
-fn steps(text: &str, run: &At<RunTable>) -> Result<(AnyIntegrator, Steps), SceneError> {
+fn steps(text: &str, run: &Location<RunTable>) -> Result<(AnyIntegrator, Steps), SceneError> {
     if let Some(scales) = &run.scales {
         let message =
             "`scales` are for an accuracy, or an estimate of the error, and a lattice has neither; remove them";
@@ -268,8 +268,8 @@ fn steps(text: &str, run: &At<RunTable>) -> Result<(AnyIntegrator, Steps), Scene
         return Err(SceneError::at(text, run.span(), message));
     }
     match way(text, run)? {
-        Way::Steps { by, steps } => Ok((by, steps)),
-        Way::Accuracy { .. } => {
+        StepControl::Steps { by, steps } => Ok((by, steps)),
+        StepControl::Accuracy { .. } => {
             Err(SceneError::at(text, run.span(), "the run of a lattice needs an `integrator` and a `step`"))
         }
     }
@@ -278,7 +278,7 @@ fn steps(text: &str, run: &At<RunTable>) -> Result<(AnyIntegrator, Steps), Scene
 /// The start of all sites.
 fn read_start(
     text: &str,
-    table: &At<Named<Profile>>,
+    table: &Location<Named<Profile>>,
     coordinates: &[String],
     sizes: &[usize],
     parameters: &[(String, f64)],
@@ -289,7 +289,7 @@ fn read_start(
     for (name, profile) in &table.0 {
         let number = |into: &mut f64| match &**profile {
             Profile::One(x) => {
-                *into = finite(text, &At::new(*x, profile.span()), name)?;
+                *into = finite(text, &Location::new(*x, profile.span()), name)?;
                 Ok(())
             }
             _ => Err(SceneError::at(text, profile.span(), format!("`{}` is one number", **name))),
@@ -333,14 +333,14 @@ fn read_start(
     let of = |all: &[Option<Vec<f64>>]| -> Vec<f64> {
         (0..sites * d).map(|k| all[k % d].as_ref().and_then(|x| x.get(k / d)).copied().unwrap_or(0.0)).collect()
     };
-    let rate = if by_momentum { Rate::Momentum(of(&p)) } else { Rate::Velocity(of(&v)) };
+    let rate = if by_momentum { InitialVelocity::Momentum(of(&p)) } else { InitialVelocity::Velocity(of(&v)) };
     Ok(Start { t, q: of(&q), rate, z })
 }
 
 /// The value of each site.
 fn values(
     text: &str,
-    profile: &At<Profile>,
+    profile: &Location<Profile>,
     name: &str,
     sizes: &[usize],
     parameters: &[(String, f64)],

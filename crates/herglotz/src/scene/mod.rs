@@ -1,15 +1,15 @@
 //! A scene: a system, a start, and what is asked of the motion.
 
-mod at;
-mod change;
 mod ends;
 mod error;
 mod file;
 mod lattice;
+mod location;
 mod members;
+mod output;
+mod overrides;
 mod start;
 mod sweep;
-mod want;
 
 pub use ends::EndsScene;
 pub use error::SceneError;
@@ -17,14 +17,14 @@ pub use lattice::LatticeScene;
 pub use members::Members;
 pub use sweep::Knob;
 
-use at::{At, Span};
 use file::{File, RunTable, SystemTable, VERSION};
+use location::{Location, Span};
+use output::{EventColumns, Events, RowTimes};
 use runtime_herglotz::{
     AnyIntegrator, CatalogueEntry, Column, Crossing, Event, Formula, FormulaError, InputError, Motion, RuntimeError,
-    Start, Steps, System, Way, check_parameters, in_words,
+    Start, StepControl, Steps, System, check_parameters, in_words,
 };
 use serde::Deserialize;
-use want::{EventColumns, Events, RowTimes};
 
 /// A scene that has been read and checked.
 #[derive(Clone)]
@@ -45,7 +45,7 @@ pub struct Scene {
     lagrangian: String,
     start: Start,
     end: f64,
-    way: Way,
+    way: StepControl,
     rows: RowTimes,
     conformal_factor: bool,
     estimate: bool,
@@ -112,22 +112,22 @@ impl Scene {
         let mut file: File = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
         let entry = entry(text, &file.system)?;
         for text_of_change in changes {
-            change::apply(&mut file, entry, text_of_change)?;
+            overrides::apply(&mut file, entry, text_of_change)?;
         }
         let formula = formula(text, &file.system, entry)?;
         let system = &file.system;
         let texts: Vec<&str> = expressions(&file).map(String::as_str).collect();
         check_used(text, &formula, system, &texts)?;
-        let lagrangian = system.lagrangian.as_ref().map_or(system.span(), At::span);
-        let runs = System::new(&formula).map_err(|error| want::of_formula(text, lagrangian, &error))?;
+        let lagrangian = system.lagrangian.as_ref().map_or(system.span(), Location::span);
+        let runs = System::new(&formula).map_err(|error| output::of_formula(text, lagrangian, &error))?;
         let run = &file.run;
-        let header = file.start.as_ref().map_or(system.span(), At::span);
+        let header = file.start.as_ref().map_or(system.span(), Location::span);
         let start = start::read(text, &formula, file.start.as_deref(), entry, header)?;
         let end = finite(text, &run.time, "time")?;
         let way = way(text, run)?;
         let by = match way {
-            Way::Accuracy { by, .. } => by,
-            Way::Steps { by, .. } => Some(by),
+            StepControl::Accuracy { by, .. } => by,
+            StepControl::Steps { by, .. } => Some(by),
         };
         if let (Some(by), Some(name)) = (by, &run.integrator) {
             let refused = |error: InputError| SceneError::at(text, name.span(), in_words(&error));
@@ -135,14 +135,14 @@ impl Scene {
         }
         let constant_rate = runs.structure().has_constant_rate();
         let events = Events::read(text, (&formula, constant_rate), &file.want.events, (start.t, end))?;
-        let columns = want::columns(text, &formula, file.want.rows.as_ref())?;
-        let of_state = want::state_of_event(&formula);
+        let columns = output::columns(text, &formula, file.want.rows.as_ref())?;
+        let of_state = output::state_of_event(&formula);
         let of_rows = columns.iter().map(|(name, _)| name);
         let named = formula.coordinates();
         let named = named.iter().chain(of_rows).chain(if events.events.is_empty() { &[] } else { &of_state[..] });
         let known: Vec<&str> = named.chain(&events.columns.names).map(String::as_str).collect();
         Ok(Scene {
-            angles: want::angles(text, &file.want.wrap, &known)?,
+            angles: output::angles(text, &file.want.wrap, &known)?,
             columns,
             events: events.events,
             event_columns: events.columns,
@@ -166,11 +166,16 @@ impl Scene {
                 start: header,
                 run: run.span(),
                 time: run.time.span(),
-                accuracy: run.accuracy.as_ref().map_or(run.span(), At::span),
-                scales: run.scales.as_ref().map_or(run.span(), At::span),
-                integrator: run.integrator.as_ref().map_or(run.span(), At::span),
-                step: run.step.as_ref().map(At::span).or(run.steps.as_ref().map(At::span)).unwrap_or(run.span()),
-                rows: file.want.rows.as_ref().map_or(run.span(), At::span),
+                accuracy: run.accuracy.as_ref().map_or(run.span(), Location::span),
+                scales: run.scales.as_ref().map_or(run.span(), Location::span),
+                integrator: run.integrator.as_ref().map_or(run.span(), Location::span),
+                step: run
+                    .step
+                    .as_ref()
+                    .map(Location::span)
+                    .or(run.steps.as_ref().map(Location::span))
+                    .unwrap_or(run.span()),
+                rows: file.want.rows.as_ref().map_or(run.span(), Location::span),
             },
         })
     }
@@ -194,7 +199,7 @@ impl Scene {
 
     /// The columns of events.csv after the name of the event: the state there, and what the events have beside it.
     pub fn columns_of_events(&self) -> Vec<String> {
-        want::state_of_event(self.system.formula())
+        output::state_of_event(self.system.formula())
             .into_iter()
             .chain(self.event_columns.names.iter().cloned())
             .collect()
@@ -261,7 +266,9 @@ impl Scene {
                 E::NoIntegrator | E::Unclaimed { .. } | E::Hypothesis { .. } | E::Stages { .. } => places.integrator,
                 E::FalseClaim { .. } => places.lagrangian,
                 E::Times { .. } => places.rows,
-                E::Undefined | E::FirstStep(_) | E::Sigma { .. } | E::Clock { .. } | E::EqualPoints => places.start,
+                E::Undefined | E::FirstStep(_) | E::Sigma { .. } | E::TimeTransformation { .. } | E::EqualPoints => {
+                    places.start
+                }
                 _ => places.run,
             },
             RuntimeError::Length { what: "scales", .. } => places.scales,
@@ -276,7 +283,7 @@ impl Scene {
 fn check_version(text: &str) -> Result<(), SceneError> {
     #[derive(Deserialize)]
     struct Versioned {
-        version: Option<At<i64>>,
+        version: Option<Location<i64>>,
     }
     // What else is wrong is said by the whole file's reader.
     let Ok(Versioned { version: Some(version) }) = toml::from_str(text) else { return Ok(()) };
@@ -290,7 +297,7 @@ fn check_version(text: &str) -> Result<(), SceneError> {
 }
 
 /// The entry of the catalogue that a scene names.
-fn entry(text: &str, system: &At<SystemTable>) -> Result<Option<&'static CatalogueEntry>, SceneError> {
+fn entry(text: &str, system: &Location<SystemTable>) -> Result<Option<&'static CatalogueEntry>, SceneError> {
     let refuse = |span, message: &str| Err(SceneError::at(text, span, message));
     match (&system.catalogue, &system.coordinates, &system.lagrangian) {
         (Some(name), None, None) => match CatalogueEntry::find(name) {
@@ -312,7 +319,7 @@ fn entry(text: &str, system: &At<SystemTable>) -> Result<Option<&'static Catalog
 /// The formula of a scene.
 fn formula(
     text: &str,
-    system: &At<SystemTable>,
+    system: &Location<SystemTable>,
     entry: Option<&'static CatalogueEntry>,
 ) -> Result<Formula, SceneError> {
     for (name, value) in &system.parameters.0 {
@@ -335,7 +342,7 @@ fn formula(
             }
             FormulaError::Name { ref name, .. } => {
                 let of_parameters = system.parameters.0.iter().map(|(key, _)| key);
-                let at = coordinates.iter().chain(of_parameters).rfind(|known| ***known == *name).map(At::span);
+                let at = coordinates.iter().chain(of_parameters).rfind(|known| ***known == *name).map(Location::span);
                 SceneError::at(text, at.unwrap_or(coordinates.span()), error.to_string())
             }
             FormulaError::Dimension { .. } => SceneError::at(text, coordinates.span(), error.to_string()),
@@ -360,7 +367,7 @@ fn expressions(file: &File) -> impl Iterator<Item = &String> {
 }
 
 /// Refuses parameters that are neither in the formula nor in the texts of columns and events.
-fn check_used(text: &str, formula: &Formula, system: &At<SystemTable>, texts: &[&str]) -> Result<(), SceneError> {
+fn check_used(text: &str, formula: &Formula, system: &Location<SystemTable>, texts: &[&str]) -> Result<(), SceneError> {
     check_parameters(formula, texts).map_err(|error| {
         let named = |name: &str| system.parameters.0.iter().find(|(known, _)| **known == *name);
         let span = match &error {
@@ -372,7 +379,7 @@ fn check_used(text: &str, formula: &Formula, system: &At<SystemTable>, texts: &[
 }
 
 /// How a motion is advanced.
-fn way(text: &str, run: &At<RunTable>) -> Result<Way, SceneError> {
+fn way(text: &str, run: &Location<RunTable>) -> Result<StepControl, SceneError> {
     let by = run.integrator.as_ref().map(|name| integrator(text, name)).transpose()?;
     let steps = match (&run.step, &run.steps) {
         (Some(_), Some(steps)) => {
@@ -391,8 +398,8 @@ fn way(text: &str, run: &At<RunTable>) -> Result<Way, SceneError> {
     };
     let refuse = |span, message: &str| Err(SceneError::at(text, span, message));
     match (&run.accuracy, by, steps) {
-        (Some(accuracy), by, None) => Ok(Way::Accuracy { wanted: positive(text, accuracy, "accuracy")?, by }),
-        (None, Some(by), Some(steps)) => Ok(Way::Steps { by, steps }),
+        (Some(accuracy), by, None) => Ok(StepControl::Accuracy { wanted: positive(text, accuracy, "accuracy")?, by }),
+        (None, Some(by), Some(steps)) => Ok(StepControl::Steps { by, steps }),
         (Some(accuracy), _, Some(_)) => {
             refuse(accuracy.span(), "give an `accuracy` or the steps, not both: the step is chosen for the accuracy")
         }
@@ -408,7 +415,7 @@ fn way(text: &str, run: &At<RunTable>) -> Result<Way, SceneError> {
     }
 }
 
-fn integrator(text: &str, name: &At<String>) -> Result<AnyIntegrator, SceneError> {
+fn integrator(text: &str, name: &Location<String>) -> Result<AnyIntegrator, SceneError> {
     name.parse().map_err(|_| {
         let all: Vec<String> = AnyIntegrator::all().iter().map(ToString::to_string).collect();
         let message = format!("there is no integrator `{}`; `herglotz list integrators` lists them", **name);
@@ -417,7 +424,7 @@ fn integrator(text: &str, name: &At<String>) -> Result<AnyIntegrator, SceneError
 }
 
 /// A number that is finite.
-fn finite(text: &str, x: &At<f64>, name: &str) -> Result<f64, SceneError> {
+fn finite(text: &str, x: &Location<f64>, name: &str) -> Result<f64, SceneError> {
     if x.is_finite() {
         return Ok(**x);
     }
@@ -425,7 +432,7 @@ fn finite(text: &str, x: &At<f64>, name: &str) -> Result<f64, SceneError> {
 }
 
 /// A number that is positive and finite.
-fn positive(text: &str, x: &At<f64>, name: &str) -> Result<f64, SceneError> {
+fn positive(text: &str, x: &Location<f64>, name: &str) -> Result<f64, SceneError> {
     if **x > 0.0 {
         return finite(text, x, name);
     }

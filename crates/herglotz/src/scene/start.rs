@@ -1,8 +1,8 @@
 //! Where a motion starts.
 
 use super::SceneError;
-use super::at::{At, Named, Numbers, Span};
-use runtime_herglotz::{CatalogueEntry, Formula, Rate, Start, velocity_name};
+use super::location::{Location, Named, Numbers, Span};
+use runtime_herglotz::{CatalogueEntry, Formula, InitialVelocity, Start, velocity_name};
 use std::ops::Range;
 
 /// A part of a start.
@@ -151,9 +151,9 @@ fn given(text: &str, keys: Vec<Key>, place: &str, table: Option<&Named<Numbers>>
             };
             SceneError::at(text, numbers.span(), format!("`{}` is {found}, where {wanted} is needed", **name))
         };
-        let values: Vec<At<f64>> = match &**numbers {
+        let values: Vec<Location<f64>> = match &**numbers {
             // Of an array, for all its entries.
-            Numbers::One(x) => vec![At::new(*x, numbers.span()); key.entries.len()],
+            Numbers::One(x) => vec![Location::new(*x, numbers.span()); key.entries.len()],
             Numbers::Many(list) if key.is_list && list.len() == key.entries.len() => list.clone(),
             Numbers::Many(list) => return Err(wrong_count(&format!("a list of {}", list.len()))),
         };
@@ -209,9 +209,9 @@ fn complete(
         return Err(SceneError::at(text, at, message));
     }
     let rate = if by_momentum {
-        Rate::Momentum(of(given.p, None, "momentum", &|x| format!("p_{x}"))?)
+        InitialVelocity::Momentum(of(given.p, None, "momentum", &|x| format!("p_{x}"))?)
     } else {
-        Rate::Velocity(of(given.v, entry.map(|entry| entry.v), "velocity", &velocity_name)?)
+        InitialVelocity::Velocity(of(given.v, entry.map(|entry| entry.v), "velocity", &velocity_name)?)
     };
     Ok(Start { t: given.t.unwrap_or(0.0), q, rate, z: given.z.unwrap_or(0.0) })
 }

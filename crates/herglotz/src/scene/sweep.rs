@@ -1,10 +1,10 @@
 //! What a sweep takes through its values.
 
 use super::SceneError;
-use super::at::At;
 use super::file::{RangeTable, Spacing, Swept, Values};
+use super::location::Location;
 use super::start::{Part, entry_of, single_names};
-use runtime_herglotz::{Formula, Rate, Start};
+use runtime_herglotz::{Formula, InitialVelocity, Start};
 
 /// The largest number of members.
 const MOST: usize = 100_000_000;
@@ -35,8 +35,8 @@ pub struct Knob {
 pub(crate) fn put(start: &mut Start, part: Part, entry: usize, value: f64) {
     let vector = match (part, &mut start.rate) {
         (Part::Position, _) => &mut start.q,
-        (Part::Velocity, Rate::Velocity(v)) => v,
-        (Part::Momentum, Rate::Momentum(p)) => p,
+        (Part::Velocity, InitialVelocity::Velocity(v)) => v,
+        (Part::Momentum, InitialVelocity::Momentum(p)) => p,
         (Part::Action, _) => return start.z = value,
         (Part::Time, _) => return start.t = value,
         (Part::Velocity | Part::Momentum, _) => return,
@@ -63,7 +63,7 @@ pub(crate) fn read(text: &str, formula: &Formula, start: &Start, table: &Swept) 
     Ok(knobs)
 }
 
-fn slot(text: &str, formula: &Formula, start: &Start, name: &At<String>) -> Result<Slot, SceneError> {
+fn slot(text: &str, formula: &Formula, start: &Start, name: &Location<String>) -> Result<Slot, SceneError> {
     let refuse = |message: &str| Err(SceneError::at(text, name.span(), message));
     let Some(of_start) = name.strip_prefix("start.") else {
         if formula.parameters().any(|(parameter, _)| parameter == **name) {
@@ -78,10 +78,12 @@ fn slot(text: &str, formula: &Formula, start: &Start, name: &At<String>) -> Resu
     };
     match (entry_of(formula, of_start), &start.rate) {
         (Some((Part::Time, _)), _) => refuse("all members start at one time; sweep another value"),
-        (Some((Part::Velocity, _)), Rate::Momentum(_) | Rate::MomentumNear { .. }) => {
+        (Some((Part::Velocity, _)), InitialVelocity::Momentum(_) | InitialVelocity::MomentumNear { .. }) => {
             refuse("the start has momenta; sweep one of them")
         }
-        (Some((Part::Momentum, _)), Rate::Velocity(_)) => refuse("the start has velocities; sweep one of them"),
+        (Some((Part::Momentum, _)), InitialVelocity::Velocity(_)) => {
+            refuse("the start has velocities; sweep one of them")
+        }
         (Some((part, entry)), _) => Ok(Slot::Start(part, entry)),
         (None, _) => {
             let names = single_names(formula);
@@ -91,7 +93,7 @@ fn slot(text: &str, formula: &Formula, start: &Start, name: &At<String>) -> Resu
     }
 }
 
-fn values_of(text: &str, values: &At<Values>) -> Result<Vec<f64>, SceneError> {
+fn values_of(text: &str, values: &Location<Values>) -> Result<Vec<f64>, SceneError> {
     let refuse = |message: &str| Err(SceneError::at(text, values.span(), message));
     let RangeTable { from, to, count, spacing } = match &**values {
         Values::List(list) if list.is_empty() => return refuse("no values; give at least one"),

@@ -57,7 +57,7 @@ fn a_path_between_ends_runs() {
     let (error, estimate) = (error.fold(0.0, f64::max), told["estimated_error"].as_f64().unwrap());
     // The range of x is a little above one.
     assert!(0.5 * error < estimate && estimate < 2.0 * error, "{estimate} for {error}");
-    assert_eq!((&told["status"], &told["suspicion"]), (&"found".into(), &serde_json::Value::Null));
+    assert_eq!((&told["status"], &told["unresolved"]), (&"found".into(), &serde_json::Value::Null));
     assert!(told["regularity"].as_f64().unwrap() > 1e-3 && told["rows"] == 41 && told["steps"] == 40, "{told}");
     assert!((told["start"]["x'"].as_f64().unwrap() - exact(1.0).1).abs() < 1e-2, "{told}");
     // The rate is one number.

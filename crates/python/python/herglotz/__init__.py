@@ -19,7 +19,7 @@ from importlib import import_module as _import_module
 from ._core import System
 from ._core import catalogue as _catalogue
 from ._core import integrators as _integrators
-from ._solution import Crossings, Interrupted, Plan, Solution, States
+from ._solution import Crossings, ResumeState, Plan, Solution, States
 from ._solve import Event, solve
 from ._system import system
 from ._trace import array, where
@@ -70,7 +70,7 @@ __all__ = [
     "Event",
     "Exponential",
     "Geometry",
-    "Interrupted",
+    "ResumeState",
     "MemberCrossings",
     "Path",
     "Plan",

@@ -83,7 +83,7 @@ class Solution:
     events: list[Crossings] | dict[str, Crossings]
     status: str
     success: bool
-    suspicion: str | None
+    unresolved: str | None
     error_estimate: float | None
     steps: int
     evaluations: int
@@ -110,7 +110,7 @@ class Path:
     status: str
     residual: float
     log_factor: float
-    suspicion: str | None
+    unresolved: str | None
     error_estimate: float | None
     regularity: float
     iterations: int
@@ -128,7 +128,7 @@ class AssembledSolution:
     log_factor: Vector | None
     status: str
     success: bool
-    suspicion: str | None
+    unresolved: str | None
     steps: int
     evaluations: int
     @property
@@ -138,7 +138,7 @@ class AssembledSolution:
     def resume(self, t: ArrayLike | None = None) -> AssembledSolution: ...
     def to_xarray(self) -> Any: ...
 
-class Interrupted(KeyboardInterrupt):
+class ResumeState(KeyboardInterrupt):
     solution: Solution | AssembledSolution | Ensemble
     def __init__(self, solution: Solution | AssembledSolution | Ensemble) -> None: ...
 
@@ -154,7 +154,7 @@ class Ensemble:
     steps: NDArray[np.int64]
     success: NDArray[np.bool_]
     troubles: dict[int, str]
-    in_lanes: int
+    batch_kernel: int
     def __len__(self) -> int: ...
     def __getitem__(self, name: str) -> Vector: ...
 

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 
 from . import _core
-from ._solution import Interrupted
+from ._solution import ResumeState
 from ._system import copied
 
 
@@ -23,7 +23,7 @@ class AssembledSolution:
         The logarithm of the conformal factor since the start, where it was asked for.
     status : str
         How the run ended; ``success`` says whether as it was asked to.
-    suspicion : str or None
+    unresolved : str or None
         The first step that was seen not to resolve the motion.
     steps, evaluations : int
         The steps taken, and the evaluations of all forces.
@@ -35,7 +35,7 @@ class AssembledSolution:
         self._run, self._request, self._shape, self._bodies = run, request, shape, bodies
         self.t, self.z, self.energy, self.log_factor = record.t, record.z, record.energy, record.log_factor
         self.q, self.v, self.p = (x.reshape(-1, *shape) for x in (record.q, record.v, record.p))
-        self.status, self.success, self.suspicion = record.status, record.success, record.suspicion
+        self.status, self.success, self.unresolved = record.status, record.success, record.unresolved
         self.steps, self.evaluations = record.steps, record.evaluations
         self._end = record.end
 
@@ -170,7 +170,7 @@ def lattice(
     ------
     ValueError
         For all that is wrong with an argument.
-    Interrupted
+    ResumeState
         A `KeyboardInterrupt` with the solution up to there.
 
     Examples
@@ -250,7 +250,7 @@ def bodies(
     ------
     ValueError
         For all that is wrong with an argument.
-    Interrupted
+    ResumeState
         A `KeyboardInterrupt` with the solution up to there.
     """
     q0, request = _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor)
@@ -301,6 +301,6 @@ def _solution(run, request, shape, bodies):
     sol = AssembledSolution(run, request, shape, record, bodies)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
-            raise Interrupted(sol)
+            raise ResumeState(sol)
         raise record.interrupted
     return sol

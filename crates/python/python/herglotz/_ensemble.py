@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import _core
-from ._solution import Interrupted, crossings
+from ._solution import ResumeState, crossings
 from ._solve import columns_of, events_of, system_and_start
 from ._system import check_parameters
 
@@ -59,7 +59,7 @@ def ensemble(
     ------
     ValueError
         For all that is wrong with an argument.
-    Interrupted
+    ResumeState
         A `KeyboardInterrupt` with the ensemble: the members that were done, and the others without success.
     """
     if parameters is not None and not hasattr(parameters, "items"):
@@ -97,7 +97,7 @@ def ensemble(
     found = Ensemble(system, record, event_names, tuple(observe or ()))
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
-            raise Interrupted(found)
+            raise ResumeState(found)
         raise record.interrupted
     return found
 
@@ -129,14 +129,14 @@ class Ensemble:
     success : array of bool of shape (M,)
     troubles : dict of str
         What went wrong or is in doubt, by the index of the member; what was not computed is not a number.
-    in_lanes : int
+    batch_kernel : int
         How many members were advanced together in vector registers.
     """
 
     def __init__(self, system, record, event_names, observed):
         self.system = system
         self.t, self.steps, self.success, self.times = record.t, record.steps, record.success, record.times
-        self.troubles, self.in_lanes = dict(record.troubles), record.in_lanes
+        self.troubles, self.batch_kernel = dict(record.troubles), record.batch_kernel
         count, n = len(record.t), system.dimension
         many = () if self.times is None else (len(self.times),)
         self.q, self.v, self.p = (x.reshape(count, *many, n) for x in (record.q, record.v, record.p))

@@ -79,12 +79,12 @@ def is_contact(map, at, *, tolerance=1e-9):
     at : tuple (q, p, z)
         The point.
     tolerance : float
-        The largest defect of a map that is called contact.
+        The max_abs_or_nan defect of a map that is called contact.
 
     Returns
     -------
     Contact
-        True or false, the conformal factor sigma, and the largest component of F*eta - sigma eta, relative to F*eta.
+        True or false, the conformal factor sigma, and the max_abs_or_nan component of F*eta - sigma eta, relative to F*eta.
         A map with sigma = 0 is not contact.
     """
     try:

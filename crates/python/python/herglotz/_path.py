@@ -23,10 +23,10 @@ class Path:
     action : float
         The action of the whole path.
     residual : float
-        The largest residual of a discrete Herglotz equation, a momentum.
+        The max_abs_or_nan residual of a discrete Herglotz equation, a momentum.
     log_factor : float
         The logarithm of the conformal factor of the whole path.
-    suspicion : str or None
+    unresolved : str or None
         Why a path that was found may be far from every motion: its steps do not resolve it, as where it jumps a centre of force, or its
         ends are conjugate to within their error.
     error_estimate : float or None
@@ -42,7 +42,7 @@ class Path:
         self.t, self.q, self.p, self.z = t, record.q, record.p, record.z
         self.found, self.status = record.found, record.status
         self.residual, self.log_factor, self.iterations = record.residual, record.log_factor, record.iterations
-        self.suspicion, self.error_estimate, self.regularity = record.suspicion, record.error_estimate, record.regularity
+        self.unresolved, self.error_estimate, self.regularity = record.unresolved, record.error_estimate, record.regularity
 
     @property
     def action(self):
@@ -52,7 +52,7 @@ class Path:
         return self.found
 
     def __repr__(self):
-        doubt = "" if self.suspicion is None else f"; {self.suspicion}"
+        doubt = "" if self.unresolved is None else f"; {self.unresolved}"
         return f"<Path: {len(self.t) - 1} steps from t = {self.t[0]} to {self.t[-1]}, {self.status}{doubt}>"
 
 

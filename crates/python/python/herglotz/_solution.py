@@ -43,7 +43,7 @@ class Plan:
         return f"<Plan: {self.steps} steps of {self.step} by {self.integrator}>"
 
 
-class Interrupted(KeyboardInterrupt):
+class ResumeState(KeyboardInterrupt):
     """A run that Ctrl-C has ended: ``solution`` has what was computed, and `Solution.resume` goes on with it; of an ensemble the members
     that were done."""
 
@@ -53,7 +53,7 @@ class Interrupted(KeyboardInterrupt):
         self.solution = solution
 
     def __reduce__(self):
-        return Interrupted, (self.solution,)
+        return ResumeState, (self.solution,)
 
 
 class Solution:
@@ -72,11 +72,11 @@ class Solution:
         The changes of sign of the events, in their order or by their names.
     status : str
         How the run ended; ``success`` says whether as it was asked to.
-    suspicion : str or None
+    unresolved : str or None
         The first step that was seen not to resolve the motion.
     error_estimate : float or None
-        The error at the end, where `estimate` was asked for: of (q, p) relative to its size, or of v relative to the largest
-        speed, whichever is larger; infinite where half steps fail.
+        The error at the end, where `estimate` was asked for: of (q, p) relative to its size, or of v relative to the max_abs_or_nan
+        speed, whichever is max_or_nan; infinite where half steps fail.
     steps, evaluations : int
         The steps taken, and the evaluations of forces or gradients.
     t_end : float
@@ -88,7 +88,7 @@ class Solution:
         self._request = request
         self.t, self.q, self.v, self.p, self.z = record.t, record.q, record.v, record.p, record.z
         self.energy, self.log_factor = record.energy, record.log_factor
-        self.status, self.success, self.suspicion = record.status, record.success, record.suspicion
+        self.status, self.success, self.unresolved = record.status, record.success, record.unresolved
         self.error_estimate = record.error_estimate
         self.steps, self.evaluations = record.steps, record.evaluations
         self._end, self._halted = record.end, record.halted

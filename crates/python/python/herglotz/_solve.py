@@ -1,7 +1,7 @@
 """One motion: what is asked of it, and its run."""
 
 from . import _core
-from ._solution import Interrupted, Solution
+from ._solution import ResumeState, Solution
 from ._system import check_parameters, copied, expression, system
 
 
@@ -43,7 +43,7 @@ def solve(
     z0 : float
         The action of the start.
     accuracy : float, optional
-        The error that is wanted, 1e-9 if nothing is said: of (q, p) relative to its size, and of v relative to the largest
+        The error that is wanted, 1e-9 if nothing is said: of (q, p) relative to its size, and of v relative to the max_abs_or_nan
         speed. The step is chosen for it, and the integrator where none is named.
     integrator : str, optional
         One of `integrators`.
@@ -74,7 +74,7 @@ def solve(
     ------
     ValueError
         For all that is wrong with an argument.
-    Interrupted
+    ResumeState
         A `KeyboardInterrupt` with the solution up to there.
     """
     given = L
@@ -108,7 +108,7 @@ def run(L, request, event_names, observed, halted=None):
     sol = Solution(L, request, record, event_names, observed)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
-            raise Interrupted(sol)
+            raise ResumeState(sol)
         raise record.interrupted
     return sol
 

@@ -11,7 +11,7 @@ pub use lattice::{Boundary, Lattice};
 pub use run::AssembledMotion;
 
 use crate::outcome::KeptRows;
-use crate::{Outcome, RuntimeError, Watch};
+use crate::{Outcome, RunMonitor, RuntimeError};
 use assembled_herglotz::AssembledSystem;
 
 /// A system of any number of coordinates as a sum of local terms: a [`Lattice`] or [`Bodies`], ready to be run.
@@ -55,7 +55,7 @@ impl Assembled {
     ///
     /// # Errors
     /// [`RuntimeError::Argument`], [`RuntimeError::Length`] and [`RuntimeError::NotFinite`] with the argument; [`RuntimeError::Assembly`].
-    pub fn run(&self, motion: &AssembledMotion, watch: &mut dyn Watch) -> Result<Outcome, RuntimeError> {
+    pub fn run(&self, motion: &AssembledMotion, watch: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
         run::run(self, motion, watch)
     }
 

@@ -2,8 +2,8 @@
 
 use super::stepper::{Place, Stepper};
 use super::{Assembled, argument};
-use crate::{Outcome, Rate, RuntimeError, Start, Watch, When};
-use discrete_herglotz::{AnyIntegrator, Halt, InputError, Status, StepError, Steps};
+use crate::{InitialVelocity, Outcome, OutputTimes, RunMonitor, RuntimeError, Start};
+use discrete_herglotz::{AnyIntegrator, InputError, Status, StepError, StepFailure, Steps};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -23,7 +23,7 @@ pub struct AssembledMotion {
     /// The length of its steps, made a little shorter so that a whole number of them fills the span; or their number.
     pub steps: Steps,
     /// The states that are recorded. One at a time inside of a step is by a shorter step of the same integrator.
-    pub rows: When,
+    pub rows: OutputTimes,
     /// Whether rows and the outcome have the logarithm of the conformal factor.
     pub conformal_factor: bool,
 }
@@ -31,7 +31,7 @@ pub struct AssembledMotion {
 impl AssembledMotion {
     /// From a start to a time by given steps, with a row of each.
     pub fn new(start: Start, end: f64, by: AnyIntegrator, steps: Steps) -> Self {
-        AssembledMotion { start, end, by, steps, rows: When::Every(1), conformal_factor: false }
+        AssembledMotion { start, end, by, steps, rows: OutputTimes::Every(1), conformal_factor: false }
     }
 
     /// The length of a step, and how many there are.
@@ -71,7 +71,7 @@ impl AssembledMotion {
 }
 
 /// A motion that is under way.
-struct Course<'a, 'w> {
+struct RunInfo<'a, 'w> {
     of: &'a Assembled,
     motion: &'a AssembledMotion,
     stepper: Stepper<'a>,
@@ -83,7 +83,7 @@ struct Course<'a, 'w> {
     log_factor: f64,
     last: Place,
     numbers: Vec<f64>,
-    watch: &'w mut dyn Watch,
+    watch: &'w mut dyn RunMonitor,
 }
 
 /// Why a motion ends before its time.
@@ -108,14 +108,18 @@ impl From<RuntimeError> for Ended {
     }
 }
 
-pub(super) fn run(of: &Assembled, motion: &AssembledMotion, watch: &mut dyn Watch) -> Result<Outcome, RuntimeError> {
+pub(super) fn run(
+    of: &Assembled,
+    motion: &AssembledMotion,
+    watch: &mut dyn RunMonitor,
+) -> Result<Outcome, RuntimeError> {
     let (h, count) = motion.step()?;
     check_rows(motion)?;
     let start = place(of, &motion.start)?;
     let stepper = Stepper::new(of, motion.by, h, &start)?;
     let numbers = Vec::with_capacity(4 + 3 * of.dimension());
     let mut course =
-        Course { of, motion, stepper, h, count, taken: 0, some: 1, log_factor: 0.0, last: start, numbers, watch };
+        RunInfo { of, motion, stepper, h, count, taken: 0, some: 1, log_factor: 0.0, last: start, numbers, watch };
     let status = match course.go() {
         Ok(()) => Status::Completed,
         Err(Ended::Stopped) => Status::Stopped { step: course.taken, t: course.time(course.taken), by: "the watch" },
@@ -128,9 +132,9 @@ pub(super) fn run(of: &Assembled, motion: &AssembledMotion, watch: &mut dyn Watc
 /// Checks the times of rows.
 fn check_rows(motion: &AssembledMotion) -> Result<(), RuntimeError> {
     let times = match &motion.rows {
-        When::Every(0) => return Err(argument("every", "is 0, where at least 1 is needed")),
-        When::Every(_) => return Ok(()),
-        When::At(times) => times,
+        OutputTimes::Every(0) => return Err(argument("every", "is 0, where at least 1 is needed")),
+        OutputTimes::Every(_) => return Ok(()),
+        OutputTimes::At(times) => times,
     };
     let onward = motion.end > motion.start.t;
     let before = |a: f64, b: f64| if onward { a <= b } else { a >= b };
@@ -161,15 +165,15 @@ fn place(of: &Assembled, start: &Start) -> Result<Place, RuntimeError> {
         }
     };
     let v = match &start.rate {
-        Rate::Velocity(v) => vector("v", v)?,
-        Rate::Momentum(p) | Rate::MomentumNear { p, .. } => {
+        InitialVelocity::Velocity(v) => vector("v", v)?,
+        InitialVelocity::Momentum(p) | InitialVelocity::MomentumNear { p, .. } => {
             vector("p", p)?.iter().zip(&of.masses).map(|(p, m)| p / m).collect()
         }
     };
     Ok(Place { t: start.t, q: vector("q", &start.q)?, v, z: start.z })
 }
 
-impl Course<'_, '_> {
+impl RunInfo<'_, '_> {
     /// The time after so many steps.
     fn time(&self, taken: usize) -> f64 {
         if taken == self.count { self.motion.end } else { self.motion.start.t + taken as f64 * self.h }
@@ -177,14 +181,14 @@ impl Course<'_, '_> {
 
     fn go(&mut self) -> Result<(), Ended> {
         match &self.motion.rows {
-            When::Every(every) => {
+            OutputTimes::Every(every) => {
                 self.row()?;
                 while self.taken < self.count {
                     self.advance((self.taken / every + 1).saturating_mul(*every).min(self.count))?;
                     self.row()?;
                 }
             }
-            When::At(times) => {
+            OutputTimes::At(times) => {
                 for time in times {
                     self.row_at(*time)?;
                 }
@@ -201,7 +205,7 @@ impl Course<'_, '_> {
             let begin = Instant::now();
             // The factors of single steps are seen after each.
             let some = if self.motion.conformal_factor { 1 } else { self.some.min(to - self.taken) };
-            if let Err(Halt { taken, cause }) = self.stepper.advance(some) {
+            if let Err(StepFailure { taken, cause }) = self.stepper.advance(some) {
                 self.taken += taken;
                 return Err(cause.into());
             }
@@ -286,7 +290,7 @@ impl Course<'_, '_> {
         let Place { t, q, v, z } = &self.last;
         Outcome {
             status,
-            suspicion: self.stepper.suspicion(),
+            unresolved: self.stepper.unresolved(),
             steps: self.taken,
             t: *t,
             q: outward(q),

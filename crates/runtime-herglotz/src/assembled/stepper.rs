@@ -3,7 +3,7 @@
 use super::{Assembled, argument};
 use crate::RuntimeError;
 use assembled_herglotz::{AssembledGauss, AssembledMidpoint, AssembledSplitting, State};
-use discrete_herglotz::{AnyIntegrator, Halt, Method, StepError, Suspicion};
+use discrete_herglotz::{AnyIntegrator, Method, StepError, StepFailure, UnresolvedStep};
 
 /// An integrator at work, with the action.
 pub(super) enum Stepper<'a> {
@@ -57,7 +57,7 @@ impl<'a> Stepper<'a> {
     }
 
     /// Takes steps.
-    pub fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+    pub fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         match self {
             Stepper::Splitting(stepper, _) => stepper.advance(steps),
             Stepper::Midpoint(stepper) => stepper.advance(steps),
@@ -81,11 +81,11 @@ impl<'a> Stepper<'a> {
     }
 
     /// The first look at which the steps were seen not to resolve the motion.
-    pub fn suspicion(&mut self) -> Option<Suspicion> {
+    pub fn unresolved(&mut self) -> Option<UnresolvedStep> {
         match self {
-            Stepper::Splitting(stepper, _) => stepper.suspicion(),
-            Stepper::Midpoint(stepper) => stepper.suspicion(),
-            Stepper::Gauss(stepper, _) => stepper.suspicion(),
+            Stepper::Splitting(stepper, _) => stepper.unresolved(),
+            Stepper::Midpoint(stepper) => stepper.unresolved(),
+            Stepper::Gauss(stepper, _) => stepper.unresolved(),
         }
     }
 

@@ -2,8 +2,8 @@
 
 use super::theorems::{Points, theorems};
 use super::{Sized, coordinates};
-use crate::{Check, Interrupt, MomentumThere, Motion, Place, RuntimeError, Stated, Way};
-use contact_geom::{OneParameterGroup, PhasePoint, Triple, larger, largest};
+use crate::{Check, Interrupt, MomentumSample, Motion, Place, RuntimeError, StatementResidual, StepControl};
+use contact_geom::{ChartVector, OneParameterGroup, PhasePoint, max_abs_or_nan, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, Start, Steps, Stop, Until};
 use formula_lagrangian::FormulaLagrangian;
 use std::ops::ControlFlow;
@@ -44,15 +44,15 @@ fn contact_defect<const N: usize>(
     t: f64,
     at: &PhasePoint<N>,
 ) -> Result<f64, RuntimeError> {
-    let from = Triple::from(*at);
+    let from = ChartVector::from(*at);
     let (end, sigma) = step(lagrangian, way, t, at)?;
     let size = |x: f64| if x > 0.0 { x } else { 1.0 };
     let sizes = [size(at.q.amax()), size(at.p.amax()), size(at.z.abs())];
     let mut differences = Vec::with_capacity(2 * N + 1);
     for k in 0..=2 * N {
         let distance = DISTANCE * sizes[k / N.max(1)];
-        let moved = |by: f64| -> Result<Triple<N>, RuntimeError> {
-            let there = Triple::<N>::from_fn(|i| from.component(i) + if i == k { by * distance } else { 0.0 });
+        let moved = |by: f64| -> Result<ChartVector<N>, RuntimeError> {
+            let there = ChartVector::<N>::from_fn(|i| from.component(i) + if i == k { by * distance } else { 0.0 });
             Ok(step(lagrangian, way, t, &there.into())?.0.into())
         };
         let [near, middle, far] = [1.0, 2.0, 3.0].map(|by| Ok::<_, RuntimeError>(moved(by)?.minus(moved(-by)?)));
@@ -66,8 +66,8 @@ fn contact_defect<const N: usize>(
         // In units of the coordinates.
         differences.push(((pulled_back - sigma * eta) * sizes[k / N.max(1)], pulled_back * sizes[k / N.max(1)]));
     }
-    let apart = largest(differences.iter().map(|d| d.0));
-    Ok(if apart == 0.0 { 0.0 } else { apart / largest(differences.iter().map(|d| d.1)) })
+    let apart = max_abs_or_nan(differences.iter().map(|d| d.0));
+    Ok(if apart == 0.0 { 0.0 } else { apart / max_abs_or_nan(differences.iter().map(|d| d.1)) })
 }
 
 /// How far a step is from the motion, relative to its size, for a unit of time.
@@ -78,15 +78,16 @@ fn herglotz_defect<const N: usize>(
     at: &PhasePoint<N>,
 ) -> Result<f64, RuntimeError> {
     let exact = (AnyIntegrator::Gauss { stages: 16 }, way.1, 2);
-    let (a, b) = (Triple::from(step(lagrangian, way, t, at)?.0), Triple::from(step(lagrangian, exact, t, at)?.0));
-    Ok(a.minus(b).amax() / larger(b.amax(), Triple::from(*at).amax()) / way.1.abs())
+    let (a, b) =
+        (ChartVector::from(step(lagrangian, way, t, at)?.0), ChartVector::from(step(lagrangian, exact, t, at)?.0));
+    Ok(a.minus(b).amax() / max_or_nan(b.amax(), ChartVector::from(*at).amax()) / way.1.abs())
 }
 
 pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: usize) -> Result<Check, RuntimeError> {
     let plan = super::run::plan(system, motion)?;
     let by = match motion.way {
-        Way::Steps { by, .. } | Way::Accuracy { by: Some(by), .. } => by,
-        Way::Accuracy { by: None, .. } => {
+        StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => by,
+        StepControl::Accuracy { by: None, .. } => {
             let unknown = |_| InputError::NoIntegrator;
             plan.integrator.name.parse().map_err(unknown)?
         }
@@ -99,7 +100,7 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
     let momenta = |x: &PhasePoint<N>| symmetries.iter().map(|s| s.momentum(&x.q, &x.p)).collect::<Vec<f64>>();
     let first = momenta(problem.state());
     let mut states: Vec<(f64, PhasePoint<N>, f64)> = vec![(motion.start.t, *problem.state(), 0.0)];
-    let mut seen = |at: &discrete_herglotz::Moment<'_, N>| {
+    let mut seen = |at: &discrete_herglotz::StepView<'_, N>| {
         if at.k.is_multiple_of(stride) && !at.last {
             states.push((at.t, at.state, at.log_factor.unwrap_or(f64::NAN)));
         }
@@ -118,7 +119,7 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
         }
         let there = momenta(x).into_iter().zip(&first);
         let momenta =
-            there.map(|(momentum, first)| MomentumThere { momentum, predicted: first * log_factor.exp() }).collect();
+            there.map(|(momentum, first)| MomentumSample { momentum, predicted: first * log_factor.exp() }).collect();
         along.push(Place {
             t: *t,
             sigma: step(lagrangian, way, *t, x)?.1,
@@ -149,7 +150,7 @@ fn theorems_with<const N: usize>(
     system: &Sized<N>,
     stages: usize,
     (h, places): (f64, &[&(f64, PhasePoint<N>, f64)]),
-) -> Result<Vec<Stated>, RuntimeError> {
+) -> Result<Vec<StatementResidual>, RuntimeError> {
     let n = system.0.formula().dimension();
     let mut points = Vec::with_capacity(places.len());
     for (t, x, _) in places {

@@ -3,7 +3,7 @@
 use super::observed::{Observed, Seen};
 use super::recorder::{Crossings, check_events, number};
 use super::{Sized, coordinates};
-use crate::{Column, Ending, EnsembleWatch, Event, Interrupt, MemberEnd, RuntimeError, Varied, Way};
+use crate::{Column, Ending, EnsembleMonitor, Event, Interrupt, MemberEnd, RuntimeError, StepControl, Varied};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint};
 use discrete_herglotz::{Ensemble, EnsembleError, InputError, Member, Row, Start, Tally, Until, legendre_inverse};
@@ -26,7 +26,7 @@ const LONG: Duration = Duration::from_millis(100);
 pub(super) fn run<const N: usize>(
     system: &Sized<N>,
     ensemble: &crate::Ensemble<'_>,
-    watch: &mut dyn EnsembleWatch,
+    watch: &mut dyn EnsembleMonitor,
 ) -> Result<Tally, RuntimeError> {
     if ensemble.count == 0 {
         return Err(EnsembleError::Empty.into());
@@ -42,8 +42,8 @@ pub(super) fn run<const N: usize>(
     let (shard, mut shards, fixed) = match (&ensemble.way, &ensemble.varied) {
         _ if observed => (OBSERVED, 2, false),
         (_, Some(_)) => (SHARD, 1, true),
-        (Way::Accuracy { .. }, None) => (SHARD, SHARDS, true),
-        (Way::Steps { .. }, None) => (SHARD, 2, false),
+        (StepControl::Accuracy { .. }, None) => (SHARD, SHARDS, true),
+        (StepControl::Steps { .. }, None) => (SHARD, 2, false),
     };
     let interrupt = watch.interrupt();
     let (mut tally, mut first) = (Tally::default(), 0);
@@ -71,7 +71,7 @@ struct Block<'b, const N: usize> {
     members: Range<usize>,
     tally: &'b mut Tally,
     interrupt: Option<&'b Interrupt>,
-    watch: &'b mut dyn EnsembleWatch,
+    watch: &'b mut dyn EnsembleMonitor,
     ended: bool,
 }
 
@@ -131,9 +131,9 @@ impl<const N: usize> Block<'_, N> {
             }),
         };
         let many = match way {
-            Way::Accuracy { wanted, by: None } => many.accuracy(wanted),
-            Way::Accuracy { wanted, by: Some(by) } => many.by(by).accuracy(wanted),
-            Way::Steps { by, steps } => many.by(by).steps(steps),
+            StepControl::Accuracy { wanted, by: None } => many.accuracy(wanted),
+            StepControl::Accuracy { wanted, by: Some(by) } => many.by(by).accuracy(wanted),
+            StepControl::Steps { by, steps } => many.by(by).steps(steps),
         };
         let many = match ensemble.threads {
             Some(threads) => many.threads(threads),
@@ -160,7 +160,7 @@ impl<const N: usize> Block<'_, N> {
                 let row = end_of(l, ending, last.as_ref());
                 Ending {
                     status: ending.status,
-                    suspicion: ending.suspicion,
+                    unresolved: ending.unresolved,
                     steps: ending.steps,
                     t: ending.t,
                     q: coordinates(&row.q, n).to_vec(),
@@ -191,8 +191,8 @@ impl<const N: usize> Block<'_, N> {
         self.tally.completed += of_block.completed;
         self.tally.stopped += of_block.stopped;
         self.tally.failed += of_block.failed;
-        self.tally.suspicious += of_block.suspicious;
-        self.tally.in_lanes += of_block.in_lanes;
+        self.tally.unresolved += of_block.unresolved;
+        self.tally.batch_kernel += of_block.batch_kernel;
         let first_failed = of_block.first_failed.map(|index| first + index);
         self.tally.first_failed = self.tally.first_failed.or(first_failed);
         Ok(())

@@ -4,11 +4,12 @@ use super::{Sized, coordinates};
 use crate::{Geometry, RuntimeError, Start};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    ContactForm, Derivatives, Lagrangian, LagrangianForm, Regularity, Triple, VelocityPoint, herglotz_field, legendre,
+    ChartVector, ContactForm, Derivatives, Lagrangian, LagrangianForm, Regularity, VelocityPoint, herglotz_field,
+    legendre,
 };
 
 /// The components of a vector on TQ x R over the first so many coordinates.
-fn components<const N: usize>(x: &Triple<N>, n: usize) -> Vec<f64> {
+fn components<const N: usize>(x: &ChartVector<N>, n: usize) -> Vec<f64> {
     [coordinates(&x.x, n), coordinates(&x.y, n), &[x.z]].concat()
 }
 
@@ -22,7 +23,7 @@ pub(super) fn at<const N: usize>(system: &Sized<N>, at: &Start) -> Result<Geomet
     let problem = system.problem(at)?;
     let (lagrangian, t, x, n) = (&system.0, at.t, problem.start(), system.0.formula().dimension());
     let form = LagrangianForm { lagrangian, t };
-    let point = Triple::from(*x);
+    let point = ChartVector::from(*x);
     let (g, w) = (lagrangian.gradient(t, x), lagrangian.hessian(t, x).vv);
     let value = lagrangian.value(t, &x.q, &x.v, x.z);
     let p = legendre(lagrangian, t, x).p;

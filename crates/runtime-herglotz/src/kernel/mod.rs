@@ -10,11 +10,12 @@ mod run;
 mod theorems;
 
 use crate::{
-    Check, Ensemble, EnsembleWatch, Geometry, Motion, Outcome, Plan, Rate, RuntimeError, SeenSymmetry, Start, Watch,
+    Check, Ensemble, EnsembleMonitor, Geometry, InitialVelocity, Motion, Outcome, Plan, RunMonitor, RuntimeError,
+    SeenSymmetry, Start,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Structure, Symmetry, VelocityPoint};
-use discrete_herglotz::{AnyIntegrator, InputError, Interrupted, Problem, StepError, Tally};
+use discrete_herglotz::{AnyIntegrator, InputError, Problem, ResumeState, StepError, Tally};
 use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
 use std::sync::Arc;
 
@@ -28,8 +29,13 @@ pub(crate) trait Kernel: Send + Sync {
     fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError>;
     fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError>;
     fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError>;
-    fn run(&self, motion: &Motion, watch: &mut dyn Watch, from: Option<Interrupted>) -> Result<Outcome, RuntimeError>;
-    fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleWatch) -> Result<Tally, RuntimeError>;
+    fn run(
+        &self,
+        motion: &Motion,
+        watch: &mut dyn RunMonitor,
+        from: Option<ResumeState>,
+    ) -> Result<Outcome, RuntimeError>;
+    fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError>;
     fn rates(&self, t: f64, y: &[f64], to: &mut [f64]);
     fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError>;
     fn check(&self, motion: &Motion, places: usize) -> Result<Check, RuntimeError>;
@@ -78,12 +84,12 @@ impl<const N: usize> Sized<N> {
         }
         let q = self.vector("q", &start.q)?;
         Ok(match &start.rate {
-            Rate::Velocity(v) => VelocityPoint { q, v: self.vector("v", v)?, z: start.z }.into(),
-            Rate::MomentumNear { p, v } => discrete_herglotz::Start::Momentum(
+            InitialVelocity::Velocity(v) => VelocityPoint { q, v: self.vector("v", v)?, z: start.z }.into(),
+            InitialVelocity::MomentumNear { p, v } => discrete_herglotz::Start::Momentum(
                 PhasePoint { q, p: self.vector("p", p)?, z: start.z },
                 self.vector("v", v)?,
             ),
-            Rate::Momentum(p) => PhasePoint { q, p: self.vector("p", p)?, z: start.z }.into(),
+            InitialVelocity::Momentum(p) => PhasePoint { q, p: self.vector("p", p)?, z: start.z }.into(),
         })
     }
 
@@ -161,11 +167,16 @@ impl<const N: usize> Kernel for Sized<N> {
         run::plan(self, motion)
     }
 
-    fn run(&self, motion: &Motion, watch: &mut dyn Watch, from: Option<Interrupted>) -> Result<Outcome, RuntimeError> {
+    fn run(
+        &self,
+        motion: &Motion,
+        watch: &mut dyn RunMonitor,
+        from: Option<ResumeState>,
+    ) -> Result<Outcome, RuntimeError> {
         run::run(self, motion, watch, from)
     }
 
-    fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleWatch) -> Result<Tally, RuntimeError> {
+    fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
         ensemble::run(self, ensemble, watch)
     }
 

@@ -1,8 +1,8 @@
 //! What is recorded of the members of an ensemble.
 
 use super::recorder::{Crossings, rows};
-use crate::{Column, Crossing, When};
-use discrete_herglotz::{Course, InputError, Moment, Needs, Observer, Row, Rows, Stop, Terminal};
+use crate::{Column, Crossing, OutputTimes};
+use discrete_herglotz::{InputError, Observer, OutputRequest, Row, Rows, RunInfo, StepView, Stop, Terminal};
 use std::ops::ControlFlow;
 
 /// What was recorded of a member.
@@ -30,13 +30,13 @@ pub(super) struct Observed<'r, const N: usize> {
 
 impl<'r, const N: usize> Observed<'r, N> {
     pub fn new(
-        when: Option<&When>,
+        when: Option<&OutputTimes>,
         columns: &[Column],
         crossings: Option<Crossings<'r, N>>,
     ) -> Result<Self, InputError> {
         let of_rows = when.map(|when| rows(when, columns)).transpose()?;
         let has_factor = columns.iter().any(Column::has_conformal_factor);
-        let last = has_factor.then(|| rows(&When::Every(usize::MAX), columns)).transpose()?;
+        let last = has_factor.then(|| rows(&OutputTimes::Every(usize::MAX), columns)).transpose()?;
         Ok(Observed { rows: of_rows, last, crossings, found: Vec::new(), forward: true })
     }
 
@@ -51,13 +51,13 @@ impl<const N: usize> Observer<N> for Observed<'_, N> {
         self.crossings.as_ref().and_then(Crossings::terminal)
     }
 
-    fn needs(&self) -> Needs {
+    fn needs(&self) -> OutputRequest {
         let of = |rows: &Option<Rows<'_, N>>| rows.as_ref().map(Observer::needs).unwrap_or_default();
         let of_events = self.crossings.as_ref().map(Crossings::needs).unwrap_or_default();
         of(&self.rows).and(of(&self.last)).and(of_events)
     }
 
-    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         self.forward = course.t_end >= course.t0;
         for rows in self.rows.iter_mut().chain(&mut self.last) {
             rows.prepare(course)?;
@@ -72,14 +72,14 @@ impl<const N: usize> Observer<N> for Observed<'_, N> {
         self.rows.as_ref().map_or(usize::MAX, |rows| rows.next(taken))
     }
 
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         for rows in self.rows.iter_mut().chain(&mut self.last) {
             rows.start(at)?;
         }
         self.crossings.as_mut().map_or(ControlFlow::Continue(()), |crossings| crossings.start(at))
     }
 
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         for rows in self.rows.iter_mut().chain(&mut self.last) {
             rows.step(at)?;
         }

@@ -97,7 +97,7 @@ fn by<D: DiscreteLagrangian<N>, const N: usize>(
         log_factor: found.log_factor,
         regularity: found.regularity,
         error_estimate: found.error_estimate,
-        suspicion: found.suspicion,
+        unresolved: found.unresolved,
         iterations: found.iterations,
     })
 }

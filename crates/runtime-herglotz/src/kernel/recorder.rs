@@ -1,11 +1,11 @@
 //! The one observer of a motion: rows, events, nodes, and whether it is to go on.
 
 use super::coordinates;
-use crate::{Column, Crossing, Direction, Motion, Rate, RuntimeError, Start, Watch, When};
+use crate::{Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{
-    Course, Event, Events, InputError, Moment, Needs, Observer, Row, Rows, Stop, Terminal, legendre_inverse,
+    Event, Events, InputError, Observer, OutputRequest, Row, Rows, RunInfo, StepView, Stop, Terminal, legendre_inverse,
 };
 use formula_lagrangian::{Expression, FormulaLagrangian};
 use std::cell::Cell;
@@ -15,7 +15,7 @@ use std::rc::Rc;
 /// The steps between two polls.
 const POLL: usize = 256;
 
-/// Sees a motion for a [`Watch`].
+/// Sees a motion for a [`RunMonitor`].
 pub(super) struct Recorder<'r, const N: usize> {
     rows: Option<Rows<'r, N>>,
     columns: &'r [Column],
@@ -23,25 +23,25 @@ pub(super) struct Recorder<'r, const N: usize> {
     numbers: Vec<f64>,
     crossings: Option<Crossings<'r, N>>,
     nodes: bool,
-    needs: Needs,
-    course: Option<Course>,
+    needs: OutputRequest,
+    course: Option<RunInfo>,
     dimension: usize,
-    watch: &'r mut dyn Watch,
+    watch: &'r mut dyn RunMonitor,
 }
 
 impl<'r, const N: usize> Recorder<'r, N> {
     pub fn new(
         lagrangian: &'r FormulaLagrangian<N>,
         motion: &'r Motion,
-        watch: &'r mut dyn Watch,
+        watch: &'r mut dyn RunMonitor,
     ) -> Result<Self, RuntimeError> {
         let columns = motion.columns.as_slice();
         let rows = motion.rows.as_ref().map(|when| rows(when, columns)).transpose()?;
         check_events(lagrangian, &motion.events)?;
         let crossings = Crossings::of(lagrangian, &motion.events, Some(&motion.start));
-        let needs = |of: Option<Needs>| of.unwrap_or_default();
+        let needs = |of: Option<OutputRequest>| of.unwrap_or_default();
         let of_rows = needs(rows.as_ref().map(Observer::needs)).and(needs(crossings.as_ref().map(Crossings::needs)));
-        let of_all = Needs { action: motion.nodes, conformal_factor: false, saved: motion.resumable };
+        let of_all = OutputRequest { action: motion.nodes, conformal_factor: false, saved: motion.resumable };
         Ok(Recorder {
             rows,
             columns,
@@ -70,7 +70,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
         ControlFlow::Continue(())
     }
 
-    fn see(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn see(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if self.nodes {
             let PhasePoint { q, p, z } = &at.state;
             // Where it is not found the momentum alone goes on.
@@ -78,7 +78,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
             self.watch.node(at.t, [q, &v, p].map(|x| coordinates(x, self.dimension)), *z);
         }
         if at.k.is_multiple_of(POLL)
-            && let Some(Course { t0, t_end, .. }) = self.course
+            && let Some(RunInfo { t0, t_end, .. }) = self.course
             && self.watch.poll(if t_end == t0 { 1.0 } else { (at.t - t0) / (t_end - t0) }).is_break()
         {
             if let Some(interrupted) = at.interrupted() {
@@ -98,10 +98,10 @@ impl<'r, const N: usize> Recorder<'r, N> {
 }
 
 /// The rows that columns need.
-pub(super) fn rows<'r, const N: usize>(when: &When, columns: &[Column]) -> Result<Rows<'r, N>, InputError> {
+pub(super) fn rows<'r, const N: usize>(when: &OutputTimes, columns: &[Column]) -> Result<Rows<'r, N>, InputError> {
     let rows = match when {
-        When::Every(stride) => Rows::every(*stride)?,
-        When::At(times) => Rows::at(times.iter().copied())?,
+        OutputTimes::Every(stride) => Rows::every(*stride)?,
+        OutputTimes::At(times) => Rows::at(times.iter().copied())?,
     };
     let any = |of: fn(&Column) -> bool| columns.iter().any(of);
     let velocity = any(|c| match c {
@@ -202,7 +202,7 @@ impl<'r, const N: usize> Crossings<'r, N> {
     /// `None` where there are no events.
     pub fn of(lagrangian: &'r FormulaLagrangian<N>, events: &'r [crate::Event], start: Option<&Start>) -> Option<Self> {
         let numbers = match start.map(|start| &start.rate) {
-            Some(Rate::Velocity(v) | Rate::MomentumNear { v, .. }) => v.as_slice(),
+            Some(InitialVelocity::Velocity(v) | InitialVelocity::MomentumNear { v, .. }) => v.as_slice(),
             _ => &[],
         };
         let v = SVector::from_fn(|i, _| numbers.get(i).copied().unwrap_or(0.0));
@@ -221,17 +221,17 @@ impl<'r, const N: usize> Crossings<'r, N> {
         })
     }
 
-    pub fn needs(&self) -> Needs {
-        Needs { action: self.action, ..Needs::default() }
+    pub fn needs(&self) -> OutputRequest {
+        OutputRequest { action: self.action, ..OutputRequest::default() }
     }
 
-    pub fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+    pub fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         self.beside.began.set(course.t0);
         self.backward = course.t_end < course.t0;
         self.events.prepare(course)
     }
 
-    pub fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    pub fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if self.velocity
             && let Ok(v) = at.velocity()
         {
@@ -248,7 +248,7 @@ impl<'r, const N: usize> Crossings<'r, N> {
     /// Hands on what is found in a step; `Break` at a terminal event.
     pub fn step(
         &mut self,
-        at: &Moment<'_, N>,
+        at: &StepView<'_, N>,
         mut hand_on: impl FnMut(Crossing) -> ControlFlow<()>,
     ) -> ControlFlow<Stop<N>> {
         let ended = self.events.step(at);
@@ -292,11 +292,11 @@ impl<const N: usize> Observer<N> for Recorder<'_, N> {
         self.crossings.as_ref().and_then(Crossings::terminal)
     }
 
-    fn needs(&self) -> Needs {
+    fn needs(&self) -> OutputRequest {
         self.needs
     }
 
-    fn prepare(&mut self, course: &Course) -> Result<(), InputError> {
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
         self.course = Some(*course);
         if let Some(rows) = &mut self.rows {
             rows.prepare(course)?;
@@ -312,7 +312,7 @@ impl<const N: usize> Observer<N> for Recorder<'_, N> {
         self.rows.as_ref().map_or(poll, |rows| rows.next(taken).min(poll))
     }
 
-    fn start(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if let Some(rows) = &mut self.rows {
             rows.start(at)?;
         }
@@ -323,7 +323,7 @@ impl<const N: usize> Observer<N> for Recorder<'_, N> {
         self.see(at)
     }
 
-    fn step(&mut self, at: &Moment<'_, N>) -> ControlFlow<Stop<N>> {
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if let Some(rows) = &mut self.rows {
             rows.step(at)?;
         }

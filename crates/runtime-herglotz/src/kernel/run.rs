@@ -2,8 +2,8 @@
 
 use super::recorder::Recorder;
 use super::{Sized, coordinates};
-use crate::{Motion, Outcome, Plan, RuntimeError, Watch, Way};
-use discrete_herglotz::{Interrupted, Problem, Run, Until};
+use crate::{Motion, Outcome, Plan, RunMonitor, RuntimeError, StepControl};
+use discrete_herglotz::{Problem, ResumeState, Run, Until};
 use formula_lagrangian::FormulaLagrangian;
 
 /// The run of a motion, without its observer.
@@ -16,9 +16,9 @@ fn of<'p, 'o, const N: usize>(
     motion: &Motion,
 ) -> Result<Run<'p, 'o, FormulaLagrangian<N>, N>, RuntimeError> {
     let run = match motion.way {
-        Way::Accuracy { wanted, by: None } => problem.accuracy(wanted),
-        Way::Accuracy { wanted, by: Some(by) } => problem.by(by).accuracy(wanted),
-        Way::Steps { by, steps } => problem.by(by).steps(steps),
+        StepControl::Accuracy { wanted, by: None } => problem.accuracy(wanted),
+        StepControl::Accuracy { wanted, by: Some(by) } => problem.by(by).accuracy(wanted),
+        StepControl::Steps { by, steps } => problem.by(by).steps(steps),
     };
     let run = if motion.action { run } else { run.without_action() };
     let run = if motion.conformal_factor { run.with_conformal_factor() } else { run };
@@ -48,8 +48,8 @@ pub(super) fn plan<const N: usize>(system: &Sized<N>, motion: &Motion) -> Result
 pub(super) fn run<const N: usize>(
     system: &Sized<N>,
     motion: &Motion,
-    watch: &mut dyn Watch,
-    from: Option<Interrupted>,
+    watch: &mut dyn RunMonitor,
+    from: Option<ResumeState>,
 ) -> Result<Outcome, RuntimeError> {
     let problem = system.problem_of(motion)?;
     let mut recorder = Recorder::new(&system.0, motion, watch)?;
@@ -61,7 +61,7 @@ pub(super) fn run<const N: usize>(
     let (outcome, n) = (run.run(Until::Time(motion.end))?, system.0.formula().dimension());
     Ok(Outcome {
         status: outcome.status,
-        suspicion: outcome.suspicion,
+        unresolved: outcome.unresolved,
         steps: outcome.steps,
         t: outcome.t,
         q: coordinates(&outcome.q, n).to_vec(),

@@ -1,8 +1,8 @@
 //! The theorems of the discrete theory on points of a motion.
 
-use crate::{RuntimeError, Stated};
+use crate::{RuntimeError, StatementResidual};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{DiscretePoint, larger};
+use contact_geom::{DiscretePoint, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, DiscreteLagrangian, Gauss, statements};
 use formula_lagrangian::{Formula, FormulaError};
 
@@ -23,7 +23,7 @@ pub(super) fn theorems(
     stages: usize,
     h: f64,
     points: &[Points],
-) -> Result<Vec<Stated>, RuntimeError> {
+) -> Result<Vec<StatementResidual>, RuntimeError> {
     macro_rules! of {
         ($($n:literal)*) => {
             match formula.dimension() {
@@ -40,7 +40,7 @@ fn within<const N: usize>(
     stages: usize,
     h: f64,
     points: &[Points],
-) -> Result<Vec<Stated>, RuntimeError> {
+) -> Result<Vec<StatementResidual>, RuntimeError> {
     let lagrangian = formula.lagrangian_within::<N>()?;
     let (gauss, symmetries) = (Gauss::new::<N>(&lagrangian, stages, h)?, lagrangian.symmetries());
     let vector = |q: &[f64]| SVector::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0));
@@ -56,11 +56,11 @@ fn within<const N: usize>(
         let mut worst: Option<f64> = None;
         for (t, point) in &points {
             if let Some(residual) = statements::residual(statement, &gauss, &symmetries, *t, point)? {
-                worst = Some(worst.map_or(residual, |worst| larger(worst, residual)));
+                worst = Some(worst.map_or(residual, |worst| max_or_nan(worst, residual)));
             }
         }
         if let Some(residual) = worst {
-            stated.push(Stated { statement, method: method.clone(), step_size: h, residual });
+            stated.push(StatementResidual { statement, method: method.clone(), step_size: h, residual });
         }
     }
     Ok(stated)

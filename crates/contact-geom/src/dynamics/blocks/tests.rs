@@ -1,7 +1,8 @@
 //! By blocks as by all directions at once.
 
 use crate::{
-    Derivatives, Dual, Lagrangian, Scalar, Structure, Triple, VelocityPoint, derived_gradient, herglotz_rates, seed,
+    ChartVector, Derivatives, Dual, Lagrangian, Scalar, Structure, VelocityPoint, derived_gradient, herglotz_rates,
+    seed,
 };
 use nalgebra::SVector;
 
@@ -33,7 +34,7 @@ impl Lagrangian<N> for Closed {
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         Generic.value(t, q, v, z)
     }
-    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
+    fn closed_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
         Some(derived_gradient(&Generic, t, x))
     }
 }
@@ -58,7 +59,7 @@ fn close(a: f64, b: f64) -> bool {
 fn derivatives_are_those_of_all_directions_at_once() {
     fn compare(l: &impl Lagrangian<N>) {
         let (t, x) = point();
-        let once = seed(&Triple::from(x));
+        let once = seed(&ChartVector::from(x));
         let first = l.value(Dual::from(t), &once.x, &once.y, once.z);
         let twice = seed(&once);
         let second = l.value(Dual::from(t), &twice.x, &twice.y, twice.z).d;

@@ -2,7 +2,7 @@
 //! is said.
 
 use super::*;
-use crate::{Hessian, Scalar, Triple, check_closed_derivatives};
+use crate::{ChartVector, Hessian, Scalar, check_closed_derivatives};
 use nalgebra::SVector;
 
 /// `m v^2/2 - k q^2/2` and one more term, in units of the action, the time and the length.
@@ -152,9 +152,12 @@ impl Lagrangian<2> for Closed {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
         (v[0] * v[0] + v[1] * v[1] - q[0] * q[0] * q[1] - z * z) * 0.5e-12
     }
-    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<2, T>) -> Option<Triple<2, T>> {
-        let gradient =
-            Triple { x: SVector::from([-x.q[0] * x.q[1], x.q[0] * x.q[0] * -0.5 * self.gradient]), y: x.v, z: -x.z };
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<2, T>) -> Option<ChartVector<2, T>> {
+        let gradient = ChartVector {
+            x: SVector::from([-x.q[0] * x.q[1], x.q[0] * x.q[0] * -0.5 * self.gradient]),
+            y: x.v,
+            z: -x.z,
+        };
         Some(gradient.scale(T::from(1e-12)))
     }
     fn closed_hessian<T: Scalar>(&self, _t: T, x: &VelocityPoint<2, T>) -> Option<Hessian<2, T>> {

@@ -1,15 +1,15 @@
 //! What the steps of a run say of themselves: whether they resolve the motion.
 
 use super::{GaussStepper, Route};
+use crate::gauss::defect_sample::{Compare, Curve, DefectSample, SAMPLE_SETS};
 use crate::gauss::dense::StepStart;
-use crate::gauss::look::{Compare, Curve, Look, SETS};
+use crate::gauss::parametrization::Physical;
 use crate::gauss::resolution::ROUNDINGS;
-use crate::gauss::time_transformation::Physical;
+use crate::run::resolution_monitor::{defect, sharper, size, value_rounding};
 use crate::run::saved::saved;
-use crate::run::watch::{misfit, sharper, size, value_rounding};
-use crate::{Doubt, Stepper, Suspicion, legendre_inverse};
+use crate::{Stepper, SuspectInterval, UnresolvedStep, legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, gradient_rounding, larger, largest};
+use contact_geom::{Derivatives, Lagrangian, gradient_rounding, max_abs_or_nan, max_or_nan};
 use pulp::{Simd, WithSimd};
 
 /// The misfit between the nodes from which a step of at least three stages does not resolve the motion: of harmonics it then has an
@@ -33,16 +33,16 @@ impl<const N: usize> Sequence<N> {
 saved!([const N: usize] Sequence<N> { velocities, q, ends });
 
 /// The stages up to which the nodes of a step do not tell whether it resolves the motion.
-pub(crate) const FEW: usize = 2;
+pub(crate) const FEW_STAGES: usize = 2;
 
 impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step.
-    pub(crate) fn look(&self, sets: usize) -> Option<Look> {
+    pub(crate) fn look(&self, sets: usize) -> Option<DefectSample> {
         let curve = self.arch.dispatch(LookAtStages { run: self })?;
         let at = |set| {
             self.arch.dispatch(Compare { lagrangian: self.lagrangian, transformation: &Physical, curve: &curve, set })
         };
-        (0..sets).map(at).reduce(Look::and)
+        (0..sets).map(at).reduce(DefectSample::and)
     }
 
     /// Follows the mean velocities of steps; those of few stages tell whether they resolve the motion, of others the sharpest turns are
@@ -66,38 +66,38 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         }
         let [a, b, c, d] = &*velocities;
         let sharper = sharper([&(d - c * 2.0 + b), c, &q], h, self.watch.floor, self.watch.sharpest);
-        let few = self.s <= FEW;
-        if few && let Some(misfit) = misfit([a, b, c, d], &q, h, self.watch.floor) {
+        let few = self.s <= FEW_STAGES;
+        if few && let Some(defect) = defect([a, b, c, d], &q, h, self.watch.floor) {
             // Like those of a rule, seen one step late.
-            self.watch.note(self.k.saturating_sub(1), misfit);
+            self.watch.note(self.k.saturating_sub(1), defect);
         }
         if let (Some(sharpness), Some(step)) = (sharper, self.k.checked_sub(1).filter(|step| *step > 0)) {
             let t = self.t0 + step as f64 * h;
             let (from, to) = (self.phase(&from), self.phase(&end));
-            self.watch.doubt(sharpness, Doubt { step, steps: 2, t, from, to });
+            self.watch.doubt(sharpness, SuspectInterval { step, steps: 2, t, from, to });
         }
     }
 
     /// The first step that was seen not to resolve the motion, or what a look at the last one shows.
-    pub(super) fn mark(&self) -> Option<Suspicion> {
+    pub(super) fn mark(&self) -> Option<UnresolvedStep> {
         if self.of_sigma > 1.0 && self.k > 0 {
-            return Some(Suspicion { step: 0, misfit: self.of_sigma });
+            return Some(UnresolvedStep { step: 0, defect: self.of_sigma });
         }
         self.watch.first.or_else(|| {
             // A linear motion that is not resolved is so in every step, and none was looked at on the way.
-            let sets = if let Route::Linear(..) = &*self.route { SETS } else { 1 };
-            let Look { misfit, of_momenta, of_action, size, size_z, .. } = self.look(sets)?;
+            let sets = if let Route::Linear(..) = &*self.route { SAMPLE_SETS } else { 1 };
+            let DefectSample { defect, of_momenta, of_action, size, size_z, .. } = self.look(sets)?;
             // A step of fewer stages is no polynomial between its nodes to speak of.
-            let allowed = if self.s > FEW { UNRESOLVED } else { 1.0 };
+            let allowed = if self.s > FEW_STAGES { UNRESOLVED } else { 1.0 };
             // A NaN is a misfit too.
-            if misfit <= allowed {
+            if defect <= allowed {
                 return None;
             }
             let [of_p, of_z] = self.rounding();
-            if of_momenta <= larger(allowed * size, of_p) && of_action <= larger(allowed * size_z, of_z) {
+            if of_momenta <= max_or_nan(allowed * size, of_p) && of_action <= max_or_nan(allowed * size_z, of_z) {
                 return None;
             }
-            Some(Suspicion { step: self.k - 1, misfit: misfit / allowed })
+            Some(UnresolvedStep { step: self.k - 1, defect: defect / allowed })
         })
     }
 
@@ -122,10 +122,10 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &near) else { return [0.0; 2] };
         let (l, g) = gradient_rounding(self.lagrangian, t, &x);
         // The stages of the integrating factor carry roundings the further, the more it changes in the step.
-        let (of, h) = (|part: &SVector<f64, N>| largest(part.iter().copied()), self.h.abs());
+        let (of, h) = (|part: &SVector<f64, N>| max_abs_or_nan(part.iter().copied()), self.h.abs());
         let carried = ROUNDINGS * (1.0 + self.sigma().ln().abs());
         // No bound where the derivatives have none. What is below the normal numbers has lost its digits.
-        [larger(of(&g.x) * h, of(&g.y)), value_rounding(l, &g.x, &x.q) * h]
+        [max_or_nan(of(&g.x) * h, of(&g.y)), value_rounding(l, &g.x, &x.q) * h]
             .map(|once| if (carried * once).is_finite() { carried * once + f64::MIN_POSITIVE } else { 0.0 })
     }
 }

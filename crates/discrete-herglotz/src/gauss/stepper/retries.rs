@@ -107,17 +107,17 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
 
     /// Tries the next cheaper solution once its pause is over.
     pub(super) fn resume(&mut self) {
-        if self.solution != Solution::Sweeps && self.pause == 0 {
+        if self.solution != Solution::FixedPointIteration && self.pause == 0 {
             self.solution = match self.solution {
                 Solution::Newton => Solution::Simplified,
-                _ => Solution::Sweeps,
+                _ => Solution::FixedPointIteration,
             };
             self.pause = self.pauses;
-            if self.solution == Solution::Sweeps {
+            if self.solution == Solution::FixedPointIteration {
                 match &mut *self.route {
                     Route::Linear(..) => {}
-                    Route::Condensed(run) => run.park_newton(),
-                    Route::General(run) => run.park_newton(),
+                    Route::Condensed(run) => run.suspend_newton(),
+                    Route::General(run) => run.suspend_newton(),
                 }
             }
         }

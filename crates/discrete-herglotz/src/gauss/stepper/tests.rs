@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::Gauss;
-use crate::{DiscreteLagrangian, Solver, Transition};
+use crate::{DiscreteLagrangian, DiscreteStep, Solver};
 use contact_geom::systems::QuadraticInZ;
 use contact_geom::{Scalar, Structure};
 use pulp::Arch;
@@ -77,7 +77,7 @@ fn follow(gauss: &Gauss<OneSided>, set: Arch, route: GaussRoute) -> (usize, u64)
     for _ in 0..100 {
         let (t, from) = (run.time(), run.state());
         run.advance(1).unwrap();
-        let Transition { end, .. } = gauss.forward(t, &from, &from.p, &mut Solver::default()).unwrap();
+        let DiscreteStep { end, .. } = gauss.forward(t, &from, &from.p, &mut Solver::default()).unwrap();
         let found = run.state();
         // Some rounding of positions, momenta and actions, all below 2.
         for (a, b) in [(found.q[0], end.q[0]), (found.p[0], end.p[0]), (found.z, end.z)] {
@@ -137,7 +137,7 @@ fn lanes_have_no_value_to_branch_on() {
             }
             let mut run = gauss.stepper(0.0, PhasePoint::new([-0.4], [0.0], 0.0), SVector::zeros()).unwrap();
             run.arch = Instructions::only(set);
-            assert_eq!(run.advance(3), Err(Halt { taken: 0, cause: StepError::Branched }), "{set:?}");
+            assert_eq!(run.advance(3), Err(StepFailure { taken: 0, cause: StepError::Branched }), "{set:?}");
         }
     }
     assert!(StepError::Branched.to_string().contains("if_less"));

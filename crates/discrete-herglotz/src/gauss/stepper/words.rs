@@ -36,7 +36,8 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
         self.solved.load(from)?;
         let mut solution = 0u32;
         solution.load(from)?;
-        self.solution = [Solution::Sweeps, Solution::Simplified, Solution::Newton].get(solution as usize).copied()?;
+        self.solution =
+            [Solution::FixedPointIteration, Solution::Simplified, Solution::Newton].get(solution as usize).copied()?;
         self.pause.load(from)?;
         self.pauses.load(from)?;
         self.newton_steps.load(from)?;

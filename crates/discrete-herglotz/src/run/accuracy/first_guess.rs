@@ -4,7 +4,7 @@ use super::Request;
 use crate::Problem;
 use crate::rules::step_equations::inverted;
 use contact_geom::nalgebra::SMatrix;
-use contact_geom::{Derivatives, Lagrangian, larger};
+use contact_geom::{Derivatives, Lagrangian, max_or_nan};
 use std::f64::consts::PI;
 
 /// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.
@@ -27,7 +27,7 @@ pub(in crate::run) fn first_guess<L: Lagrangian<N>, const N: usize>(
     // Beyond half a period sweeps do not contract.
     let radians = 0.5 * radians;
     // Sweeps for the velocity contract by the angle that it turns.
-    let count = span.abs() * larger(of_position / radians.min(s / 3.0).min(PI), turning / radians.min(1.0));
+    let count = span.abs() * max_or_nan(of_position / radians.min(s / 3.0).min(PI), turning / radians.min(1.0));
     // What is stiff at its start need not be resolved, and what is free there may be anything later.
     if count.is_finite() { (count.ceil() as usize).clamp(1, 1 << 20) } else { 1 }
 }

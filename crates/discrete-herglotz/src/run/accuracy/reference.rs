@@ -4,25 +4,25 @@ use super::*;
 
 /// The steps of any integrator, whose runs are compared with the reference.
 pub(super) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
-    pilots: &mut Pilots<'_, 'p, L, N>,
+    trials: &mut TrialRuns<'_, 'p, L, N>,
     integrator: &Shared<'p, L, N>,
     found: &Converged<N>,
-) -> Result<Choice<'p, L, N>, InputError> {
-    let wanted = pilots.wanted;
-    let (order, marks) = (f64::from(integrator.facts().order), &found.marks);
+) -> Result<StepSelection<'p, L, N>, InputError> {
+    let wanted = trials.wanted;
+    let (order, marks) = (f64::from(integrator.info().order), &found.marks);
     let whole = |count: f64| marks.whole(count);
     let refuse = |reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
     let mut count = whole((found.k * REFERENCE) as f64 / order.min(4.0));
     let (mut best, mut strikes) = (f64::INFINITY, 0);
-    let (mut cause, mut before) = (Obstacle::Budget, None);
+    let (mut cause, mut before) = (SelectionFailure::Budget, None);
     // The fewest steps that were seen to be enough, with their error.
     let mut enough: Option<(usize, f64)> = None;
     for _ in 0..ATTEMPTS {
         if count as f64 > MOST_STEPS {
             break;
         }
-        let factor = match pilots.own(integrator, count, marks)? {
-            PilotEnd::Followed(track) => {
+        let factor = match trials.own(integrator, count, marks)? {
+            TrialEnd::Followed(track) => {
                 let error = track.distance(&found.truth);
                 if error <= 0.7 * wanted {
                     enough = Some((count, error));
@@ -42,7 +42,8 @@ pub(super) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
                 if let Some((n, other)) = before.replace((count, error)) {
                     let shown = f64::ln(other / error) / f64::ln(count as f64 / n as f64);
                     let round_off = error < 1e-9 && shown < 0.5 * order;
-                    cause = if round_off { Obstacle::RoundOff } else { Obstacle::Order { order: shown } };
+                    cause =
+                        if round_off { SelectionFailure::RoundOff } else { SelectionFailure::Order { order: shown } };
                 }
                 best = best.min(error);
                 if strikes == 4 {
@@ -54,22 +55,23 @@ pub(super) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
                     2.0
                 }
             }
-            PilotEnd::Halted { part, cause: halt } => {
+            TrialEnd::Halted { part, cause: halt } => {
                 if enough.is_some() {
                     break;
                 }
-                cause = Obstacle::Halted { t: pilots.request.problem.t0 + part * pilots.request.span, cause: halt };
+                cause =
+                    SelectionFailure::Halted { t: trials.request.problem.t0 + part * trials.request.span, cause: halt };
                 2.0
             }
             _ => {
-                cause = Obstacle::Budget;
+                cause = SelectionFailure::Budget;
                 break;
             }
         };
         count = whole(count as f64 * factor);
     }
     match enough {
-        Some((count, error)) => Ok(chosen(pilots, integrator, count, error, found)),
+        Some((count, error)) => Ok(chosen(trials, integrator, count, error, found)),
         None => refuse(best, cause),
     }
 }

@@ -1,9 +1,9 @@
 //! What the choice of steps costs.
 
 use super::choose_with;
-use crate::run::pilot::{BUDGET, Pilots};
-use crate::run::{Needs, Problem, Request, Shared, Until};
-use crate::{AnyIntegrator, GaussCollocation, Stepper, Wants};
+use crate::run::trial_runs::{BUDGET, TrialRuns};
+use crate::run::{OutputRequest, Problem, Request, Shared, Until};
+use crate::{AnyIntegrator, GaussCollocation, Stepper, StepperOptions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Duffing, Kepler, OneCoordinate, Pendulum, QuadraticInZ};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
@@ -18,13 +18,13 @@ fn search<L: Lagrangian<N>, const N: usize>(
     wanted: f64,
 ) -> (Cow<'static, str>, usize, u64) {
     let integrator = integrator.map(|by| Arc::new(by) as Shared<'_, L, N>);
-    let request = Request { problem, t_end: span, span, integrator, needs: Needs::default(), scales: None };
-    let mut pilots = Pilots::new(&request, wanted);
-    let choice = choose_with(&mut pilots).unwrap();
-    (choice.integrator.facts().name, choice.count, BUDGET - pilots.left)
+    let request = Request { problem, t_end: span, span, integrator, needs: OutputRequest::default(), scales: None };
+    let mut trials = TrialRuns::new(&request, wanted);
+    let choice = choose_with(&mut trials).unwrap();
+    (choice.integrator.info().name, choice.count, BUDGET - trials.left)
 }
 
-/// Pilot runs cost a small multiple of the run: those with k, 2k and k + 1 steps, and where the first do not agree with 4k; before them one that
+/// trial runs cost a small multiple of the run: those with k, 2k and k + 1 steps, and where the first do not agree with 4k; before them one that
 /// ends where its misfit is seen to be too large. The run has more than k steps, or more than 1.2 k.
 #[test]
 fn pilot_runs_cost_little() {
@@ -70,7 +70,8 @@ fn steps_that_cost_less_are_taken() {
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.0], 1.0)).unwrap();
     let (_, count, _) = search(&problem, 100.0, None, 1e-3);
     let newton_steps = |count: usize| {
-        let mut run = GaussCollocation { stages: 8 }.run(&problem, 100.0 / count as f64, Wants::default()).unwrap();
+        let mut run =
+            GaussCollocation { stages: 8 }.run(&problem, 100.0 / count as f64, StepperOptions::default()).unwrap();
         run.advance(count).unwrap();
         run.newton_steps()
     };
@@ -78,7 +79,7 @@ fn steps_that_cost_less_are_taken() {
     assert!(3 * ours < longer, "{ours} of {count} steps, {longer} of {}", count / 2);
 }
 
-/// So they do by a clock; and where it would gain nothing it costs nothing: the search is that for the integrator by name.
+/// So they do in transformed time; and where it would gain nothing it costs nothing: the search is that for the integrator by name.
 #[test]
 fn pilot_runs_by_a_clock_cost_little() {
     let kepler = Kepler::<2> { gamma: 0.0, mu: 1.0 };
@@ -94,7 +95,7 @@ fn pilot_runs_by_a_clock_cost_little() {
                 assert_eq!((integrator, spent), (name, by_name), "{e}");
                 continue;
             }
-            assert_eq!(integrator, "clocked_gauss_8", "{e}");
+            assert_eq!(integrator, "transformed_gauss_8", "{e}");
             let run = problem.accuracy(1e-8).run(Until::Time(40.0)).unwrap();
             let most = 7.0 * run.evaluations as f64 + 2.5 * 2.0 * 2000.0;
             assert!(spent as f64 <= most, "{e}: {spent} evaluations for {}", run.evaluations);

@@ -76,7 +76,7 @@ fn what_is_narrow_is_met() {
                 };
                 let system = Meeting { thing, c, at: place(k), w };
                 let found = motion(&system, [0.0, v, 0.3], duration).unwrap().end.v[0];
-                if (found - v).abs() < 1e-12 { missed += 1 } else { worst = larger(worst, (found - end).abs()) }
+                if (found - v).abs() < 1e-12 { missed += 1 } else { worst = max_or_nan(worst, (found - end).abs()) }
             }
             // A velocity turned round in a part w of the span is known to the rounding of the positions there: c / w of it.
             assert!(missed <= 1 && worst < 64.0 * f64::EPSILON * 9.0 * 40.0 / w, "w = {w}: {missed} missed, {worst:e}");
@@ -104,7 +104,7 @@ fn kinks_are_found() {
         };
         // A dozen roundings in each half of a period, of a time that grows.
         let found = found.unwrap();
-        let apart = larger((found.end.q[0] - q).abs(), (found.end.v[0] - v).abs());
+        let apart = max_or_nan((found.end.q[0] - q).abs(), (found.end.v[0] - v).abs());
         assert!(apart < 128.0 * f64::EPSILON * (1.0 + periods), "{periods}: {apart:e}");
         assert!(found.evaluations < 6000 + 6000 * periods as u64, "{periods}: {}", found.evaluations);
     }
@@ -205,7 +205,7 @@ fn a_ripple_on_a_spring_is_met() {
                 let end = motion(&system, [x[0], x[1], 0.0], duration / parts).unwrap().end;
                 x = [end.q[0], end.v[0]];
             }
-            let apart = larger((whole.q[0] - x[0]).abs() / q, (whole.v[0] - x[1]).abs() / fastest);
+            let apart = max_or_nan((whole.q[0] - x[0]).abs() / q, (whole.v[0] - x[1]).abs() / fastest);
             // Roundings of the parts' sums, which add up like a random walk; neighbours part no faster than q k.sqrt() a time.
             assert!(apart < 4.0 * f64::EPSILON * parts.sqrt(), "{k}, {duration}: {apart:e}");
         }

@@ -4,17 +4,17 @@ use contact_examples::{Checks, Subject, fractions};
 use contact_geom::statements::{ActionSquared, ClosedFlow, conformal_flow};
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, Lienard, VanDerPol};
 use contact_geom::{
-    ContactForm, Darboux, DarbouxField, GeometryError, Smooth, SmoothFunction, Statement, Triple, dissipation_defect,
-    hamiltonian_vector_field, infinitesimal_conformality,
+    ChartVector, ContactForm, Darboux, DarbouxField, GeometryError, Smooth, SmoothFunction, Statement,
+    dissipation_defect, hamiltonian_vector_field, infinitesimal_conformality,
 };
 
 /// The points at which each statement is checked on each system.
 pub const SAMPLES: usize = 32;
 
 /// A point of T\*Q x R with `|q|, |p| < 2` and `|z| < 1`.
-fn phase_point(i: usize) -> Triple<1> {
+fn phase_point(i: usize) -> ChartVector<1> {
     let u = fractions(i, 3);
-    Triple { x: [4.0 * u[0] - 2.0].into(), y: [4.0 * u[1] - 2.0].into(), z: 2.0 * u[2] - 1.0 }
+    ChartVector { x: [4.0 * u[0] - 2.0].into(), y: [4.0 * u[1] - 2.0].into(), z: 2.0 * u[2] - 1.0 }
 }
 
 /// Statements 5 and 11 along flows in closed form.
@@ -77,13 +77,16 @@ fn hamiltonian(name: &'static str, h: &impl SmoothFunction<1>, checks: &mut Chec
     }
 }
 
-fn field_in_darboux_coordinates(h: &impl SmoothFunction<1>, x: &Triple<1>) -> Result<f64, GeometryError> {
+fn field_in_darboux_coordinates(h: &impl SmoothFunction<1>, x: &ChartVector<1>) -> Result<f64, GeometryError> {
     let closed = DarbouxField { hamiltonian: h, t: 0.0 }.at(x)?;
     let generic = hamiltonian_vector_field(&Darboux, h, 0.0, x)?;
     Ok(closed.minus(generic).amax() / closed.amax().max(generic.amax()))
 }
 
-fn conformal_at_the_rate_of_the_reeb_field(h: &impl SmoothFunction<1>, x: &Triple<1>) -> Result<f64, GeometryError> {
+fn conformal_at_the_rate_of_the_reeb_field(
+    h: &impl SmoothFunction<1>,
+    x: &ChartVector<1>,
+) -> Result<f64, GeometryError> {
     let measured = infinitesimal_conformality(&Darboux, &DarbouxField { hamiltonian: h, t: 0.0 }, x)?;
     let rate = -h.differential(0.0, x).dot(&Darboux.reeb(x)?);
     Ok(measured.defect.max((measured.rate - rate).abs() / (1.0 + rate.abs())))

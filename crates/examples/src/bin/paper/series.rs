@@ -3,7 +3,7 @@
 use crate::explicit::Explicit;
 use contact_examples::Failure;
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, System};
-use contact_geom::{DiscretePoint, Energy, GeometryError, PhasePoint, SmoothFunction, Triple, VelocityPoint};
+use contact_geom::{ChartVector, DiscretePoint, Energy, GeometryError, PhasePoint, SmoothFunction, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, Flow, legendre_minus};
 
 /// The rate of the conformal factor in both examples, in inverse units of time.
@@ -94,7 +94,7 @@ pub fn rows<E: Example>(system: &E, ld: &impl DiscreteLagrangian<1>, count: usiz
     let mut rows = Vec::with_capacity(count);
     for k in 0..count {
         let t = k as f64 * h;
-        let middle = Triple { x: (step.q0 + step.q1) * 0.5, y: (step.q1 - step.q0) / h, z: step.z0 };
+        let middle = ChartVector { x: (step.q0 + step.q1) * 0.5, y: (step.q1 - step.q0) / h, z: step.z0 };
         let truth = system.motion(t, &origin);
         rows.push(Row {
             k,

@@ -74,7 +74,7 @@ fn distance(a: &[[f64; 2]], b: &[[f64; 2]], relative: bool) -> f64 {
     let of = |(a, b): (&[f64; 2], &[f64; 2])| {
         (a[0] - b[0]).hypot(a[1] - b[1]) / if relative { b[0].hypot(b[1]) } else { 1.0 }
     };
-    contact_geom::largest(a.iter().zip(b).map(of))
+    contact_geom::max_abs_or_nan(a.iter().zip(b).map(of))
 }
 
 /// The pendula of problem P5: `q0` in [-2, 2] by `v0` in [-1, 1], 400 by 250.
@@ -242,7 +242,7 @@ fn peak() -> Option<usize> {
 }
 
 fn sizes(report: &mut Report) -> Result<(), Failure> {
-    let largest = if report.quick { 100_000 } else { 1_000_000 };
+    let max_abs_or_nan = if report.quick { 100_000 } else { 1_000_000 };
     let start = |i: usize| VelocityPoint::new([2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0], [0.5], 0.0);
     let run = |count: usize, integrator: AnyIntegrator, threads: usize| -> Result<f64, Failure> {
         let ensemble = Ensemble::new(&PENDULUM, 0.0, count, start)
@@ -259,7 +259,7 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
     for integrator in [AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6), AnyIntegrator::Gauss { stages: 4 }] {
         let mut peaks = Vec::new();
         let mut count = 100;
-        while count <= largest {
+        while count <= max_abs_or_nan {
             peak();
             let seconds = run(count, integrator, 1)?;
             let bytes = peak();
@@ -276,7 +276,7 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
             );
         }
         // In turn, so that others on the machine disturb both.
-        let count = largest / 5;
+        let count = max_abs_or_nan / 5;
         let mut seconds = [f64::INFINITY; 2];
         for _ in 0..20 {
             for threads in [1, 2] {

@@ -1,7 +1,7 @@
 """Pendula by heyoka's Taylor method, in batches as wide as its vectors and one by one, to errors that are found here.
 
 Reads the drag gamma, then the count and the time of the neighbours. Writes a line for each run: what, how, the tolerance, the seconds
-for each member, and the largest error at the end.
+for each member, and the max_abs_or_nan error at the end.
 """
 
 import sys

@@ -5,7 +5,7 @@ use crate::sparse_path;
 use contact_examples::Failure;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::Chain;
-use contact_geom::{Hessian, Lagrangian, Scalar, Triple, VelocityPoint, larger, largest};
+use contact_geom::{ChartVector, Hessian, Lagrangian, Scalar, VelocityPoint, max_abs_or_nan, max_or_nan};
 use discrete_herglotz::{BoundaryPath, DiscreteLagrangian, End, LeftMidpoint};
 use std::hint::black_box;
 use std::time::Instant;
@@ -46,10 +46,10 @@ fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str;
             let sparse = black_box(sparse_path::newton::<N>(&ld, steps, ends()));
             let seconds = start.elapsed().as_secs_f64();
             let off = |points: &[SVector<f64, N>]| {
-                largest(points.iter().zip(&found.points).flat_map(|(a, b)| (a - b).data.0[0]))
+                max_abs_or_nan(points.iter().zip(&found.points).flat_map(|(a, b)| (a - b).data.0[0]))
             };
-            let of_actions = largest(actions.iter().zip(&found.actions).map(|(a, b)| a - b));
-            differences[0] = if actions.is_empty() { f64::NAN } else { larger(off(&points), of_actions) };
+            let of_actions = max_abs_or_nan(actions.iter().zip(&found.actions).map(|(a, b)| a - b));
+            differences[0] = if actions.is_empty() { f64::NAN } else { max_or_nan(off(&points), of_actions) };
             if let Some((points, corrections)) = sparse {
                 best_sparse = best_sparse.min(seconds / f64::from(corrections));
                 differences[1] = off(&points);
@@ -104,8 +104,8 @@ impl<const N: usize> Lagrangian<N> for Springs<N> {
     }
 
     #[inline(always)]
-    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> Option<Triple<N, T>> {
-        Some(Triple { x: -springs(&x.q).0, y: x.v, z: T::from(GAMMA) })
+    fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
+        Some(ChartVector { x: -springs(&x.q).0, y: x.v, z: T::from(GAMMA) })
     }
 
     #[inline(always)]
@@ -186,15 +186,15 @@ fn by_hand_newton<const N: usize>(steps: usize, h: f64) -> ByHand<N> {
             (next[k], rhs[k]) = (upper, right);
             (u, g, k_mid) = (u1, g1, k1);
         }
-        let (mut change, mut largest, mut size) = (SVector::<f64, N>::zeros(), 0.0f64, 0.0f64);
+        let (mut change, mut max_abs_or_nan, mut size) = (SVector::<f64, N>::zeros(), 0.0f64, 0.0f64);
         for k in (1..steps).rev() {
             change = rhs[k] - next[k] * change;
             q[k] += change;
-            largest = largest.max(change.amax());
+            max_abs_or_nan = max_abs_or_nan.max(change.amax());
             size = size.max(q[k].amax());
         }
         // Quadratic convergence: after a correction of 1e-8 the next is round-off; the library makes it to be sure.
-        if largest <= 1e-10 * size {
+        if max_abs_or_nan <= 1e-10 * size {
             let mut z = vec![0.0; steps + 1];
             for k in 0..steps {
                 let v = (q[k + 1] - q[k]) / h;

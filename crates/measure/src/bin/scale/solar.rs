@@ -8,7 +8,7 @@ use assembled_herglotz::{AssembledSplitting, AssembledSystem, State};
 use contact_examples::{Failure, print};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Bodies;
-use contact_geom::{PhasePoint, larger};
+use contact_geom::{PhasePoint, max_or_nan};
 use discrete_herglotz::{Gauss, SplittingScheme, Stepper};
 use std::time::Instant;
 
@@ -81,7 +81,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     for (error, seconds) in &theirs.runs {
         report.row(CASE, &format!("REBOUND's IAS15 to {error:.0e} au"), years, *seconds, None);
         // What is below the difference of the two finest runs is round-off, of both.
-        let level = larger(*error, distance(exact, &finest));
+        let level = max_or_nan(*error, distance(exact, &finest));
         let here = ours.iter().filter(|f| f.0 <= level).map(|f| f.1).fold(f64::INFINITY, f64::min);
         report.verdict(CASE, &format!("time to {error:.0e} au over IAS15's"), here / seconds, 0.5);
     }

@@ -35,13 +35,13 @@ pub fn newton<const N: usize>(
         let matrix = SparseColMat::new_from_argsort(pattern.clone(), order, &entries.values).ok()?;
         let lu = Lu::try_new_with_symbolic(symbolic.clone(), matrix.as_ref()).ok()?;
         lu.solve_in_place(&mut rhs);
-        let (mut largest, mut most) = (0.0f64, 0.0f64);
+        let (mut max_abs_or_nan, mut most) = (0.0f64, 0.0f64);
         for k in 1..=steps {
             let place = (k - 1) * (N + 1);
             let dz = if k < steps {
                 let change = SVector::<f64, N>::from_fn(|i, _| rhs[(place + i, 0)]);
                 q[k] += change;
-                largest = largest.max(change.amax());
+                max_abs_or_nan = max_abs_or_nan.max(change.amax());
                 most = most.max(q[k].amax());
                 rhs[(place + N, 0)]
             } else {
@@ -49,7 +49,7 @@ pub fn newton<const N: usize>(
             };
             z[k] += dz;
         }
-        if largest <= 1e-10 * most {
+        if max_abs_or_nan <= 1e-10 * most {
             return Some((q, iteration));
         }
     }

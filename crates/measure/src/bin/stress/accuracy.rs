@@ -7,7 +7,7 @@ use crate::random::Random;
 use crate::report::Report;
 use crate::statistics::quantile;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
-use contact_geom::{PhasePoint, VelocityPoint, larger};
+use contact_geom::{PhasePoint, VelocityPoint, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, InputError, Method, SplittingScheme, Steps};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -246,7 +246,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     report.at_most("where dop853 sides with the run, not with the exact flow: count", that(&|f| f.doubt), 0.0)?;
     let of = |value: &dyn Fn(&Found) -> Option<f64>| known.iter().filter_map(|(_, f)| value(f)).collect::<Vec<f64>>();
     let planned = of(&|f| (f.named.is_none() && f.run.is_finite()).then_some(f.plan / f.run));
-    report.at_most_timed("time of plan and pilots over the run's, median", quantile(&planned, 0.5), 4.0)?;
+    report.at_most_timed("time of plan and trial runs over the run's, median", quantile(&planned, 0.5), 4.0)?;
     let ratios = of(&|f| Some(f.run / f.best?));
     report.at_most_timed("time of the run over the best configuration's, median", quantile(&ratios, 0.5), 1.5)?;
     report.say(&format!(
@@ -257,7 +257,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         quantile(&ratios, 0.9),
         ratios.len()
     ))?;
-    let longest = known.iter().fold(0.0, |most, (_, f)| larger(most, f.plan));
+    let longest = known.iter().fold(0.0, |most, (_, f)| max_or_nan(most, f.plan));
     report.at_most_timed("longest plan, in seconds", longest, PATIENCE)?;
 
     let mut decades: BTreeMap<i32, [f64; 5]> = BTreeMap::new();

@@ -7,7 +7,7 @@ use crate::random::Random;
 use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, Triple, VelocityPoint, larger, largest};
+use contact_geom::{ChartVector, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Flow, Gauss, InputError, Rows, Run, Stepper, Steps};
 
 /// A particle in a square well with rounded corners, chaotic at this energy.
@@ -66,8 +66,8 @@ fn reversal(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
             let back = turned(&run(-gamma, span, &end)?);
             let growth = growth(&end, span / PIECE, |x| run(-gamma, PIECE, x))?;
             let defect = distance(&back, &start, 1.0);
-            worst = larger(worst, defect / (growth * f64::EPSILON * (steps_of(span) as f64).sqrt()));
-            largest_growth = larger(largest_growth, growth);
+            worst = max_or_nan(worst, defect / (growth * f64::EPSILON * (steps_of(span) as f64).sqrt()));
+            largest_growth = max_or_nan(largest_growth, growth);
         }
         Ok((worst, largest_growth))
     });
@@ -82,7 +82,7 @@ fn reversal(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
             points.push((f64::from(*span), worst * growth * f64::EPSILON * (steps_of(*span) as f64).sqrt(), growth));
         }
         match of_family.iter_mut().find(|(n, _)| *n == name) {
-            Some((_, w)) => *w = larger(*w, worst),
+            Some((_, w)) => *w = max_or_nan(*w, worst),
             None => of_family.push((name, worst)),
         }
     }
@@ -123,7 +123,7 @@ fn growth(
         states.push(run(&states[k])?);
     }
     let entries = |x: &PhasePoint<2>| SVector::<f64, 4>::new(x.q[0], x.q[1], x.p[0], x.p[1]);
-    let mut largest = 1.0;
+    let mut max_abs_or_nan = 1.0;
     for k in 0..4 {
         let (mut growth, mut direction) = (1.0, SVector::<f64, 4>::ith(k, 1.0));
         for ends in states.windows(2) {
@@ -133,13 +133,13 @@ fn growth(
             growth *= apart.norm() / APART;
             direction = apart.normalize();
         }
-        largest = larger(largest, growth);
+        max_abs_or_nan = max_or_nan(max_abs_or_nan, growth);
     }
-    Ok(largest)
+    Ok(max_abs_or_nan)
 }
 
 fn bits<const N: usize>(x: &PhasePoint<N>) -> Vec<u64> {
-    let x = Triple::from(*x);
+    let x = ChartVector::from(*x);
     (0..=2 * N).map(|i| x.component(i).to_bits()).collect()
 }
 
@@ -201,11 +201,11 @@ fn lanes(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure
         let mut fast = gauss.stepper(0.0, problem.state(), start.v)?;
         let mut plain = Flow::with_guess(&gauss, 0.0, problem.state(), start.v)?;
         let ended = fast.advance(8).is_err() || Stepper::advance(&mut plain, 8).is_err();
-        let (a, b) = (Triple::from(Stepper::state(&fast)), Triple::from(Stepper::state(&plain)));
-        let ulps = largest(a.minus(b).to_vector().iter().copied()) / f64::EPSILON;
+        let (a, b) = (ChartVector::from(Stepper::state(&fast)), ChartVector::from(Stepper::state(&plain)));
+        let ulps = max_abs_or_nan(a.minus(b).to_vector().iter().copied()) / f64::EPSILON;
         let ulps = if ended { f64::NAN } else { ulps };
         rows.push(vec!["lanes against single numbers".into(), stages.to_string(), "8".into(), number(ulps)]);
-        worst = larger(worst, ulps);
+        worst = max_or_nan(worst, ulps);
     }
     // Eight steps, each with the rounding of its sums and of Newton's last iterate.
     report.at_most("gauss_1 .. 16 in lanes against single numbers, 8 steps: ulps of one", worst, 32.0)

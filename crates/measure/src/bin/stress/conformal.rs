@@ -5,7 +5,7 @@ use crate::motion::{FAMILIES, Problem};
 use crate::parallel::parallel;
 use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
-use contact_geom::{PhasePoint, Triple, VelocityPoint, larger, largest};
+use contact_geom::{ChartVector, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, InputError, Steps};
 
 /// The drag, and the step: a power of two.
@@ -33,9 +33,9 @@ fn factor(integrator: AnyIntegrator) -> f64 {
         AnyIntegrator::Composition(_, scheme) => {
             scheme.substeps().map_or(f64::NAN, |g| g.iter().map(|g| rational(*g)).sum())
         }
-        // Gauss methods have the Pade approximation of e^x, which at this x is e^x from two stages on; by a clock its steps differ.
+        // Gauss methods have the Pade approximation of e^x, which at this x is e^x from two stages on; in transformed time its steps differ.
         AnyIntegrator::Gauss { .. }
-        | AnyIntegrator::Clocked { .. }
+        | AnyIntegrator::TransformedGauss { .. }
         | AnyIntegrator::Divided(_)
         | AnyIntegrator::Splitting(_) => 2.0 * half,
     }
@@ -46,7 +46,7 @@ fn angular(x: &PhasePoint<2>) -> f64 {
 }
 
 /// One step from a state.
-fn step(integrator: AnyIntegrator, from: &Triple<2>) -> Result<(PhasePoint<2>, f64), InputError> {
+fn step(integrator: AnyIntegrator, from: &ChartVector<2>) -> Result<(PhasePoint<2>, f64), InputError> {
     let start = VelocityPoint { q: from.x, v: from.y, z: from.z };
     let problem = Problem { system: Formula::<2>::kepler(GAMMA), t0: 0.0, start, span: H };
     let motion = problem.motion()?;
@@ -59,12 +59,12 @@ fn step(integrator: AnyIntegrator, from: &Triple<2>) -> Result<(PhasePoint<2>, f
 /// How far a step's pullback of `dz - p dq` is from `sigma_d` times it: by differences of fourth order.
 fn contact_defect(integrator: AnyIntegrator, at: &PhasePoint<2>) -> Result<f64, InputError> {
     const DISTANCE: f64 = 1e-3;
-    let from = Triple::from(*at);
+    let from = ChartVector::from(*at);
     let (end, sigma) = step(integrator, &from)?;
     let mut worst = 0.0;
     for k in 0..5 {
-        let moved = |by: f64| -> Result<Triple<2>, InputError> {
-            let there = Triple::from_fn(|i| from.component(i) + if i == k { by * DISTANCE } else { 0.0 });
+        let moved = |by: f64| -> Result<ChartVector<2>, InputError> {
+            let there = ChartVector::from_fn(|i| from.component(i) + if i == k { by * DISTANCE } else { 0.0 });
             Ok(step(integrator, &there)?.0.into())
         };
         let (near, far) = (moved(1.0)?.minus(moved(-1.0)?), moved(2.0)?.minus(moved(-2.0)?));
@@ -75,7 +75,7 @@ fn contact_defect(integrator: AnyIntegrator, at: &PhasePoint<2>) -> Result<f64, 
             4 => 1.0,
             _ => 0.0,
         };
-        worst = larger(worst, (pulled_back - sigma * eta).abs() / (1.0 + at.p.norm()));
+        worst = max_or_nan(worst, (pulled_back - sigma * eta).abs() / (1.0 + at.p.norm()));
     }
     Ok(worst)
 }
@@ -124,10 +124,10 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         // A rounding of the momentum each substep, as a random walk; a composition has 17.
         let stages = if matches!(integrator, AnyIntegrator::Composition(..)) { 17.0 } else { 5.0 };
         let walk = |steps: f64| 8.0 * f64::EPSILON * (stages * steps).sqrt();
-        let momentum = largest(found.iter().map(|r| r.momentum / walk(r.steps)));
+        let momentum = max_abs_or_nan(found.iter().map(|r| r.momentum / walk(r.steps)));
         // Each sigma_d is a number beside one, rounded to half of eps.
-        let product = largest(found.iter().map(|r| r.product / (stages * f64::EPSILON * r.steps)));
-        let contact = largest(found.iter().map(|r| r.contact));
+        let product = max_abs_or_nan(found.iter().map(|r| r.product / (stages * f64::EPSILON * r.steps)));
+        let contact = max_abs_or_nan(found.iter().map(|r| r.contact));
         report.at_most(
             &format!("{integrator}: angular momentum against its factor, over a random walk"),
             momentum,

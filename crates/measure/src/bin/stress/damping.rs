@@ -7,7 +7,7 @@ use crate::report::Report;
 use contact_examples::{Failure, number};
 use contact_geom::nalgebra::SMatrix;
 use contact_geom::systems::HarmonicOscillator;
-use contact_geom::{PhasePoint, VelocityPoint, larger};
+use contact_geom::{PhasePoint, VelocityPoint, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, SplittingScheme};
 use std::collections::BTreeMap;
 
@@ -114,7 +114,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     for ((integrator, claims, gamma, k), (worth, error)) in cases.iter().zip(&found) {
         let exact = *integrator == AnyIntegrator::Splitting(SplittingScheme::STRANG);
         if exact && *claims && *k <= 1e-9 && *gamma <= 0.0 {
-            worst = larger(worst, if *worth == Worth::Right { *error } else { f64::NAN });
+            worst = max_or_nan(worst, if *worth == Worth::Right { *error } else { f64::NAN });
         }
     }
     report.at_most("strang at k h^2 <= 1e-9, any damping: error (its rate is exact)", worst, 1e-8)?;
@@ -148,7 +148,7 @@ fn masses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
                 _ => f64::NAN,
             };
             if integrator.order() >= 16 {
-                worst = larger(worst, error);
+                worst = max_or_nan(worst, error);
             }
             *tally.entry(worth).or_default() += 1;
             let names = [integrator.to_string(), "true".into(), number(ratio)];

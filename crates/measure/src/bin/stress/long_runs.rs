@@ -7,7 +7,7 @@ use crate::report::Report;
 use crate::statistics::quantile;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::systems::HarmonicOscillator;
-use contact_geom::{PhasePoint, Triple, VelocityPoint, larger, largest};
+use contact_geom::{ChartVector, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, SplittingScheme, Steps};
 use std::time::Instant;
 
@@ -125,7 +125,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         for (steps, error, bound) in &seen {
             rows.push([name.clone(), steps.to_string(), number(*error), number(*bound)].into());
         }
-        let worst = largest(seen.iter().map(|(_, error, bound)| error / bound));
+        let worst = max_abs_or_nan(seen.iter().map(|(_, error, bound)| error / bound));
         let last = seen.last().copied().unwrap_or((f64::NAN, f64::NAN, f64::NAN));
         let what =
             format!("{name}: error over its bound, worst along {:.0e} steps ({:.1e} at the end)", last.0, last.1);
@@ -192,11 +192,15 @@ fn decays(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
             }
         }
         let end = stepper.state();
-        broken += u32::from(fails || !Triple::from(end).is_finite());
-        left = larger(left, largest([end.q[0], end.p[0], end.z]));
+        broken += u32::from(fails || !ChartVector::from(end).is_finite());
+        left = max_or_nan(left, max_abs_or_nan([end.q[0], end.p[0], end.z]));
         slower.push(quantile(&times[11..], 0.5) / quantile(&times[..8], 0.5));
     }
     report.at_most("families that fail or give a NaN on the way to zero", f64::from(broken), 0.0)?;
     report.at_most("what is left where e^-1000 is", left, 1e-300)?;
-    report.at_most_timed("time of a step at zero over that of a step before, the slowest family", largest(slower), 5.0)
+    report.at_most_timed(
+        "time of a step at zero over that of a step before, the slowest family",
+        max_abs_or_nan(slower),
+        5.0,
+    )
 }

@@ -2,7 +2,7 @@
 
 use crate::formula::Formula;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, Triple, VelocityPoint, herglotz_rates, larger, legendre};
+use contact_geom::{ChartVector, PhasePoint, VelocityPoint, herglotz_rates, legendre, max_or_nan};
 use differential_equations::methods::ExplicitRungeKutta;
 use differential_equations::prelude::{IVP, ODE};
 use discrete_herglotz::{
@@ -91,7 +91,7 @@ impl<const N: usize> End<N> {
     /// What it is worth where the error may be at most a bound.
     pub fn worth(&self, truth: &PhasePoint<N>, scale: f64, bound: f64) -> Worth {
         match self {
-            End::Whole(state) | End::Marked(state) if !Triple::from(*state).is_finite() => Worth::NotANumber,
+            End::Whole(state) | End::Marked(state) if !ChartVector::from(*state).is_finite() => Worth::NotANumber,
             End::Whole(state) if distance(state, truth, scale) <= bound => Worth::Right,
             End::Whole(_) => Worth::Wrong,
             End::Marked(_) => Worth::Marked,
@@ -104,7 +104,7 @@ impl<const N: usize> End<N> {
 
 /// The norm of a vector whose entries may be as small or as large as numbers are.
 pub fn norm(entries: &[f64]) -> f64 {
-    let size = contact_geom::largest(entries.iter().copied());
+    let size = contact_geom::max_abs_or_nan(entries.iter().copied());
     if size > 0.0 && size.is_finite() {
         size * entries.iter().map(|e| (e / size).powi(2)).sum::<f64>().sqrt()
     } else {
@@ -115,7 +115,7 @@ pub fn norm(entries: &[f64]) -> f64 {
 /// The 2-norm of the error of (q, p), relative to the truth's or to a scale that is larger.
 pub fn distance<const N: usize>(state: &PhasePoint<N>, truth: &PhasePoint<N>, scale: f64) -> f64 {
     let entries = |f: &dyn Fn(usize) -> f64| (0..2 * N).map(f).collect::<Vec<_>>();
-    let (found, true_one) = (Triple::from(*state), Triple::from(*truth));
+    let (found, true_one) = (ChartVector::from(*state), ChartVector::from(*truth));
     let error = entries(&|i| found.component(i) - true_one.component(i));
     let size = norm(&entries(&|i| true_one.component(i)));
     let error = norm(&error);
@@ -169,7 +169,7 @@ impl<const N: usize> Problem<N> {
             stepper.advance(1).ok()?;
             let start = VelocityPoint { q: before.q, v: self.system.velocity(&before.q, &before.p), z: before.z };
             let exact = Problem { t0, start, span: plan.step_size(), ..*self }.exact().ok()?;
-            worst = larger(worst, distance(&stepper.state(), &exact, scale));
+            worst = max_or_nan(worst, distance(&stepper.state(), &exact, scale));
             if worst > ORDER_ONE {
                 break;
             }
@@ -213,7 +213,7 @@ impl<const N: usize> Problem<N> {
 pub fn end_of_outcome<const N: usize>(outcome: &Outcome<N>) -> End<N> {
     let state = outcome.state();
     match outcome.status {
-        Status::Completed if outcome.suspicion.is_some() => End::Marked(state),
+        Status::Completed if outcome.unresolved.is_some() => End::Marked(state),
         Status::Completed => End::Whole(state),
         Status::Failed { cause, .. } => End::Halted(cause),
         _ => End::Marked(state),
@@ -228,7 +228,7 @@ impl<const N: usize, const D: usize> ODE<f64, [f64; D]> for Equations<'_, N> {
         let x = VelocityPoint { q: SVector::from_fn(|i, _| y[i]), v: SVector::from_fn(|i, _| y[N + i]), z: y[2 * N] };
         match herglotz_rates(self.0, t, &x) {
             Ok((field, _)) => {
-                let field = Triple::from(VelocityPoint { q: x.v, v: field.y, z: field.z });
+                let field = ChartVector::from(VelocityPoint { q: x.v, v: field.y, z: field.z });
                 *rate = std::array::from_fn(|i| field.component(i));
             }
             Err(_) => *rate = [f64::NAN; D],
@@ -243,14 +243,14 @@ pub fn dop853<const N: usize, const D: usize>(
     absolute: f64,
 ) -> Option<PhasePoint<N>> {
     let Problem { system, t0, start, span } = problem;
-    let from = Triple::from(*start);
+    let from = ChartVector::from(*start);
     let from: [f64; D] = std::array::from_fn(|i| from.component(i));
     let method = ExplicitRungeKutta::dop853().rtol(tolerance).atol(absolute).max_steps(10_000_000);
     let equations = Equations(system);
     let ivp = IVP::ode(&equations, *t0, t0 + span, from).t_eval([t0 + span]).method(method);
     let solution = caught(|| ivp.solve().ok()).flatten()?;
     let end = solution.y.last()?;
-    let end = VelocityPoint::from(Triple::<N>::from_fn(|i| end[i]));
+    let end = VelocityPoint::from(ChartVector::<N>::from_fn(|i| end[i]));
     Some(legendre(system, t0 + span, &end))
 }
 

@@ -12,7 +12,7 @@ use crate::statistics::{mean, rms, slope};
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw_row, number};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Radial;
-use contact_geom::{PhasePoint, Structure, VelocityPoint, larger, largest, legendre};
+use contact_geom::{PhasePoint, Structure, VelocityPoint, legendre, max_abs_or_nan, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Gauss, InputError, Method, SplittingScheme, Stepper, Steps};
 
 /// The starts of an ensemble.
@@ -53,7 +53,7 @@ enum Way {
     /// A splitting that is not told that the drag is linear.
     ActionDriven(SplittingScheme),
     /// Gauss collocation in the time of Kepler's clock.
-    Clocked(usize),
+    TransformedGauss(usize),
 }
 
 impl Way {
@@ -62,14 +62,14 @@ impl Way {
             Way::By(integrator) => integrator.to_string(),
             Way::General(stages) => format!("gauss_{stages}_general"),
             Way::ActionDriven(scheme) => format!("{}_action", scheme.name()),
-            Way::Clocked(stages) => format!("gauss_{stages}_clocked"),
+            Way::TransformedGauss(stages) => format!("transformed_gauss_{stages}"),
         }
     }
 
     fn order(self) -> u32 {
         match self {
             Way::By(integrator) => integrator.order(),
-            Way::General(stages) | Way::Clocked(stages) => 2 * stages as u32,
+            Way::General(stages) | Way::TransformedGauss(stages) => 2 * stages as u32,
             Way::ActionDriven(scheme) => scheme.order(),
         }
     }
@@ -122,17 +122,17 @@ fn ensembles() -> Vec<Ensemble> {
         (gauss(8), 16, [0.5, 0.5, 0.125]),
         (gauss(16), 16, [1.0, 1.0, 0.25]),
         (Way::General(8), 15, [0.5, 0.5, 0.125]),
-        (Way::Clocked(8), 15, [0.0, 0.0, 0.25]),
+        (Way::TransformedGauss(8), 15, [0.0, 0.0, 0.25]),
     ];
     let mut all = Vec::new();
     for (way, power, steps) in table {
         for (motion, h) in [Oscillator, Pendulum, Kepler].into_iter().zip(steps).filter(|(_, h)| *h > 0.0) {
             for drag in [Drag::None, Drag::Weak, Drag::Swinging] {
-                // The clock is for autonomous motions, drag by f(z) for a steady f. Where there is no invariant, only the scatter is looked at, and only of
+                // the time transformation is for autonomous motions, drag by f(z) for a steady f. Where there is no invariant, only the scatter is looked at, and only of
                 // methods that do not swing themselves.
                 let second = way.order() == 2 && motion != Oscillator;
                 let invariant = motion != Pendulum || drag != Drag::Swinging;
-                let steady = matches!(way, Way::Clocked(_) | Way::ActionDriven(_));
+                let steady = matches!(way, Way::TransformedGauss(_) | Way::ActionDriven(_));
                 if (steady && drag == Drag::Swinging) || (second && !invariant) {
                     continue;
                 }
@@ -279,17 +279,18 @@ impl Ensemble {
                     states
                 };
                 match self.way {
-                    Way::Clocked(stages) => {
+                    Way::TransformedGauss(stages) => {
                         let gauss = Gauss::new(&system, stages, self.h)?;
                         let clock = Radial { exponent: 1.5 };
-                        let mut stepper = gauss.clocked_stepper(clock, 0.0, legendre(&system, 0.0, &start), start.v)?;
+                        let mut stepper =
+                            gauss.transformed_stepper(clock, 0.0, legendre(&system, 0.0, &start), start.v)?;
                         Ok(walk(&mut stepper))
                     }
                     Way::By(_) | Way::General(_) | Way::ActionDriven(_) => {
                         let integrator = match self.way {
                             Way::By(integrator) => integrator,
                             Way::ActionDriven(scheme) => AnyIntegrator::Splitting(scheme),
-                            Way::General(stages) | Way::Clocked(stages) => AnyIntegrator::Gauss { stages },
+                            Way::General(stages) | Way::TransformedGauss(stages) => AnyIntegrator::Gauss { stages },
                         };
                         let motion = problem.motion()?;
                         let plan = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end())?;
@@ -318,7 +319,7 @@ impl Ensemble {
                 .iter()
                 .enumerate()
                 .filter(|(_, n)| **n * 128 > last)
-                .map(|(k, n)| ((*n as f64).ln(), larger(rms(column(rows, k)), f64::EPSILON / 8.0).ln()))
+                .map(|(k, n)| ((*n as f64).ln(), max_or_nan(rms(column(rows, k)), f64::EPSILON / 8.0).ln()))
                 .collect();
             slope(&points)
         };
@@ -407,9 +408,9 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     for way in &ways {
         let of = || worst.iter().filter(|(name, ..)| name == way);
         // Below a half is as good as a half.
-        let exponent = largest(of().map(|(_, e, _)| if *e < 0.0 { 0.0 } else { *e }));
+        let exponent = max_abs_or_nan(of().map(|(_, e, _)| if *e < 0.0 { 0.0 } else { *e }));
         report.at_most(&format!("{way}: largest exponent of the growth"), exponent, EXPONENT)?;
-        let sigmas = largest(of().filter_map(|(.., s)| *s));
+        let sigmas = max_abs_or_nan(of().filter_map(|(.., s)| *s));
         report.at_most(&format!("{way}: bias in standard errors of its mean"), sigmas, SIGMAS)?;
     }
     report.figure(&diagram(&all, &found))

@@ -7,7 +7,7 @@ use crate::parallel::parallel;
 use crate::report::Report;
 use contact_examples::{Failure, number};
 use contact_geom::systems::HarmonicOscillator;
-use contact_geom::{PhasePoint, VelocityPoint, larger};
+use contact_geom::{PhasePoint, VelocityPoint, max_or_nan};
 
 /// Powers of two from 3e-151 to 3e150: their squares, which z is, are still normal numbers.
 const POWERS: [i32; 7] = [-500, -300, -100, 0, 100, 300, 500];
@@ -53,7 +53,7 @@ fn states(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
                 _ => f64::NAN,
             };
             rows.push(row("scaled_state", &integrator.to_string(), scale, "-", error));
-            worst = larger(worst, error);
+            worst = max_or_nan(worst, error);
         }
     }
     // Some roundings for each of 64 steps.
@@ -71,7 +71,7 @@ fn tiny_steps(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
             let error = problem.by(integrator, steps).error(&exact, 0.0);
             rows.push(row("tiny_step", &integrator.to_string(), h, "-", error));
             // A rounding a step, in substeps that are up to five times as many.
-            worst = larger(worst, error);
+            worst = max_or_nan(worst, error);
         }
     }
     let bound = 2.0 * f64::EPSILON * (5.0 * steps as f64).sqrt();
@@ -107,7 +107,7 @@ fn late_times(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
             _ => f64::NAN,
         };
         rows.push(row("late_autonomous", &integrator.to_string(), LATE, "-", error));
-        moved = larger(moved, error);
+        moved = max_or_nan(moved, error);
 
         let force = Force::Swinging { size: 1.0, frequency: 0.5 };
         let system = Formula { force, ..Formula::pendulum(-0.1) };
@@ -116,7 +116,7 @@ fn late_times(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
         let error =
             problem.by(integrator, if integrator.order() > 4 { 256 } else { 1 << 16 }).error(&problem.exact()?, 0.0);
         rows.push(row("late_driven", &integrator.to_string(), LATE, "-", error));
-        worst = larger(worst, error);
+        worst = max_or_nan(worst, error);
     }
     report.at_most("autonomous motions from t0 = 1e9: difference from t0 = 0", moved, 0.0)?;
     // Times are rounded to eps t0, and with them the phase of the drive.

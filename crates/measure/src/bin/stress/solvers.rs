@@ -8,7 +8,7 @@ use crate::random::Random;
 use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{PhasePoint, Triple, VelocityPoint, larger};
+use contact_geom::{ChartVector, PhasePoint, VelocityPoint, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Flow, Gauss, InputError, Midpoint, Solver, Stepper, Steps, Trapezoidal};
 use std::time::{Duration, Instant};
 
@@ -129,7 +129,7 @@ fn domains(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failu
             let (worth, error) = match &end {
                 End::Whole(x) => {
                     let error = (energy(x) - first).abs() / first;
-                    let finite = Triple::from(*x).is_finite();
+                    let finite = ChartVector::from(*x).is_finite();
                     (
                         if !finite {
                             Worth::NotANumber
@@ -187,7 +187,7 @@ fn matrices(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
             let (mut a, mut b) = (matrix, rhs);
             let solved = solver.solve(&mut a, &mut b);
             // Row by row, each in units of its own terms.
-            let residual = contact_geom::largest((0..SIZE).map(|i| {
+            let residual = contact_geom::max_abs_or_nan((0..SIZE).map(|i| {
                 let terms: f64 = (0..SIZE).map(|j| (matrix[(i, j)] * b[j]).abs()).sum();
                 let sum: f64 = (0..SIZE).map(|j| matrix[(i, j)] * b[j]).sum();
                 if sum == rhs[i] { 0.0 } else { (sum - rhs[i]).abs() / (terms + rhs[i].abs()) }
@@ -205,7 +205,7 @@ fn matrices(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
             );
             wrong += u32::from(ended == "wrong" || (regular && ended == "refused") || (singular && ended != "refused"));
             if ended == "solved" {
-                worst = larger(worst, residual);
+                worst = max_or_nan(worst, residual);
             }
             rows.push(row("matrix", by, name, ended, residual));
         }
@@ -238,9 +238,9 @@ fn price(report: &mut Report) -> Result<(), Failure> {
         for (j, (name, times)) in
             [("pendulum", pendulum), ("pendulum, acting z", general), ("pair", coupled)].into_iter().enumerate()
         {
-            let contracting = times[..4].iter().map(|(_, [taken, _])| *taken).fold(0.0, larger);
+            let contracting = times[..4].iter().map(|(_, [taken, _])| *taken).fold(0.0, max_or_nan);
             // Zero where there is none.
-            let dearest = |which: usize| times.iter().map(|(_, of)| of[which]).fold(0.0, larger);
+            let dearest = |which: usize| times.iter().map(|(_, of)| of[which]).fold(0.0, max_or_nan);
             for (which, of) in ["step that is taken", "step that is given up"].into_iter().enumerate() {
                 report.at_most_timed(
                     &format!("{integrator}, {name}: dearest {of} over the dearest that contracts"),
@@ -251,7 +251,7 @@ fn price(report: &mut Report) -> Result<(), Failure> {
             curves.push(Curve::new(
                 &format!("{integrator}, {name}").replace('_', " "),
                 Line::Coloured(3 * i + j),
-                times.map(|(h, [taken, given_up])| (h, larger(taken, given_up))),
+                times.map(|(h, [taken, given_up])| (h, max_or_nan(taken, given_up))),
             ));
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::problems::Problem;
 use contact_geom::{Lagrangian, VelocityPoint};
-use discrete_herglotz::{AnyIntegrator, Halt, InputError, Steps, Until};
+use discrete_herglotz::{AnyIntegrator, InputError, StepFailure, Steps, Until};
 use std::time::Instant;
 use thiserror::Error;
 
@@ -54,7 +54,7 @@ pub enum RunError {
     Input(#[from] InputError),
     /// A step could not be taken.
     #[error("after {} steps: {}", .0.taken, .0.cause)]
-    Halt(Halt),
+    StepFailure(StepFailure),
     /// A peer gave up.
     #[error("{0}")]
     Peer(String),
@@ -103,7 +103,7 @@ impl<L: Lagrangian<N>, const N: usize> Candidate for OfLibrary<L, N> {
         let plan = run.plan(Until::Time(self.problem.duration))?;
         let mut stepper = plan.stepper()?;
         let clock = Instant::now();
-        stepper.advance(plan.count()).map_err(RunError::Halt)?;
+        stepper.advance(plan.count()).map_err(RunError::StepFailure)?;
         let seconds = clock.elapsed().as_secs_f64();
         let end = stepper.state();
         let mut state: Vec<f64> = end.q.iter().chain(end.p.iter()).copied().collect();

@@ -18,7 +18,7 @@ pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
 
 fn of<L: Lagrangian<N>, const N: usize>(lagrangian: &'static L, problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
     // Those of one step size: by a clock the number of steps is found by the run.
-    let fixed = |integrator: &AnyIntegrator| !matches!(integrator, AnyIntegrator::Clocked { .. });
+    let fixed = |integrator: &AnyIntegrator| !matches!(integrator, AnyIntegrator::TransformedGauss { .. });
     let applicable = |integrator: &AnyIntegrator| fixed(integrator) && integrator.check(lagrangian).is_ok();
     let chosen = AnyIntegrator::all().into_iter().filter(applicable);
     chosen.map(|integrator| of_library(lagrangian, integrator, problem, z)).collect()

@@ -13,15 +13,15 @@ use std::ops::Neg;
 /// (`re`, `extent`, `==`) gets none, whether they agree or not: see [`branched`](crate::gauss::lanes::branched).
 #[derive(Clone, Copy)]
 #[repr(align(64))] // Registers that lie across cache lines are slow to read after they were written.
-pub(super) struct Pack<S: Simd, const K: usize>(pub [S::f64s; K]);
+pub(super) struct SimdBatch<S: Simd, const K: usize>(pub [S::f64s; K]);
 
-impl<S: Simd, const K: usize> Pack<S, K> {
+impl<S: Simd, const K: usize> SimdBatch<S, K> {
     /// The lanes of all registers.
     pub const COUNT: usize = S::F64_LANES * K;
 
     #[inline(always)]
     pub fn splat(x: f64) -> Self {
-        Pack([token::<S>().splat_f64s(x); K])
+        SimdBatch([token::<S>().splat_f64s(x); K])
     }
 
     /// The lanes from a function of their index.
@@ -46,12 +46,12 @@ impl<S: Simd, const K: usize> Pack<S, K> {
     #[inline(always)]
     pub fn mul_add(self, b: Self, c: Self) -> Self {
         let set = token::<S>();
-        Pack(std::array::from_fn(|k| set.mul_add_f64s(self.0[k], b.0[k], c.0[k])))
+        SimdBatch(std::array::from_fn(|k| set.mul_add_f64s(self.0[k], b.0[k], c.0[k])))
     }
 
     #[inline(always)]
     fn map(self, f: impl Fn(S::f64s) -> S::f64s) -> Self {
-        Pack(self.0.map(f))
+        SimdBatch(self.0.map(f))
     }
 
     /// A function of one number, lane by lane.
@@ -65,16 +65,16 @@ impl<S: Simd, const K: usize> Pack<S, K> {
     #[inline(always)]
     pub fn at_most(self, b: Self, then: Self, otherwise: Self) -> Self {
         let set = token::<S>();
-        Pack(std::array::from_fn(|k| {
+        SimdBatch(std::array::from_fn(|k| {
             set.select_f64s(set.less_than_or_equal_f64s(self.0[k], b.0[k]), then.0[k], otherwise.0[k])
         }))
     }
 
     /// Lane by lane the larger; where one is not a number, the result may be either.
     #[inline(always)]
-    pub fn larger(self, b: Self) -> Self {
+    pub fn max_or_nan(self, b: Self) -> Self {
         let set = token::<S>();
-        Pack(std::array::from_fn(|k| set.max_f64s(self.0[k], b.0[k])))
+        SimdBatch(std::array::from_fn(|k| set.max_f64s(self.0[k], b.0[k])))
     }
 
     /// Whether a lane is not 0.
@@ -91,49 +91,49 @@ impl<S: Simd, const K: usize> Pack<S, K> {
     fn within_range(self, argument: Self) -> Self {
         let set = token::<S>();
         let (range, none) = (set.splat_f64s(REDUCIBLE), set.splat_f64s(f64::NAN));
-        Pack(std::array::from_fn(|k| {
+        SimdBatch(std::array::from_fn(|k| {
             set.select_f64s(set.less_than_f64s(Lanes::<S>(argument.0[k]).abs().0, range), self.0[k], none)
         }))
     }
 }
 
-impl<S: Simd, const K: usize> Register for Pack<S, K> {
+impl<S: Simd, const K: usize> Register for SimdBatch<S, K> {
     const FUSED: bool = true;
     #[inline(always)]
     fn splat(x: f64) -> Self {
-        Pack::splat(x)
+        SimdBatch::splat(x)
     }
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
-        Pack::mul_add(self, b, c)
+        SimdBatch::mul_add(self, b, c)
     }
     #[inline(always)]
     fn turned(self, of: Self) -> Self {
-        Pack(std::array::from_fn(|k| Lanes::<S>(self.0[k]).turned(Lanes(of.0[k])).0))
+        SimdBatch(std::array::from_fn(|k| Lanes::<S>(self.0[k]).turned(Lanes(of.0[k])).0))
     }
 }
 
-impl<S: Simd, const K: usize> Debug for Pack<S, K> {
+impl<S: Simd, const K: usize> Debug for SimdBatch<S, K> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         self.lanes().fmt(f)
     }
 }
 
-impl<S: Simd, const K: usize> PartialEq for Pack<S, K> {
+impl<S: Simd, const K: usize> PartialEq for SimdBatch<S, K> {
     fn eq(&self, _: &Self) -> bool {
         note_branch();
         false
     }
 }
 
-impl<S: Simd, const K: usize> From<f64> for Pack<S, K> {
+impl<S: Simd, const K: usize> From<f64> for SimdBatch<S, K> {
     #[inline(always)]
     fn from(x: f64) -> Self {
         Self::splat(x)
     }
 }
 
-impl<S: Simd, const K: usize> Neg for Pack<S, K> {
+impl<S: Simd, const K: usize> Neg for SimdBatch<S, K> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -141,14 +141,14 @@ impl<S: Simd, const K: usize> Neg for Pack<S, K> {
     }
 }
 
-scalar_operators! { [S: Simd, const K: usize] Pack<S, K>;
-    a + b = Pack(std::array::from_fn(|k| token::<S>().add_f64s(a.0[k], b.0[k])));
-    c - d = Pack(std::array::from_fn(|k| token::<S>().sub_f64s(c.0[k], d.0[k])));
-    e * f = Pack(std::array::from_fn(|k| token::<S>().mul_f64s(e.0[k], f.0[k])));
-    g / h = Pack(std::array::from_fn(|k| token::<S>().div_f64s(g.0[k], h.0[k])));
+scalar_operators! { [S: Simd, const K: usize] SimdBatch<S, K>;
+    a + b = SimdBatch(std::array::from_fn(|k| token::<S>().add_f64s(a.0[k], b.0[k])));
+    c - d = SimdBatch(std::array::from_fn(|k| token::<S>().sub_f64s(c.0[k], d.0[k])));
+    e * f = SimdBatch(std::array::from_fn(|k| token::<S>().mul_f64s(e.0[k], f.0[k])));
+    g / h = SimdBatch(std::array::from_fn(|k| token::<S>().div_f64s(g.0[k], h.0[k])));
 }
 
-impl<S: Simd, const K: usize> Scalar for Pack<S, K> {
+impl<S: Simd, const K: usize> Scalar for SimdBatch<S, K> {
     fn re(self) -> f64 {
         note_branch();
         f64::NAN
@@ -163,7 +163,7 @@ impl<S: Simd, const K: usize> Scalar for Pack<S, K> {
     fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
         let set = token::<S>();
         let unordered = set.splat_f64s(f64::NAN);
-        Pack(std::array::from_fn(|k| {
+        SimdBatch(std::array::from_fn(|k| {
             let less = set.less_than_f64s(self.0[k], than.0[k]);
             let not_less = set.less_than_or_equal_f64s(than.0[k], self.0[k]);
             set.select_f64s(less, then.0[k], set.select_f64s(not_less, otherwise.0[k], unordered))

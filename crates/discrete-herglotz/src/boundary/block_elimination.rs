@@ -4,7 +4,7 @@ use super::elimination::{ActionRow, BlockRows, Panel, back_substitute};
 use super::end::Conditions;
 use crate::{DiscreteLagrangian, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{DiscretePoint, SecondDiscreteJet, larger, linear};
+use contact_geom::{DiscretePoint, SecondDiscreteJet, linear, max_or_nan};
 
 /// The positions and actions of a path.
 #[derive(Clone)]
@@ -13,7 +13,7 @@ pub(super) struct Nodes<const N: usize> {
     pub z: Vec<f64>,
 }
 
-/// What is left of the equations at a point: `dq_k + next dq_{k+1} = rhs`, with one more term on the left where the [`Sweep`] has
+/// What is left of the equations at a point: `dq_k + next dq_{k+1} = rhs`, with one more term on the left where the [`BlockElimination`] has
 /// one of this point.
 #[derive(Clone, Copy)]
 pub(super) struct Eliminated<const N: usize> {
@@ -40,7 +40,7 @@ impl<const N: usize> Carry<N> {
 }
 
 /// The workspace of a sweep, of a length proportional to that of the path.
-pub(super) struct Sweep<const N: usize> {
+pub(super) struct BlockElimination<const N: usize> {
     pub points: Vec<Eliminated<N>>,
     /// The matrices of `dq_{k+2}`, of the points k where rows were exchanged with the next point's.
     pub after: Vec<(usize, SMatrix<f64, N, N>)>,
@@ -131,7 +131,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Equations<'_, D, N> {
 
 /// The discrete Herglotz equation of a point, `H = D1 + sigma p` with `p = D2` of the step before (or a given momentum), and its
 /// derivatives in the point's own position and action and in the next position, those through p left out.
-pub(super) struct Herglotz<const N: usize> {
+pub(super) struct HerglotzEquation<const N: usize> {
     value: SVector<f64, N>,
     /// The sizes of its terms.
     size: SVector<f64, N>,
@@ -140,12 +140,12 @@ pub(super) struct Herglotz<const N: usize> {
     pub next: SMatrix<f64, N, N>,
 }
 
-impl<const N: usize> Herglotz<N> {
+impl<const N: usize> HerglotzEquation<N> {
     #[inline(always)]
     pub fn new(p: &SVector<f64, N>, jet: &SecondDiscreteJet<N>, neighbour: &SVector<f64, N>) -> Self {
         let sigma = jet.first.sigma();
         let next = jet.d12 + p * jet.d2z.transpose();
-        Herglotz {
+        HerglotzEquation {
             value: jet.first.d1 + p * sigma,
             // The three positions of the equation are rounded, and move it by as much.
             size: jet.first.d1.abs() + p.abs() * sigma.abs() + next.abs() * neighbour.abs() * 4.0,
@@ -157,7 +157,7 @@ impl<const N: usize> Herglotz<N> {
 
     /// The condition `D2 = p` at the end of a path.
     fn at_end(p: &SVector<f64, N>, jet: &SecondDiscreteJet<N>, neighbour: &SVector<f64, N>) -> Self {
-        Herglotz {
+        HerglotzEquation {
             value: jet.first.d2 - p,
             size: jet.first.d2.abs() + p.abs() + jet.d12.abs().transpose() * neighbour.abs() * 2.0,
             here: SMatrix::zeros(),
@@ -218,15 +218,15 @@ impl<const N: usize> Measured<N> {
         for i in 0..N {
             let off = value[i].abs();
             self.squares[i] += off * off;
-            self.sizes[i] = larger(self.sizes[i], size[i]);
+            self.sizes[i] = max_or_nan(self.sizes[i], size[i]);
             within &= (off <= self.relative * size[i]) & (off <= self.residual);
         }
         if !within {
             for (off, size) in value.iter().map(|x| x.abs()).zip(size) {
-                self.residual = larger(self.residual, off);
+                self.residual = max_or_nan(self.residual, off);
                 let within = off <= self.relative * size;
                 if !within {
-                    self.relative = larger(self.relative, off / size);
+                    self.relative = max_or_nan(self.relative, off / size);
                 }
             }
         }
@@ -249,11 +249,11 @@ impl<const N: usize> Measured<N> {
     }
 }
 
-impl<const N: usize> Sweep<N> {
+impl<const N: usize> BlockElimination<N> {
     pub fn new<D>(of: &Equations<'_, D, N>) -> Self {
         let zero = SMatrix::zeros();
         let closed = if of.conditions.is_periodic() { of.steps } else { 0 };
-        Sweep {
+        BlockElimination {
             points: vec![Eliminated { next: zero, rhs: SVector::zeros() }; of.steps],
             after: Vec::new(),
             first: vec![zero; closed],
@@ -303,7 +303,7 @@ impl<const N: usize> Sweep<N> {
         let (start, end) = of.conditions.momenta();
         let mut panel = Panel::new(PERIODIC);
         if let Some(p) = &start {
-            let at = Herglotz::new(p, &now, &x.q[1]);
+            let at = HerglotzEquation::new(p, &now, &x.q[1]);
             measured.take(&at.value, &at.size);
             panel.top = BlockRows { here: at.here, next: at.next, rhs: -at.value, ..BlockRows::zero() };
         }
@@ -320,16 +320,16 @@ impl<const N: usize> Sweep<N> {
             let ahead = if k + 1 < steps { Some(of.jet(k + 1, &x.q[k + 1], &x.q[k + 2], x.z[k + 1])?) } else { None };
             let bottom = match (&ahead, &end) {
                 (Some(jet), _) => {
-                    let at = Herglotz::new(&now.first.d2, jet, &x.q[k + 2]);
+                    let at = HerglotzEquation::new(&now.first.d2, jet, &x.q[k + 2]);
                     Some((at, jet.first.sigma()))
                 }
-                (None, Some(p)) => Some((Herglotz::at_end(p, &now, &x.q[k]), 1.0)),
+                (None, Some(p)) => Some((HerglotzEquation::at_end(p, &now, &x.q[k]), 1.0)),
                 // The momentum at the end of a periodic path is that of its start.
                 (None, None) if PERIODIC => {
-                    let at = Herglotz::new(&now.first.d2, &opening, &x.q[1]);
+                    let at = HerglotzEquation::new(&now.first.d2, &opening, &x.q[1]);
                     // Its derivatives in the first two positions have waited since the start.
                     let (here, next) = (SMatrix::zeros(), SMatrix::zeros());
-                    Some((Herglotz { here, next, action: SVector::zeros(), ..at }, opening.first.sigma()))
+                    Some((HerglotzEquation { here, next, action: SVector::zeros(), ..at }, opening.first.sigma()))
                 }
                 (None, None) => None,
             };
@@ -471,6 +471,6 @@ impl<const N: usize> Extent<N> {
     /// The largest part of its coordinate's size, along this path or the `first`, that a correction changes.
     pub fn relative(&self, first: &SVector<f64, N>) -> f64 {
         let size = self.positions.sup(first);
-        (0..N).filter(|&i| self.change[i] != 0.0).fold(0.0, |worst, i| larger(worst, self.change[i] / size[i]))
+        (0..N).filter(|&i| self.change[i] != 0.0).fold(0.0, |worst, i| max_or_nan(worst, self.change[i] / size[i]))
     }
 }

@@ -1,13 +1,13 @@
 //! The times that the general step can be taken in.
 
-use super::compensated::Compensated;
+use super::compensated::CompensatedSum;
 use super::stages::Stages;
 use crate::run::saved::saved;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Clock, Scalar};
+use contact_geom::{Scalar, TimeTransformation};
 
 /// The time that steps are equal in.
-pub(super) trait TimeTransformation<const N: usize> {
+pub(super) trait Parametrization<const N: usize> {
     /// Whether it is t itself: nothing is computed for it then.
     const PHYSICAL: bool;
     /// The rate `g = dt/dtau`.
@@ -17,7 +17,7 @@ pub(super) trait TimeTransformation<const N: usize> {
 /// The time t.
 pub(super) struct Physical;
 
-impl<const N: usize> TimeTransformation<N> for Physical {
+impl<const N: usize> Parametrization<N> for Physical {
     const PHYSICAL: bool = true;
     #[inline(always)]
     fn rate<T: Scalar>(&self, _q: &SVector<T, N>) -> T {
@@ -25,10 +25,10 @@ impl<const N: usize> TimeTransformation<N> for Physical {
     }
 }
 
-/// The time of a clock.
+/// The time of a time transformation.
 pub(super) struct Fictitious<C>(pub C);
 
-impl<const N: usize, C: Clock<N>> TimeTransformation<N> for Fictitious<C> {
+impl<const N: usize, C: TimeTransformation<N>> Parametrization<N> for Fictitious<C> {
     const PHYSICAL: bool = false;
     #[inline(always)]
     fn rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
@@ -36,12 +36,12 @@ impl<const N: usize, C: Clock<N>> TimeTransformation<N> for Fictitious<C> {
     }
 }
 
-/// What the time of a clock adds to a step.
+/// What a transformed time adds to a step.
 pub(super) struct Extension<P> {
     pub transformation: P,
-    pub t: Compensated,
+    pub t: CompensatedSum,
     /// The momentum of t.
-    pub p_t: Compensated,
+    pub p_t: CompensatedSum,
     /// The rates g of the stages.
     pub g: Stages,
 }
@@ -55,11 +55,11 @@ impl<P> Extension<P> {
 /// The state with what is carried of it.
 #[derive(Clone, Copy)]
 pub(super) struct Values<const N: usize> {
-    pub q: [Compensated; N],
-    pub p: [Compensated; N],
-    pub z: Compensated,
-    pub t: Compensated,
-    pub p_t: Compensated,
+    pub q: [CompensatedSum; N],
+    pub p: [CompensatedSum; N],
+    pub z: CompensatedSum,
+    pub t: CompensatedSum,
+    pub p_t: CompensatedSum,
     pub one_minus_rho: f64,
 }
 

@@ -3,26 +3,28 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use super::coefficients::{Coefficients, MOST, lagrange_rows};
+use super::coefficients::{Coefficients, MAX_STAGES, lagrange_rows};
 use super::condensed::Condensed;
 use super::dense::Solved;
 use super::pair::{Registers, Two, by_two};
+use super::parametrization::Parametrization;
 use super::stage_values::StageValues;
 use super::stages::{StageMap, Stages, blocks};
-use super::time_transformation::TimeTransformation;
 use crate::gauss::lanes::{Lanes, vector};
 use contact_geom::nalgebra::SMatrix;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, Triple, VelocityPoint, larger, largest};
+use contact_geom::{
+    ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint, max_abs_or_nan, max_or_nan,
+};
 use pulp::{Simd, WithSimd};
 use std::array::from_fn;
 use std::sync::OnceLock;
 
 /// What a look at a step has found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Look {
+pub(crate) struct DefectSample {
     /// The largest misfit of the curve: of `p' = L_q + L_z p` and `z' = L`, over the length of the step, and of `p = L_v`; relative to
     /// the momenta and actions. Infinite where something is not finite.
-    pub misfit: f64,
+    pub defect: f64,
     /// The same of momenta and forces alone, and of the action alone, in their own units.
     pub of_momenta: f64,
     pub of_action: f64,
@@ -46,52 +48,52 @@ pub(crate) struct Look {
 /// Products of two numbers that are smaller have lost digits.
 pub(crate) const UNDERFLOWN: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
-impl Look {
+impl DefectSample {
     /// Whether the misfit is one of numbers that have lost digits since they are too small, as where a force begins at nothing.
     pub fn is_underflown(&self) -> bool {
-        self.misfit * self.size < UNDERFLOWN
+        self.defect * self.size < UNDERFLOWN
     }
 
     /// The jump of the values of L to the next step, beyond their round-off.
-    pub fn jump_to(&self, next: &Look) -> f64 {
+    pub fn jump_to(&self, next: &DefectSample) -> f64 {
         let (before, after) = (self.ends[1], next.ends[0]);
-        beyond_rounding((after - before).abs(), larger(before.abs(), after.abs()))
+        beyond_rounding((after - before).abs(), max_or_nan(before.abs(), after.abs()))
     }
 
     /// Together with that of the next part of the same step, between which L may jump.
-    pub fn joined(self, next: Look) -> Look {
-        Look {
-            misfit: larger(self.misfit, next.misfit),
-            of_momenta: larger(self.of_momenta, next.of_momenta),
-            of_action: larger(self.of_action, next.of_action),
-            size: larger(self.size, next.size),
-            size_z: larger(self.size_z, next.size_z),
-            expected: larger(self.expected, next.expected),
-            of_value: larger(self.of_value, next.of_value),
-            kinetic: larger(self.kinetic, next.kinetic),
+    pub fn joined(self, next: DefectSample) -> DefectSample {
+        DefectSample {
+            defect: max_or_nan(self.defect, next.defect),
+            of_momenta: max_or_nan(self.of_momenta, next.of_momenta),
+            of_action: max_or_nan(self.of_action, next.of_action),
+            size: max_or_nan(self.size, next.size),
+            size_z: max_or_nan(self.size_z, next.size_z),
+            expected: max_or_nan(self.expected, next.expected),
+            of_value: max_or_nan(self.of_value, next.of_value),
+            kinetic: max_or_nan(self.kinetic, next.kinetic),
             ends: [self.ends[0], next.ends[1]],
             ..self
         }
     }
 
     /// The same after a jump of L.
-    pub fn after_a_jump(self) -> Look {
-        Look { follows_a_jump: true, ..self }
+    pub fn after_a_jump(self) -> DefectSample {
+        DefectSample { follows_a_jump: true, ..self }
     }
 
     /// Together with one at other points of the step.
-    pub fn and(self, other: Look) -> Look {
-        Look {
-            misfit: larger(self.misfit, other.misfit),
-            of_momenta: larger(self.of_momenta, other.of_momenta),
-            of_action: larger(self.of_action, other.of_action),
-            of_value: larger(self.of_value, other.of_value),
+    pub fn and(self, other: DefectSample) -> DefectSample {
+        DefectSample {
+            defect: max_or_nan(self.defect, other.defect),
+            of_momenta: max_or_nan(self.of_momenta, other.of_momenta),
+            of_action: max_or_nan(self.of_action, other.of_action),
+            of_value: max_or_nan(self.of_value, other.of_value),
             ..self
         }
     }
 }
 
-/// A step as it was solved: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L; where there is a clock
+/// A step as it was solved: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L; where there is a time transformation
 /// in its time, each multiplied with its rate.
 pub(super) struct Curve<const N: usize> {
     pub s: usize,
@@ -106,7 +108,7 @@ pub(super) struct Curve<const N: usize> {
     pub l: Stages,
     /// Whether z is part of the step; else `L` is that at `z = 0`.
     pub acts: bool,
-    /// The rates of the clock at the start and at the end.
+    /// The rates of the time transformation at the start and at the end.
     rates: [f64; 2],
 }
 
@@ -130,8 +132,8 @@ impl<const N: usize> Curve<N> {
         }
     }
 
-    /// From the stages of a step by a clock, and the rates of the clock at its ends.
-    pub fn of_clock(&mut self, solved: &Solved<N>, rates: [f64; 2]) {
+    /// From the stages of a step in transformed time, and the rates of the time transformation at its ends.
+    pub fn of_transformed(&mut self, solved: &Solved<N>, rates: [f64; 2]) {
         self.of_solved(solved);
         self.rates = rates;
     }
@@ -185,19 +187,20 @@ struct Between {
 /// The round-off of a value of L, relative to its size: some hundred units for the sums that it is made of.
 const ROUNDED: f64 = 256.0 * f64::EPSILON;
 
-fn beyond_rounding(misfit: f64, size: f64) -> f64 {
+fn beyond_rounding(defect: f64, size: f64) -> f64 {
     // A NaN stays one.
-    if misfit <= ROUNDED * size { 0.0 } else { misfit - ROUNDED * size }
+    if defect <= ROUNDED * size { 0.0 } else { defect - ROUNDED * size }
 }
 
 /// The sets of points that there are.
-pub(crate) const SETS: usize = 16;
+pub(crate) const SAMPLE_SETS: usize = 16;
 
 impl Between {
     /// One of the sets of points for a number of stages from 1 to 16, made once.
     fn of(s: usize, set: usize) -> &'static Between {
-        static TABLES: [[OnceLock<Box<Between>>; SETS]; MOST] = [const { [const { OnceLock::new() }; SETS] }; MOST];
-        let (s, set) = (s.clamp(1, MOST), set.min(SETS - 1));
+        static TABLES: [[OnceLock<Box<Between>>; SAMPLE_SETS]; MAX_STAGES] =
+            [const { [const { OnceLock::new() }; SAMPLE_SETS] }; MAX_STAGES];
+        let (s, set) = (s.clamp(1, MAX_STAGES), set.min(SAMPLE_SETS - 1));
         TABLES[s - 1][set].get_or_init(|| Box::new(Self::new(s, set)))
     }
 
@@ -234,7 +237,7 @@ impl Between {
 }
 
 /// The sum of the stages with weights, which are 0 beyond the last.
-fn weighted(weights: &[f64; MOST], y: &Stages) -> f64 {
+fn weighted(weights: &[f64; MAX_STAGES], y: &Stages) -> f64 {
     weights.iter().zip(&y.0).map(|(w, y)| w * y).sum()
 }
 
@@ -246,18 +249,18 @@ pub(super) struct Compare<'a, L, P, const N: usize> {
     pub set: usize,
 }
 
-impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Compare<'_, L, P, N> {
-    type Output = Look;
+impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compare<'_, L, P, N> {
+    type Output = DefectSample;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> Look {
+    fn with_simd<S: Simd>(self, _simd: S) -> DefectSample {
         let Compare { lagrangian, transformation, curve, set } = self;
         let Curve { s, t, h, .. } = *curve;
         let between = Between::of(s, set);
         let zero = Lanes::<S>::splat(0.0);
         let (mut v, mut q, mut f, mut y) = ([Stages::ZERO; N], [Stages::ZERO; N], [Stages::ZERO; N], [Stages::ZERO; N]);
         let (mut rate, mut one_minus_rho, mut l, mut z) =
-            (Stages::ZERO, Stages::ZERO, Stages::ZERO, Stages([curve.z; MOST]));
+            (Stages::ZERO, Stages::ZERO, Stages::ZERO, Stages([curve.z; MAX_STAGES]));
         for d in 0..N {
             between.value::<S>(s, &curve.v[d], &mut v[d]);
             between.grown::<S>(s, h, &curve.v[d], curve.q[d], &mut q[d]);
@@ -271,15 +274,15 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
             between.grown::<S>(s, h, &curve.l, curve.z, &mut z);
         }
         let (mut of_value, mut kinetic, mut largest_l) = (zero, zero, zero);
-        let (mut misfit, mut size, mut of_z, mut size_z, mut all) = (zero, zero, zero, zero, zero);
-        let mut other: Option<(Lanes<S>, Triple<N, Lanes<S>>)> = None;
+        let (mut defect, mut size, mut of_z, mut size_z, mut all) = (zero, zero, zero, zero, zero);
+        let mut other: Option<(Lanes<S>, ChartVector<N, Lanes<S>>)> = None;
         for r in 0..blocks::<S>(s) {
             let mut x = VelocityPoint {
                 q: vector(|d| q[d].block::<S>(r)),
                 v: vector(|d| v[d].block::<S>(r)),
                 z: z.block::<S>(r),
             };
-            // From the clock's time to t.
+            // From the transformed time to t.
             let (mut slower, mut long) = (Lanes::<S>::splat(1.0), Lanes::<S>::splat(h));
             if !P::PHYSICAL {
                 let rate = transformation.rate(&x.q);
@@ -295,8 +298,8 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
                         z: Two::of(&z, r),
                     };
                     let (l, g) = lagrangian.with_gradient(Two::of(&between.points, r) * h + t, &pair);
-                    other = Some((l.1, Triple { x: g.x.map(|e| e.1), y: g.y.map(|e| e.1), z: g.z.1 }));
-                    (l.0, Triple { x: g.x.map(|e| e.0), y: g.y.map(|e| e.0), z: g.z.0 })
+                    other = Some((l.1, ChartVector { x: g.x.map(|e| e.1), y: g.y.map(|e| e.1), z: g.z.1 }));
+                    (l.0, ChartVector { x: g.x.map(|e| e.0), y: g.y.map(|e| e.0), z: g.z.0 })
                 }
                 None => lagrangian.with_gradient(between.points.block::<S>(r) * h + t, &x),
             };
@@ -308,7 +311,7 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
                 let force = f[d].block::<S>(r) * inverse * h;
                 let of_force = p.mul_add(drag, force - g.x[d] * long);
                 let of_momentum = p - g.y[d];
-                misfit = misfit.max(of_force.abs()).max(of_momentum.abs());
+                defect = defect.max(of_force.abs()).max(of_momentum.abs());
                 size = size.max(p.abs()).max(force.abs());
                 all += of_force * 0.0 + of_momentum * 0.0;
                 work = p.mul_add(x.v[d], work);
@@ -325,24 +328,24 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
         }
         // The largest over lanes may hide a NaN; a NaN or an infinity times 0 is not 0.
         if all.sum() != 0.0 {
-            return Look {
-                misfit: f64::INFINITY,
+            return DefectSample {
+                defect: f64::INFINITY,
                 of_momenta: f64::INFINITY,
                 of_action: f64::INFINITY,
                 of_value: f64::INFINITY,
-                ..Look::default()
+                ..DefectSample::default()
             };
         }
-        let relative = |misfit: f64, size: f64| if misfit > 0.0 { misfit / size } else { 0.0 };
-        let (size, size_z) = (size.largest(), size_z.largest());
-        let (of_momenta, of_action) = (misfit.largest(), of_z.largest());
-        let misfit = relative(of_momenta, size) + relative(of_action, size_z);
-        let of_value = beyond_rounding(of_value.largest(), largest_l.largest());
+        let relative = |defect: f64, size: f64| if defect > 0.0 { defect / size } else { 0.0 };
+        let (size, size_z) = (size.max_abs_or_nan(), size_z.max_abs_or_nan());
+        let (of_momenta, of_action) = (defect.max_abs_or_nan(), of_z.max_abs_or_nan());
+        let defect = relative(of_momenta, size) + relative(of_action, size_z);
+        let of_value = beyond_rounding(of_value.max_abs_or_nan(), largest_l.max_abs_or_nan());
         // The coefficients are the same for all points.
         if set > 0 {
-            return Look { misfit, of_momenta, of_action, of_value, ..Look::default() };
+            return DefectSample { defect, of_momenta, of_action, of_value, ..DefectSample::default() };
         }
-        let fastest = largest(v.iter().flat_map(|v| v.0));
+        let fastest = max_abs_or_nan(v.iter().flat_map(|v| v.0));
         let g = Coefficients::of(s);
         // The sizes of the last two coefficients together.
         let tail = |y: &Stages| g.last.iter().map(|row| weighted(row, y).abs()).sum::<f64>();
@@ -354,15 +357,15 @@ impl<L: Lagrangian<N>, P: TimeTransformation<N>, const N: usize> WithSimd for Co
             expected += relative(tail(&curve.l) * h, size_z);
         }
         let ends = from_fn(|i| weighted(&g.ends[i], &curve.l) / curve.rates[i]);
-        Look {
-            misfit,
+        DefectSample {
+            defect,
             of_momenta,
             of_action,
             size,
             size_z,
             expected,
             of_value,
-            kinetic: kinetic.largest(),
+            kinetic: kinetic.max_abs_or_nan(),
             ends,
             follows_a_jump: false,
         }

@@ -1,13 +1,13 @@
-//! Contact Gauss collocation in the time of a clock.
+//! Contact Gauss collocation in transformed time.
 
 #![allow(clippy::unwrap_used)]
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Kepler, Pendulum, PerturbedKepler, Radial, System};
-use contact_geom::{Clock, Lagrangian, Larger, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
+use contact_geom::{Lagrangian, MaxOrNan, PhasePoint, Scalar, Structure, TimeTransformation, VelocityPoint, legendre};
 use discrete_herglotz::{
-    AnyIntegrator, ClockedStepper, Facts, Gauss, InputError, Outcome, Problem, Rows, Status, StepError, Stepper, Steps,
-    Until,
+    AnyIntegrator, Gauss, InputError, MethodInfo, Outcome, Problem, Rows, Status, StepError, Stepper, Steps,
+    TransformedStepper, Until,
 };
 
 type Planar = Kepler<2>;
@@ -17,18 +17,18 @@ fn pericentre(e: f64) -> VelocityPoint<2> {
     VelocityPoint::new([1.0 - e, 0.0], [0.0, ((1.0 + e) / (1.0 - e)).sqrt()], 0.0)
 }
 
-fn clocked<'a, C: Clock<2>>(
+fn clocked<'a, C: TimeTransformation<2>>(
     gauss: &'a Gauss<Planar>,
     kepler: &Planar,
     clock: C,
     e: f64,
-) -> ClockedStepper<'a, Planar, C, 2> {
+) -> TransformedStepper<'a, Planar, C, 2> {
     let start = pericentre(e);
-    gauss.clocked_stepper(clock, 0.0, legendre(kepler, 0.0, &start), start.v).unwrap()
+    gauss.transformed_stepper(clock, 0.0, legendre(kepler, 0.0, &start), start.v).unwrap()
 }
 
 fn distance(a: &PhasePoint<2>, b: &PhasePoint<2>) -> f64 {
-    (a.q - b.q).norm().larger((a.p - b.p).norm()).larger((a.z - b.z).abs())
+    (a.q - b.q).norm().max_or_nan((a.p - b.p).norm()).max_or_nan((a.z - b.z).abs())
 }
 
 fn angular_momentum(x: &PhasePoint<2>) -> f64 {
@@ -39,10 +39,10 @@ fn energy(kepler: &Planar, x: &PhasePoint<2>) -> f64 {
     kepler.hamiltonian(0.0, x).unwrap()
 }
 
-/// The clock of a constant rate, and of any sign.
+/// the time transformation of a constant rate, and of any sign.
 struct Steady(f64);
 
-impl Clock<2> for Steady {
+impl TimeTransformation<2> for Steady {
     fn rate<T: Scalar>(&self, _q: &SVector<T, 2>) -> T {
         T::from(self.0)
     }
@@ -71,13 +71,13 @@ fn order_two_s_at_a_physical_time() {
     let kepler = Planar { gamma: -0.05, mu: 1.0 };
     let at = |s: usize, h: f64, t: f64| {
         let gauss = Gauss::new(kepler, s, h).unwrap();
-        let mut run = clocked(&gauss, &kepler, kepler.clock(), 0.5);
+        let mut run = clocked(&gauss, &kepler, kepler.time_transformation(), 0.5);
         run.advance_to(t).unwrap();
         assert!((run.time() - t).abs() <= 1e-15 * t, "{} for {t}", run.time());
         run.state()
     };
     let t = 7.0;
-    // From the plain method, so that a clock's error cannot hide in both.
+    // From the plain method, so that a time transformation's error cannot hide in both.
     let start = pericentre(0.5);
     let gauss = Gauss::new(kepler, 12, t / 100.0).unwrap();
     let mut reference = gauss.stepper(0.0, legendre(&kepler, 0.0, &start), start.v).unwrap();
@@ -94,14 +94,15 @@ fn order_two_s_at_a_physical_time() {
 fn momenta_contract_by_sigma() {
     let kepler = Planar { gamma: -0.01, mu: 1.0 };
     let gauss = Gauss::new(kepler, 4, 0.2).unwrap();
-    let mut run = clocked(&gauss, &kepler, kepler.clock(), 0.5);
+    let mut run = clocked(&gauss, &kepler, kepler.time_transformation(), 0.5);
     let (start, p_t) = (run.state(), run.time_momentum());
     let (mut contracted, mut defect) = (1.0, 0.0_f64);
     for _ in 0..1000 {
         run.advance(1).unwrap();
         contracted *= run.sigma();
         // K / g, which is 0 for the motion.
-        defect = defect.larger((energy(&kepler, &run.state()) + run.time_momentum()).abs() / run.time_momentum().abs());
+        defect =
+            defect.max_or_nan((energy(&kepler, &run.state()) + run.time_momentum()).abs() / run.time_momentum().abs());
     }
     let off = angular_momentum(&run.state()) / (contracted * angular_momentum(&start)) - 1.0;
     assert!(off.abs() < 1e-13, "{off:e}");
@@ -123,7 +124,7 @@ fn eccentric_orbits_cost_less() {
     let (reference, _) = plain(12, 8000);
     let (fixed, most) = plain(8, 800);
     let gauss = Gauss::new(kepler, 8, 0.5).unwrap();
-    let mut run = clocked(&gauss, &kepler, kepler.clock(), 0.9);
+    let mut run = clocked(&gauss, &kepler, kepler.time_transformation(), 0.9);
     run.advance_to(t).unwrap();
     let (error, of_fixed) = (distance(&run.state(), &reference), distance(&fixed, &reference));
     println!("{error:e} with {}, {of_fixed:e} with {most}", run.evaluations());
@@ -138,13 +139,13 @@ fn bad_input_is_refused() {
     let state = legendre(&kepler, 0.0, &start);
     let gauss = Gauss::new(kepler, 3, 0.1).unwrap();
     for bad in [0.0, -1.0, f64::INFINITY, f64::NAN] {
-        let refused = gauss.clocked_stepper(Steady(bad), 0.0, state, start.v).err();
-        assert!(matches!(refused, Some(InputError::Clock { .. })), "{bad}: {refused:?}");
+        let refused = gauss.transformed_stepper(Steady(bad), 0.0, state, start.v).err();
+        assert!(matches!(refused, Some(InputError::TimeTransformation { .. })), "{bad}: {refused:?}");
     }
     let driven = Gauss::new(PerturbedKepler::default(), 3, 0.1).unwrap();
-    let refused = driven.clocked_stepper(Radial { exponent: 1.0 }, 0.0, state, start.v).err();
+    let refused = driven.transformed_stepper(Radial { exponent: 1.0 }, 0.0, state, start.v).err();
     assert_eq!(refused, Some(InputError::Unclaimed { claim: "autonomous" }));
-    let mut run = gauss.clocked_stepper(kepler.clock(), 0.0, state, start.v).unwrap();
+    let mut run = gauss.transformed_stepper(kepler.time_transformation(), 0.0, state, start.v).unwrap();
     assert_eq!(run.advance_to(f64::NAN).map_err(|halt| halt.cause), Err(StepError::NonFinite));
     assert_eq!((run.advance_to(-1.0), run.time()), (Ok(()), 0.0));
 }
@@ -153,7 +154,7 @@ fn bad_input_is_refused() {
 fn a_clock_that_is_not_defined_ends_the_run() {
     /// Not defined beyond `x = 0`.
     struct Ending;
-    impl Clock<2> for Ending {
+    impl TimeTransformation<2> for Ending {
         fn rate<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
             q[0].sqrt() + 1.0
         }
@@ -189,21 +190,21 @@ fn on_orbit(e: f64, t: f64) -> SVector<f64, 4> {
 }
 
 /// The orbit for a span of three revolutions and a little, to an error, by an integrator or none; the true error.
-fn to_accuracy(e: f64, wanted: f64, by: Option<AnyIntegrator>) -> (Facts, Outcome<2>, f64) {
+fn to_accuracy(e: f64, wanted: f64, by: Option<AnyIntegrator>) -> (MethodInfo, Outcome<2>, f64) {
     let (kepler, span) = (Planar { gamma: 0.0, mu: 1.0 }, 20.0);
     let problem = Problem::new(&kepler, 0.0, pericentre(e)).unwrap();
     let run = problem.accuracy(wanted);
     let run = if let Some(by) = by { run.by(by) } else { run };
     let plan = run.plan(Until::Time(span)).unwrap();
     let outcome = plan.run().unwrap();
-    assert_eq!((outcome.status, outcome.suspicion), (Status::Completed, None));
+    assert_eq!((outcome.status, outcome.unresolved), (Status::Completed, None));
     assert_eq!(outcome.steps, plan.count(), "{plan}");
     let (q, p, truth) = (outcome.q, outcome.p, on_orbit(e, span));
     let error = (SVector::from([q[0], q[1], p[0], p[1]]) - truth).norm() / truth.norm();
     (plan.integrator().clone(), outcome, error)
 }
 
-/// Eccentric orbits are followed by the clock, to the accuracy that is wanted, and for a part of the evaluations of equal steps. Of
+/// Eccentric orbits are followed by the time transformation, to the accuracy that is wanted, and for a part of the evaluations of equal steps. Of
 /// these `(1 - e)^(-3/2)` are as long as those at distance one; their iterations take two or three sweeps, where long steps take up to
 /// eighteen, and half of the rest is left to the orbit's mean.
 #[test]
@@ -211,14 +212,20 @@ fn eccentric_orbits_choose_the_clock() {
     for e in [0.9, 0.99] {
         for wanted in [1e-6, 1e-8, 1e-10, 1e-11] {
             let (integrator, outcome, error) = to_accuracy(e, wanted, None);
-            assert!(integrator.by_clock, "{e}, {wanted:e}: {integrator:?}");
+            assert!(integrator.in_transformed_time, "{e}, {wanted:e}: {integrator:?}");
             assert!(error <= wanted, "{e}, {wanted:e}: {error:e}");
             assert_eq!(outcome.t, 20.0);
         }
         let (wanted, least) = (1e-8, 0.05 * (1.0 - e).powf(-1.5));
-        let (by_clock, equal) = (to_accuracy(e, wanted, None).1, to_accuracy(e, wanted, "gauss_8".parse().ok()).1);
-        let ratio = equal.evaluations as f64 / by_clock.evaluations as f64;
-        assert!(ratio >= least, "{e}: {} evaluations, {} by equal steps", by_clock.evaluations, equal.evaluations);
+        let (in_transformed_time, equal) =
+            (to_accuracy(e, wanted, None).1, to_accuracy(e, wanted, "gauss_8".parse().ok()).1);
+        let ratio = equal.evaluations as f64 / in_transformed_time.evaluations as f64;
+        assert!(
+            ratio >= least,
+            "{e}: {} evaluations, {} by equal steps",
+            in_transformed_time.evaluations,
+            equal.evaluations
+        );
     }
 }
 
@@ -233,18 +240,18 @@ fn starts_at_the_apocentre() {
         let Outcome { status, q, p, .. } = plan.run().unwrap();
         let truth = -on_orbit(e, 20.0 + std::f64::consts::PI);
         let error = (SVector::from([q[0], q[1], p[0], p[1]]) - truth).norm() / truth.norm();
-        assert!(plan.integrator().by_clock && status == Status::Completed, "{plan}");
+        assert!(plan.integrator().in_transformed_time && status == Status::Completed, "{plan}");
         assert!(error <= 1e-8, "{e}: {error:e}");
     }
 }
 
-/// Where the clock would gain little it is left alone; named, it keeps the accuracy there too, with any number of stages.
+/// Where the time transformation would gain little it is left alone; named, it keeps the accuracy there too, with any number of stages.
 #[test]
 fn round_orbits_take_equal_steps() {
     for e in [0.0, 0.1] {
         let (integrator, _, error) = to_accuracy(e, 1e-8, None);
-        assert!(!integrator.by_clock && error <= 1e-8, "{e}: {integrator:?}, {error:e}");
-        for name in ["clocked_gauss_4", "clocked_gauss_8"] {
+        assert!(!integrator.in_transformed_time && error <= 1e-8, "{e}: {integrator:?}, {error:e}");
+        for name in ["transformed_gauss_4", "transformed_gauss_8"] {
             let (_, _, error) = to_accuracy(e, 1e-8, name.parse().ok());
             assert!(error <= 1e-8, "{e}, {name}: {error:e}");
         }
@@ -257,16 +264,16 @@ fn rows_of_a_clocked_run_change_nothing() {
     let kepler = Planar { gamma: -0.01, mu: 1.0 };
     let problem = Problem::new(&kepler, 0.0, pericentre(0.9)).unwrap();
     for to_accuracy in [false, true] {
-        let by_clock = || {
-            let run = problem.by(AnyIntegrator::Clocked { stages: 8 });
+        let in_transformed_time = || {
+            let run = problem.by(AnyIntegrator::TransformedGauss { stages: 8 });
             if to_accuracy { run.accuracy(1e-8) } else { run.steps(Steps::Size(0.25)) }
         };
-        let nothing = by_clock().without_action().run(Until::Time(20.0)).unwrap();
+        let nothing = in_transformed_time().without_action().run(Until::Time(20.0)).unwrap();
         let mut rows = Rows::every(7).unwrap();
-        let all = by_clock().with_conformal_factor().observe(&mut rows).run(Until::Time(20.0)).unwrap();
+        let all = in_transformed_time().with_conformal_factor().observe(&mut rows).run(Until::Time(20.0)).unwrap();
         let rows = rows.rows;
-        assert_eq!((nothing.status, nothing.suspicion), (Status::Completed, None));
-        assert_eq!((all.status, all.suspicion), (Status::Completed, None));
+        assert_eq!((nothing.status, nothing.unresolved), (Status::Completed, None));
+        assert_eq!((all.status, all.unresolved), (Status::Completed, None));
         assert_eq!((nothing.q, nothing.p, nothing.t, nothing.steps), (all.q, all.p, all.t, all.steps));
         assert_eq!(rows.len(), all.steps.div_ceil(7) + 1);
         assert_eq!(rows.last().map(|row| (row.t, row.q, row.z)), Some((all.t, all.q, all.z)));
@@ -277,14 +284,14 @@ fn rows_of_a_clocked_run_change_nothing() {
     }
 }
 
-/// A free particle with a clock of any rate, autonomous or not.
+/// A free particle with a time transformation of any rate, autonomous or not.
 struct Clocked {
     rate: f64,
     autonomous: bool,
 }
 
 impl Lagrangian<1> for Clocked {
-    const HAS_CLOCK: bool = true;
+    const HAS_TIME_TRANSFORMATION: bool = true;
 
     fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
         v[0] * v[0] * 0.5 - z * 0.1
@@ -292,15 +299,18 @@ impl Lagrangian<1> for Clocked {
     fn structure(&self) -> Structure {
         Structure { autonomous: self.autonomous, ..Structure::default() }
     }
-    fn clock_rate<T: Scalar>(&self, _q: &SVector<T, 1>) -> T {
+    fn dt_dtau<T: Scalar>(&self, _q: &SVector<T, 1>) -> T {
         T::from(self.rate)
     }
 }
 
 #[test]
 fn clocks_that_cannot_be_followed_are_refused() {
-    let by = AnyIntegrator::Clocked { stages: 4 };
-    assert_eq!(AnyIntegrator::Clocked { stages: 17 }.check(&Planar::default()), Err(InputError::Stages { found: 17 }));
+    let by = AnyIntegrator::TransformedGauss { stages: 4 };
+    assert_eq!(
+        AnyIntegrator::TransformedGauss { stages: 17 }.check(&Planar::default()),
+        Err(InputError::Stages { found: 17 })
+    );
     assert!(matches!(by.check(&Pendulum { gamma: -0.1 }), Err(InputError::Hypothesis { .. })));
     assert!(matches!(by.check(&PerturbedKepler::default()), Err(InputError::Hypothesis { .. })));
     let driven = Clocked { rate: 1.0, autonomous: false };
@@ -316,19 +326,19 @@ fn clocks_that_cannot_be_followed_are_refused() {
     };
     assert_eq!(refused(1.0, false, Steps::Size(0.1)), Some(InputError::Unclaimed { claim: "autonomous" }));
     for rate in [0.0, -1.0, f64::INFINITY, f64::NAN] {
-        assert!(matches!(refused(rate, true, Steps::Size(0.1)), Some(InputError::Clock { .. })), "{rate}");
-        assert!(matches!(inaccurate(rate), Some(InputError::Clock { .. })), "{rate}");
+        assert!(matches!(refused(rate, true, Steps::Size(0.1)), Some(InputError::TimeTransformation { .. })), "{rate}");
+        assert!(matches!(inaccurate(rate), Some(InputError::TimeTransformation { .. })), "{rate}");
     }
     assert!(matches!(refused(1e-300, true, Steps::Size(0.1)), Some(InputError::TooMany { .. })));
     assert_eq!(refused(1.0, true, Steps::Size(-0.1)), Some(InputError::Step { h: -0.1 }));
     let sentence = refused(1.0, true, Steps::Count(10)).map(|error| error.to_string()).unwrap_or_default();
-    assert!(sentence.contains("steps of a given size in the time of its clock"), "{sentence}");
-    // A clock that gains nothing is not chosen, whatever its rate.
+    assert!(sentence.contains("steps of a given size in its transformed time"), "{sentence}");
+    // A time transformation that gains nothing is not chosen, whatever its rate.
     for rate in [1.0, 1e-3, -1.0, f64::NAN] {
         let system = Clocked { rate, autonomous: true };
         let problem = Problem::new(&system, 0.0, start).unwrap();
         let plan = problem.accuracy(1e-8).plan(Until::Time(2.0)).unwrap();
-        assert!(!plan.integrator().by_clock, "{rate}: {plan}");
+        assert!(!plan.integrator().in_transformed_time, "{rate}: {plan}");
     }
     let system = Clocked { rate: 0.5, autonomous: true };
     let problem = Problem::new(&system, 0.0, start).unwrap();
@@ -338,12 +348,15 @@ fn clocks_that_cannot_be_followed_are_refused() {
     assert_eq!((tenths.steps, tenths.t), (10, 2.0));
     // Thirteen steps of 0.15, and one of a third of that; and the tenth of 0.2 ends the span, for all its rounding.
     assert_eq!((outcome.steps, plan.count(), outcome.t), (14, 14, 2.0));
-    assert!(plan.to_string().contains("14 steps of 0.3 of the clock's time by clocked_gauss_4, t = 0 .. 2"), "{plan}");
+    assert!(
+        plan.to_string().contains("14 steps of 0.3 of the transformed time by transformed_gauss_4, t = 0 .. 2"),
+        "{plan}"
+    );
     // The same number of steps back, each as long.
     let plan = problem.by(by).steps(Steps::Size(0.3)).plan(Until::Time(-2.0)).unwrap();
     let back = plan.run().unwrap();
     assert_eq!((back.steps, plan.count(), back.t, plan.step_size()), (14, 14, -2.0, -0.3));
-    // A clock has no number of steps to end after.
+    // A time transformation has no number of steps to end after.
     let counted = problem.by(by).steps(Steps::Size(0.3)).plan(Until::Steps(14)).err();
     assert!(matches!(counted, Some(InputError::Hypothesis { .. })), "{counted:?}");
 }
@@ -355,8 +368,11 @@ fn a_fall_into_the_centre_ends() {
     let problem = Problem::new(&kepler, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0)).unwrap();
     let refused = problem.accuracy(1e-6).plan(Until::Time(2.0)).err();
     assert!(matches!(refused, Some(InputError::Accuracy { .. })), "{refused:?}");
-    let outcome =
-        problem.by(AnyIntegrator::Clocked { stages: 8 }).steps(Steps::Size(0.1)).run(Until::Time(2.0)).unwrap();
+    let outcome = problem
+        .by(AnyIntegrator::TransformedGauss { stages: 8 })
+        .steps(Steps::Size(0.1))
+        .run(Until::Time(2.0))
+        .unwrap();
     assert!(matches!(outcome.status, Status::Failed { .. }), "{outcome:?}");
     // It takes pi / 8^(1/2) without another force.
     assert!(outcome.t <= std::f64::consts::PI / 8.0f64.sqrt() && outcome.t > 1.0, "{}", outcome.t);

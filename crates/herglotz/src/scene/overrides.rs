@@ -1,8 +1,8 @@
 //! Changes of single values of a scene from outside.
 
 use super::SceneError;
-use super::at::{At, Named, Numbers};
 use super::file::File;
+use super::location::{Location, Named, Numbers};
 use runtime_herglotz::CatalogueEntry;
 
 /// Where errors of changes are.
@@ -18,8 +18,8 @@ pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str)
     let at_run = file.run.span();
     let pair = text.split_once('=').map(|(name, value)| (name.trim(), value.trim()));
     if let Some(("run.integrator", name)) = pair {
-        let at = file.run.integrator.as_ref().map_or(at_run, At::span);
-        file.run.integrator = Some(At::new(name.trim_matches('"').to_owned(), at));
+        let at = file.run.integrator.as_ref().map_or(at_run, Location::span);
+        file.run.integrator = Some(Location::new(name.trim_matches('"').to_owned(), at));
         return Ok(());
     }
     let parsed = pair.and_then(|(name, value)| Some((name, value.parse::<f64>().ok()?)));
@@ -27,8 +27,8 @@ pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str)
         return refuse("a change is a name, `=` and a finite number, as in gamma=-0.2");
     };
     // What is wrong with the value later is shown where that of the file is.
-    let put = |place: &mut Option<At<f64>>, at| {
-        *place = Some(At::new(value, place.as_ref().map_or(at, At::span)));
+    let put = |place: &mut Option<Location<f64>>, at| {
+        *place = Some(Location::new(value, place.as_ref().map_or(at, Location::span)));
     };
     let run = &mut *file.run;
     match name {
@@ -45,15 +45,15 @@ pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str)
             if value.fract() != 0.0 || !(0.0..=2f64.powi(53)).contains(&value) {
                 return refuse("`run.steps` is a whole number, as in run.steps=100");
             }
-            let at = run.steps.as_ref().map_or(at_run, At::span);
-            (run.accuracy, run.step, run.steps) = (None, None, Some(At::new(value as usize, at)));
+            let at = run.steps.as_ref().map_or(at_run, Location::span);
+            (run.accuracy, run.step, run.steps) = (None, None, Some(Location::new(value as usize, at)));
         }
         _ => match name.strip_prefix("start.") {
             Some(of_start) => {
                 let at = file.system.span();
-                let start = file.start.get_or_insert(At::new(Named::default(), at));
-                let at = start.get(of_start).map_or(start.span(), At::span);
-                start.set(of_start, At::new(Numbers::One(value), at));
+                let start = file.start.get_or_insert(Location::new(Named::default(), at));
+                let at = start.get(of_start).map_or(start.span(), Location::span);
+                start.set(of_start, Location::new(Numbers::One(value), at));
             }
             None => {
                 let own = file.system.parameters.0.iter().map(|(name, _)| name.as_str());
@@ -69,8 +69,8 @@ pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str)
                     let near = known.chain(OF_RUN);
                     return Err(SceneError::unknown(text, (0, name.len()), name, near, message).in_file(SOURCE));
                 }
-                let at = file.system.parameters.get(name).map_or(file.system.span(), At::span);
-                file.system.parameters.set(name, At::new(value, at));
+                let at = file.system.parameters.get(name).map_or(file.system.span(), Location::span);
+                file.system.parameters.set(name, Location::new(value, at));
             }
         },
     }

@@ -1,10 +1,10 @@
 //! What is recorded of a motion.
 
 use super::SceneError;
-use super::at::{At, Span};
 use super::file::{DirectionName, EventTable, RowsTable};
+use super::location::{Location, Span};
 use runtime_herglotz::{
-    Column, Direction, Event, Expression, Formula, FormulaError, RuntimeError, When, nearest_name, velocity_name,
+    Column, Direction, Event, Expression, Formula, FormulaError, OutputTimes, RuntimeError, nearest_name, velocity_name,
 };
 
 /// The rows of a scene that asks for none.
@@ -28,15 +28,15 @@ pub(crate) enum RowTimes {
 
 impl RowTimes {
     /// The times of a motion from one to another.
-    pub fn when(&self, t0: f64, end: f64) -> When {
+    pub fn when(&self, t0: f64, end: f64) -> OutputTimes {
         match self {
             // The start alone.
-            RowTimes::Parts(_) | RowTimes::Every(_) if t0 == end => When::At(vec![t0]),
-            RowTimes::EveryStep(steps) => When::Every(*steps),
-            RowTimes::At(times) => When::At(times.clone()),
+            RowTimes::Parts(_) | RowTimes::Every(_) if t0 == end => OutputTimes::At(vec![t0]),
+            RowTimes::EveryStep(steps) => OutputTimes::Every(*steps),
+            RowTimes::At(times) => OutputTimes::At(times.clone()),
             RowTimes::Parts(parts) => {
                 let of = |k: usize| if k == *parts { end } else { t0 + (end - t0) * (k as f64 / *parts as f64) };
-                When::At((0..=*parts).map(of).collect())
+                OutputTimes::At((0..=*parts).map(of).collect())
             }
             RowTimes::Every(every) => {
                 // A whole number of them fills the span but for its rounding.
@@ -44,12 +44,12 @@ impl RowTimes {
                 let stride = every.copysign(end - t0);
                 let at = |k: usize| t0 + k as f64 * stride;
                 let inside = |t: f64| if end < t0 { t.max(end) } else { t.min(end) };
-                When::At((0..=count as usize).map(at).map(inside).collect())
+                OutputTimes::At((0..=count as usize).map(at).map(inside).collect())
             }
         }
     }
 
-    pub fn read(text: &str, rows: Option<&At<RowsTable>>, (t0, end): (f64, f64)) -> Result<Self, SceneError> {
+    pub fn read(text: &str, rows: Option<&Location<RowsTable>>, (t0, end): (f64, f64)) -> Result<Self, SceneError> {
         let Some(rows) = rows else { return Ok(RowTimes::Parts(DEFAULT_ROWS)) };
         match (&rows.every, &rows.at, &rows.every_step) {
             (Some(every), None, None) => {
@@ -70,7 +70,7 @@ impl RowTimes {
         }
     }
 
-    fn at(text: &str, times: &At<Vec<At<f64>>>, (t0, end): (f64, f64)) -> Result<Self, SceneError> {
+    fn at(text: &str, times: &Location<Vec<Location<f64>>>, (t0, end): (f64, f64)) -> Result<Self, SceneError> {
         let mut last: Option<f64> = None;
         for time in times.iter() {
             let t = within(text, time, "a time", (t0, end))?;
@@ -86,7 +86,7 @@ impl RowTimes {
 }
 
 /// A time of a motion from one to another.
-fn within(text: &str, time: &At<f64>, name: &str, (t0, end): (f64, f64)) -> Result<f64, SceneError> {
+fn within(text: &str, time: &Location<f64>, name: &str, (t0, end): (f64, f64)) -> Result<f64, SceneError> {
     let t = super::finite(text, time, name)?;
     if !(t0.min(end)..=t0.max(end)).contains(&t) {
         let message = format!("the time {t} is not between {t0}, at which the motion starts, and its end, {end}");
@@ -99,7 +99,7 @@ fn within(text: &str, time: &At<f64>, name: &str, (t0, end): (f64, f64)) -> Resu
 pub(crate) fn columns(
     text: &str,
     formula: &Formula,
-    rows: Option<&At<RowsTable>>,
+    rows: Option<&Location<RowsTable>>,
 ) -> Result<Vec<(String, Column)>, SceneError> {
     let Some(columns) = rows.and_then(|rows| rows.columns.as_ref()) else { return Ok(Column::state(formula)) };
     if columns.is_empty() {
@@ -109,7 +109,7 @@ pub(crate) fn columns(
             "no columns; name some, or leave `columns` out for the whole state",
         ));
     }
-    let of = |name: &At<String>| match Column::parse(name, formula) {
+    let of = |name: &Location<String>| match Column::parse(name, formula) {
         Ok(column) => Ok((name_of(name).to_owned(), column)),
         Err(error) => Err(with_nearest(of_formula(text, name.span(), &error), formula)),
     };
@@ -170,7 +170,7 @@ impl Events {
         tables: &[EventTable],
         span: (f64, f64),
     ) -> Result<Self, SceneError> {
-        let expression = |source: &At<String>, named: bool| {
+        let expression = |source: &Location<String>, named: bool| {
             let read = if named { formula.named_expression(source) } else { formula.expression(source) };
             let refused = |error: FormulaError| with_nearest(of_formula(text, source.span(), &error.into()), formula);
             let read = read.map_err(refused)?;
@@ -210,7 +210,7 @@ impl Events {
 
 impl EventColumns {
     /// Adds those of one more event.
-    fn add(&mut self, text: &str, formula: &Formula, columns: &[At<String>]) -> Result<(), SceneError> {
+    fn add(&mut self, text: &str, formula: &Formula, columns: &[Location<String>]) -> Result<(), SceneError> {
         let of_state = state_of_event(formula);
         let mut own = Vec::with_capacity(columns.len());
         for column in columns {
@@ -234,8 +234,8 @@ impl EventColumns {
 }
 
 /// The names of columns that are angles, of those that there are.
-pub(crate) fn angles(text: &str, wrapped: &[At<String>], known: &[&str]) -> Result<Vec<String>, SceneError> {
-    let of = |name: &At<String>| {
+pub(crate) fn angles(text: &str, wrapped: &[Location<String>], known: &[&str]) -> Result<Vec<String>, SceneError> {
+    let of = |name: &Location<String>| {
         if known.contains(&name.as_str()) {
             return Ok((**name).clone());
         }

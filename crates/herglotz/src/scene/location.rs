@@ -14,15 +14,15 @@ pub(crate) type Span = (usize, usize);
 
 /// A value with its place in the file.
 #[derive(Clone, Debug)]
-pub(crate) struct At<T> {
+pub(crate) struct Location<T> {
     value: T,
     span: Span,
 }
 
-impl<T> At<T> {
+impl<T> Location<T> {
     /// A value that is at these bytes.
     pub fn new(value: T, span: Span) -> Self {
-        At { value, span }
+        Location { value, span }
     }
 
     /// Where it is.
@@ -31,7 +31,7 @@ impl<T> At<T> {
     }
 }
 
-impl<T> Deref for At<T> {
+impl<T> Deref for Location<T> {
     type Target = T;
 
     fn deref(&self) -> &T {
@@ -39,21 +39,21 @@ impl<T> Deref for At<T> {
     }
 }
 
-impl<T> DerefMut for At<T> {
+impl<T> DerefMut for Location<T> {
     fn deref_mut(&mut self) -> &mut T {
         &mut self.value
     }
 }
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for At<T> {
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Location<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let read = Spanned::<T>::deserialize(deserializer)?;
         let Range { start, end } = read.span();
-        Ok(At { value: read.into_inner(), span: (start, end) })
+        Ok(Location { value: read.into_inner(), span: (start, end) })
     }
 }
 
-impl<T: JsonSchema> JsonSchema for At<T> {
+impl<T: JsonSchema> JsonSchema for Location<T> {
     fn inline_schema() -> bool {
         T::inline_schema()
     }
@@ -69,7 +69,7 @@ impl<T: JsonSchema> JsonSchema for At<T> {
 
 /// A table whose keys are names of the user's, in the order of the file.
 #[derive(Clone, Debug)]
-pub(crate) struct Named<T>(pub Vec<(At<String>, At<T>)>);
+pub(crate) struct Named<T>(pub Vec<(Location<String>, Location<T>)>);
 
 impl<T> Default for Named<T> {
     fn default() -> Self {
@@ -79,15 +79,15 @@ impl<T> Default for Named<T> {
 
 impl<T> Named<T> {
     /// The value of a name.
-    pub fn get(&self, name: &str) -> Option<&At<T>> {
+    pub fn get(&self, name: &str) -> Option<&Location<T>> {
         self.0.iter().find(|(key, _)| **key == name).map(|(_, value)| value)
     }
 
     /// Gives a name a value, instead of the one that it has.
-    pub fn set(&mut self, name: &str, value: At<T>) {
+    pub fn set(&mut self, name: &str, value: Location<T>) {
         match self.0.iter_mut().find(|(key, _)| **key == name) {
             Some((_, old)) => *old = value,
-            None => self.0.push((At::new(name.to_owned(), value.span()), value)),
+            None => self.0.push((Location::new(name.to_owned(), value.span()), value)),
         }
     }
 }
@@ -108,7 +108,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Named<T> {
                     all.push(entry);
                 }
                 // The reader of the file sorts tables by name.
-                all.sort_by_key(|(key, _): &(At<String>, At<T>)| key.span());
+                all.sort_by_key(|(key, _): &(Location<String>, Location<T>)| key.span());
                 Ok(Named(all))
             }
         }
@@ -137,7 +137,7 @@ pub(crate) enum Numbers {
     /// A number; of an array, for all its entries.
     One(f64),
     /// As many as an array has entries.
-    Many(Vec<At<f64>>),
+    Many(Vec<Location<f64>>),
 }
 
 impl<'de> Deserialize<'de> for Numbers {

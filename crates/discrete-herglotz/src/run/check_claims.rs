@@ -14,7 +14,7 @@ pub(crate) const PROBE: f64 = 1e-12;
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold; [`InputError::Geometry`] where L is defined at neither
 /// point.
-pub fn verified<L: Lagrangian<N>, const N: usize>(
+pub fn check_claims<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     t: f64,
     start: &VelocityPoint<N>,
@@ -44,7 +44,7 @@ pub fn verified<L: Lagrangian<N>, const N: usize>(
 
 /// The first claim that is false at a state `(q, p, z)` of a motion; `guess` is a guess of its velocity. `None` too where L is not
 /// defined, or no velocity belongs to the momentum: nothing is said there.
-pub(crate) fn refuted<L: Lagrangian<N>, const N: usize>(
+pub(crate) fn violated_claim<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     t: f64,
     state: &PhasePoint<N>,
@@ -62,7 +62,7 @@ pub(crate) fn refuted<L: Lagrangian<N>, const N: usize>(
 ///
 /// # Errors
 /// [`InputError::FalseClaim`] with the first claim that does not hold.
-pub(crate) fn verified_over<L: Lagrangian<N>, const N: usize>(
+pub(crate) fn check_claims_over<L: Lagrangian<N>, const N: usize>(
     lagrangian: &L,
     t0: f64,
     span: f64,
@@ -112,7 +112,7 @@ mod tests {
     fn a_slope_in_time_that_vanishes_at_the_start_is_seen() {
         for (system, false_claim) in [(Even::Drag, "constant_rate"), (Even::Spring, "autonomous")] {
             for t in [0.0, std::f64::consts::PI] {
-                let found = verified(&system, t, &VelocityPoint::new([1.0], [0.5], 0.2));
+                let found = check_claims(&system, t, &VelocityPoint::new([1.0], [0.5], 0.2));
                 let refused =
                     matches!(found, Err(InputError::FalseClaim { claim, size }) if claim == false_claim && size > 1e-3);
                 assert!(refused, "{false_claim} at t = {t}: {found:?}");

@@ -4,9 +4,9 @@ use crate::StepError;
 
 /// What is to be done after a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum AfterSweep {
+pub(super) enum IterationOutcome {
     /// Another sweep.
-    Going,
+    Continue,
     /// The stages are solved to round-off.
     Done,
     /// The iteration does not contract: the largest change of the last sweep, relative to the terms.
@@ -21,13 +21,15 @@ pub(super) enum AfterSweep {
     SigmaVanished { sigma: f64 },
 }
 
-impl From<AfterSweep> for StepError {
-    fn from(refused: AfterSweep) -> Self {
+impl From<IterationOutcome> for StepError {
+    fn from(refused: IterationOutcome) -> Self {
         match refused {
-            AfterSweep::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
-            AfterSweep::StageFactor { rho } => StepError::StageFactor { rho },
-            AfterSweep::Slow { change, sweeps } => StepError::NotConverged { residual: change, iterations: sweeps },
-            AfterSweep::Branched => StepError::Branched,
+            IterationOutcome::SigmaVanished { sigma } => StepError::SigmaVanished { sigma },
+            IterationOutcome::StageFactor { rho } => StepError::StageFactor { rho },
+            IterationOutcome::Slow { change, sweeps } => {
+                StepError::NotConverged { residual: change, iterations: sweeps }
+            }
+            IterationOutcome::Branched => StepError::Branched,
             _ => StepError::NonFinite,
         }
     }
@@ -52,7 +54,7 @@ pub(super) const AGE: u32 = 16;
 /// changes near round-off, or that move nothing, no longer fall. It is given up when larger changes have not fallen three times, or
 /// at the limit: so it neither stalls nor loops.
 #[derive(Default)]
-pub(super) struct Sweeps {
+pub(super) struct FixedPointIteration {
     enough: f64,
     left: f64,
     count: u32,
@@ -71,12 +73,12 @@ pub(super) struct Sweeps {
     last: bool,
 }
 
-impl Sweeps {
+impl FixedPointIteration {
     /// An iteration that ends with a change of so many times the round-off of its terms, or when the next one is expected to be so small
     /// as what may be left. What is left has the same direction in every step, and so it adds up like the number of steps, where
     /// round-off adds up like its root.
     pub fn until(enough: f64, left: f64) -> Self {
-        Sweeps { enough, left, ..Sweeps::default() }
+        FixedPointIteration { enough, left, ..FixedPointIteration::default() }
     }
 
     pub fn count(&self) -> u32 {
@@ -95,7 +97,7 @@ impl Sweeps {
 
     /// Whether a sweep ahead is worth it after this change, relative to the terms: the changes fall, and they are small enough to tell the
     /// slope of a force. Then it is taken.
-    pub fn go_ahead(&mut self, change: f64) -> bool {
+    pub fn secant_step(&mut self, change: f64) -> bool {
         self.ahead = self.count > 1 && self.ratio < 0.5 && change <= TELLING;
         self.ahead
     }
@@ -107,19 +109,19 @@ impl Sweeps {
 
     /// Judges a sweep by its largest change and the largest term.
     #[inline(always)]
-    pub fn judge(&mut self, change: f64, size: f64) -> AfterSweep {
+    pub fn judge(&mut self, change: f64, size: f64) -> IterationOutcome {
         self.count += 1;
         let round_off = 0.5 * f64::EPSILON * size;
         let ahead = std::mem::take(&mut self.ahead);
         if change <= self.enough * round_off {
-            return AfterSweep::Done;
+            return IterationOutcome::Done;
         }
         if self.last && change <= 256.0 * round_off {
             self.ends_ahead = ahead;
-            return AfterSweep::Done;
+            return IterationOutcome::Done;
         }
         if !(change + size).is_finite() {
-            return AfterSweep::NonFinite;
+            return IterationOutcome::NonFinite;
         }
         if self.count == 1 {
             self.first = (change, size);
@@ -130,21 +132,21 @@ impl Sweeps {
             let next = change * expected;
             if next <= self.left * round_off {
                 self.ends_ahead = ahead;
-                return AfterSweep::Done;
+                return IterationOutcome::Done;
             }
             self.last = next * expected <= self.left * round_off;
             if ratio >= 1.0 {
                 if change <= 256.0 * round_off || self.still {
-                    return AfterSweep::Done;
+                    return IterationOutcome::Done;
                 }
                 self.risen += 1;
             }
             if self.risen > 3 || self.count > LIMIT {
-                return AfterSweep::Slow { change: change / size, sweeps: self.count };
+                return IterationOutcome::Slow { change: change / size, sweeps: self.count };
             }
             self.ratio = ratio;
         }
         self.before = change;
-        AfterSweep::Going
+        IterationOutcome::Continue
     }
 }

@@ -1,12 +1,12 @@
 //! What is found of a Lagrangian at the start of a run.
 
 use crate::rules::step_equations::{inverted, kept_mass_matrix};
-use crate::{InputError, StepError, legendre_inverse, verified};
+use crate::{InputError, StepError, check_claims, legendre_inverse};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint, largest};
+use contact_geom::{GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint, max_abs_or_nan};
 
 /// The start of a run.
-pub(super) struct Beginning<const N: usize> {
+pub(super) struct ConsistentStart<const N: usize> {
     pub start: VelocityPoint<N>,
     pub structure: Structure,
     /// W and its inverse.
@@ -14,7 +14,7 @@ pub(super) struct Beginning<const N: usize> {
     pub inverse: Box<SMatrix<f64, N, N>>,
 }
 
-impl<const N: usize> Beginning<N> {
+impl<const N: usize> ConsistentStart<N> {
     /// With the structure that has been probed there, or after a probe.
     pub fn of(
         lagrangian: &impl Lagrangian<N>,
@@ -28,7 +28,7 @@ impl<const N: usize> Beginning<N> {
             return Err(GeometryError::NonFinite { what: "t0", index: 0, value: t0 }.into());
         }
         let start = legendre_inverse(lagrangian, t0, state, &guess).map_err(InputError::FirstStep)?;
-        let structure = probed.map_or_else(|| verified(lagrangian, t0, &start), Ok)?;
+        let structure = probed.map_or_else(|| check_claims(lagrangian, t0, &start), Ok)?;
         let w = kept_mass_matrix(lagrangian, t0, &start);
         let inverse = inverted(&w).map_err(|e| InputError::FirstStep(StepError::Singular { pivot: e.pivot }))?;
         // Rows of different units are no matter: |W^-1| |W| is 1 for every diagonal W.
@@ -36,12 +36,12 @@ impl<const N: usize> Beginning<N> {
         if condition.is_nan() || condition > 0.1 / f64::EPSILON {
             return Err(InputError::FirstStep(StepError::Singular { pivot: 1.0 / condition }));
         }
-        Ok(Beginning { start, structure, w, inverse })
+        Ok(ConsistentStart { start, structure, w, inverse })
     }
 }
 
 /// The largest row sum of `|W^-1| |W|`; entry by entry, for the sake of the stack.
 fn condition_of<const N: usize>(inverse: &SMatrix<f64, N, N>, w: &SMatrix<f64, N, N>) -> f64 {
     let product = |i: usize, j: usize| (0..N).map(|k| inverse[(i, k)].abs() * w[(k, j)].abs()).sum::<f64>();
-    largest((0..N).map(|i| (0..N).map(|j| product(i, j)).sum()))
+    max_abs_or_nan((0..N).map(|i| (0..N).map(|j| product(i, j)).sum()))
 }

@@ -1,4 +1,4 @@
-//! Steps that do not resolve their motion are seen; those that do raise no suspicion.
+//! Steps that do not resolve their motion are seen; those that do are not flagged.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
@@ -14,7 +14,7 @@ type Outcome = Result<(), InputError>;
 
 /// Whether a run says, by its status or by its mark, that it cannot be trusted.
 fn says_so<const N: usize>(mut motion: impl Stepper<N>, steps: usize) -> bool {
-    motion.advance(steps).is_err() || motion.suspicion().is_some()
+    motion.advance(steps).is_err() || motion.unresolved().is_some()
 }
 
 /// `z' = v^2/2 + z^2` leaves the real line before t = 1; so does every velocity with it.
@@ -99,9 +99,9 @@ fn the_edge_of_stability_is_marked() -> Outcome {
 }
 
 /// Runs a motion to its end, without a mark.
-fn assert_unsuspicious<const N: usize>(name: &str, mut motion: impl Stepper<N>, steps: usize) {
+fn assert_not_flagged<const N: usize>(name: &str, mut motion: impl Stepper<N>, steps: usize) {
     assert_eq!(motion.advance(steps), Ok(()), "{name}");
-    assert_eq!(motion.suspicion(), None, "{name}, until t = {}", motion.time());
+    assert_eq!(motion.unresolved(), None, "{name}, until t = {}", motion.time());
 }
 
 /// Every splitting, and the rules, on a motion that they resolve: stages of the length h.
@@ -110,7 +110,7 @@ fn assert_resolved<L: Lagrangian<N>, const N: usize>(l: &L, h: f64, t0: f64, sta
     for scheme in &SplittingScheme::ALL {
         let stages = scheme.stages();
         let h = h * stages as f64;
-        assert_unsuspicious(scheme.name(), Splitting::new(l, scheme, h, t0, start)?.watched(), steps / stages);
+        assert_not_flagged(scheme.name(), Splitting::new(l, scheme, h, t0, start)?.watched(), steps / stages);
     }
     assert_rules_resolve(l, h, t0, start, steps)
 }
@@ -123,13 +123,13 @@ fn assert_rules_resolve<L: Lagrangian<N>, const N: usize>(
     steps: usize,
 ) -> Outcome {
     let (midpoint, trapezoidal) = (Midpoint::new(l, h)?, Trapezoidal::new(l, h)?);
-    assert_unsuspicious("midpoint", Flow::new(&midpoint, t0, start)?, steps);
-    assert_unsuspicious("trapezoidal", Flow::new(&trapezoidal, t0, start)?, steps);
+    assert_not_flagged("midpoint", Flow::new(&midpoint, t0, start)?, steps);
+    assert_not_flagged("trapezoidal", Flow::new(&trapezoidal, t0, start)?, steps);
     for scheme in [SplittingScheme::YOSHIDA_4, SplittingScheme::SUZUKI_UMENO_8] {
         let stages = scheme.stages();
         let rule = |h| Midpoint::new(l, h);
         let motion = Composition::new(rule, &scheme, h * stages as f64, t0, start)?;
-        assert_unsuspicious(scheme.name(), motion, steps / stages);
+        assert_not_flagged(scheme.name(), motion, steps / stages);
     }
     Ok(())
 }
@@ -148,7 +148,7 @@ impl Lagrangian<1> for Pulse {
 }
 
 #[test]
-fn what_is_resolved_raises_no_suspicion() -> Outcome {
+fn what_is_resolved_is_not_flagged() -> Outcome {
     let start = PhasePoint::new([1.0], [1.0], 0.2);
     assert_resolved(&OneCoordinate::from(Pendulum { gamma: -0.05 }), 0.05, 0.0, start, 100.0)?;
     assert_resolved(
@@ -168,10 +168,10 @@ fn what_is_resolved_raises_no_suspicion() -> Outcome {
     let rest = PhasePoint::new([0.0], [0.0], 0.0);
     for scheme in &SplittingScheme::ALL {
         let motion = Splitting::new(&Pulse, scheme, 0.01 * scheme.stages() as f64, 0.0, rest)?.watched();
-        assert_unsuspicious(scheme.name(), motion, 10_000 / scheme.stages());
+        assert_not_flagged(scheme.name(), motion, 10_000 / scheme.stages());
     }
     let midpoint = Midpoint::new(&Pulse, 0.01)?;
-    assert_unsuspicious("midpoint", Flow::new(&midpoint, 0.0, rest)?, 10_000);
+    assert_not_flagged("midpoint", Flow::new(&midpoint, 0.0, rest)?, 10_000);
     // Fast in the units of time, and slow.
     for scale in [1e-6, 1e6] {
         let kepler = Kepler::<2> { mu: scale * scale, gamma: -1e-3 * scale };
@@ -188,7 +188,7 @@ fn what_is_resolved_raises_no_suspicion() -> Outcome {
     assert_rules_resolve(&square, 0.05, 0.0, start, 2000)?;
     for scheme in SplittingScheme::ALL.iter().filter(|s| !s.is_nystrom()) {
         let motion = ActionSplitting::new(&square, scheme, 0.02 * scheme.stages() as f64, 0.0, start)?;
-        assert_unsuspicious(scheme.name(), motion, 2000 / scheme.stages());
+        assert_not_flagged(scheme.name(), motion, 2000 / scheme.stages());
     }
     Ok(())
 }
@@ -199,12 +199,12 @@ fn the_mark_is_that_of_its_step() -> Outcome {
     let (kepler, start) = (Kepler::<2> { mu: 1.0, gamma: 0.0 }, PhasePoint::new([1.0, 0.0], [0.0, 0.0], 0.0));
     let mut motion = Splitting::new(&kepler, &SplittingScheme::STRANG, 0.05, 0.0, start)?.watched();
     let mut at_once = Splitting::new(&kepler, &SplittingScheme::STRANG, 0.05, 0.0, start)?.watched();
-    let seen = (0..200).find(|_| motion.advance(1).is_ok() && motion.suspicion().is_some());
+    let seen = (0..200).find(|_| motion.advance(1).is_ok() && motion.unresolved().is_some());
     assert_eq!(at_once.advance(200), Ok(()));
-    let mark = at_once.suspicion();
-    assert_eq!((seen, motion.suspicion()), (mark.map(|mark| mark.step), mark));
+    let mark = at_once.unresolved();
+    assert_eq!((seen, motion.unresolved()), (mark.map(|mark| mark.step), mark));
     // The fall takes 1.11.
-    assert!(mark.is_some_and(|mark| (18..26).contains(&mark.step) && mark.misfit > 1.0), "{mark:?}");
+    assert!(mark.is_some_and(|mark| (18..26).contains(&mark.step) && mark.defect > 1.0), "{mark:?}");
     Ok(())
 }
 

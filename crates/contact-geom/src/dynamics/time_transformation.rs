@@ -1,9 +1,9 @@
-//! Clocks: times that motions are stepped in.
+//! Time transformations: the variables in which steps are equal.
 
 use crate::Scalar;
 use nalgebra::SVector;
 
-/// A clock of an autonomous motion: the time tau with `dt = g(q) dtau`, whose rate g is positive where the motion goes.
+/// A time transformation of an autonomous motion: the time tau with `dt = g(q) dtau`, whose rate g is positive where the motion goes.
 ///
 /// Equal steps of tau are steps of t that follow g. That is the time transformation of Poincare and Levi-Civita: on T\*(Q x R) x R
 /// with coordinates `(q, t, p, p_t, z)` the contact Hamiltonian `K = g(q) (H(q, p, z) + p_t)` has on `K = 0` the motion of H
@@ -11,16 +11,16 @@ use nalgebra::SVector;
 /// variable step for H; see Hairer, "Variable time step integration with symplectic methods", Appl. Numer. Math. 25 (1997).
 ///
 /// ```
-/// use contact_geom::{nalgebra::SVector, Clock, Scalar};
+/// use contact_geom::{nalgebra::SVector, TimeTransformation, Scalar};
 /// struct Sundman;
-/// impl Clock<2> for Sundman {
+/// impl TimeTransformation<2> for Sundman {
 ///     fn rate<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
 ///         q.dot(q).sqrt()
 ///     }
 /// }
 /// assert_eq!(Sundman.rate(&SVector::from([3.0, 4.0])), 5.0);
 /// ```
-pub trait Clock<const N: usize> {
+pub trait TimeTransformation<const N: usize> {
     /// The rate `g(q) = dt/dtau`.
     fn rate<T: Scalar>(&self, q: &SVector<T, N>) -> T;
 }

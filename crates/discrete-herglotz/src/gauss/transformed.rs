@@ -1,34 +1,34 @@
-//! Runs of contact Gauss collocation in the time of a clock.
+//! Runs of contact Gauss collocation in transformed time.
 
-use super::account::account_by_clock;
-use super::beginning::Beginning;
-use super::compensated::Compensated;
+use super::compensated::CompensatedSum;
+use super::consistent_start::ConsistentStart;
+use super::defect_sample::{Compare, Curve, DefectSample};
+use super::fixed_point::IterationOutcome;
 use super::general::General;
 use super::instructions::Instructions;
-use super::look::{Compare, Curve, Look};
 use super::mass::Mass;
-use super::sweeps::AfterSweep;
+use super::parametrization::{Extension, Fictitious, Values};
 use super::table::StageTable;
-use super::time_transformation::{Extension, Fictitious, Values};
+use super::work_summary::work_summary_in_transformed_time;
 use crate::gauss::lanes::forget_branches;
 use crate::run::saved::{Saved, load_option, save_option};
-use crate::{Halt, ITERATION_LIMIT, InputError, Item, StepError, Stepper, Suspicion};
+use crate::{ITERATION_LIMIT, InputError, PlanEntry, StepError, StepFailure, Stepper, UnresolvedStep};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Clock, Lagrangian, PhasePoint, Scalar, Structure};
+use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation};
 use pulp::{Simd, WithSimd};
 
-/// The clock that a Lagrangian states.
+/// the time transformation that a Lagrangian states.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct OwnClock<'a, L>(pub &'a L);
+pub(crate) struct OwnTransformation<'a, L>(pub &'a L);
 
-impl<L: Lagrangian<N>, const N: usize> Clock<N> for OwnClock<'_, L> {
+impl<L: Lagrangian<N>, const N: usize> TimeTransformation<N> for OwnTransformation<'_, L> {
     #[inline(always)]
     fn rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
-        self.0.clock_rate(q)
+        self.0.dt_dtau(q)
     }
 }
 
-/// Contact Gauss collocation of variable step at work: its steps are equal in the time tau of a [`Clock`], `dt = g(q) dtau`.
+/// Contact Gauss collocation of variable step at work: its steps are equal in the time tau of a [`TimeTransformation`], `dt = g(q) dtau`.
 ///
 /// It is Gauss collocation of `K = g(q) (H + p_t)` on T\*(Q x R) x R with `p_t = -H` at the start, which makes `K = 0`. With
 /// the velocities V with respect to t, `g = g(Q)` and the energy `E = V.L_v - L`, the stages are
@@ -48,12 +48,12 @@ impl<L: Lagrangian<N>, const N: usize> Clock<N> for OwnClock<'_, L> {
 /// let kepler = Kepler::<2>::default();
 /// let start = kepler.initial();
 /// let gauss = Gauss::new(kepler, 6, 0.2)?;
-/// let mut run = gauss.clocked_stepper(kepler.clock(), 0.0, legendre(&kepler, 0.0, &start), start.v)?;
+/// let mut run = gauss.transformed_stepper(kepler.time_transformation(), 0.0, legendre(&kepler, 0.0, &start), start.v)?;
 /// run.advance_to(10.0)?;
 /// assert!((run.time() - 10.0).abs() < 1e-14);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct ClockedStepper<'a, L, C, const N: usize> {
+pub struct TransformedStepper<'a, L, C, const N: usize> {
     general: Box<General<'a, L, Fictitious<C>, N>>,
     arch: Instructions,
     h: f64,
@@ -61,35 +61,44 @@ pub struct ClockedStepper<'a, L, C, const N: usize> {
     taken: usize,
     /// The start of the last step, where that was taken by itself.
     from: Option<Values<N>>,
-    suspicion: Option<Suspicion>,
+    unresolved: Option<UnresolvedStep>,
 }
 
-impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C, N> {
+impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> TransformedStepper<'a, L, C, N> {
     pub(super) fn new(
         lagrangian: &'a L,
         (s, h): (usize, f64),
-        clock: C,
+        transformation: C,
         probed: Option<Structure>,
         t0: f64,
         state: PhasePoint<N>,
         guess: SVector<f64, N>,
     ) -> Result<Self, InputError> {
-        let Beginning { start, structure, inverse, .. } = Beginning::of(lagrangian, probed, t0, &state, guess)?;
+        let ConsistentStart { start, structure, inverse, .. } =
+            ConsistentStart::of(lagrangian, probed, t0, &state, guess)?;
         if !structure.autonomous {
             return Err(InputError::Unclaimed { claim: "autonomous" });
         }
-        let rate = clock.rate(&state.q);
+        let rate = transformation.rate(&state.q);
         if !(rate > 0.0 && rate.is_finite()) {
-            return Err(InputError::Clock { rate });
+            return Err(InputError::TimeTransformation { rate });
         }
         let energy = start.v.dot(&state.p) - lagrangian.value(t0, &start.q, &start.v, start.z);
         if !energy.is_finite() {
             return Err(InputError::FirstStep(StepError::NonFinite));
         }
-        let extension = Extension::new(Fictitious(clock), t0, -energy);
+        let extension = Extension::new(Fictitious(transformation), t0, -energy);
         let (table, mass) = (StageTable::new(s, h), Mass::new(&structure, inverse));
         let general = Box::new(General::new(lagrangian, extension, table, mass, false, &state, &start.v));
-        Ok(ClockedStepper { general, arch: Instructions::new(), h, tau: 0.0, taken: 0, from: None, suspicion: None })
+        Ok(TransformedStepper {
+            general,
+            arch: Instructions::new(),
+            h,
+            tau: 0.0,
+            taken: 0,
+            from: None,
+            unresolved: None,
+        })
     }
 
     /// The momentum `p_t` of the time, minus the energy but for the method's error: `E + p_t = K / g`. It is contracted as every
@@ -98,7 +107,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         self.general.extension.p_t.value
     }
 
-    /// The time tau of the clock since the start.
+    /// The transformed time tau since the start.
     pub(crate) fn tau(&self) -> f64 {
         self.tau
     }
@@ -108,23 +117,28 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
     ///
     /// # Errors
     /// As [`advance`](Stepper::advance); [`StepError::NonFinite`] for a time that is not finite.
-    pub fn advance_to(&mut self, t_end: f64) -> Result<(), Halt> {
+    pub fn advance_to(&mut self, t_end: f64) -> Result<(), StepFailure> {
         self.advance_until(usize::MAX, t_end).map(|_| ())
     }
 
     /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step that was
     /// taken by itself.
-    pub(crate) fn look(&self, sets: usize) -> Option<Look> {
+    pub(crate) fn look(&self, sets: usize) -> Option<DefectSample> {
         let (general, from) = (&*self.general, self.from.as_ref()?);
-        let value = |x: &[Compensated; N]| SVector::from(x.map(|x| x.value));
+        let value = |x: &[CompensatedSum; N]| SVector::from(x.map(|x| x.value));
         let start = PhasePoint { q: value(&from.q), p: value(&from.p), z: from.z.value };
-        let (&StageTable { s, h, .. }, clock) = (&general.table, &general.extension.transformation);
+        let (&StageTable { s, h, .. }, transformation) = (&general.table, &general.extension.transformation);
         let mut curve = Curve::new(s, from.t.value, h, &start);
-        curve.of_clock(&general.solved_by_clock(), [clock.0.rate(&start.q), general.rate()]);
+        curve.of_transformed(&general.solved_in_transformed_time(), [transformation.0.rate(&start.q), general.rate()]);
         let at = |set| {
-            self.arch.dispatch(Compare { lagrangian: general.lagrangian, transformation: clock, curve: &curve, set })
+            self.arch.dispatch(Compare {
+                lagrangian: general.lagrangian,
+                transformation: transformation,
+                curve: &curve,
+                set,
+            })
         };
-        (0..sets).map(at).reduce(Look::and)
+        (0..sets).map(at).reduce(DefectSample::and)
     }
 
     /// Takes the last step again from where it started, so long that it ends at a time, which it has passed.
@@ -162,9 +176,9 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
     }
 
     /// Takes steps by sweeps.
-    fn sweep(&mut self, steps: usize) -> Result<(), Halt> {
-        let ClockedStepper { general, taken, suspicion, .. } = self;
-        self.arch.dispatch(AdvanceClocked { general: &mut **general, suspicion, taken, steps })
+    fn sweep(&mut self, steps: usize) -> Result<(), StepFailure> {
+        let TransformedStepper { general, taken, unresolved, .. } = self;
+        self.arch.dispatch(AdvanceTransformed { general: &mut **general, unresolved, taken, steps })
     }
 
     /// From the words of another; no look at its last step.
@@ -178,7 +192,7 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
         self.tau.load(from)?;
         self.taken.load(from)?;
         self.from = None;
-        self.suspicion = load_option(from, || Suspicion { step: 0, misfit: 0.0 })?;
+        self.unresolved = load_option(from, || UnresolvedStep { step: 0, defect: 0.0 })?;
         Some(())
     }
 
@@ -191,15 +205,15 @@ impl<'a, L: Lagrangian<N>, C: Clock<N>, const N: usize> ClockedStepper<'a, L, C,
 }
 
 /// Steps in the lanes of one instruction set; ends at a step that cannot be taken.
-struct AdvanceClocked<'b, 'a, L, C, const N: usize> {
+struct AdvanceTransformed<'b, 'a, L, C, const N: usize> {
     general: &'b mut General<'a, L, Fictitious<C>, N>,
-    suspicion: &'b mut Option<Suspicion>,
+    unresolved: &'b mut Option<UnresolvedStep>,
     taken: &'b mut usize,
     steps: usize,
 }
 
-impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for AdvanceClocked<'_, '_, L, C, N> {
-    type Output = Result<(), Halt>;
+impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> WithSimd for AdvanceTransformed<'_, '_, L, C, N> {
+    type Output = Result<(), StepFailure>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
@@ -208,11 +222,11 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for AdvanceClocked<
             // L does not depend on it.
             let t = self.general.extension.t.value;
             let progress = self.general.step::<S>(t);
-            if progress != AfterSweep::Done {
-                return Err(Halt { taken, cause: progress.into() });
+            if progress != IterationOutcome::Done {
+                return Err(StepFailure { taken, cause: progress.into() });
             }
-            if self.general.misfit > 1.0 && self.suspicion.is_none() {
-                *self.suspicion = Some(Suspicion { step: *self.taken, misfit: self.general.misfit });
+            if self.general.defect > 1.0 && self.unresolved.is_none() {
+                *self.unresolved = Some(UnresolvedStep { step: *self.taken, defect: self.general.defect });
             }
             *self.taken += 1;
         }
@@ -220,9 +234,9 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> WithSimd for AdvanceClocked<
     }
 }
 
-impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedStepper<'_, L, C, N> {
-    /// The steps are equal in the clock's time.
-    fn advance(&mut self, steps: usize) -> Result<(), Halt> {
+impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Stepper<N> for TransformedStepper<'_, L, C, N> {
+    /// The steps are equal in the transformed time.
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         self.lengthen();
         self.from = None;
         let done = self.sweep(steps);
@@ -235,8 +249,8 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
     }
 
     /// The last step is shorter, so that it ends at `t_end` to round-off.
-    fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, Halt> {
-        let halt = |taken, cause| Halt { taken, cause };
+    fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, StepFailure> {
+        let halt = |taken, cause| StepFailure { taken, cause };
         if !t_end.is_finite() {
             return Err(halt(0, StepError::NonFinite));
         }
@@ -278,8 +292,8 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
         self.general.evaluations
     }
 
-    fn account(&self) -> Vec<Item> {
-        account_by_clock(&self.general.lagrangian.structure())
+    fn work_summary(&self) -> Vec<PlanEntry> {
+        work_summary_in_transformed_time(&self.general.lagrangian.structure())
     }
 
     fn save(&self) -> Option<Vec<u64>> {
@@ -287,7 +301,7 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
         self.general.save(&mut words);
         [self.general.table.h, self.tau].save(&mut words);
         self.taken.save(&mut words);
-        save_option(self.suspicion.as_ref(), &mut words);
+        save_option(self.unresolved.as_ref(), &mut words);
         Some(words)
     }
 
@@ -295,7 +309,7 @@ impl<L: Lagrangian<N>, C: Clock<N>, const N: usize> Stepper<N> for ClockedSteppe
         self.read(&mut words).is_some() && words.is_empty()
     }
 
-    fn suspicion(&self) -> Option<Suspicion> {
-        self.suspicion
+    fn unresolved(&self) -> Option<UnresolvedStep> {
+        self.unresolved
     }
 }
