@@ -446,6 +446,20 @@ impl std::fmt::Display for Status {
     }
 }
 
+/// The earlier of two unresolved steps.
+pub(crate) fn first(a: Option<UnresolvedStep>, b: Option<UnresolvedStep>) -> Option<UnresolvedStep> {
+    a.into_iter().chain(b).min_by_key(|s| s.step)
+}
+
+/// The error of a step of an integrator that cannot be started.
+pub(crate) fn step_error(error: InputError) -> StepError {
+    match error {
+        InputError::FirstStep(cause) => cause,
+        InputError::Sigma { sigma } => StepError::SigmaVanished { sigma },
+        _ => StepError::NonFinite,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

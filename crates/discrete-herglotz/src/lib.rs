@@ -27,6 +27,9 @@ mod boundary;
 mod ensemble;
 mod error;
 mod gauss;
+mod integration;
+mod numbers;
+mod resolution;
 pub mod rules;
 mod run;
 mod solve;
@@ -35,24 +38,23 @@ mod switching;
 mod theory;
 
 pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus, branch, continuation};
-pub use ensemble::{
-    BatchKernel, Ending, Ensemble, EnsembleError, Member, Merge, ObservedEnsemble, ShardedEnsemble, Tally,
-};
+pub use ensemble::{Ending, Ensemble, EnsembleError, Member, Merge, ObservedEnsemble, ShardedEnsemble, Tally};
 pub use error::{InputError, SelectionFailure, Status, StepError, UnresolvedStep};
-pub use gauss::{DenseStep, Gauss, GaussCollocation, GaussRoute, GaussStepper, TransformedGauss, TransformedStepper};
+pub use gauss::{Gauss, GaussCollocation, GaussRoute, GaussStepper, TransformedGauss, TransformedStepper};
+pub use integration::{
+    BatchKernel, DenseStep, INTERRUPTION, Integrator, Interrupt, MethodInfo, PlanEntry, Problem, SplittingScheme,
+    Start, StepFailure, Stepper, StepperOptions, SuspectInterval, check_claims,
+};
 pub use rules::*;
 #[cfg(feature = "csv")]
 pub use run::CsvRows;
 pub use run::{
-    AnyIntegrator, Checkpoint, CheckpointError, Crossing, EnergyDrift, EnergyLook, Event, Events, INTERRUPTION,
-    Integrator, Interrupt, LastStep, MethodInfo, MomentumDecay, MomentumRow, Observer, Outcome, OutputRequest, Plan,
-    PlanEntry, Problem, Progress, Quotient, ResumeState, Row, Rows, Run, RunInfo, Start, StepFailure, StepView,
-    Stepper, StepperOptions, Steps, Stop, SuspectInterval, Terminal, UnknownIntegrator, Until, check_claims,
+    AnyIntegrator, Checkpoint, CheckpointError, Crossing, EnergyDrift, EnergyLook, Event, Events, LastStep,
+    MomentumDecay, MomentumRow, Observer, Outcome, OutputRequest, Plan, Progress, Quotient, ResumeState, Row, Rows,
+    Run, RunInfo, StepView, Steps, Stop, Terminal, UnknownIntegrator, Until,
 };
 pub use solve::{CROSSOVER, ITERATION_LIMIT, Solver, last_correction};
-pub use splitting::{
-    ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, RiccatiMap, Splitting, SplittingScheme, Strang,
-};
+pub use splitting::{ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, RiccatiMap, Splitting, Strang};
 pub use switching::{DividedGauss, jumps_between};
 pub use theory::{
     DiscreteLagrangian, DiscretePath, DiscreteRegularity, DiscreteStep, HamiltonianFlow, derived_jet,

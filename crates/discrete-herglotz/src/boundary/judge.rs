@@ -1,7 +1,7 @@
 //! Whether a found path is a motion: its steps resolve it, and what they leave out does not move it by as much as it moves.
 
 use super::block_elimination::{BlockElimination, Carry, Equations, Nodes};
-use crate::run::resolution_monitor::{ROUNDED, at_rest, rounding};
+use crate::resolution::monitor::{ROUNDED, at_rest, rounding};
 use crate::{DiscreteLagrangian, UnresolvedStep};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{PhasePoint, max_abs_or_nan, max_or_nan};

@@ -1,7 +1,7 @@
 //! Ensembles to a wanted error.
 
 use super::Ensemble;
-use super::lane::Lane;
+use crate::ensemble::lane::Lane;
 use crate::{GaussCollocation, Run, Steps};
 use contact_geom::{Lagrangian, PhasePoint};
 
@@ -9,7 +9,7 @@ use contact_geom::{Lagrangian, PhasePoint};
 type Within<L, const N: usize> = for<'p, 'o> fn(Run<'p, 'o, L, N>, f64) -> Run<'p, 'o, L, N>;
 
 /// How long the steps of the members are.
-pub(super) enum StepControl<L, const N: usize> {
+pub(crate) enum StepControl<L, const N: usize> {
     Given(Steps),
     /// For a wanted error: in a program that asks for none trial runs are not compiled.
     For(f64, Within<L, N>),
@@ -56,7 +56,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
 }
 
 /// Refuses, as what is not finite, what is farther from where twice as many steps lead.
-pub(super) fn refuse_beyond<const N: usize>(wanted: f64, lanes: &mut [Lane<N>], finer: &[Lane<N>]) {
+pub(crate) fn refuse_beyond<const N: usize>(wanted: f64, lanes: &mut [Lane<N>], finer: &[Lane<N>]) {
     let square = |x: &PhasePoint<N>| x.q.norm_squared() + x.p.norm_squared();
     for (Lane { state: x, .. }, Lane { state: fine, .. }) in lanes.iter_mut().zip(finer) {
         let apart = square(&PhasePoint { q: x.q - fine.q, p: x.p - fine.p, z: 0.0 });

@@ -1,9 +1,9 @@
 //! A file of the shards that are done.
 
-use super::member::{Ending, Member};
 use super::{EnsembleError, SHARD, Shard};
+use crate::ensemble::member::{Ending, Member};
+use crate::numbers::state_words::{Saved, load_option, save_option};
 use crate::run::digest;
-use crate::run::saved::{Saved, load_option, save_option};
 use crate::{CheckpointError, InputError, Row, Status, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
@@ -24,7 +24,7 @@ const LONGEST: u64 = 1 << 31;
 
 /// The shards that are done, in any order, each whole or not there: it is written at once, behind those before it, with its length in front and a
 /// digest at its end. What was cut off in the middle of it is the last of the file, and is done again.
-pub(super) struct Shards {
+pub(crate) struct Shards {
     path: PathBuf,
     file: BufReader<File>,
     /// How much of the file is whole.
@@ -155,7 +155,7 @@ impl Shards {
 }
 
 /// A shard as words, its number first. Of a member that has not completed they say no more than that.
-pub(super) fn words_of<const N: usize>(shard: usize, of: &Shard<N>) -> Vec<u64> {
+pub(crate) fn words_of<const N: usize>(shard: usize, of: &Shard<N>) -> Vec<u64> {
     let mut words = vec![shard as u64];
     of.batch_kernel.save(&mut words);
     of.members.len().save(&mut words);
@@ -174,7 +174,7 @@ pub(super) fn words_of<const N: usize>(shard: usize, of: &Shard<N>) -> Vec<u64> 
 }
 
 /// A shard from its words, and its number; members that have not completed are those which [`Task`](super::Task) runs again.
-pub(super) fn shard_of<const N: usize>(mut from: &[u64]) -> Option<(usize, Shard<N>)> {
+pub(crate) fn shard_of<const N: usize>(mut from: &[u64]) -> Option<(usize, Shard<N>)> {
     let from = &mut from;
     let (mut shard, mut batch_kernel, mut count) = (0usize, 0, 0);
     shard.load(from)?;

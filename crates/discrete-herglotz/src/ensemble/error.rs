@@ -53,7 +53,7 @@ pub enum EnsembleError {
 }
 
 impl EnsembleError {
-    pub(super) fn checkpoint(path: &Path, cause: CheckpointError) -> Self {
+    pub(crate) fn checkpoint(path: &Path, cause: CheckpointError) -> Self {
         EnsembleError::Checkpoint { path: path.into(), cause }
     }
 }

@@ -3,17 +3,17 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use super::judge::Judge;
-use super::lane::{Lane, LaneOptions, interrupted};
-use super::simd_batch::SimdBatch;
-use super::twofold::{CompensatedBatch, Pair};
+use crate::ensemble::judge::Judge;
+use crate::ensemble::lane::{Lane, LaneOptions, interrupted};
 use crate::gauss::FEW_STAGES;
-use crate::gauss::coefficients::{Coefficients, MAX_STAGES};
-use crate::gauss::condensed::Condensed;
-use crate::gauss::instructions::Instructions;
-use crate::gauss::resolution::{MOVED, of_sigma};
-use crate::run::interrupt::BETWEEN;
-use crate::run::resolution_monitor::ROUNDED;
+use crate::gauss::resolution::tail::{MOVED, of_sigma};
+use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
+use crate::gauss::tables::condensed::Condensed;
+use crate::integration::interrupt::BETWEEN;
+use crate::numbers::compensated_batch::{CompensatedBatch, Pair};
+use crate::numbers::instructions::Instructions;
+use crate::numbers::simd_batch::SimdBatch;
+use crate::resolution::monitor::ROUNDED;
 use crate::splitting::separable::SeparableForm;
 use crate::{InputError, Interrupt, StepError};
 use contact_geom::nalgebra::SVector;
@@ -28,7 +28,7 @@ use qd::Quad;
 /// A sweep takes the stages in their order, each from the newest accelerations of the others (Gauss and Seidel's iteration); the first takes the
 /// newest of all, those of the step before among them, as points of a polynomial, which guesses a step one stage at a time. Lanes end their
 /// sweeps each for itself, by the rules of `gauss/sweeps.rs`; what has ended is kept while others go on.
-pub(super) struct GaussPacks<'a, L, const N: usize> {
+pub(crate) struct GaussPacks<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
     table: Box<Table>,
     t0: f64,
@@ -389,7 +389,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussPacks<'a, L, N> {
         let zero = SimdBatch::zero();
         let at = VelocityPoint { q: SVector::from_fn(|d, _| x[d]), v: SVector::from_fn(|_, _| zero), z: zero };
         let (_, force) = self.form.lagrangian.with_force(SimdBatch::splat(t), &at);
-        super::splitting::velocity(&self.form, &force)
+        crate::ensemble::splitting::velocity(&self.form, &force)
     }
 
     /// The end of the step from its accelerations.

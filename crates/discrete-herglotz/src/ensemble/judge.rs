@@ -1,6 +1,6 @@
 //! Whether the sweeps of Gauss collocation go on, lane by lane.
 
-use super::simd_batch::SimdBatch;
+use crate::numbers::simd_batch::SimdBatch;
 use num_traits::Zero;
 use pulp::Simd;
 
@@ -9,7 +9,7 @@ const LIMIT: u32 = 60;
 
 /// See `FixedPointIteration` of `gauss/sweeps.rs`, lane by lane.
 #[derive(Clone, Copy)]
-pub(super) struct Judge<S: Simd, const K: usize> {
+pub(crate) struct Judge<S: Simd, const K: usize> {
     before: SimdBatch<S, K>,
     ratio: SimdBatch<S, K>,
     /// 1 where the next sweep is the last.

@@ -5,7 +5,7 @@ use contact_geom::PhasePoint;
 
 /// What is wanted of members in lanes beside their ends.
 #[derive(Clone, Copy)]
-pub(super) struct LaneOptions {
+pub(crate) struct LaneOptions {
     /// A row after each so many steps.
     pub rows: Option<usize>,
     /// Marks where steps do not resolve the motion.
@@ -14,7 +14,7 @@ pub(super) struct LaneOptions {
 
 /// A member on its way in a lane.
 #[derive(Clone, Debug)]
-pub(super) struct Lane<const N: usize> {
+pub(crate) struct Lane<const N: usize> {
     /// How far it has come.
     pub state: PhasePoint<N>,
     /// Its rows, where they are recorded.
@@ -50,6 +50,6 @@ fn row<const N: usize>(t: f64, PhasePoint { q, p, z }: PhasePoint<N>, action: bo
 }
 
 /// Marks members as not finished: each then has a run of its own, which says how far it has come.
-pub(super) fn interrupted<const N: usize>(some: &mut [Lane<N>]) {
+pub(crate) fn interrupted<const N: usize>(some: &mut [Lane<N>]) {
     some.iter_mut().for_each(|lane| lane.state.z = f64::NAN);
 }

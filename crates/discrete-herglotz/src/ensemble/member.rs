@@ -56,7 +56,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    pub(super) fn add<const N: usize>(&mut self, member: &Member<N>) {
+    pub(crate) fn add<const N: usize>(&mut self, member: &Member<N>) {
         self.members += 1;
         self.unresolved += usize::from(member.ending.is_ok_and(|ending| ending.unresolved.is_some()));
         match member.ending.map(|ending| ending.status) {

@@ -10,26 +10,22 @@ mod member;
 mod observed;
 mod sharded;
 mod shards;
-mod simd_batch;
 mod single;
 mod splitting;
 #[cfg(test)]
 mod tests;
-mod twofold;
 
 pub use error::EnsembleError;
 pub use member::{Ending, Member, Tally};
 pub use observed::ObservedEnsemble;
 pub use sharded::{Merge, ShardedEnsemble};
 
-use crate::gauss::instructions::Instructions;
-use crate::gauss::lanes::{branched, forget_branches};
+use crate::numbers::instructions::Instructions;
+use crate::numbers::lanes::{branched, forget_branches};
 use crate::run::may_drift;
 use crate::run::{digest, rows};
 use crate::switching::has_switching_functions;
-use crate::{
-    GaussCollocation, InputError, Integrator, Interrupt, Observer, Rows, SplittingScheme, Start, Status, Steps, Until,
-};
+use crate::{BatchKernel, InputError, Integrator, Interrupt, Observer, Problem, Rows, Start, Status, Steps, Until};
 use accuracy::StepControl;
 use contact_geom::{ChartVector, Derivatives, Lagrangian, PhasePoint, VelocityPoint, legendre};
 use gauss::GaussPacks;
@@ -39,15 +35,6 @@ use splitting::SplittingPacks;
 use std::num::NonZeroUsize;
 use std::ops::{ControlFlow, Range};
 use std::path::PathBuf;
-
-/// What an [`Integrator`] has a kernel for that takes a step of many motions at once.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BatchKernel {
-    /// The steps of a splitting with linear drag.
-    Splitting(SplittingScheme),
-    /// Those of contact Gauss collocation, for constant mass and constant rate of the conformal factor.
-    Gauss(GaussCollocation),
-}
 
 /// The members that are computed, kept and handed on together: whole packs of one to four registers of at most eight lanes.
 const SHARD: usize = 384;
@@ -110,6 +97,20 @@ pub struct Ensemble<'a, L, const N: usize> {
     checkpoint: Option<PathBuf>,
     interrupt: Option<Interrupt<'a>>,
     progress: Option<Box<dyn Fn(f64) + 'a>>,
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
+    /// So many motions of it from other starts, at the same time: each a function of its index.
+    pub fn ensemble<X: Into<Start<N>>>(
+        &self,
+        count: usize,
+        start: impl Fn(usize) -> X + Sync + 'a,
+    ) -> Ensemble<'a, L, N>
+    where
+        L: Sync,
+    {
+        Ensemble::new(self.lagrangian, self.t0, count, start)
+    }
 }
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
@@ -339,7 +340,7 @@ impl<L: Lagrangian<N>, const N: usize> Kernel<'_, L, N> {
 }
 
 /// A run of an ensemble after its checks.
-struct Task<'e, 'a, L, const N: usize> {
+pub(crate) struct Task<'e, 'a, L, const N: usize> {
     members: &'e (dyn Fn(usize) -> (&'a L, Start<N>) + Sync + 'a),
     count: usize,
     instructions: Instructions,
@@ -355,7 +356,7 @@ struct Task<'e, 'a, L, const N: usize> {
 }
 
 /// The members of a shard at their ends.
-struct Shard<const N: usize> {
+pub(crate) struct Shard<const N: usize> {
     members: Vec<Member<N>>,
     batch_kernel: usize,
     /// Whether members that have not completed say why; those that were read from words do not.
@@ -382,9 +383,7 @@ impl<'a, L: Lagrangian<N> + Sync, const N: usize> Task<'_, 'a, L, N> {
                 SplittingPacks::new(lagrangian, &scheme, plan, self.common.t0, state)
                     .map(|packs| Kernel::Splitting(packs.with_interrupt(self.interrupt)))
             }
-            Some(BatchKernel::Gauss(GaussCollocation { stages }))
-                if structure.separable && structure.has_constant_rate() =>
-            {
+            Some(BatchKernel::Gauss { stages }) if structure.separable && structure.has_constant_rate() => {
                 GaussPacks::new(lagrangian, stages, plan, self.common.t0, state)
                     .map(|packs| Kernel::Gauss(packs.with_interrupt(self.interrupt)))
             }

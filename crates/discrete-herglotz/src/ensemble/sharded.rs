@@ -1,9 +1,9 @@
 //! An ensemble in shards, for those who compute them in other processes.
 
-use super::checkpoint::{self, Shards};
-use super::shards::WINDOW_OF_A_THREAD;
 use super::{Ensemble, EnsembleError, Member, SHARD, Shard, Tally, Task};
 use crate::Until;
+use crate::ensemble::checkpoint::{self, Shards};
+use crate::ensemble::shards::WINDOW_OF_A_THREAD;
 use contact_geom::Lagrangian;
 use std::collections::VecDeque;
 
@@ -31,7 +31,7 @@ use std::collections::VecDeque;
 /// # Ok::<(), discrete_herglotz::EnsembleError>(())
 /// ```
 pub struct ShardedEnsemble<'e, 'a, L, const N: usize> {
-    pub(super) task: Task<'e, 'a, L, N>,
+    pub(crate) task: Task<'e, 'a, L, N>,
 }
 
 impl<'a, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'a, L, N> {
@@ -148,7 +148,7 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Merge<'_, '_, '_, L, N> {
         }
     }
 
-    pub(super) fn add_shard(
+    pub(crate) fn add_shard(
         &mut self,
         index: usize,
         shard: Shard<N>,

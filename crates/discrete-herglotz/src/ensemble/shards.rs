@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// The shards that may be done, or under way, before one of them that is not: what a slow one holds up.
-pub(super) const WINDOW_OF_A_THREAD: usize = 8;
+pub(crate) const WINDOW_OF_A_THREAD: usize = 8;
 
 /// What the threads share.
 struct Window<R> {
@@ -76,7 +76,7 @@ impl<R> Drop for AtTheEnd<'_, R> {
 /// thread of the caller, until that breaks. At most [`WINDOW_OF_A_THREAD`] results a thread are kept at a time.
 ///
 /// The caller computes too: with a thread that only waits to hand on, the others would make room for it after each shard.
-pub(super) fn in_order<R: Send>(
+pub(crate) fn in_order<R: Send>(
     threads: usize,
     count: usize,
     work: impl Fn(usize) -> R + Sync,

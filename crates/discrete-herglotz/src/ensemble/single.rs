@@ -1,8 +1,8 @@
 //! A member by a run of its own.
 
-use super::accuracy::StepControl;
-use super::member::{Ending, Member};
-use crate::run::interrupt::Asking;
+use crate::ensemble::accuracy::StepControl;
+use crate::ensemble::member::{Ending, Member};
+use crate::run::Interruption;
 use crate::{
     BatchKernel, InputError, Integrator, Interrupt, MethodInfo, Observer, Plan, Problem, Rows, Run, Start, Stepper,
     StepperOptions, Until,
@@ -10,7 +10,7 @@ use crate::{
 use contact_geom::Lagrangian;
 
 /// The integrator of an ensemble, for as long as a run of one member lasts.
-pub(super) struct OfMember<'i, 'a, L, const N: usize> {
+pub(crate) struct OfMember<'i, 'a, L, const N: usize> {
     pub integrator: &'i (dyn Integrator<'a, L, N> + Sync + 'a),
     pub lagrangian: &'a L,
 }
@@ -44,7 +44,7 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
 }
 
 /// What all members have in common.
-pub(super) struct Common<L, const N: usize> {
+pub(crate) struct Common<L, const N: usize> {
     pub t0: f64,
     pub length: StepControl<L, N>,
     pub until: Until,
@@ -85,7 +85,7 @@ impl<L: Lagrangian<N>, const N: usize> Common<L, N> {
         observer: Option<&mut impl Observer<N>>,
         interrupt: Option<Interrupt<'a>>,
     ) -> Member<N> {
-        let (mut rows, mut asking) = (Vec::new(), interrupt.map(Asking));
+        let (mut rows, mut asking) = (Vec::new(), interrupt.map(Interruption));
         let outcome = self.with(integrator, lagrangian, start, interrupt, |run| {
             let run = match &mut asking {
                 Some(asking) => run.observe(asking),

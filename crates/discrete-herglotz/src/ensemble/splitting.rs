@@ -1,10 +1,10 @@
 //! Splittings with trajectories in lanes.
 
-use super::lane::{Lane, LaneOptions, interrupted};
-use super::simd_batch::SimdBatch;
-use crate::gauss::instructions::Instructions;
-use crate::run::interrupt::BETWEEN;
-use crate::run::resolution_monitor::ROUNDED;
+use crate::ensemble::lane::{Lane, LaneOptions, interrupted};
+use crate::integration::interrupt::BETWEEN;
+use crate::numbers::instructions::Instructions;
+use crate::numbers::simd_batch::SimdBatch;
+use crate::resolution::monitor::ROUNDED;
 use crate::splitting::drag::{Drag, Drift};
 use crate::splitting::linear_drag::{Stage, SubstepTable};
 use crate::splitting::separable::SeparableForm;
@@ -15,7 +15,7 @@ use pulp::{Simd, WithSimd};
 use std::borrow::Cow;
 
 /// The steps of a [`Splitting`](crate::Splitting), for many motions of one Lagrangian.
-pub(super) struct SplittingPacks<'a, L, const N: usize> {
+pub(crate) struct SplittingPacks<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
     drag: Drag<N>,
     table: SubstepTable,
@@ -312,7 +312,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
 
 /// `M^-1 p`, by the operations of a product of a matrix with one vector, in their order.
 #[inline(always)]
-pub(super) fn velocity<L, S: Simd, const K: usize, const N: usize>(
+pub(crate) fn velocity<L, S: Simd, const K: usize, const N: usize>(
     form: &SeparableForm<L, N>,
     p: &SVector<SimdBatch<S, K>, N>,
 ) -> SVector<SimdBatch<S, K>, N> {

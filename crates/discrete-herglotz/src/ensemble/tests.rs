@@ -1,6 +1,7 @@
-use super::simd_batch::SimdBatch;
-use super::*;
-use crate::gauss::instructions::Instructions;
+use crate::ensemble::*;
+use crate::numbers::instructions::Instructions;
+use crate::numbers::simd_batch::SimdBatch;
+use crate::{GaussCollocation, SplittingScheme};
 use contact_geom::systems::{Kepler, Pendulum};
 use contact_geom::{Scalar, VelocityPoint};
 use pulp::{Arch, Simd, WithSimd};
@@ -76,7 +77,7 @@ fn ends<const N: usize>(
     let of = Ensemble::new(lagrangian, 0.0, 61, start).steps(Steps::Count(12)).threads(1).only(set);
     let of = match by {
         BatchKernel::Splitting(scheme) => of.by(scheme),
-        BatchKernel::Gauss(gauss) => of.by(gauss),
+        BatchKernel::Gauss { stages } => of.by(GaussCollocation { stages }),
     };
     let mut all = Vec::new();
     let tally = of.run(Until::Time(3.0), |member| all.push(member.clone())).unwrap();
@@ -94,7 +95,7 @@ fn members_in_all_widths_are_the_same() {
     for by in [
         BatchKernel::Splitting(SplittingScheme::BLANES_CASAS_8),
         BatchKernel::Splitting(SplittingScheme::KAHAN_LI_6),
-        BatchKernel::Gauss(GaussCollocation { stages: 5 }),
+        BatchKernel::Gauss { stages: 5 },
     ] {
         let sets = instruction_sets();
         let first = (ends(&pendulum, pendula, by, sets[0]), ends(&kepler, orbits, by, sets[0]));

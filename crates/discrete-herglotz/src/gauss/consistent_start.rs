@@ -1,12 +1,12 @@
 //! What is found of a Lagrangian at the start of a run.
 
-use crate::rules::step_equations::{inverted, kept_mass_matrix};
+use crate::solve::mass_matrix::{inverted, kept_mass_matrix};
 use crate::{InputError, StepError, check_claims, legendre_inverse};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint, max_abs_or_nan};
 
 /// The start of a run.
-pub(super) struct ConsistentStart<const N: usize> {
+pub(crate) struct ConsistentStart<const N: usize> {
     pub start: VelocityPoint<N>,
     pub structure: Structure,
     /// W and its inverse.

@@ -3,13 +3,13 @@
 // Several arrays share an index.
 #![allow(clippy::needless_range_loop)]
 
-use super::coefficients::{Coefficients, MAX_STAGES, POLYNOMIALS};
-use super::condensed::Condensed;
-use crate::run::saved::saved;
+use crate::DenseStep;
+use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
+use crate::gauss::tables::condensed::Condensed;
+use crate::integration::dense_step::Series;
+use crate::numbers::state_words::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, PhasePoint};
-use std::array::from_fn;
-use std::sync::OnceLock;
 
 /// The state at the start of a step as a route holds it: momenta, or velocities in the condensed routes.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +26,7 @@ impl<const N: usize> StepStart<N> {
 }
 
 /// The stages of a solved step: V, `rho L_q`, `rho L_z` and L, with 0 beyond the last stage.
-pub(super) struct Solved<const N: usize> {
+pub(crate) struct Solved<const N: usize> {
     pub v: [[f64; MAX_STAGES]; N],
     pub force: [[f64; MAX_STAGES]; N],
     pub rate: [f64; MAX_STAGES],
@@ -40,6 +40,13 @@ impl<const N: usize> Solved<N> {
         rate: [0.0; MAX_STAGES],
         l: [0.0; MAX_STAGES],
     };
+
+    /// The collocation polynomial of the step through these stages.
+    pub fn curve(&self, s: usize, t: f64, h: f64, start: PhasePoint<N>) -> DenseStep<N> {
+        let series = |values: &[f64; MAX_STAGES]| through(values, s);
+        let [v, force] = [&self.v, &self.force].map(|of| of.each_ref().map(series));
+        DenseStep::new(s, (t, h), start, [v, force], [series(&self.rate), series(&self.l)])
+    }
 
     /// From the accelerations and the positions of a condensed step.
     pub fn from_accelerations(
@@ -85,198 +92,22 @@ impl<const N: usize> Solved<N> {
     }
 }
 
-/// A step as a curve: the collocation polynomial of [`GaussStepper`](super::GaussStepper), with `tau` from 0 to h
-///
-/// `q(tau) = q0 + int V`, `z(tau) = z0 + int L`, `rho(tau) = 1 - int rho L_z`, `p(tau) = (p0 + int rho L_q) / rho(tau)`,
-///
-/// where V, L, `rho L_z` and `rho L_q` are the polynomials of degree `s - 1` through the stages.
-///
-/// At its ends it is the states of the run to round-off, which have order 2s; between them its order is s. So the curve of
-/// a run is continuous, and its velocity jumps from step to step by `O(h^s)`. Where the action is not requested
-/// and z decouples, z stays what it was at the start.
-#[derive(Clone, Copy, Debug)]
-pub struct DenseStep<const N: usize> {
-    s: usize,
-    t: f64,
-    h: f64,
-    start: PhasePoint<N>,
-    v: [Series; N],
-    force: [Series; N],
-    rate: Series,
-    l: Series,
-}
-
-impl<const N: usize> DenseStep<N> {
-    pub(super) fn new(s: usize, t: f64, h: f64, start: PhasePoint<N>, solved: &Solved<N>) -> Self {
-        let series = |values: &[f64; MAX_STAGES]| Series::through(values, s);
-        DenseStep {
-            s,
-            t,
-            h,
-            start,
-            v: from_fn(|d| series(&solved.v[d])),
-            force: from_fn(|d| series(&solved.force[d])),
-            rate: series(&solved.rate),
-            l: series(&solved.l),
+/// The polynomial through values at the nodes: Gauss' weights integrate its products with the Legendre polynomials exactly.
+fn through(values: &[f64; MAX_STAGES], s: usize) -> Series {
+    let mut c = [0.0; MAX_STAGES];
+    for (row, value) in Coefficients::of(s).series.iter().zip(values).take(s) {
+        for (c, entry) in c.iter_mut().zip(row) {
+            *c += entry * value;
         }
     }
-
-    /// The times of the step's start and end.
-    pub fn span(&self) -> (f64, f64) {
-        (self.t, self.t + self.h)
-    }
-
-    /// The state at a time of the [`span`](Self::span); beyond it the polynomials are continued.
-    pub fn at(&self, t: f64) -> PhasePoint<N> {
-        self.at_fraction((t - self.t) / self.h)
-    }
-
-    /// The velocity `dq/dt` of the curve at a time: a polynomial of degree `s - 1`, the stages' velocities at their times.
-    pub fn velocity(&self, t: f64) -> SVector<f64, N> {
-        let p = polynomials(self.s, (t - self.t) / self.h);
-        SVector::from_fn(|d, _| self.v[d].value(&p, self.s))
-    }
-
-    /// Velocity, value of L and rho at a fraction of the step.
-    pub(super) fn stage(&self, fraction: f64) -> (SVector<f64, N>, f64, f64) {
-        let p = polynomials(self.s, fraction);
-        let v = SVector::from_fn(|d, _| self.v[d].value(&p, self.s));
-        let rho = 1.0 - self.h * self.rate.value(&integrals(self.s, &p, fraction), self.s);
-        (v, self.l.value(&p, self.s), rho)
-    }
-
-    /// The length of the step.
-    pub(super) fn length(&self) -> f64 {
-        self.h
-    }
-
-    /// The parts in which [`sketch`](Self::sketch) divides the step.
-    pub(crate) fn parts(&self) -> usize {
-        self.s + 2
-    }
-
-    /// The states between the parts of the step, all at once.
-    pub(crate) fn sketch(&self, to: &mut Vec<PhasePoint<N>>) {
-        let table = integrals_to_parts(self.s);
-        let along = |series: &Series| {
-            let mut sums = [0.0; BETWEEN_PARTS];
-            for (row, c) in table.iter().zip(&series.0).take(self.s) {
-                for (sum, integral) in sums.iter_mut().zip(row) {
-                    *sum += self.h * c * integral;
-                }
-            }
-            sums
-        };
-        let (moved, pushed) = (self.v.each_ref().map(along), self.force.each_ref().map(along));
-        let (rate, action) = (along(&self.rate), along(&self.l));
-        to.extend((0..self.parts() - 1).map(|i| PhasePoint {
-            q: SVector::from_fn(|d, _| self.start.q[d] + moved[d][i]),
-            p: SVector::from_fn(|d, _| (self.start.p[d] + pushed[d][i]) / (1.0 - rate[i])),
-            z: self.start.z + action[i],
-        }));
-    }
-
-    /// The state at a fraction of the step.
-    pub(crate) fn at_fraction(&self, fraction: f64) -> PhasePoint<N> {
-        let p = polynomials(self.s, fraction);
-        let integrals = integrals(self.s, &p, fraction);
-        let integral = |series: &Series| self.h * series.value(&integrals, self.s);
-        let rho = 1.0 - integral(&self.rate);
-        PhasePoint {
-            q: SVector::from_fn(|d, _| self.start.q[d] + integral(&self.v[d])),
-            p: SVector::from_fn(|d, _| (self.start.p[d] + integral(&self.force[d])) / rho),
-            z: self.start.z + integral(&self.l),
-        }
-    }
-}
-
-/// The factors of the recurrence `P_(k+1) = (2k + 1)/(k + 1) x P_k - k/(k + 1) P_(k-1)`.
-const RECURRENCE: [[f64; 2]; MAX_STAGES] = {
-    let (mut factors, mut k) = ([[0.0; 2]; MAX_STAGES], 0);
-    while k < MAX_STAGES {
-        factors[k] = [(2 * k + 1) as f64 / (k + 1) as f64, k as f64 / (k + 1) as f64];
-        k += 1;
-    }
-    factors
-};
-
-/// The Legendre polynomials `P_0` to `P_s` of `2 x - 1`, without divisions.
-fn polynomials(s: usize, fraction: f64) -> [f64; POLYNOMIALS] {
-    let x = 2.0 * fraction - 1.0;
-    let mut p = [1.0; POLYNOMIALS];
-    p[1] = x;
-    for k in 1..s.min(MAX_STAGES) {
-        let [first, second] = RECURRENCE[k];
-        p[k + 1] = first * x * p[k] - second * p[k - 1];
-    }
-    p
-}
-
-/// The integrals of the Legendre polynomials from 0 to a fraction of `[0, 1]`: `(2k + 1) P_k` is the derivative of `P_(k+1) - P_(k-1)`.
-fn integrals(s: usize, p: &[f64; POLYNOMIALS], fraction: f64) -> [f64; POLYNOMIALS] {
-    let mut integrals = [0.0; POLYNOMIALS];
-    integrals[0] = fraction;
-    for k in 1..s {
-        integrals[k] = (p[k + 1] - p[k - 1]) * HALF_OF_ODD[k];
-    }
-    integrals
-}
-
-/// The most states between the parts of a step.
-const BETWEEN_PARTS: usize = MAX_STAGES + 1;
-
-/// The integrals of the Legendre polynomials to the ends of the parts of a step, of which there are s + 2: `[k][i]` to the end of part i.
-fn integrals_to_parts(s: usize) -> &'static [[f64; BETWEEN_PARTS]; MAX_STAGES] {
-    static TABLES: [OnceLock<Box<[[f64; BETWEEN_PARTS]; MAX_STAGES]>>; MAX_STAGES] =
-        [const { OnceLock::new() }; MAX_STAGES];
-    TABLES[s.clamp(1, MAX_STAGES) - 1].get_or_init(|| {
-        let mut table = Box::new([[0.0; BETWEEN_PARTS]; MAX_STAGES]);
-        for i in 0..=s {
-            let fraction = (i + 1) as f64 / (s + 2) as f64;
-            let p = polynomials(s, fraction);
-            for (row, integral) in table.iter_mut().zip(integrals(s, &p, fraction)) {
-                row[i] = integral;
-            }
-        }
-        table
-    })
-}
-
-/// `1 / (2 (2k + 1))`.
-const HALF_OF_ODD: [f64; MAX_STAGES] = {
-    let (mut numbers, mut k) = ([0.0; MAX_STAGES], 0);
-    while k < MAX_STAGES {
-        numbers[k] = 0.5 / (2 * k + 1) as f64;
-        k += 1;
-    }
-    numbers
-};
-
-/// The coefficients of a polynomial on `[0, 1]` in the Legendre polynomials of `2 x - 1`.
-#[derive(Clone, Copy, Debug)]
-struct Series([f64; MAX_STAGES]);
-
-impl Series {
-    /// The polynomial through values at the nodes: Gauss' weights integrate its products with the Legendre polynomials exactly.
-    fn through(values: &[f64; MAX_STAGES], s: usize) -> Self {
-        let mut c = [0.0; MAX_STAGES];
-        for (row, value) in Coefficients::of(s).series.iter().zip(values).take(s) {
-            for (c, entry) in c.iter_mut().zip(row) {
-                *c += entry * value;
-            }
-        }
-        Series(c)
-    }
-
-    fn value(&self, p: &[f64; MAX_STAGES + 1], s: usize) -> f64 {
-        (0..s).fold(0.0, |sum, k| sum + self.0[k] * p[k])
-    }
+    Series(c)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use contact_geom::max_or_nan;
+    use std::array::from_fn;
 
     /// The states between the parts are those of the curve, to some roundings of each of its terms.
     #[test]
@@ -287,7 +118,7 @@ mod tests {
             let mut solved = Solved::<2>::ZERO;
             (solved.v, solved.force) = ([stages(0.1), stages(0.7)], [stages(1.9), stages(2.3)]);
             (solved.rate, solved.l) = (stages(3.1), stages(0.4));
-            let curve = DenseStep::new(s, 0.5, 0.3, PhasePoint::new([1.0, -2.0], [0.4, 0.9], 0.2), &solved);
+            let curve = solved.curve(s, 0.5, 0.3, PhasePoint::new([1.0, -2.0], [0.4, 0.9], 0.2));
             let mut sketch = Vec::new();
             curve.sketch(&mut sketch);
             assert_eq!(sketch.len() + 1, curve.parts());

@@ -1,7 +1,7 @@
 //! Contact Gauss collocation as an integrator.
 
-use super::transformed::OwnTransformation;
-use super::{GaussStepper, MAX_STAGES, TransformedStepper};
+use crate::gauss::routes::transformed::OwnTransformation;
+use crate::gauss::{GaussStepper, MAX_STAGES, TransformedStepper};
 use crate::{BatchKernel, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
 
@@ -102,7 +102,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussColloca
     }
 
     fn batch_kernel(&self) -> Option<BatchKernel> {
-        Some(BatchKernel::Gauss(*self))
+        Some(BatchKernel::Gauss { stages: self.stages })
     }
 }
 

@@ -1,57 +1,31 @@
 //! Contact Gauss collocation.
 
-pub(crate) mod coefficients;
-mod compensated;
-pub(crate) mod condensed;
 mod consistent_start;
-mod damping;
-mod defect_sample;
 mod dense;
-mod double_double;
-mod fixed_point;
-mod general;
-mod general_evaluation;
-mod general_saved;
-mod general_stages;
-mod general_sweep;
-pub(crate) mod instructions;
 mod integrator;
-pub(crate) mod lanes;
-mod linear;
-mod mass;
-mod modes;
-mod pair;
-mod parametrization;
-mod position_newton;
 pub(crate) mod resolution;
-mod separable;
-mod simplified;
-pub(crate) mod sine;
-mod stage_equations;
-mod stage_values;
+mod routes;
 mod stages;
 mod stepper;
-mod table;
-mod transformed;
+pub(crate) mod tables;
 mod work_summary;
 
-pub(crate) use defect_sample::{DefectSample, SAMPLE_SETS, UNDERFLOWN};
-pub use dense::DenseStep;
 pub(crate) use dense::StepStart;
 pub(crate) use integrator::info;
 pub use integrator::{GaussCollocation, TransformedGauss};
+pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS, UNDERFLOWN};
+pub use routes::transformed::TransformedStepper;
 pub(crate) use stepper::FEW_STAGES;
 pub use stepper::{GaussRoute, GaussStepper};
-pub use transformed::TransformedStepper;
 
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
-pub(crate) use coefficients::MAX_STAGES;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
     ChartVector, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet,
     TimeTransformation, seed,
 };
-use stage_equations::{Given, Products, StageEquations, Workspace};
+use stages::equations::{Given, Products, StageEquations, Workspace};
+pub(crate) use tables::coefficients::MAX_STAGES;
 
 /// Contact Gauss collocation with `s` stages, of order `2s`, for every regular Lagrangian: the discrete Lagrangian
 /// `L_d(q0, q1, z0) = z1 - z0` of the stage equations

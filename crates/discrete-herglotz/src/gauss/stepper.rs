@@ -1,33 +1,33 @@
 //! Runs of contact Gauss collocation.
 
-mod marks;
+mod resolution;
 mod retries;
-mod words;
+mod state_words;
 
-use super::coefficients::{Coefficients, MAX_STAGES};
-use super::condensed::Condensed;
-use super::consistent_start::ConsistentStart;
-use super::dense::{DenseStep, Solved, StepStart};
-use super::fixed_point::IterationOutcome;
-use super::general::General;
-use super::instructions::Instructions;
-use super::linear::Linear;
-use super::mass::Mass;
-use super::parametrization::{Extension, Physical};
-use super::resolution;
-use super::separable::SeparableStages;
-use super::stage_equations::{Products, Workspace};
-use super::table::StageTable;
-use super::work_summary::work_summary;
-use crate::gauss::lanes::forget_branches;
-use crate::rules::step_equations::is_identity;
-use crate::run::resolution_monitor::ResolutionMonitor;
-use crate::{InputError, PlanEntry, StepError, StepFailure, Stepper, SuspectInterval, UnresolvedStep};
+use crate::gauss::consistent_start::ConsistentStart;
+use crate::gauss::dense::{Solved, StepStart};
+use crate::gauss::resolution::tail;
+use crate::gauss::routes::general::General;
+use crate::gauss::routes::linear::Linear;
+use crate::gauss::routes::separable::SeparableStages;
+use crate::gauss::stages::equations::{Products, Workspace};
+use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::stages::mass_matrix::Mass;
+use crate::gauss::stages::parametrization::{Extension, Physical};
+use crate::gauss::stepper::resolution::Sequence;
+use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
+use crate::gauss::tables::condensed::Condensed;
+use crate::gauss::tables::stage_table::StageTable;
+use crate::gauss::work_summary::work_summary;
+use crate::numbers::instructions::Instructions;
+use crate::numbers::lanes::forget_branches;
+use crate::resolution::monitor::ResolutionMonitor;
+use crate::solve::mass_matrix::is_identity;
+use crate::{DenseStep, InputError, PlanEntry, StepError, StepFailure, Stepper, SuspectInterval, UnresolvedStep};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure};
-pub(crate) use marks::FEW_STAGES;
-use marks::Sequence;
 use pulp::{Simd, WithSimd};
+pub(crate) use resolution::FEW_STAGES;
 use retries::{PAUSE, Tried};
 use std::sync::Arc;
 
@@ -100,7 +100,7 @@ pub struct GaussStepper<'a, L, const N: usize> {
 }
 
 impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
-    pub(super) fn new(
+    pub(crate) fn new(
         lagrangian: &'a L,
         (s, h): (usize, f64),
         probed: Option<Structure>,
@@ -117,7 +117,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             let table = Condensed::of(s, h, lagrangian.gradient(t0, &start).z)?;
             let unit = is_identity(&w);
             mass = Some(w);
-            of_sigma = resolution::of_sigma(1.0 + table.grow.head, table.gamma * h);
+            of_sigma = tail::of_sigma(1.0 + table.grow.head, table.gamma * h);
             // Of many coordinates the matrix costs more than the sweeps that it spares, and more room than the stack has.
             let linear = if structure.quadratic && structure.autonomous && const { N <= MOST_LINEAR } {
                 Linear::new(lagrangian, &table, &inverse, t0, &start, wants_z)
@@ -210,7 +210,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> GaussStepper<'a, L, N> {
             Route::Condensed(run) => condensed(&run.table, [&run.a.map(|a| a.0), &run.x.map(|x| x.0)], run.wants_z),
             Route::General(run) => run.solved(),
         };
-        Some(DenseStep::new(s, t, h, start, &solved))
+        Some(solved.curve(s, t, h, start))
     }
 
     /// The state as the route holds it.

@@ -2,7 +2,7 @@
 
 use super::GaussRoute;
 use crate::PlanEntry;
-use crate::run::DECOUPLED;
+use crate::integration::plan_entry::DECOUPLED;
 use contact_geom::Structure;
 
 fn mass_matrix(constant: bool) -> PlanEntry {
@@ -19,7 +19,7 @@ fn action(structure: &Structure) -> PlanEntry {
 }
 
 /// By equal steps of time.
-pub(super) fn work_summary(route: GaussRoute, structure: &Structure) -> Vec<PlanEntry> {
+pub(crate) fn work_summary(route: GaussRoute, structure: &Structure) -> Vec<PlanEntry> {
     let newton = PlanEntry::skipped("Newton's method", "only in steps whose iteration does not contract");
     let gradients = PlanEntry::skipped("Jacobian", "the iteration needs gradients alone");
     match route {
@@ -50,7 +50,7 @@ pub(super) fn work_summary(route: GaussRoute, structure: &Structure) -> Vec<Plan
 }
 
 /// By steps that are equal in transformed time.
-pub(super) fn work_summary_in_transformed_time(structure: &Structure) -> Vec<PlanEntry> {
+pub(crate) fn work_summary_in_transformed_time(structure: &Structure) -> Vec<PlanEntry> {
     vec![
         PlanEntry::computed(
             "time step",

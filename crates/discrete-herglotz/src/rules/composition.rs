@@ -1,8 +1,8 @@
 //! Symmetric compositions of discrete flows.
 
+use crate::numbers::state_words::{Saved, saved};
+use crate::resolution::monitor::{ResolutionMonitor, sharper, turning};
 use crate::rules::flow::account_of;
-use crate::run::resolution_monitor::{ResolutionMonitor, sharper, turning};
-use crate::run::saved::{Saved, saved};
 use crate::{
     DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, Solver, SplittingScheme, StepError, StepFailure, Stepper,
     SuspectInterval, UnresolvedStep,
@@ -77,7 +77,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Composition<D, N> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
-        crate::run::check_time(t0)?;
+        crate::integration::problem::check_time(t0)?;
         state.check()?;
         let Some(lengths) = scheme.substeps() else {
             return Err(InputError::Hypothesis {

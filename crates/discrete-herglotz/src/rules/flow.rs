@@ -1,8 +1,8 @@
 //! The discrete Hamiltonian flow at work on a motion.
 
-use crate::run::resolution_monitor::{ResolutionMonitor, at_rest, sharper};
-use crate::run::saved::{Saved, saved};
-use crate::run::{check_time, start_of};
+use crate::integration::problem::{check_time, start_of};
+use crate::numbers::state_words::{Saved, saved};
+use crate::resolution::monitor::{ResolutionMonitor, at_rest, sharper};
 use crate::{
     DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, Solver, StepError, StepFailure, Stepper, SuspectInterval,
     UnresolvedStep,

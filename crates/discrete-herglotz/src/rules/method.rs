@@ -164,7 +164,7 @@ impl Method {
         t: f64,
         state: &PhasePoint<N>,
     ) -> Result<AnyDiscreteLagrangian<L, N>, InputError> {
-        crate::run::check_time(t)?;
+        crate::integration::problem::check_time(t)?;
         state.check()?;
         Ok(match self {
             Method::Rectangle => AnyDiscreteLagrangian::Rectangle(Quadrature::new(lagrangian, h)?),

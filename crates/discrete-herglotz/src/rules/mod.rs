@@ -1,6 +1,7 @@
 //! Rules: discrete Lagrangians from Lagrangians, one file each for the quadratures of the action; their flow, and compositions of it.
 
 mod composition;
+mod extended_path;
 pub(crate) mod flow;
 mod integrator;
 mod left_midpoint;

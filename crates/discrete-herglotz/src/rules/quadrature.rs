@@ -1,7 +1,7 @@
 //! Discrete Lagrangians by quadrature of the action: what the rules of [`crate::rules`] share.
 
+use crate::resolution::monitor::{defect, factor_defect, value_rounding};
 use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
-use crate::run::resolution_monitor::{defect, factor_defect, value_rounding};
 use crate::solve::newton::{Linearised, NewtonStart, max_abs_or_nan, newton};
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};

@@ -1,9 +1,8 @@
 //! The table of integrators.
 
-use super::{Integrator, MethodInfo, Problem, StepperOptions};
 use crate::{
-    BatchKernel, CompositionMethod, DividedGauss, Gauss, GaussCollocation, InputError, Method, SplittingScheme,
-    Stepper, TransformedGauss,
+    BatchKernel, CompositionMethod, DividedGauss, Gauss, GaussCollocation, InputError, Integrator, Method, MethodInfo,
+    Problem, SplittingScheme, Stepper, StepperOptions, TransformedGauss,
 };
 use contact_geom::Lagrangian;
 use std::fmt::{Display, Formatter};

@@ -2,71 +2,33 @@
 
 mod accuracy;
 mod any_integrator;
-pub(crate) mod check_claims;
-mod checkpoint;
-mod claims;
-mod crossings;
-#[cfg(feature = "csv")]
-mod csv_rows;
-mod divided;
-mod ended;
-mod energy;
-mod estimate;
-mod events;
+mod checks;
 mod explain;
-mod halved;
-mod integrator;
-pub(crate) mod interrupt;
-mod jump;
-mod momentum;
-mod noise;
-mod observer;
+mod observers;
 mod outcome;
 mod plan;
-mod problem;
-mod progress;
-mod quotient;
-pub(crate) mod resolution_monitor;
-mod rest;
-mod roots;
-pub(crate) mod rows;
-pub(crate) mod saved;
-mod stepper;
-mod track;
-mod trial_runs;
-mod velocities;
 
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
-pub use check_claims::check_claims;
-pub(crate) use checkpoint::digest;
-pub use checkpoint::{Checkpoint, CheckpointError, ResumeState};
+pub(crate) use checks::energy::may_drift;
+pub use checks::energy::{EnergyDrift, EnergyLook};
+pub(crate) use observers::checkpoint::digest;
+pub use observers::checkpoint::{Checkpoint, CheckpointError, ResumeState};
 #[cfg(feature = "csv")]
-pub use csv_rows::CsvRows;
-pub(crate) use energy::may_drift;
-pub use energy::{EnergyDrift, EnergyLook};
-pub use events::{Crossing, Event, Events};
-pub(crate) use explain::DECOUPLED;
-pub use explain::PlanEntry;
-pub use integrator::{Integrator, MethodInfo, StepperOptions};
-pub use interrupt::{INTERRUPTION, Interrupt};
-pub(crate) use jump::between;
-pub use momentum::{MomentumDecay, MomentumRow};
-pub use observer::{LastStep, Observer, OutputRequest, RunInfo, StepView, Stop, Terminal};
+pub use observers::csv_rows::CsvRows;
+pub use observers::events::{Crossing, Event, Events};
+pub(crate) use observers::interruption::Interruption;
+pub use observers::momentum::{MomentumDecay, MomentumRow};
+pub use observers::observer::{LastStep, Observer, OutputRequest, RunInfo, StepView, Stop, Terminal};
+pub use observers::progress::Progress;
+pub use observers::quotient::Quotient;
+pub(crate) use observers::rows;
+pub use observers::rows::{Row, Rows};
 pub use outcome::Outcome;
 pub use plan::Plan;
-pub(crate) use plan::{first, step_error};
-pub use problem::{Problem, Start};
-pub(crate) use problem::{check_time, start_of};
-pub use progress::Progress;
-pub use quotient::Quotient;
-pub use resolution_monitor::SuspectInterval;
-pub(crate) use roots::bracketed_root;
-pub use rows::{Row, Rows};
-pub use stepper::{StepFailure, Stepper};
 
-use crate::{DenseStep, GaussCollocation, InputError, StepError};
+use crate::integration::check_claims::check_claims_over;
+use crate::{DenseStep, GaussCollocation, InputError, Integrator, Problem, StepError};
 use accuracy::StepSelection;
-use check_claims::check_claims_over;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, max_or_nan};
 use std::sync::Arc;
@@ -116,7 +78,7 @@ impl<L, const N: usize> Clone for StepControl<'_, L, N> {
 impl<L, const N: usize> Copy for StepControl<'_, L, N> {}
 
 /// What is asked of a run, without its observers.
-struct Request<'p, L, const N: usize> {
+pub(crate) struct Request<'p, L, const N: usize> {
     problem: &'p Problem<'p, L, N>,
     t_end: f64,
     span: f64,
@@ -200,7 +162,7 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
 
     /// The same with one more observer, which sees what those before it have seen.
     pub fn observe(mut self, observer: &'o mut impl Observer<N>) -> Self {
-        self.observers.push(Box::new(observer::Borrowed(observer)));
+        self.observers.push(Box::new(observers::observer::Borrowed(observer)));
         self
     }
 
@@ -270,6 +232,23 @@ impl<'p, 'o, L: Lagrangian<N>, const N: usize> Run<'p, 'o, L, N> {
     /// Those of [`plan`](Self::plan), and of observers that cannot observe such a run. What goes wrong in mid-run is the outcome's status.
     pub fn run(mut self, until: Until) -> Result<Outcome<N>, InputError> {
         self.plan(until)?.observed_by(&mut self.observers, self.from.as_ref())
+    }
+}
+
+impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
+    /// A run of it by an integrator.
+    pub fn by<'p, 'o>(&'p self, integrator: impl Integrator<'p, L, N> + 'p) -> Run<'p, 'o, L, N> {
+        Run::of(self).by(integrator)
+    }
+
+    /// A run of it by given steps of contact Gauss collocation with eight stages.
+    pub fn steps<'o>(&self, steps: Steps) -> Run<'_, 'o, L, N> {
+        self.by(GaussCollocation { stages: 8 }).steps(steps)
+    }
+
+    /// A run of it to a relative error of (q, p) and v, by an integrator that is chosen for it; see [`Run::accuracy`].
+    pub fn accuracy<'o>(&self, wanted: f64) -> Run<'_, 'o, L, N> {
+        Run::of(self).accuracy(wanted)
     }
 }
 

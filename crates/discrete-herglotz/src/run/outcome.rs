@@ -1,6 +1,6 @@
 //! What a run has led to.
 
-use super::Start;
+use crate::Start;
 use crate::{Status, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
@@ -31,7 +31,7 @@ pub struct Outcome<const N: usize> {
     pub error_estimate: Option<f64>,
     /// The evaluations of forces or gradients.
     pub evaluations: u64,
-    pub(super) z_or_start: f64,
+    pub(crate) z_or_start: f64,
 }
 
 impl<const N: usize> Outcome<N> {

@@ -1,19 +1,22 @@
 //! The plan of a run: the route, and the one loop of all runs.
 
-use super::accuracy::StepSelection;
-use super::checkpoint::digest;
-use super::claims::ClaimMonitor;
-use super::ended::Before;
-use super::energy::{EnergyMonitor, EnergySums};
-use super::rest::REST;
-use super::{
-    MethodInfo, Motion, Near, Observer, Outcome, OutputRequest, PlanEntry, Problem, Request, ResumeState, RunInfo,
-    Shared, StepView, StepperOptions, Stop,
-};
+use crate::error::first;
 use crate::gauss::FEW_STAGES;
-use crate::run::check_claims::violated_claim;
+use crate::integration::check_claims::violated_claim;
+use crate::run::accuracy::StepSelection;
+use crate::run::accuracy::ended::Before;
+use crate::run::accuracy::rest::REST;
+use crate::run::checks::claims::ClaimMonitor;
+use crate::run::checks::energy::{EnergyMonitor, EnergySums};
+use crate::run::observers::checkpoint::digest;
+use crate::run::{
+    Motion, Near, Observer, Outcome, OutputRequest, Request, ResumeState, RunInfo, Shared, StepView, Stop,
+};
 use crate::switching::{has_switching_functions, of_integrator};
-use crate::{DenseStep, InputError, Status, StepError, Stepper, SuspectInterval, UnresolvedStep, legendre_inverse};
+use crate::{
+    DenseStep, InputError, MethodInfo, PlanEntry, Problem, Status, StepError, Stepper, StepperOptions, SuspectInterval,
+    UnresolvedStep, legendre_inverse,
+};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 
@@ -38,7 +41,7 @@ fn halved_step(taken: usize, count: usize) -> usize {
 const MATRIX: (usize, usize) = (32, 1024);
 
 /// A problem for so many steps of an integrator: where they are too few for the matrix of a linear motion its stages are solved like those of others.
-pub(super) fn for_steps<'p, L, const N: usize>(
+pub(crate) fn for_steps<'p, L, const N: usize>(
     problem: &Problem<'p, L, N>,
     integrator: &MethodInfo,
     steps: usize,
@@ -51,11 +54,6 @@ pub(super) fn for_steps<'p, L, const N: usize>(
 
 /// The steps by which a run may pass the end that trial runs have met: the errors of both.
 const PASSED: usize = 2;
-
-/// The earlier of two.
-pub(crate) fn first(a: Option<UnresolvedStep>, b: Option<UnresolvedStep>) -> Option<UnresolvedStep> {
-    a.into_iter().chain(b).min_by_key(|s| s.step)
-}
 
 /// The stepper of an integrator, with steps that end on kinks and jumps where the Lagrangian states them.
 fn stepper_of<'p, L: Lagrangian<N>, const N: usize>(
@@ -71,37 +69,37 @@ fn stepper_of<'p, L: Lagrangian<N>, const N: usize>(
     integrator.stepper(problem, h, wants)
 }
 
-/// A run after its checks, with step and route chosen; made by [`Run::plan`](super::Run::plan). Printed, it says what will be computed and
+/// A run after its checks, with step and route chosen; made by [`Run::plan`](crate::run::Run::plan). Printed, it says what will be computed and
 /// what is skipped.
 pub struct Plan<'p, L, const N: usize> {
-    pub(super) problem: &'p Problem<'p, L, N>,
-    pub(super) t_end: f64,
+    pub(crate) problem: &'p Problem<'p, L, N>,
+    pub(crate) t_end: f64,
     /// Negative where the run goes back.
-    pub(super) h: f64,
-    pub(super) count: usize,
+    pub(crate) h: f64,
+    pub(crate) count: usize,
     /// The steps after which an observer is to end the run.
     ended: Option<usize>,
     error: Option<f64>,
     integrator: Shared<'p, L, N>,
-    pub(super) info: MethodInfo,
-    pub(super) needs: OutputRequest,
+    pub(crate) info: MethodInfo,
+    pub(crate) needs: OutputRequest,
     /// What errors of the coordinates are measured by, where that is given.
-    pub(super) scales: Option<SVector<f64, N>>,
+    pub(crate) scales: Option<SVector<f64, N>>,
     /// What its steps compute and skip, as the stepper says.
-    pub(super) work_summary: Vec<PlanEntry>,
+    pub(crate) work_summary: Vec<PlanEntry>,
     /// Whether `sigma_d` is the same in all steps.
-    pub(super) constant_rate: bool,
+    pub(crate) constant_rate: bool,
     /// Whether the Lagrangian states switching functions.
-    pub(super) switches: bool,
+    pub(crate) switches: bool,
     /// Whether the error of given steps is estimated.
-    pub(super) estimated: bool,
+    pub(crate) estimated: bool,
     /// The end that was requested, where it ends before since the motion is at rest from there on.
-    pub(super) rests_until: Option<f64>,
+    pub(crate) rests_until: Option<f64>,
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     /// Finds the route of a request.
-    pub(super) fn new(request: &Request<'p, L, N>, choice: &StepSelection<'p, L, N>) -> Result<Self, InputError> {
+    pub(crate) fn new(request: &Request<'p, L, N>, choice: &StepSelection<'p, L, N>) -> Result<Self, InputError> {
         let Request { problem, t_end, needs, scales, .. } = *request;
         let StepSelection { integrator, count, h, error, ended } = choice.clone();
         let switches = has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?;
@@ -168,7 +166,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     }
 
     /// A stepper at a start, by steps of h.
-    pub(super) fn make_stepper(
+    pub(crate) fn make_stepper(
         &self,
         problem: &Problem<'p, L, N>,
         h: f64,
@@ -178,7 +176,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     }
 
     /// Whether steps look at themselves between the nodes of their many stages.
-    pub(super) fn many_stages(&self) -> bool {
+    pub(crate) fn many_stages(&self) -> bool {
         self.info.collocation.is_some_and(|stages| stages > FEW_STAGES)
     }
 
@@ -196,7 +194,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     }
 
     /// Runs it under the eyes of observers.
-    pub(super) fn observed_by(
+    pub(crate) fn observed_by(
         &self,
         observers: &mut Vec<Box<dyn Observer<N> + '_>>,
         from: Option<&ResumeState>,
@@ -362,7 +360,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     }
 
     /// What observers see after some steps.
-    pub(super) fn moment<'r>(
+    pub(crate) fn moment<'r>(
         &'r self,
         stepper: &'r dyn Stepper<N>,
         before: Option<(f64, PhasePoint<N>)>,
@@ -389,7 +387,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     }
 
     /// A stepper after one step from a time and a state to another time; it is guessed from the curve of a longer one.
-    pub(super) fn step_to(
+    pub(crate) fn step_to(
         &self,
         (t0, from): &(f64, PhasePoint<N>),
         t: f64,
@@ -415,7 +413,7 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
     ///
     /// # Errors
     /// [`InputError::FalseClaim`] with the first claim that does not hold.
-    pub(super) fn probe_first_steps(&self) -> Result<(), InputError> {
+    pub(crate) fn probe_first_steps(&self) -> Result<(), InputError> {
         if const { L::PROVED } {
             return Ok(());
         }
@@ -476,14 +474,5 @@ impl<L: Lagrangian<N>, const N: usize> Motion<N> for Plan<'_, L, N> {
     ) -> Result<(PhasePoint<N>, f64), StepError> {
         let run = self.step_to(from, t, near, curve)?;
         Ok((run.state(), run.sigma()))
-    }
-}
-
-/// Of what goes wrong along a motion.
-pub(crate) fn step_error(error: InputError) -> StepError {
-    match error {
-        InputError::FirstStep(cause) => cause,
-        InputError::Sigma { sigma } => StepError::SigmaVanished { sigma },
-        _ => StepError::NonFinite,
     }
 }

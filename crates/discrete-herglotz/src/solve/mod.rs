@@ -2,10 +2,13 @@
 
 #[cfg(feature = "faer")]
 mod faer_lu;
+pub(crate) mod hermite;
 pub(crate) mod inverse;
+pub(crate) mod mass_matrix;
 #[cfg(not(feature = "faer"))]
 mod nalgebra_lu;
 pub(crate) mod newton;
+pub(crate) mod roots;
 pub(crate) mod solver;
 pub(crate) mod unknowns;
 

@@ -2,7 +2,7 @@
 
 use super::separable::SeparableForm;
 use crate::InputError;
-use crate::gauss::coefficients::Coefficients;
+use crate::gauss::tables::coefficients::Coefficients;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint};
 

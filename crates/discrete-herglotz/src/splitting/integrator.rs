@@ -1,7 +1,8 @@
 //! Splitting schemes as integrators.
 
 use super::separable::SeparableForm;
-use super::{ActionSplitting, Splitting, SplittingScheme};
+use super::{ActionSplitting, Splitting};
+use crate::SplittingScheme;
 use crate::{BatchKernel, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
 use contact_geom::Lagrangian;
 use std::borrow::Cow;

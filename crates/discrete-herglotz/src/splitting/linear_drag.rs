@@ -3,8 +3,8 @@
 use super::drag::{Drag, Drift};
 use super::motion::{CompensatedState, Reached, SplittingRun};
 use super::separable::SeparableForm;
-use crate::run::DECOUPLED;
-use crate::run::saved::Saved;
+use crate::integration::plan_entry::DECOUPLED;
+use crate::numbers::state_words::Saved;
 use crate::{InputError, PlanEntry, SplittingScheme, StepFailure, Stepper, SuspectInterval, UnresolvedStep};
 use contact_geom::{Lagrangian, PhasePoint};
 

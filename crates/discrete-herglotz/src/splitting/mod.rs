@@ -7,9 +7,6 @@ mod integrator;
 pub(crate) mod linear_drag;
 mod motion;
 mod nonlinear_drag;
-#[cfg(test)]
-mod order_conditions;
-mod scheme;
 pub(crate) mod separable;
 mod strang;
 #[cfg(test)]
@@ -19,7 +16,6 @@ pub use action_flow::{ActionFlow, ActionMap, Riccati, RiccatiMap};
 pub use action_strang::ActionStrang;
 pub use linear_drag::Splitting;
 pub use nonlinear_drag::ActionSplitting;
-pub use scheme::SplittingScheme;
 pub use strang::Strang;
 
 use crate::PlanEntry;

@@ -1,7 +1,7 @@
 //! What every splitting moves: sums that may carry their rounding, a state of them, and a run in chunks.
 
-use crate::run::resolution_monitor::{ResolutionMonitor, sharper, turning};
-use crate::run::saved::saved;
+use crate::numbers::state_words::saved;
+use crate::resolution::monitor::{ResolutionMonitor, sharper, turning};
 use crate::{StepError, StepFailure, SuspectInterval};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, PhasePoint, max_or_nan};

@@ -3,7 +3,7 @@
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::motion::{CompensatedState, Reached, SplittingRun};
 use super::separable::SeparableForm;
-use crate::run::saved::Saved;
+use crate::numbers::state_words::Saved;
 use crate::{InputError, PlanEntry, SplittingScheme, StepFailure, Stepper, SuspectInterval, UnresolvedStep};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};

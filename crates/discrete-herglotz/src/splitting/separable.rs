@@ -1,7 +1,7 @@
 //! Lagrangians `v.Mv/2 - V(t, q) + f(z)`, as splittings read them.
 
-use crate::rules::step_equations::{inverted, is_identity, kept_mass_matrix};
-use crate::run::check_claims::PROBE;
+use crate::integration::check_claims::PROBE;
+use crate::solve::mass_matrix::{inverted, is_identity, kept_mass_matrix};
 use crate::{InputError, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Defect, Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPoint};
@@ -38,7 +38,7 @@ impl<L: Lagrangian<N>, const N: usize> SeparableForm<L, N> {
         if !(h != 0.0 && h.is_finite()) {
             return Err(InputError::Step { h });
         }
-        crate::run::check_time(t)?;
+        crate::integration::problem::check_time(t)?;
         state.check()?;
         let structure = lagrangian.structure();
         if !structure.separable {

@@ -2,7 +2,7 @@
 
 use super::drag::{Drag, Drift};
 use super::separable::SeparableForm;
-use crate::run::resolution_monitor::defect;
+use crate::resolution::monitor::defect;
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};

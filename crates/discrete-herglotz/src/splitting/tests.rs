@@ -1,6 +1,7 @@
 //! Splittings against an independent reference, and against what the theory says of them.
 
-use super::{ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, Splitting, SplittingScheme, Strang};
+use super::{ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, Splitting, Strang};
+use crate::SplittingScheme;
 use crate::{Composition, DiscreteLagrangian, Flow, InputError, Midpoint, Solver, StepError, StepFailure, Stepper};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, Duffing, Kepler, LaneEmden, Pendulum, QuadraticInZ};

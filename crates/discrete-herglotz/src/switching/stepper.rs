@@ -2,10 +2,10 @@
 
 use super::corner::{Corner, corner};
 use super::surfaces::{SignChange, StepCurve, Surfaces, TimedState};
+use crate::error::{first, step_error};
 use crate::gauss::StepStart;
-use crate::run::bracketed_root;
-use crate::run::saved::{Saved, load_option, save_option, saved};
-use crate::run::{first, step_error};
+use crate::numbers::state_words::{Saved, load_option, save_option, saved};
+use crate::solve::roots::bracketed_root;
 use crate::{
     DenseStep, Gauss, GaussCollocation, GaussStepper, InputError, Integrator, PlanEntry, Problem, StepError,
     StepFailure, Stepper, StepperOptions, SuspectInterval, UnresolvedStep, legendre_inverse,

@@ -2,8 +2,8 @@
 
 use super::corner::{Corner, corner};
 use crate::gauss::StepStart;
-use crate::run::between;
-use crate::run::bracketed_root;
+use crate::solve::hermite::hermite;
+use crate::solve::roots::bracketed_root;
 use crate::{DenseStep, InputError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan};
@@ -112,7 +112,7 @@ impl<const N: usize> StepCurve<N> {
                 let x = dense.at_fraction(fraction);
                 VelocityPoint { q: x.q, v: dense.velocity(t), z: x.z }
             }
-            None => between(&self.from.point(), &self.to.point(), self.span(), fraction * self.span()),
+            None => hermite(&self.from.point(), &self.to.point(), self.span(), fraction * self.span()),
         };
         (t, x)
     }
@@ -177,7 +177,7 @@ impl Surfaces {
     ) -> bool {
         [-beside, 1.0 + beside].into_iter().any(|fraction| {
             let span = curve.span();
-            let x = between(&curve.from.point(), &curve.to.point(), span, fraction * span);
+            let x = hermite(&curve.from.point(), &curve.to.point(), span, fraction * span);
             self.values.clear();
             lagrangian.switching_functions(curve.from.t + fraction * span, &x, &mut self.values);
             // A surface on which the motion starts has no side yet.

@@ -1,6 +1,6 @@
 //! Discrete Lagrangians on Q x Q x R.
 
-use crate::rules::step_equations::BLOCK;
+use crate::solve::mass_matrix::BLOCK;
 use crate::solve::newton::{Linearised, NewtonStart, newton};
 use crate::{InputError, Solver, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};

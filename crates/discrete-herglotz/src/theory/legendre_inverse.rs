@@ -1,6 +1,6 @@
 //! The inverse of the Legendre transformation.
 
-use crate::rules::step_equations::mass_matrix;
+use crate::solve::mass_matrix::mass_matrix;
 use crate::{ITERATION_LIMIT, StepError, last_correction};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, linear, max_abs_or_nan};

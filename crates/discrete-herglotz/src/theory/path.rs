@@ -1,8 +1,8 @@
 //! The discrete path space, the discrete action and its differential, the discrete Herglotz equations.
 
-use crate::{DiscreteLagrangian, InputError, Quadrature, Rule, StepError};
+use crate::{DiscreteLagrangian, InputError, StepError};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{DiscreteJet, DiscretePoint, GeometryError, Lagrangian, Scalar};
+use contact_geom::{DiscreteJet, DiscretePoint, GeometryError, Scalar};
 
 /// A discrete path `q_d = (q_0, ..., q_N)` in Q; paper, section 3.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,28 +98,6 @@ impl<const N: usize> DiscretePath<N> {
     ) -> Result<Vec<SVector<f64, N>>, StepError> {
         let jets = self.jets(ld, t0, z0)?;
         Ok(jets.windows(2).map(|pair| pair[1].1.d1 + pair[0].1.d2 * pair[1].1.sigma()).collect())
-    }
-
-    /// The residuals of the condition of Vermeeren, Bravetti and Seri on `Q x Q x R^2` at the interior points:
-    /// `S_1(k) + S_2(k-1) (1 + S_z0(k)) / (1 - S_z1(k-1))`, k = 1..N-1.
-    ///
-    /// # Errors
-    /// Those of the discrete Lagrangian.
-    pub fn extended_residuals<L: Lagrangian<N>, R: Rule>(
-        &self,
-        ld: &Quadrature<L, R>,
-        t0: f64,
-        z0: f64,
-    ) -> Result<Vec<SVector<f64, N>>, StepError> {
-        let z = self.actions(ld, t0, z0)?;
-        let h = ld.step_size();
-        let jets: Vec<_> = (0..self.steps())
-            .map(|k| {
-                let x = DiscretePoint { q0: self.points[k], q1: self.points[k + 1], z0: z[k] };
-                ld.extended_jet(t0 + k as f64 * h, &x, z[k + 1])
-            })
-            .collect();
-        Ok(jets.windows(2).map(|pair| pair[1].s1 + pair[0].s2 * ((1.0 + pair[1].z0) / (1.0 - pair[0].z1))).collect())
     }
 }
 

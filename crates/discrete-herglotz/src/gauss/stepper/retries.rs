@@ -1,13 +1,13 @@
 //! What is tried on a step that the sweeps do not solve.
 
 use super::{GaussStepper, Route, Solution};
-use crate::gauss::stage_equations::{Given, Products, StageEquations, Workspace};
+use crate::gauss::stages::equations::{Given, Products, StageEquations, Workspace};
 use crate::{StepError, Stepper, legendre_inverse};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint};
 
 /// What has been tried on a step.
 #[derive(Default)]
-pub(super) struct Tried {
+pub(crate) struct Tried {
     /// Simplified Newton iteration with the Jacobian at its start.
     pub simplified: bool,
     pub newton: bool,
@@ -16,14 +16,14 @@ pub(super) struct Tried {
 }
 
 /// The steps of Newton's method after which cheaper sweeps are tried again for the first time.
-pub(super) const PAUSE: usize = 8;
+pub(crate) const PAUSE: usize = 8;
 
 impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// Has the refused step tried again: by simplified Newton iteration, with the Jacobian at its start if that is not so
     /// already, then by Newton's method. `refused` where all have been tried.
     #[cold]
     #[inline(never)]
-    pub(super) fn try_again(&mut self, tried: &mut Tried, refused: StepError) -> Result<(), StepError> {
+    pub(crate) fn try_again(&mut self, tried: &mut Tried, refused: StepError) -> Result<(), StepError> {
         if !self.newton {
             return Err(refused);
         }
@@ -85,7 +85,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     }
 
     /// Solves the stages of the next step by Newton's method, from a motion without forces or of constant velocity.
-    pub(super) fn solve_stages(&mut self) -> Result<(), StepError> {
+    pub(crate) fn solve_stages(&mut self) -> Result<(), StepError> {
         self.solved = false;
         let (t, from) = (self.time(), self.state());
         if let Route::General(_) = &*self.route {
@@ -106,7 +106,7 @@ impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     }
 
     /// Tries the next cheaper solution once its pause is over.
-    pub(super) fn resume(&mut self) {
+    pub(crate) fn resume(&mut self) {
         if self.solution != Solution::FixedPointIteration && self.pause == 0 {
             self.solution = match self.solution {
                 Solution::Newton => Solution::Simplified,

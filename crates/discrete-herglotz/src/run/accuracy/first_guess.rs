@@ -2,13 +2,13 @@
 
 use super::Request;
 use crate::Problem;
-use crate::rules::step_equations::inverted;
+use crate::solve::mass_matrix::inverted;
 use contact_geom::nalgebra::SMatrix;
 use contact_geom::{Derivatives, Lagrangian, max_or_nan};
 use std::f64::consts::PI;
 
 /// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.
-pub(in crate::run) fn first_guess<L: Lagrangian<N>, const N: usize>(
+pub(crate) fn first_guess<L: Lagrangian<N>, const N: usize>(
     request: &Request<'_, L, N>,
     stages: usize,
     goal: f64,

@@ -3,7 +3,7 @@
 use super::*;
 
 /// The steps of any integrator, whose runs are compared with the reference.
-pub(super) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
+pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
     trials: &mut TrialRuns<'_, 'p, L, N>,
     integrator: &Shared<'p, L, N>,
     found: &Converged<N>,

@@ -1,7 +1,7 @@
 //! What the choice of steps costs.
 
 use super::choose_with;
-use crate::run::trial_runs::{BUDGET, TrialRuns};
+use crate::run::accuracy::trial_runs::{BUDGET, TrialRuns};
 use crate::run::{OutputRequest, Problem, Request, Shared, Until};
 use crate::{AnyIntegrator, GaussCollocation, Stepper, StepperOptions};
 use contact_geom::nalgebra::SVector;

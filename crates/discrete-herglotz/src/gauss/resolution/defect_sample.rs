@@ -1,0 +1,373 @@
+//! A look between the nodes of a step: does its curve solve Herglotz' equations there?
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+use crate::gauss::dense::Solved;
+use crate::gauss::stages::lagrangian_values::StageValues;
+use crate::gauss::stages::parametrization::Parametrization;
+use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES, lagrange_rows};
+use crate::gauss::tables::condensed::Condensed;
+use crate::numbers::lanes::{Lanes, vector};
+use crate::numbers::pair::{Registers, Two, by_two};
+use crate::numbers::registers::{StageMap, Stages, blocks};
+use contact_geom::nalgebra::SMatrix;
+use contact_geom::{
+    ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint, max_abs_or_nan, max_or_nan,
+};
+use pulp::{Simd, WithSimd};
+use std::array::from_fn;
+use std::sync::OnceLock;
+
+/// What a look at a step has found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct DefectSample {
+    /// The largest misfit of the curve: of `p' = L_q + L_z p` and `z' = L`, over the length of the step, and of `p = L_v`; relative to
+    /// the momenta and actions. Infinite where something is not finite.
+    pub defect: f64,
+    /// The same of momenta and forces alone, and of the action alone, in their own units.
+    pub of_momenta: f64,
+    pub of_action: f64,
+    /// The momenta that it is relative to.
+    pub size: f64,
+    /// The actions.
+    pub size_z: f64,
+    /// The misfit that the last two coefficients of the step's polynomials let expect.
+    pub expected: f64,
+    /// The largest misfit of the values of L themselves, beyond their round-off: what jumps between two points and has no gradient at
+    /// either is seen in the values alone.
+    pub of_value: f64,
+    /// The largest `|p.v| + |z L_z|`, which such a misfit changes.
+    pub kinetic: f64,
+    /// The values of L at the start and at the end of the step's curve.
+    ends: [f64; 2],
+    /// Whether L may jump between the step before and this one.
+    pub follows_a_jump: bool,
+}
+
+/// Products of two numbers that are smaller have lost digits.
+pub(crate) const UNDERFLOWN: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+
+impl DefectSample {
+    /// Whether the misfit is one of numbers that have lost digits since they are too small, as where a force begins at nothing.
+    pub fn is_underflown(&self) -> bool {
+        self.defect * self.size < UNDERFLOWN
+    }
+
+    /// The jump of the values of L to the next step, beyond their round-off.
+    pub fn jump_to(&self, next: &DefectSample) -> f64 {
+        let (before, after) = (self.ends[1], next.ends[0]);
+        beyond_rounding((after - before).abs(), max_or_nan(before.abs(), after.abs()))
+    }
+
+    /// Together with that of the next part of the same step, between which L may jump.
+    pub fn joined(self, next: DefectSample) -> DefectSample {
+        DefectSample {
+            defect: max_or_nan(self.defect, next.defect),
+            of_momenta: max_or_nan(self.of_momenta, next.of_momenta),
+            of_action: max_or_nan(self.of_action, next.of_action),
+            size: max_or_nan(self.size, next.size),
+            size_z: max_or_nan(self.size_z, next.size_z),
+            expected: max_or_nan(self.expected, next.expected),
+            of_value: max_or_nan(self.of_value, next.of_value),
+            kinetic: max_or_nan(self.kinetic, next.kinetic),
+            ends: [self.ends[0], next.ends[1]],
+            ..self
+        }
+    }
+
+    /// The same after a jump of L.
+    pub fn after_a_jump(self) -> DefectSample {
+        DefectSample { follows_a_jump: true, ..self }
+    }
+
+    /// Together with one at other points of the step.
+    pub fn and(self, other: DefectSample) -> DefectSample {
+        DefectSample {
+            defect: max_or_nan(self.defect, other.defect),
+            of_momenta: max_or_nan(self.of_momenta, other.of_momenta),
+            of_action: max_or_nan(self.of_action, other.of_action),
+            of_value: max_or_nan(self.of_value, other.of_value),
+            ..self
+        }
+    }
+}
+
+/// A step as it was solved: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L; where there is a time transformation
+/// in its time, each multiplied with its rate.
+pub(crate) struct Curve<const N: usize> {
+    pub s: usize,
+    pub t: f64,
+    pub h: f64,
+    pub q: [f64; N],
+    pub p: [f64; N],
+    pub z: f64,
+    pub v: [Stages; N],
+    pub force: [Stages; N],
+    pub rate: Stages,
+    pub l: Stages,
+    /// Whether z is part of the step; else `L` is that at `z = 0`.
+    pub acts: bool,
+    /// The rates of the time transformation at the start and at the end.
+    rates: [f64; 2],
+}
+
+impl<const N: usize> Curve<N> {
+    /// With stages still to be filled in.
+    pub fn new(s: usize, t: f64, h: f64, start: &PhasePoint<N>) -> Self {
+        let zero = [Stages::ZERO; N];
+        Curve {
+            s,
+            t,
+            h,
+            q: start.q.into(),
+            p: start.p.into(),
+            z: start.z,
+            v: zero,
+            force: zero,
+            rate: Stages::ZERO,
+            l: Stages::ZERO,
+            acts: true,
+            rates: [1.0; 2],
+        }
+    }
+
+    /// From the stages of a step in transformed time, and the rates of the time transformation at its ends.
+    pub fn of_transformed(&mut self, solved: &Solved<N>, rates: [f64; 2]) {
+        self.of_solved(solved);
+        self.rates = rates;
+    }
+
+    /// From the stages of a general step.
+    pub fn of_solved(&mut self, solved: &Solved<N>) {
+        (self.v, self.force) = (solved.v.map(Stages), solved.force.map(Stages));
+        (self.rate, self.l) = (Stages(solved.rate), Stages(solved.l));
+    }
+
+    /// From the accelerations and positions of a condensed step that began with the velocity v0.
+    #[inline(always)]
+    pub fn of_accelerations<S: Simd, L: Lagrangian<N>>(
+        &mut self,
+        lagrangian: &L,
+        table: &Condensed,
+        mass: Option<&SMatrix<f64, N, N>>,
+        v0: &[f64; N],
+        [a, x]: [&[Stages; N]; 2],
+    ) {
+        (self.acts, self.z) = (false, 0.0);
+        for d in 0..N {
+            let v0 = Lanes::<S>::splat(v0[d]);
+            table.d.apply(&a[d], table.s, &mut self.v[d], |r| table.inverse_rho.block(r) * v0);
+        }
+        for r in 0..blocks::<S>(table.s) {
+            let rho = table.inverse_rho.block::<S>(r).recip();
+            self.rate.set(r, rho * table.gamma);
+            for i in 0..N {
+                let mut force = Lanes::<S>::splat(0.0);
+                for j in 0..N {
+                    let mass = mass.map_or(f64::from(u8::from(i == j)), |mass| mass[(i, j)]);
+                    force = a[j].block::<S>(r).mul_add(Lanes::splat(mass), force);
+                }
+                self.force[i].set(r, force * rho);
+            }
+        }
+        self.l = StageValues { lagrangian, times: &table.times, t: self.t, x, v: &self.v }.all::<S>(table.s);
+    }
+}
+
+/// Maps from the stages to as many points between the nodes.
+struct Between {
+    /// The points, as fractions of the step.
+    points: Stages,
+    /// The values of the polynomial, and its integral from 0.
+    value: StageMap,
+    integral: StageMap,
+}
+
+/// The round-off of a value of L, relative to its size: some hundred units for the sums that it is made of.
+const ROUNDED: f64 = 256.0 * f64::EPSILON;
+
+fn beyond_rounding(defect: f64, size: f64) -> f64 {
+    // A NaN stays one.
+    if defect <= ROUNDED * size { 0.0 } else { defect - ROUNDED * size }
+}
+
+/// The sets of points that there are.
+pub(crate) const SAMPLE_SETS: usize = 16;
+
+impl Between {
+    /// One of the sets of points for a number of stages from 1 to 16, made once.
+    fn of(s: usize, set: usize) -> &'static Between {
+        static TABLES: [[OnceLock<Box<Between>>; SAMPLE_SETS]; MAX_STAGES] =
+            [const { [const { OnceLock::new() }; SAMPLE_SETS] }; MAX_STAGES];
+        let (s, set) = (s.clamp(1, MAX_STAGES), set.min(SAMPLE_SETS - 1));
+        TABLES[s - 1][set].get_or_init(|| Box::new(Self::new(s, set)))
+    }
+
+    /// A polynomial at the points.
+    #[inline(always)]
+    fn value<S: Simd>(&self, s: usize, y: &Stages, out: &mut Stages) {
+        self.value.apply(y, s, out, |_| Lanes::<S>::splat(0.0));
+    }
+
+    /// From a number at the start of the step, what grows at the rate of a polynomial.
+    #[inline(always)]
+    fn grown<S: Simd>(&self, s: usize, h: f64, y: &Stages, from: f64, out: &mut Stages) {
+        self.integral.apply(y, s, out, |_| Lanes::<S>::splat(0.0));
+        for r in 0..blocks::<S>(s) {
+            out.set(r, out.block::<S>(r) * h + from);
+        }
+    }
+
+    fn new(s: usize, set: usize) -> Self {
+        let g = Coefficients::of(s);
+        let golden = 0.618_033_988_749_894_9;
+        // The Gauss points of one stage fewer lie between those of s; one more beside the step's end, where curves are worst. The
+        // other sets are equidistant, each moved so that all together leave the shortest gaps.
+        let inner = Coefficients::of(s.saturating_sub(1).max(1));
+        let end = 0.5 * (1.0 + g.c[s - 1].0);
+        let points = from_fn(|i| match set {
+            0 if i + 1 < s => inner.c[i].0,
+            0 => end,
+            _ => (i.min(s - 1) as f64 + (set as f64 * golden).fract()) / s as f64,
+        });
+        let [value, integral] = lagrange_rows(s, &points);
+        Between { points: Stages(points), value: StageMap::new(&value, s), integral: StageMap::new(&integral, s) }
+    }
+}
+
+/// The sum of the stages with weights, which are 0 beyond the last.
+fn weighted(weights: &[f64; MAX_STAGES], y: &Stages) -> f64 {
+    weights.iter().zip(&y.0).map(|(w, y)| w * y).sum()
+}
+
+/// The look, in the lanes of an instruction set.
+pub(crate) struct Compare<'a, L, P, const N: usize> {
+    pub lagrangian: &'a L,
+    pub transformation: &'a P,
+    pub curve: &'a Curve<N>,
+    pub set: usize,
+}
+
+impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> WithSimd for Compare<'_, L, P, N> {
+    type Output = DefectSample;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> DefectSample {
+        let Compare { lagrangian, transformation, curve, set } = self;
+        let Curve { s, t, h, .. } = *curve;
+        let between = Between::of(s, set);
+        let zero = Lanes::<S>::splat(0.0);
+        let (mut v, mut q, mut f, mut y) = ([Stages::ZERO; N], [Stages::ZERO; N], [Stages::ZERO; N], [Stages::ZERO; N]);
+        let (mut rate, mut one_minus_rho, mut l, mut z) =
+            (Stages::ZERO, Stages::ZERO, Stages::ZERO, Stages([curve.z; MAX_STAGES]));
+        for d in 0..N {
+            between.value::<S>(s, &curve.v[d], &mut v[d]);
+            between.grown::<S>(s, h, &curve.v[d], curve.q[d], &mut q[d]);
+            between.value::<S>(s, &curve.force[d], &mut f[d]);
+            between.grown::<S>(s, h, &curve.force[d], curve.p[d], &mut y[d]);
+        }
+        between.value::<S>(s, &curve.rate, &mut rate);
+        between.grown::<S>(s, h, &curve.rate, 0.0, &mut one_minus_rho);
+        between.value::<S>(s, &curve.l, &mut l);
+        if curve.acts {
+            between.grown::<S>(s, h, &curve.l, curve.z, &mut z);
+        }
+        let (mut of_value, mut kinetic, mut largest_l) = (zero, zero, zero);
+        let (mut defect, mut size, mut of_z, mut size_z, mut all) = (zero, zero, zero, zero, zero);
+        let mut other: Option<(Lanes<S>, ChartVector<N, Lanes<S>>)> = None;
+        for r in 0..blocks::<S>(s) {
+            let mut x = VelocityPoint {
+                q: vector(|d| q[d].block::<S>(r)),
+                v: vector(|d| v[d].block::<S>(r)),
+                z: z.block::<S>(r),
+            };
+            // From the transformed time to t.
+            let (mut slower, mut long) = (Lanes::<S>::splat(1.0), Lanes::<S>::splat(h));
+            if !P::PHYSICAL {
+                let rate = transformation.rate(&x.q);
+                (slower, long) = (rate.recip(), long * rate);
+                x.v *= slower;
+            }
+            let (value, g) = match other.take() {
+                Some(other) => other,
+                None if const { L::INTERPRETED && P::PHYSICAL && by_two::<S>() } && r + 1 < blocks::<S>(s) => {
+                    let pair = VelocityPoint {
+                        q: vector(|d| Two::<S>::of(&q[d], r)),
+                        v: vector(|d| Two::of(&v[d], r)),
+                        z: Two::of(&z, r),
+                    };
+                    let (l, g) = lagrangian.with_gradient(Two::of(&between.points, r) * h + t, &pair);
+                    other = Some((l.1, ChartVector { x: g.x.map(|e| e.1), y: g.y.map(|e| e.1), z: g.z.1 }));
+                    (l.0, ChartVector { x: g.x.map(|e| e.0), y: g.y.map(|e| e.0), z: g.z.0 })
+                }
+                None => lagrangian.with_gradient(between.points.block::<S>(r) * h + t, &x),
+            };
+            let inverse = (Lanes::<S>::splat(1.0) - one_minus_rho.block::<S>(r)).recip();
+            let mut work = zero;
+            let drag = (rate.block::<S>(r) * inverse * slower - g.z) * long;
+            for d in 0..N {
+                let p = y[d].block::<S>(r) * inverse;
+                let force = f[d].block::<S>(r) * inverse * h;
+                let of_force = p.mul_add(drag, force - g.x[d] * long);
+                let of_momentum = p - g.y[d];
+                defect = defect.max(of_force.abs()).max(of_momentum.abs());
+                size = size.max(p.abs()).max(force.abs());
+                all += of_force * 0.0 + of_momentum * 0.0;
+                work = p.mul_add(x.v[d], work);
+            }
+            let apart = l.block::<S>(r) * slower - value;
+            of_value = of_value.max(apart.abs());
+            kinetic = kinetic.max(work.abs() + (g.z * x.z).abs());
+            largest_l = largest_l.max(value.abs());
+            all += apart * 0.0;
+            if curve.acts {
+                of_z = of_z.max((apart * long).abs());
+                size_z = size_z.max(z.block::<S>(r).abs()).max((value * long).abs());
+            }
+        }
+        // The largest over lanes may hide a NaN; a NaN or an infinity times 0 is not 0.
+        if all.sum() != 0.0 {
+            return DefectSample {
+                defect: f64::INFINITY,
+                of_momenta: f64::INFINITY,
+                of_action: f64::INFINITY,
+                of_value: f64::INFINITY,
+                ..DefectSample::default()
+            };
+        }
+        let relative = |defect: f64, size: f64| if defect > 0.0 { defect / size } else { 0.0 };
+        let (size, size_z) = (size.max_abs_or_nan(), size_z.max_abs_or_nan());
+        let (of_momenta, of_action) = (defect.max_abs_or_nan(), of_z.max_abs_or_nan());
+        let defect = relative(of_momenta, size) + relative(of_action, size_z);
+        let of_value = beyond_rounding(of_value.max_abs_or_nan(), largest_l.max_abs_or_nan());
+        // The coefficients are the same for all points.
+        if set > 0 {
+            return DefectSample { defect, of_momenta, of_action, of_value, ..DefectSample::default() };
+        }
+        let fastest = max_abs_or_nan(v.iter().flat_map(|v| v.0));
+        let g = Coefficients::of(s);
+        // The sizes of the last two coefficients together.
+        let tail = |y: &Stages| g.last.iter().map(|row| weighted(row, y).abs()).sum::<f64>();
+        let mut expected = tail(&curve.rate) * h;
+        for d in 0..N {
+            expected += relative(tail(&curve.force[d]) * h, size) + relative(tail(&curve.v[d]), fastest);
+        }
+        if curve.acts {
+            expected += relative(tail(&curve.l) * h, size_z);
+        }
+        let ends = from_fn(|i| weighted(&g.ends[i], &curve.l) / curve.rates[i]);
+        DefectSample {
+            defect,
+            of_momenta,
+            of_action,
+            size,
+            size_z,
+            expected,
+            of_value,
+            kinetic: kinetic.max_abs_or_nan(),
+            ends,
+            follows_a_jump: false,
+        }
+    }
+}

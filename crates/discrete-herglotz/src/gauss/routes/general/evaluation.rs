@@ -1,0 +1,98 @@
+//! L and its gradient at the stages of a general step.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+use crate::gauss::routes::general::General;
+use crate::gauss::stages::parametrization::Parametrization;
+use crate::numbers::lanes::{Lanes, vector};
+use crate::numbers::pair::{Registers, over_registers};
+use crate::numbers::registers::blocks;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{ChartVector, Derivatives, KernelDual, Lagrangian, VelocityPoint};
+use pulp::Simd;
+use std::array::from_fn;
+
+impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, N> {
+    /// The point of TQ x R at a block of stages.
+    #[inline(always)]
+    pub(crate) fn point<S: Simd>(&self, r: usize) -> VelocityPoint<N, Lanes<S>> {
+        VelocityPoint {
+            q: vector(|d| self.x[d].block(r)),
+            v: vector(|d| self.v[d].block(r)),
+            z: self.z_stages.block(r),
+        }
+    }
+
+    /// Evaluates L and its gradient at the stages; returns the largest change of the rates dt/dtau, relative to the largest, or 0 without one.
+    #[inline(always)]
+    pub(crate) fn evaluate<S: Simd>(&mut self, t: f64) -> f64 {
+        let m = blocks::<S>(self.table.s);
+        self.evaluations += self.table.s as u64;
+        if const { P::PHYSICAL } {
+            let mut r = 0;
+            while r < m {
+                r = over_registers!(self.take_gradients(t, r); L, S, m - r);
+            }
+            return 0.0;
+        }
+        let (mut dg, mut sg) = (Lanes::<S>::splat(0.0), Lanes::<S>::splat(0.0));
+        for r in 0..m {
+            let at = self.table.times.block::<S>(r) + t;
+            let (re, d) = self.lagrangian.with_gradient(at, &self.point::<S>(r));
+            let (mut weight, one_minus_rho_stages) =
+                (self.table.weights.block::<S>(r), -self.one_minus_rho_stages.block::<S>(r));
+            let point = self.point::<S>(r);
+            let q = vector::<_, N>(|i| {
+                let mut q = KernelDual::<Lanes<S>, SVector<Lanes<S>, N>>::constant(point.q[i]);
+                q.d[i] = Lanes::splat(1.0);
+                q
+            });
+            let KernelDual { re: g, d: slope } = self.extension.transformation.rate(&q);
+            let energy = point.v.dot(&d.y) - re;
+            let extended = energy.mul_add(one_minus_rho_stages, energy + self.extension.p_t.value);
+            let of_transformed: [_; N] = from_fn(|i| slope[i] * extended * -weight);
+            weight *= g;
+            dg = dg.max((g - self.extension.g.block(r)).abs());
+            sg = sg.max(g.abs());
+            self.extension.g.set(r, g);
+            self.l.set(r, weight * re);
+            self.rate.set(r, weight * d.z.mul_add(one_minus_rho_stages, d.z));
+            for i in 0..N {
+                let push = d.x[i].mul_add(one_minus_rho_stages, d.x[i]);
+                self.force[i].set(r, push.mul_add(weight, of_transformed[i]));
+                self.l_v[i].set(r, d.y[i]);
+            }
+        }
+        dg.max_abs_or_nan() / sg.max_abs_or_nan()
+    }
+
+    /// L and its gradient at the blocks of stages that T holds, from the r-th on, in physical time.
+    #[inline(always)]
+    fn take_gradients<S: Simd, T: Registers<S>>(&mut self, t: f64, r: usize) -> usize {
+        let point = VelocityPoint {
+            q: vector(|d| T::of(&self.x[d], r)),
+            v: vector(|d| T::of(&self.v[d], r)),
+            z: T::of(&self.z_stages, r),
+        };
+        let (l, d) = self.lagrangian.with_gradient(T::of(&self.table.times, r) + t, &point);
+        for i in 0..T::COUNT {
+            let of = |x: &SVector<T, N>| vector(|d| x[d].register(i));
+            self.weigh(r + i, l.register(i), &ChartVector { x: of(&d.x), y: of(&d.y), z: d.z.register(i) });
+        }
+        r + T::COUNT
+    }
+
+    /// Takes L and its gradient at one block of stages, with the weights of physical time.
+    #[inline(always)]
+    fn weigh<S: Simd>(&mut self, r: usize, l: Lanes<S>, d: &ChartVector<N, Lanes<S>>) {
+        let (weight, one_minus_rho_stages) =
+            (self.table.weights.block::<S>(r), -self.one_minus_rho_stages.block::<S>(r));
+        self.l.set(r, weight * l);
+        self.rate.set(r, weight * d.z.mul_add(one_minus_rho_stages, d.z));
+        for i in 0..N {
+            self.force[i].set(r, weight * d.x[i].mul_add(one_minus_rho_stages, d.x[i]));
+            self.l_v[i].set(r, d.y[i]);
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Sweeps of the general step.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+use crate::gauss::routes::general::General;
+use crate::gauss::stages::parametrization::Parametrization;
+use crate::numbers::lanes::{Lanes, vector};
+use crate::numbers::registers::{blocks, over_groups};
+use contact_geom::{Lagrangian, Scalar};
+use pulp::Simd;
+
+/// The largest changes of a sweep, and the largest values: of velocities, of factors and of actions.
+struct Changes<S: Simd> {
+    change: [Lanes<S>; 3],
+    size: [Lanes<S>; 3],
+}
+
+impl<S: Simd> Changes<S> {
+    #[inline(always)]
+    fn see(&mut self, kind: usize, change: Lanes<S>, value: Lanes<S>) {
+        self.change[kind] = self.change[kind].max(change.abs());
+        self.size[kind] = self.size[kind].max(value.abs());
+    }
+
+    /// The largest change of a kind, in units of the largest value.
+    #[inline(always)]
+    fn relative(&self, kind: usize) -> f64 {
+        let change = self.change[kind].max_abs_or_nan();
+        if change > 0.0 { change / self.size[kind].max_abs_or_nan() } else { change }
+    }
+}
+
+impl<L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'_, L, P, N> {
+    /// New velocities, positions, actions and factors of the stages; returns the largest change, each in units of the
+    /// largest of its kind.
+    ///
+    /// What is found for some registers stays there until it is used: through memory it would be late. By loops, and not by closures, which may be
+    /// compiled by themselves and for no vector instructions.
+    #[inline(always)]
+    pub(crate) fn sweep<S: Simd>(&mut self) -> f64 {
+        let (zero, one) = (Lanes::<S>::splat(0.0), Lanes::splat(1.0));
+        let mut seen = Changes { change: [zero; 3], size: [zero, one, zero] };
+        over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.push::<S, K>(r, &mut seen));
+        over_groups!(S, blocks::<S>(self.table.s), r, K at most 2 => self.move_stages::<S, K>(r, &mut seen));
+        let change = seen.relative(0).max(seen.relative(1));
+        let of_action = seen.relative(2);
+        // `f64::max` would hide a NaN.
+        if of_action > change || of_action.is_nan() { of_action } else { change }
+    }
+
+    /// New factors and velocities of the stages in K registers from the r-th on.
+    #[inline(always)]
+    fn push<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S>) {
+        let (s, zero, one) = (self.table.s, Lanes::<S>::splat(0.0), Lanes::<S>::splat(1.0));
+        let (mut one_minus_rho_stages, mut pushed) = ([zero; K], [[zero; K]; N]);
+        for d in 0..N {
+            let mut p = [Lanes::splat(self.p[d].value); K];
+            for k in 0..K {
+                p[k] -= self.l_v[d].block(r + k);
+            }
+            if d == 0 {
+                [one_minus_rho_stages, pushed[0]] = self.m.rows([&self.rate, &self.force[0]], s, [[zero; K], p], r);
+            } else {
+                [pushed[d]] = self.m.rows([&self.force[d]], s, [p], r);
+            }
+        }
+        for k in 0..K {
+            let (r, one_minus_rho_stages) = (r + k, one_minus_rho_stages[k]);
+            let (before, rho) = (self.one_minus_rho_stages.block::<S>(r), one - one_minus_rho_stages);
+            seen.see(1, one_minus_rho_stages - before, rho);
+            self.one_minus_rho_stages.set(r, one_minus_rho_stages);
+            let inverse = rho.recip();
+            let excess =
+                vector::<Lanes<S>, N>(|d| self.l_v[d].block::<S>(r).mul_add(one_minus_rho_stages, pushed[d][k]));
+            let mut weight = self.table.weights.block::<S>(r);
+            if const { !P::PHYSICAL } {
+                weight *= self.extension.g.block(r);
+            }
+            for i in 0..N {
+                let mut change = zero;
+                for j in 0..N {
+                    change = (self.mass.inverse::<S>(i, j, r) * inverse).mul_add(excess[j], change);
+                }
+                let v = self.v[i].block::<S>(r) + change;
+                seen.see(0, change, v);
+                self.v[i].set(r, v);
+                self.moved[i].set(r, weight * v);
+            }
+        }
+    }
+
+    /// New positions and actions of the stages in K registers from the r-th on.
+    #[inline(always)]
+    fn move_stages<S: Simd, const K: usize>(&mut self, r: usize, seen: &mut Changes<S>) {
+        let s = self.table.s;
+        let mut z = [Lanes::<S>::splat(self.z.value); K];
+        for d in 0..N {
+            let mut x = [Lanes::<S>::splat(self.q[d].value); K];
+            if d == 0 {
+                [z, x] = self.m.rows([&self.l, &self.moved[0]], s, [z, x], r);
+            } else {
+                [x] = self.m.rows([&self.moved[d]], s, [x], r);
+            }
+            for k in 0..K {
+                if self.follows {
+                    z[k] = self.l_v[d].block::<S>(r + k).mul_add(x[k] - self.x[d].block(r + k), z[k]);
+                }
+                self.x[d].set(r + k, x[k]);
+            }
+        }
+        for k in 0..K {
+            seen.see(2, z[k] - self.z_stages.block(r + k), z[k]);
+            self.z_stages.set(r + k, z[k]);
+        }
+    }
+}

@@ -1,0 +1,445 @@
+//! Steps of contact Gauss collocation for every regular Lagrangian.
+
+// Several arrays share an index.
+#![allow(clippy::needless_range_loop)]
+
+mod acceptance;
+mod evaluation;
+mod iteration;
+mod state_words;
+
+use crate::gauss::resolution::tail::Tail;
+use crate::gauss::stages::fixed_point::{AGE, FixedPointIteration, IterationOutcome, SLOW};
+use crate::gauss::stages::mass_matrix::Mass;
+use crate::gauss::stages::parametrization::{Extension, Parametrization, Values};
+use crate::gauss::stages::simplified_newton::{CorrectStages, StageNewton};
+use crate::gauss::tables::coefficients::MAX_STAGES;
+use crate::gauss::tables::stage_table::StageTable;
+use crate::numbers::compensated::{CompensatedSum, Unevaluated, add, finite};
+use crate::numbers::instructions::Instructions;
+use crate::numbers::lanes::{Lanes, branched};
+use crate::numbers::registers::{StageMap, Stages, blocks};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{ChartVector, Derivatives, Hessian, Lagrangian, PhasePoint, VelocityPoint};
+use pulp::Simd;
+use std::array::from_fn;
+
+/// The coordinates up to which W is inverted at several stages at once: the matrices take room on the stack.
+const MOST_IN_LANES: usize = 8;
+
+/// The state and the workspace of the general step.
+///
+/// The unknowns are the velocities V, the actions Z and the integrating factors rho of the stages:
+/// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`. A sweep takes the right-hand sides
+/// from the gradients of L before, and the velocities from the momenta by `W^-1`.
+///
+/// In a transformed time they are those of `K = g (H + p_t)`: `Q = q0 + hA (g V)`, `Z = z0 + hA (g L)`, `t = t0 + hA g`,
+/// `rho = 1 - hA (rho g L_z)`, `rho L_v = p0 + hA (rho g L_q - grad g (rho E + p_t0))`, since `rho p_t = p_t0`, the momentum of
+/// the time at the start, where L does not depend on t.
+///
+/// Herglotz' principle says what the action takes over from the positions: among curves with the same start, near a motion, `dZ = L_v dQ`.
+/// So a sweep that has moved the stages by dQ has moved their actions by that, to first order, and need not evaluate L to know it. Where
+/// z acts on the motion other than by a rate, this spares one sweep in ten to twenty per cent of them.
+///
+/// A rate that is the same in every step is rounded the same in every step: so `1 - rho`, which is small where the rate is, is
+/// carried instead of rho, and enters by sums of which the rounding depends on the motion.
+///
+/// The matrix of the sweeps and what it multiplies lie together, as in [`SeparableStages`](crate::gauss::routes::separable::SeparableStages).
+#[repr(C)]
+pub(crate) struct General<'a, L, P, const N: usize> {
+    /// The `m` of the table.
+    pub(crate) m: StageMap,
+    /// The stages: velocities and `L_v`.
+    pub(crate) v: [Stages; N],
+    pub(crate) l_v: [Stages; N],
+    /// With the weights `h b`, and g where there is a time transformation: V, `rho L_q`, L and `rho L_z`.
+    pub(crate) moved: [Stages; N],
+    pub(crate) force: [Stages; N],
+    pub(crate) l: Stages,
+    pub(crate) rate: Stages,
+    /// `1 - rho`.
+    pub(crate) one_minus_rho_stages: Stages,
+    pub(crate) z_stages: Stages,
+    pub(crate) x: [Stages; N],
+    pub lagrangian: &'a L,
+    pub extension: Extension<P>,
+    pub table: StageTable,
+    pub mass: Mass<N>,
+    /// Whether the actions of the stages follow their positions within a sweep.
+    pub(crate) follows: bool,
+    pub q: [CompensatedSum; N],
+    pub p: [CompensatedSum; N],
+    pub z: CompensatedSum,
+    /// `1 - rho` at the end of the last step.
+    pub one_minus_rho: f64,
+    pub(crate) warm: bool,
+    /// Corrects the sweeps where they do not contract by themselves.
+    pub newton: Option<Box<StageNewton<N>>>,
+    /// The steps that Newton's Jacobian has served.
+    pub(crate) age: u32,
+    pub(crate) tail: Tail,
+    /// Above one where the last step has not resolved the motion, or its drag.
+    pub defect: f64,
+    /// The same while it is not used.
+    suspended_newton: Option<Box<StageNewton<N>>>,
+    /// Whether the stages of the next step are solved: v, l and falling are theirs.
+    pub(crate) solved: bool,
+    /// Whether these are a prediction of it.
+    predicted: bool,
+    /// A velocity of the motion at the end of the last step, or before it: an iteration that fails leaves none in the stages.
+    pub(crate) known: [f64; N],
+    pub evaluations: u64,
+}
+
+impl<'a, L: Lagrangian<N>, P: Parametrization<N>, const N: usize> General<'a, L, P, N> {
+    /// From a state with a velocity that belongs to it, or a guess of it; `driven` says that z acts on the motion other than by a rate.
+    pub fn new(
+        lagrangian: &'a L,
+        extension: Extension<P>,
+        table: StageTable,
+        mass: Mass<N>,
+        driven: bool,
+        state: &PhasePoint<N>,
+        v: &SVector<f64, N>,
+    ) -> Self {
+        let tail = Tail::new(table.s);
+        let mut general = General {
+            m: table.m.clone(),
+            lagrangian,
+            extension,
+            table,
+            mass,
+            // In transformed time the times of the stages move too.
+            follows: driven && P::PHYSICAL,
+            q: [0.0.into(); N],
+            p: [0.0.into(); N],
+            z: 0.0.into(),
+            v: [Stages::ZERO; N],
+            l_v: [Stages::ZERO; N],
+            moved: [Stages::ZERO; N],
+            force: [Stages::ZERO; N],
+            l: Stages::ZERO,
+            rate: Stages::ZERO,
+            one_minus_rho_stages: Stages::ZERO,
+            z_stages: Stages::ZERO,
+            x: [Stages::ZERO; N],
+            one_minus_rho: 0.0,
+            warm: false,
+            newton: None,
+            age: 0,
+            tail,
+            defect: 0.0,
+            suspended_newton: None,
+            solved: false,
+            predicted: false,
+            known: (*v).into(),
+            evaluations: 0,
+        };
+        general.q = from_fn(|i| state.q[i].into());
+        general.p = from_fn(|i| state.p[i].into());
+        general.z = state.z.into();
+        general.guess(v);
+        general
+    }
+
+    /// The velocity at the last stage of the step before, or that of the start.
+    pub fn last_velocity(&self) -> SVector<f64, N> {
+        SVector::from(self.known)
+    }
+
+    /// Guesses the next step to be a motion of constant velocity.
+    pub fn guess(&mut self, v: &SVector<f64, N>) {
+        self.v = from_fn(|i| Stages([v[i]; MAX_STAGES]));
+        self.warm = false;
+    }
+
+    /// Has the sweeps corrected by Newton's method, with these derivatives of L from now on; `false` where that is not possible.
+    pub fn linearise(&mut self, gradient: &ChartVector<N>, hessian: &Hessian<N>) -> bool {
+        if self.newton.is_none() {
+            self.newton = self.suspended_newton.take().or_else(|| Some(Box::new(StageNewton::new(&self.table))));
+        }
+        self.newton.as_mut().is_some_and(|newton| newton.factorise(gradient, hessian))
+    }
+
+    /// Takes the sweeps as they are again.
+    pub fn suspend_newton(&mut self) {
+        self.suspended_newton = self.newton.take();
+    }
+
+    /// Has the next step taken from stages that are solved: their velocities, actions' rates and factors.
+    pub fn accept(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, f64, f64)>) {
+        self.predict(stages);
+        (self.predicted, self.solved) = (false, true);
+    }
+
+    /// Has the iteration of the next step begin from the same of stages that are near.
+    pub fn predict(&mut self, stages: impl Iterator<Item = (SVector<f64, N>, f64, f64)>) {
+        self.l = Stages::ZERO;
+        for (i, (v, l, rho)) in stages.enumerate() {
+            // Beyond the last stage it is repeated.
+            for d in 0..N {
+                self.v[d].0[i..].fill(v[d]);
+            }
+            self.l.0[i] = self.table.weights.0[i] * l;
+            self.one_minus_rho_stages.0[i..].fill(1.0 - rho);
+        }
+        (self.warm, self.predicted) = (false, true);
+    }
+
+    /// Takes Newton's Jacobian anew, at the middle stage of the last step.
+    #[cold]
+    #[inline(never)]
+    fn renew(&mut self, t: f64) {
+        self.age = 0;
+        let i = self.table.s / 2;
+        let (q, v) = (SVector::from_fn(|d, _| self.x[d].0[i]), SVector::from_fn(|d, _| self.v[d].0[i]));
+        let (t, x) = (t + self.table.times.0[i], VelocityPoint { q, v, z: self.z_stages.0[i] });
+        if !self.linearise(&self.lagrangian.gradient(t, &x), &self.lagrangian.hessian(t, &x)) {
+            self.warm = false;
+        }
+    }
+
+    pub fn values(&self) -> Values<N> {
+        let Extension { t, p_t, .. } = self.extension;
+        Values { q: self.q, p: self.p, z: self.z, t, p_t, one_minus_rho: self.one_minus_rho }
+    }
+
+    /// Goes on from other values; the velocities of the stages are the guess.
+    pub fn reset(&mut self, values: &Values<N>) {
+        Values {
+            q: self.q,
+            p: self.p,
+            z: self.z,
+            t: self.extension.t,
+            p_t: self.extension.p_t,
+            one_minus_rho: self.one_minus_rho,
+        } = *values;
+        self.warm = false;
+    }
+
+    /// The rate dt/dtau at the state.
+    pub fn rate(&self) -> f64 {
+        self.extension.transformation.rate(&SVector::from(self.q.map(|q| q.value)))
+    }
+
+    /// What the velocities of the stages move the positions by.
+    #[inline(always)]
+    fn weighted_velocities<S: Simd>(&mut self) {
+        for r in 0..blocks::<S>(self.table.s) {
+            let mut weight = self.table.weights.block::<S>(r);
+            if !P::PHYSICAL {
+                weight *= self.extension.g.block(r);
+            }
+            for d in 0..N {
+                self.moved[d].set(r, weight * self.v[d].block(r));
+            }
+        }
+    }
+
+    /// Inverts W at the stages where it is not constant; `false` where it is singular.
+    #[inline(always)]
+    fn invert_mass<S: Simd>(&mut self, t: f64) -> bool {
+        if matches!(self.mass, Mass::Constant(_)) {
+            return true;
+        }
+        if const { N > MOST_IN_LANES } {
+            return self.invert_one_by_one(t);
+        }
+        for r in 0..blocks::<S>(self.table.s) {
+            let at = self.table.times.block::<S>(r) + t;
+            let w = self.lagrangian.mass_matrix(at, &self.point::<S>(r));
+            if !self.mass.invert(r, &w) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// The positions and the actions of the stages from their velocities and Lagrangians.
+    #[inline(always)]
+    fn stage_positions<S: Simd>(&mut self) {
+        self.weighted_velocities::<S>();
+        let (m, s) = (&self.m, self.table.s);
+        for ((q, moved), x) in self.q.iter().zip(&self.moved).zip(&mut self.x) {
+            let q = Lanes::<S>::splat(q.value);
+            m.apply(moved, s, x, |_| q);
+        }
+        let z = Lanes::<S>::splat(self.z.value);
+        m.apply(&self.l, s, &mut self.z_stages, |_| z);
+    }
+
+    /// The guesses of a step: the last one's polynomials carried on.
+    #[inline(always)]
+    fn extrapolate<S: Simd>(&mut self) {
+        let s = self.table.s;
+        let renewed = 1.0 / (1.0 - self.one_minus_rho);
+        let rates = if P::PHYSICAL { None } else { Some(&mut self.extension.g) };
+        let StageTable { extrapolation, extrapolation_weighted, .. } = &self.table;
+        for x in self.v.iter_mut().chain(&mut self.l_v).chain(rates) {
+            let before = *x;
+            extrapolation.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
+        }
+        // rho starts from 1 again.
+        let scaled = self.force.iter_mut().chain([&mut self.rate]).map(|x| (x, renewed));
+        for (x, factor) in scaled.chain([(&mut self.l, 1.0)]) {
+            let before = *x;
+            extrapolation_weighted.apply(&before, s, x, |_| Lanes::<S>::splat(0.0));
+            for r in 0..blocks::<S>(s) {
+                x.set(r, x.block::<S>(r) * factor);
+            }
+        }
+    }
+
+    /// Takes one step from the time `t`; on failure the state is unchanged.
+    #[inline(always)]
+    pub fn step<S: Simd>(&mut self, t: f64) -> IterationOutcome {
+        let (solved, predicted) = (std::mem::take(&mut self.solved), std::mem::take(&mut self.predicted));
+        // Without a step before, from a motion of constant velocity.
+        let mut cold = !self.warm || self.newton.is_some();
+        if self.warm && !solved {
+            self.extrapolate::<S>();
+            if self.newton.is_some() {
+                self.table
+                    .m
+                    .apply(&self.rate, self.table.s, &mut self.one_minus_rho_stages, |_| Lanes::<S>::splat(0.0));
+            }
+        } else if !solved && !predicted {
+            self.l = Stages::ZERO;
+            self.one_minus_rho_stages = Stages::ZERO;
+            if !P::PHYSICAL {
+                self.extension.g = Stages([self.rate(); MAX_STAGES]);
+            }
+        }
+        self.warm = false;
+        self.stage_positions::<S>();
+        if !self.invert_mass::<S>(t) {
+            return IterationOutcome::NonFinite;
+        }
+        let mut sweeps = FixedPointIteration::until(1.0, 0.25);
+        // The momenta that are carried on are no L_v of the velocities that are: both may be those of the step before, and the next sweep tell.
+        let mut carried = !cold && !solved;
+        // L is evaluated at one place in the code, so that it is compiled into this loop and for its instruction set.
+        loop {
+            let change = if cold || solved {
+                f64::INFINITY
+            } else if self.newton.is_some() {
+                let (change, moved) = self.correct();
+                sweeps.still = moved <= 4.0 * f64::EPSILON;
+                change
+            } else {
+                self.sweep::<S>()
+            };
+            let of_transformed = self.evaluate::<S>(t);
+            if solved {
+                let outcome = self.finish::<S>();
+                self.judge::<S>(f64::INFINITY);
+                return outcome;
+            }
+            if cold {
+                cold = false;
+                continue;
+            }
+            // `f64::max` would hide a NaN.
+            let change = if !P::PHYSICAL && (of_transformed > change || of_transformed.is_nan()) {
+                of_transformed
+            } else {
+                change
+            };
+            match sweeps.judge(change, 1.0) {
+                IterationOutcome::Continue => {}
+                IterationOutcome::Done if carried => sweeps = FixedPointIteration::until(1.0, 0.25),
+                IterationOutcome::Done => {
+                    let outcome = self.finish::<S>();
+                    self.judge::<S>(sweeps.first());
+                    self.age = self.age.saturating_add(1);
+                    if self.newton.is_some() && sweeps.count() > SLOW && self.age > AGE {
+                        self.renew(t);
+                    }
+                    return outcome;
+                }
+                IterationOutcome::Slow { .. } if self.holds::<S>(t) => return self.finish::<S>(),
+                refused => return refused,
+            }
+            carried = false;
+        }
+    }
+
+    /// A sweep of Newton's method, in the place of [`sweep`](Self::sweep).
+    #[cold]
+    #[inline(never)]
+    fn correct(&mut self) -> (f64, f64) {
+        let Some(newton) = &self.newton else { return (f64::NAN, f64::NAN) };
+        Instructions::new().dispatch(CorrectStages {
+            newton,
+            table: &self.table,
+            start: (self.q.map(|q| q.value), self.p.map(|p| p.value), self.z.value),
+            l_v: &self.l_v,
+            l: &self.l,
+            force: &self.force,
+            rate: &self.rate,
+            v: &mut self.v,
+            z: &mut self.z_stages,
+            one_minus_rho_stages: &mut self.one_minus_rho_stages,
+            moved: &mut self.moved,
+            x: &mut self.x,
+        })
+    }
+
+    /// The end of the step from its stages.
+    #[inline(always)]
+    fn finish<S: Simd>(&mut self) -> IterationOutcome {
+        if !P::PHYSICAL {
+            // With the rates of the last evaluation.
+            self.weighted_velocities::<S>();
+        }
+        let s = self.table.s;
+        let (one_minus_rho, dz) = (self.rate.sum::<S>(s), self.l.sum::<S>(s));
+        let mut deepest = Lanes::<S>::splat(f64::NEG_INFINITY);
+        for r in 0..blocks::<S>(s) {
+            deepest = deepest.max(self.one_minus_rho_stages.block::<S>(r));
+        }
+        let rho = 1.0 - deepest.max_abs_or_nan();
+        if rho <= 0.0 {
+            return IterationOutcome::StageFactor { rho };
+        }
+        if one_minus_rho >= 1.0 {
+            return IterationOutcome::SigmaVanished { sigma: 1.0 / (1.0 - one_minus_rho) };
+        }
+        // sigma_d - 1, so that a small rate does not round the whole.
+        let grow = one_minus_rho / (1.0 - one_minus_rho);
+        let single = |head| Unevaluated { head, tail: 0.0 };
+        let (mut dq, mut dp) = ([Unevaluated::default(); N], [Unevaluated::default(); N]);
+        for d in 0..N {
+            dq[d] = single(self.moved[d].sum::<S>(s));
+            let pushed = self.force[d].sum::<S>(s);
+            dp[d] = Unevaluated { head: pushed, tail: grow * (pushed + self.p[d].value) };
+        }
+        if branched() {
+            return IterationOutcome::Branched;
+        }
+        // The largest change over lanes may hide a NaN; one of `one_minus_rho` is in `dp`.
+        if !finite(&dq, &dp, single(dz)) {
+            return IterationOutcome::NonFinite;
+        }
+        if !P::PHYSICAL {
+            let mut dt = Stages::ZERO;
+            for r in 0..blocks::<S>(s) {
+                dt.set(r, self.table.weights.block::<S>(r) * self.extension.g.block(r));
+            }
+            let dt = dt.sum::<S>(s);
+            let runs = self.extension.g.0[..s].iter().all(|g| *g > 0.0);
+            if !(runs && dt.is_finite()) {
+                return IterationOutcome::NonFinite;
+            }
+            self.extension.t.add(single(dt));
+            self.extension.p_t.add(single(grow * self.extension.p_t.value));
+        }
+        add(&mut self.q, &dq);
+        add(&mut self.p, &dp);
+        self.z.add(single(dz));
+        self.one_minus_rho = one_minus_rho;
+        self.known = from_fn(|d| self.v[d].0[s - 1]);
+        self.warm = true;
+        IterationOutcome::Done
+    }
+}

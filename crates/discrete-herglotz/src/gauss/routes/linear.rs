@@ -1,0 +1,237 @@
+//! Steps of contact Gauss collocation for a linear motion: one matrix, made once.
+
+use crate::gauss::dense::StepStart;
+use crate::gauss::tables::coefficients::MAX_STAGES;
+use crate::gauss::tables::condensed::Condensed;
+use crate::numbers::compensated::{CompensatedSum, Unevaluated};
+use crate::numbers::double_double::solve_exactly;
+use crate::numbers::state_words::saved;
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Derivatives, Hessian, Lagrangian, VelocityPoint, linear};
+use num_traits::{One, Zero};
+use qd::Quad;
+use std::array::from_fn;
+
+/// The change of the action, a polynomial of degree two in the velocity and the position from a place, beside `grow z`. The place is the equilibrium, if
+/// there is one: elsewhere the terms of a motion that comes to rest would cancel, and leave their rounding.
+struct Action<const N: usize> {
+    stage_positions: SVector<f64, N>,
+    qq: SMatrix<f64, N, N>,
+    qv: SMatrix<f64, N, N>,
+    vv: SMatrix<f64, N, N>,
+    q: SVector<f64, N>,
+    v: SVector<f64, N>,
+    constant: f64,
+}
+
+/// The state of a linear motion and the affine map that advances it, as changes: `q1 - q0`, `v1 - v0`.
+pub(crate) struct Linear<const N: usize> {
+    qq: [[Unevaluated; N]; N],
+    qv: [[Unevaluated; N]; N],
+    vq: [[Unevaluated; N]; N],
+    vv: [[Unevaluated; N]; N],
+    shift_q: [Unevaluated; N],
+    shift_v: [Unevaluated; N],
+    grow: Unevaluated,
+    action: Option<Action<N>>,
+    /// The accelerations of the stages, row `i N + d`, as affine functions of (q0, v0): for dense output.
+    stages: Vec<Vec<f64>>,
+    pub q: [CompensatedSum; N],
+    pub v: [CompensatedSum; N],
+    pub z: CompensatedSum,
+}
+
+/// Where a force that is linear in the positions vanishes, from its slope and its value at the origin; the origin where there is no such place, or more than one.
+fn equilibrium<const N: usize>(slope: &SMatrix<f64, N, N>, at_origin: &SVector<f64, N>) -> SVector<f64, N> {
+    let mut stage_positions = -at_origin;
+    if stage_positions.iter().all(|x| *x == 0.0) {
+        return SVector::zeros();
+    }
+    let solved = linear::solve(&mut slope.clone(), &mut stage_positions).is_ok()
+        && stage_positions.iter().all(|x| x.is_finite());
+    if solved { stage_positions } else { SVector::zeros() }
+}
+
+impl<const N: usize> Linear<N> {
+    /// For `a = M^-1 L_q = -K q + f`; `None` where the stage equations have no solution.
+    #[inline(never)]
+    pub fn new<L: Lagrangian<N>>(
+        lagrangian: &L,
+        table: &Condensed,
+        inverse_mass: &SMatrix<f64, N, N>,
+        t: f64,
+        start: &VelocityPoint<N>,
+        wants_z: bool,
+    ) -> Option<Box<Self>> {
+        let (s, zero, one) = (table.s, Quad::zero(), Quad::one());
+        let origin = VelocityPoint::new([0.0; N], [0.0; N], 0.0);
+        let Hessian { qq, qv, vv, .. } = lagrangian.hessian(t, start);
+        let at_origin = lagrangian.gradient(t, &origin);
+        let (slope, constant) = (inverse_mass * qq, inverse_mass * at_origin.x);
+        let unit = |d: usize, e: usize, x: Quad| if d == e { x } else { zero };
+        let stage_positions = equilibrium(&qq, &at_origin.x);
+        let there = VelocityPoint { q: stage_positions, v: SVector::zeros(), z: 0.0 };
+        let at_place = lagrangian.gradient(t, &there);
+        let constant_at_place = inverse_mass * at_place.x;
+        // The stages' accelerations: rows (i, d), a_id - sum slope B a = slope (q0 + u v0) + f; as right-hand sides the unit
+        // vectors of q0 and v0, and f, at the origin and for positions from the place.
+        let [last, from_place] = [2 * N, 2 * N + 1];
+        let sides = 2 * N + 2;
+        let mut rows: Vec<Vec<Quad>> = (0..s * N)
+            .map(|row| {
+                let (i, d) = (row / N, row % N);
+                let left = (0..s * N).map(|column| {
+                    let (k, e) = (column / N, column % N);
+                    unit(row, column, one) - Quad::from(slope[(d, e)]) * table.b[i][k]
+                });
+                let right = (0..sides).map(|side| match side {
+                    side if side < N => Quad::from(slope[(d, side)]),
+                    side if side < 2 * N => Quad::from(slope[(d, side - N)]) * table.u[i],
+                    side if side == last => Quad::from(constant[d]),
+                    _ => Quad::from(constant_at_place[d]),
+                });
+                left.chain(right).collect()
+            })
+            .collect();
+        if !solve_exactly(&mut rows) {
+            return None;
+        }
+        let a = |i: usize, d: usize, side: usize| rows[i * N + d][s * N + side];
+        let exact = &table.exact;
+        let sum = |w: &[Quad], d: usize, side: usize| (0..s).fold(zero, |sum, j| sum + w[j] * a(j, d, side));
+        let action = wants_z.then(|| {
+            // The stages as affine functions of (q0, v0, 1), with positions from the place, and the sum of L over them.
+            let position = |i: usize, d: usize, side: usize| {
+                unit(side, d, one) + unit(side, N + d, table.u[i]) + sum(&table.b[i], d, side)
+            };
+            let velocity =
+                |i: usize, d: usize, side: usize| unit(side, N + d, exact.inverse_rho[i]) + sum(&exact.d[i], d, side);
+            let rest = lagrangian.value(t, &stage_positions, &origin.v, 0.0);
+            let form = |a: usize, b: usize| {
+                (0..s).fold(0.0, |total, i| {
+                    let x = |side: usize| SVector::<f64, N>::from_fn(|d, _| position(i, d, side).0);
+                    let y = |side: usize| SVector::<f64, N>::from_fn(|d, _| velocity(i, d, side).0);
+                    let (xa, xb, ya, yb) = (x(a), x(b), y(a), y(b));
+                    let second = xa.dot(&(qq * xb)) + ya.dot(&(vv * yb)) + xa.dot(&(qv * yb)) + xb.dot(&(qv * ya));
+                    let first = |side: usize| at_place.x.dot(&x(side)) + at_place.y.dot(&y(side));
+                    let linear = if b == from_place { first(a) } else { 0.0 };
+                    let (half, once) =
+                        if a == from_place { (0.5, rest) } else { (if b == from_place { 1.0 } else { 0.5 }, 0.0) };
+                    total + exact.end_v[i].0 * (half * second + linear + once)
+                })
+            };
+            Action {
+                stage_positions,
+                qq: SMatrix::from_fn(&form),
+                qv: SMatrix::from_fn(|a, b| 2.0 * form(a, N + b)),
+                vv: SMatrix::from_fn(|a, b| form(N + a, N + b)),
+                q: SVector::from_fn(|a, _| form(a, from_place)),
+                v: SVector::from_fn(|a, _| form(N + a, from_place)),
+                constant: form(from_place, from_place),
+            }
+        });
+        let entries = |f: &dyn Fn(usize, usize) -> Quad| from_fn(|d| from_fn(|e| f(d, e).into()));
+        Some(Box::new(Linear {
+            qq: entries(&|d, e| sum(&exact.end_b, d, e)),
+            qv: entries(&|d, e| unit(d, e, exact.end_u) + sum(&exact.end_b, d, N + e)),
+            vq: entries(&|d, e| sum(&exact.end_v, d, e)),
+            vv: entries(&|d, e| unit(d, e, exact.grow) + sum(&exact.end_v, d, N + e)),
+            shift_q: from_fn(|d| sum(&exact.end_b, d, last).into()),
+            shift_v: from_fn(|d| sum(&exact.end_v, d, last).into()),
+            grow: table.grow,
+            action,
+            stages: rows.iter().map(|row| row[s * N..=s * N + last].iter().map(|e| e.0).collect()).collect(),
+            q: from_fn(|i| start.q[i].into()),
+            v: from_fn(|i| start.v[i].into()),
+            z: start.z.into(),
+        }))
+    }
+
+    /// Takes steps until one is not finite; the state is then that before it. Returns how many, and where the last one began.
+    ///
+    /// Only a run that leaves the finite numbers is looked at step by step, again from its start.
+    #[inline(always)]
+    pub fn advance(&mut self, steps: usize) -> (usize, StepStart<N>) {
+        let start = (self.q, self.v, self.z);
+        (1..steps).for_each(|_| self.step());
+        let last = self.start();
+        self.step();
+        if self.is_finite() {
+            return (steps, last);
+        }
+        (self.q, self.v, self.z) = start;
+        let mut taken = 0;
+        loop {
+            let before = (self.q, self.v, self.z);
+            self.step();
+            if !self.is_finite() {
+                (self.q, self.v, self.z) = before;
+                return (taken, self.start());
+            }
+            taken += 1;
+        }
+    }
+
+    fn start(&self) -> StepStart<N> {
+        StepStart { q: self.q.map(|q| q.value), y: self.v.map(|v| v.value), z: self.z.value }
+    }
+
+    fn is_finite(&self) -> bool {
+        self.q.iter().chain(&self.v).chain([&self.z]).all(|x| x.value.is_finite())
+    }
+
+    /// Takes one step.
+    #[inline(always)]
+    fn step(&mut self) {
+        let (q, v) = (self.q, self.v);
+        if let Some(action) = &self.action {
+            let (q, v) = (SVector::from(q.map(|q| q.value)) - action.stage_positions, v.map(|v| v.value));
+            let mut change = action.constant;
+            for i in 0..N {
+                let (mut of_q, mut of_v) = (action.q[i], action.v[i]);
+                for j in 0..N {
+                    of_q += action.qq[(i, j)] * q[j] + action.qv[(i, j)] * v[j];
+                    of_v += action.vv[(i, j)] * v[j];
+                }
+                change += of_q * q[i] + of_v * v[i];
+            }
+            self.z.add(Unevaluated { head: change, tail: 0.0 } + self.grow * self.z.value);
+        }
+        for i in 0..N {
+            let row = |of_q: &[Unevaluated; N], of_v: &[Unevaluated; N], shift: Unevaluated| {
+                (0..N).fold(shift, |sum, j| sum.plus(of_q[j].times(q[j]).plus(of_v[j].times(v[j]))))
+            };
+            self.q[i].add(row(&self.qq[i], &self.qv[i], self.shift_q[i]));
+            self.v[i].add(row(&self.vq[i], &self.vv[i], self.shift_v[i]));
+        }
+    }
+
+    /// Whether the action is computed.
+    pub fn wants_z(&self) -> bool {
+        self.action.is_some()
+    }
+
+    /// The accelerations of the stages of the step from a position and a velocity.
+    pub fn accelerations(&self, q: &[f64; N], v: &[f64; N]) -> [[f64; MAX_STAGES]; N] {
+        let side = |k: usize| {
+            if k < N {
+                q[k]
+            } else if k < 2 * N {
+                v[k - N]
+            } else {
+                1.0
+            }
+        };
+        let s = self.stages.len() / N;
+        from_fn(|d| {
+            from_fn(|i| {
+                if i >= s {
+                    return 0.0;
+                }
+                self.stages[i * N + d].iter().enumerate().map(|(k, e)| e * side(k)).sum()
+            })
+        })
+    }
+}
+
+saved!([const N: usize] Linear<N> { q, v, z });

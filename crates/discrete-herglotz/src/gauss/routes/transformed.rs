@@ -1,0 +1,315 @@
+//! Runs of contact Gauss collocation in transformed time.
+
+use crate::gauss::consistent_start::ConsistentStart;
+use crate::gauss::resolution::defect_sample::{Compare, Curve, DefectSample};
+use crate::gauss::routes::general::General;
+use crate::gauss::stages::fixed_point::IterationOutcome;
+use crate::gauss::stages::mass_matrix::Mass;
+use crate::gauss::stages::parametrization::{Extension, Fictitious, Values};
+use crate::gauss::tables::stage_table::StageTable;
+use crate::gauss::work_summary::work_summary_in_transformed_time;
+use crate::numbers::compensated::CompensatedSum;
+use crate::numbers::instructions::Instructions;
+use crate::numbers::lanes::forget_branches;
+use crate::numbers::state_words::{Saved, load_option, save_option};
+use crate::{ITERATION_LIMIT, InputError, PlanEntry, StepError, StepFailure, Stepper, UnresolvedStep};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation};
+use pulp::{Simd, WithSimd};
+
+/// the time transformation that a Lagrangian states.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OwnTransformation<'a, L>(pub &'a L);
+
+impl<L: Lagrangian<N>, const N: usize> TimeTransformation<N> for OwnTransformation<'_, L> {
+    #[inline(always)]
+    fn rate<T: Scalar>(&self, q: &SVector<T, N>) -> T {
+        self.0.dt_dtau(q)
+    }
+}
+
+/// Contact Gauss collocation of variable step at work: its steps are equal in the time tau of a [`TimeTransformation`], `dt = g(q) dtau`.
+///
+/// It is Gauss collocation of `K = g(q) (H + p_t)` on T\*(Q x R) x R with `p_t = -H` at the start, which makes `K = 0`. With
+/// the velocities V with respect to t, `g = g(Q)` and the energy `E = V.L_v - L`, the stages are
+///
+/// `Q = q0 + hA (g V)`, `Z = z0 + hA (g L)`, `t = t0 + hA g`, `rho = 1 - hA (rho g L_z)`, `rho p_t = p_t0`,
+/// `rho L_v = p0 + hA (rho (g L_q - (E + p_t) grad g))`,
+///
+/// and the same sums with `hb` end the step, `sigma_d = 1 / rho1`. The step contracts `dz - p dq - p_t dt` by `sigma_d`, and so
+/// every momentum of a symmetry of L that leaves g invariant. Order 2s in tau, and symmetric.
+///
+/// The stages are found by fixed-point iteration: a step that is too large for it is refused with
+/// [`StepError::NotConverged`].
+///
+/// ```
+/// use contact_geom::{legendre, systems::{Kepler, System}};
+/// use discrete_herglotz::{Gauss, Stepper};
+/// let kepler = Kepler::<2>::default();
+/// let start = kepler.initial();
+/// let gauss = Gauss::new(kepler, 6, 0.2)?;
+/// let mut run = gauss.transformed_stepper(kepler.time_transformation(), 0.0, legendre(&kepler, 0.0, &start), start.v)?;
+/// run.advance_to(10.0)?;
+/// assert!((run.time() - 10.0).abs() < 1e-14);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct TransformedStepper<'a, L, C, const N: usize> {
+    general: Box<General<'a, L, Fictitious<C>, N>>,
+    arch: Instructions,
+    h: f64,
+    tau: f64,
+    taken: usize,
+    /// The start of the last step, where that was taken by itself.
+    from: Option<Values<N>>,
+    unresolved: Option<UnresolvedStep>,
+}
+
+impl<'a, L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> TransformedStepper<'a, L, C, N> {
+    pub(crate) fn new(
+        lagrangian: &'a L,
+        (s, h): (usize, f64),
+        transformation: C,
+        probed: Option<Structure>,
+        t0: f64,
+        state: PhasePoint<N>,
+        guess: SVector<f64, N>,
+    ) -> Result<Self, InputError> {
+        let ConsistentStart { start, structure, inverse, .. } =
+            ConsistentStart::of(lagrangian, probed, t0, &state, guess)?;
+        if !structure.autonomous {
+            return Err(InputError::Unclaimed { claim: "autonomous" });
+        }
+        let rate = transformation.rate(&state.q);
+        if !(rate > 0.0 && rate.is_finite()) {
+            return Err(InputError::TimeTransformation { rate });
+        }
+        let energy = start.v.dot(&state.p) - lagrangian.value(t0, &start.q, &start.v, start.z);
+        if !energy.is_finite() {
+            return Err(InputError::FirstStep(StepError::NonFinite));
+        }
+        let extension = Extension::new(Fictitious(transformation), t0, -energy);
+        let (table, mass) = (StageTable::new(s, h), Mass::new(&structure, inverse));
+        let general = Box::new(General::new(lagrangian, extension, table, mass, false, &state, &start.v));
+        Ok(TransformedStepper {
+            general,
+            arch: Instructions::new(),
+            h,
+            tau: 0.0,
+            taken: 0,
+            from: None,
+            unresolved: None,
+        })
+    }
+
+    /// The momentum `p_t` of the time, minus the energy but for the method's error: `E + p_t = K / g`. It is contracted as every
+    /// momentum.
+    pub fn time_momentum(&self) -> f64 {
+        self.general.extension.p_t.value
+    }
+
+    /// The transformed time tau since the start.
+    pub(crate) fn tau(&self) -> f64 {
+        self.tau
+    }
+
+    /// Takes steps up to a physical time, the last one shorter so that it ends there to round-off. Nothing is done where the
+    /// time is past already.
+    ///
+    /// # Errors
+    /// As [`advance`](Stepper::advance); [`StepError::NonFinite`] for a time that is not finite.
+    pub fn advance_to(&mut self, t_end: f64) -> Result<(), StepFailure> {
+        self.advance_until(usize::MAX, t_end).map(|_| ())
+    }
+
+    /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step that was
+    /// taken by itself.
+    pub(crate) fn look(&self, sets: usize) -> Option<DefectSample> {
+        let (general, from) = (&*self.general, self.from.as_ref()?);
+        let value = |x: &[CompensatedSum; N]| SVector::from(x.map(|x| x.value));
+        let start = PhasePoint { q: value(&from.q), p: value(&from.p), z: from.z.value };
+        let (&StageTable { s, h, .. }, transformation) = (&general.table, &general.extension.transformation);
+        let mut curve = Curve::new(s, from.t.value, h, &start);
+        curve.of_transformed(&general.solved_in_transformed_time(), [transformation.0.rate(&start.q), general.rate()]);
+        let at = |set| {
+            self.arch.dispatch(Compare {
+                lagrangian: general.lagrangian,
+                transformation: transformation,
+                curve: &curve,
+                set,
+            })
+        };
+        (0..sets).map(at).reduce(DefectSample::and)
+    }
+
+    /// Takes the last step again from where it started, so long that it ends at a time, which it has passed.
+    fn shorten(&mut self, before: &Values<N>, t_end: f64) -> Result<(), StepError> {
+        // Lengths, whichever way the run goes.
+        let way = self.h.signum();
+        let (mut short, mut long, mut length) = (0.0, self.h.abs(), self.h.abs());
+        let mut over = (self.time() - t_end) * way;
+        for _ in 0..ITERATION_LIMIT {
+            // Newton's method, where dt/dh is the rate at the end but for the method's error.
+            let newton = length - over / self.general.rate();
+            length = if short < newton && newton < long { newton } else { 0.5 * (short + long) };
+            self.general.reset(before);
+            self.general.table = StageTable::new(self.general.table.s, length * way);
+            self.sweep(1).map_err(|halt| halt.cause)?;
+            over = (self.time() - t_end) * way;
+            if self.ends_at(t_end, before.t.value) {
+                // The stages are those of another length than the next step's.
+                let end = self.general.values();
+                self.general.reset(&end);
+                return Ok(());
+            }
+            *(if over > 0.0 { &mut long } else { &mut short }) = length;
+        }
+        Err(StepError::NotConverged { residual: over, iterations: ITERATION_LIMIT })
+    }
+
+    /// Whether a step from some time ends at another to round-off; that is then the time.
+    fn ends_at(&mut self, t_end: f64, before: f64) -> bool {
+        let there = (self.time() - t_end).abs() <= 2.0 * f64::EPSILON * t_end.abs().max(before.abs());
+        if there {
+            self.general.extension.t = t_end.into();
+        }
+        there
+    }
+
+    /// Takes steps by sweeps.
+    fn sweep(&mut self, steps: usize) -> Result<(), StepFailure> {
+        let TransformedStepper { general, taken, unresolved, .. } = self;
+        self.arch.dispatch(AdvanceTransformed { general: &mut **general, unresolved, taken, steps })
+    }
+
+    /// From the words of another; no look at its last step.
+    fn read(&mut self, from: &mut &[u64]) -> Option<()> {
+        self.general.load(from)?;
+        let mut h = 0.0;
+        h.load(from)?;
+        if h != self.general.table.h {
+            self.general.table = StageTable::new(self.general.table.s, h);
+        }
+        self.tau.load(from)?;
+        self.taken.load(from)?;
+        self.from = None;
+        self.unresolved = load_option(from, || UnresolvedStep { step: 0, defect: 0.0 })?;
+        Some(())
+    }
+
+    /// Goes back to the full step after one that was made shorter.
+    fn lengthen(&mut self) {
+        if self.general.table.h != self.h {
+            self.general.table = StageTable::new(self.general.table.s, self.h);
+        }
+    }
+}
+
+/// Steps in the lanes of one instruction set; ends at a step that cannot be taken.
+struct AdvanceTransformed<'b, 'a, L, C, const N: usize> {
+    general: &'b mut General<'a, L, Fictitious<C>, N>,
+    unresolved: &'b mut Option<UnresolvedStep>,
+    taken: &'b mut usize,
+    steps: usize,
+}
+
+impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> WithSimd for AdvanceTransformed<'_, '_, L, C, N> {
+    type Output = Result<(), StepFailure>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        forget_branches();
+        for taken in 0..self.steps {
+            // L does not depend on it.
+            let t = self.general.extension.t.value;
+            let progress = self.general.step::<S>(t);
+            if progress != IterationOutcome::Done {
+                return Err(StepFailure { taken, cause: progress.into() });
+            }
+            if self.general.defect > 1.0 && self.unresolved.is_none() {
+                *self.unresolved = Some(UnresolvedStep { step: *self.taken, defect: self.general.defect });
+            }
+            *self.taken += 1;
+        }
+        Ok(())
+    }
+}
+
+impl<L: Lagrangian<N>, C: TimeTransformation<N>, const N: usize> Stepper<N> for TransformedStepper<'_, L, C, N> {
+    /// The steps are equal in the transformed time.
+    fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
+        self.lengthen();
+        self.from = None;
+        let done = self.sweep(steps);
+        self.tau += done.map_or_else(|halt| halt.taken, |()| steps) as f64 * self.h;
+        done
+    }
+
+    fn last_velocity(&self) -> Option<SVector<f64, N>> {
+        Some(self.general.last_velocity())
+    }
+
+    /// The last step is shorter, so that it ends at `t_end` to round-off.
+    fn advance_until(&mut self, steps: usize, t_end: f64) -> Result<usize, StepFailure> {
+        let halt = |taken, cause| StepFailure { taken, cause };
+        if !t_end.is_finite() {
+            return Err(halt(0, StepError::NonFinite));
+        }
+        let mut taken = 0;
+        while taken < steps && (t_end - self.time()) * self.h > 0.0 {
+            self.lengthen();
+            let before = self.general.values();
+            self.from = None;
+            self.sweep(1).map_err(|refused| halt(taken, refused.cause))?;
+            if !self.ends_at(t_end, before.t.value)
+                && (self.time() - t_end) * self.h > 0.0
+                && let Err(cause) = self.shorten(&before, t_end)
+            {
+                self.general.reset(&before);
+                return Err(halt(taken, cause));
+            }
+            self.from = Some(before);
+            self.tau += self.general.table.h;
+            taken += 1;
+        }
+        Ok(taken)
+    }
+
+    fn state(&self) -> PhasePoint<N> {
+        let Values { q, p, z, .. } = self.general.values();
+        PhasePoint { q: q.map(|q| q.value).into(), p: p.map(|p| p.value).into(), z: z.value }
+    }
+
+    /// The physical time.
+    fn time(&self) -> f64 {
+        self.general.extension.t.value
+    }
+
+    fn sigma(&self) -> f64 {
+        1.0 / (1.0 - self.general.one_minus_rho)
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.general.evaluations
+    }
+
+    fn work_summary(&self) -> Vec<PlanEntry> {
+        work_summary_in_transformed_time(&self.general.lagrangian.structure())
+    }
+
+    fn save(&self) -> Option<Vec<u64>> {
+        let mut words = Vec::new();
+        self.general.save(&mut words);
+        [self.general.table.h, self.tau].save(&mut words);
+        self.taken.save(&mut words);
+        save_option(self.unresolved.as_ref(), &mut words);
+        Some(words)
+    }
+
+    fn restore(&mut self, mut words: &[u64]) -> bool {
+        self.read(&mut words).is_some() && words.is_empty()
+    }
+
+    fn unresolved(&self) -> Option<UnresolvedStep> {
+        self.unresolved
+    }
+}

@@ -1,0 +1,39 @@
+//! The values of a Lagrangian at the stages of a condensed step.
+
+use crate::numbers::lanes::vector;
+use crate::numbers::pair::{Registers, over_registers};
+use crate::numbers::registers::{Stages, blocks};
+use contact_geom::Lagrangian;
+use pulp::Simd;
+
+/// `L(t, q, v, 0)` at the stages of a step that begins at the time t.
+pub(crate) struct StageValues<'a, L, const N: usize> {
+    pub lagrangian: &'a L,
+    pub times: &'a Stages,
+    pub t: f64,
+    pub x: &'a [Stages; N],
+    pub v: &'a [Stages; N],
+}
+
+impl<L: Lagrangian<N>, const N: usize> StageValues<'_, L, N> {
+    /// At all s stages.
+    #[inline(always)]
+    pub fn all<S: Simd>(&self, s: usize) -> Stages {
+        let (mut values, mut r, m) = (Stages::ZERO, 0, blocks::<S>(s));
+        while r < m {
+            r = over_registers!(self.take(r, &mut values); L, S, m - r);
+        }
+        values
+    }
+
+    /// At the blocks of stages that T holds, from the r-th on.
+    #[inline(always)]
+    fn take<S: Simd, T: Registers<S>>(&self, r: usize, values: &mut Stages) -> usize {
+        let (q, v) = (vector(|d| T::of(&self.x[d], r)), vector(|d| T::of(&self.v[d], r)));
+        let l = self.lagrangian.value(T::of(self.times, r) + self.t, &q, &v, T::zero());
+        for i in 0..T::COUNT {
+            values.set(r + i, l.register(i));
+        }
+        r + T::COUNT
+    }
+}

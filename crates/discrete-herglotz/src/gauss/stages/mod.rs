@@ -1,0 +1,10 @@
+//! The stages of a collocation step: their values in vector registers, their equations, and the iterations that solve these.
+
+pub(crate) mod damping;
+pub(crate) mod equations;
+pub(crate) mod fixed_point;
+pub(crate) mod lagrangian_values;
+pub(crate) mod mass_matrix;
+pub(crate) mod parametrization;
+pub(crate) mod position_newton;
+pub(crate) mod simplified_newton;

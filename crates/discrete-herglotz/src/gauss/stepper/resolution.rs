@@ -1,0 +1,166 @@
+//! What the steps of a run say of themselves: whether they resolve the motion.
+
+use crate::gauss::dense::StepStart;
+use crate::gauss::resolution::defect_sample::{Compare, Curve, DefectSample, SAMPLE_SETS};
+use crate::gauss::resolution::tail::ROUNDINGS;
+use crate::gauss::stages::parametrization::Physical;
+use crate::gauss::stepper::{GaussStepper, Route};
+use crate::numbers::state_words::saved;
+use crate::resolution::monitor::{defect, sharper, size, value_rounding};
+use crate::{Stepper, SuspectInterval, UnresolvedStep, legendre_inverse};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Derivatives, Lagrangian, gradient_rounding, max_abs_or_nan, max_or_nan};
+use pulp::{Simd, WithSimd};
+
+/// The misfit between the nodes from which a step of at least three stages does not resolve the motion: of harmonics it then has an
+/// error of its own of 0.01 to 0.1.
+const UNRESOLVED: f64 = 0.1;
+
+/// The mean velocities of the last steps, in sequence, the last position, and the states after the last two steps.
+pub(crate) struct Sequence<const N: usize> {
+    pub velocities: [SVector<f64, N>; 4],
+    pub q: SVector<f64, N>,
+    pub ends: [StepStart<N>; 2],
+}
+
+impl<const N: usize> Sequence<N> {
+    /// Before the first step.
+    pub fn new(start: StepStart<N>) -> Box<Self> {
+        Box::new(Sequence { velocities: [SVector::zeros(); 4], q: SVector::from(start.q), ends: [start; 2] })
+    }
+}
+
+saved!([const N: usize] Sequence<N> { velocities, q, ends });
+
+/// The stages up to which the nodes of a step do not tell whether it resolves the motion.
+pub(crate) const FEW_STAGES: usize = 2;
+
+impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
+    /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step.
+    pub(crate) fn look(&self, sets: usize) -> Option<DefectSample> {
+        let curve = self.arch.dispatch(LookAtStages { run: self })?;
+        let at = |set| {
+            self.arch.dispatch(Compare { lagrangian: self.lagrangian, transformation: &Physical, curve: &curve, set })
+        };
+        (0..sets).map(at).reduce(DefectSample::and)
+    }
+
+    /// Follows the mean velocities of steps; those of few stages tell whether they resolve the motion, of others the sharpest turns are
+    /// doubts.
+    #[inline(never)]
+    pub(crate) fn follow(&mut self) {
+        let (end, h) = (self.values(), self.h);
+        let q = SVector::from(end.q);
+        let Some(Sequence { velocities, q: before, ends }) = self.sequence.as_deref_mut() else { return };
+        let [from, last] = *ends;
+        *ends = [last, end];
+        let latest = (q - *before) / h;
+        velocities.rotate_left(1);
+        velocities[3] = latest;
+        *before = q;
+        // Before the first step velocities changed as they do in the second, for all that is known.
+        match self.k {
+            0 => velocities.fill(latest),
+            1 => velocities[1] = velocities[2] * 2.0 - latest,
+            _ => {}
+        }
+        let [a, b, c, d] = &*velocities;
+        let sharper = sharper([&(d - c * 2.0 + b), c, &q], h, self.watch.floor, self.watch.sharpest);
+        let few = self.s <= FEW_STAGES;
+        if few && let Some(defect) = defect([a, b, c, d], &q, h, self.watch.floor) {
+            // Like those of a rule, seen one step late.
+            self.watch.note(self.k.saturating_sub(1), defect);
+        }
+        if let (Some(sharpness), Some(step)) = (sharper, self.k.checked_sub(1).filter(|step| *step > 0)) {
+            let t = self.t0 + step as f64 * h;
+            let (from, to) = (self.phase(&from), self.phase(&end));
+            self.watch.doubt(sharpness, SuspectInterval { step, steps: 2, t, from, to });
+        }
+    }
+
+    /// The first step that was seen not to resolve the motion, or what a look at the last one shows.
+    pub(crate) fn mark(&self) -> Option<UnresolvedStep> {
+        if self.of_sigma > 1.0 && self.k > 0 {
+            return Some(UnresolvedStep { step: 0, defect: self.of_sigma });
+        }
+        self.watch.first.or_else(|| {
+            // A linear motion that is not resolved is so in every step, and none was looked at on the way.
+            let sets = if let Route::Linear(..) = &*self.route { SAMPLE_SETS } else { 1 };
+            let DefectSample { defect, of_momenta, of_action, size, size_z, .. } = self.look(sets)?;
+            // A step of fewer stages is no polynomial between its nodes to speak of.
+            let allowed = if self.s > FEW_STAGES { UNRESOLVED } else { 1.0 };
+            // A NaN is a misfit too.
+            if defect <= allowed {
+                return None;
+            }
+            let [of_p, of_z] = self.rounding();
+            if of_momenta <= max_or_nan(allowed * size, of_p) && of_action <= max_or_nan(allowed * size_z, of_z) {
+                return None;
+            }
+            Some(UnresolvedStep { step: self.k - 1, defect: defect / allowed })
+        })
+    }
+
+    /// Whether the step that ends at a time has only the rounding of its forces left, and moves by no more than that.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn is_at_rest(&self, t: f64) -> bool {
+        let state = self.state();
+        let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &SVector::zeros()) else { return false };
+        let (force, rounding) = (self.lagrangian.gradient(t, &x), gradient_rounding(self.lagrangian, t, &x).1);
+        size(&x.v) * self.h.abs() <= self.watch.floor
+            && size(&(force.x + state.p * force.z)) <= ROUNDINGS * size(&rounding.x)
+    }
+
+    /// What of the misfits of momenta and of the action in the last step is rounding: that of the forces and of L there, which is all that is
+    /// left of a motion at rest.
+    #[cold]
+    #[inline(never)]
+    fn rounding(&self) -> [f64; 2] {
+        let (t, state) = (self.time(), self.state());
+        let near = self.last_velocity().unwrap_or_else(SVector::zeros);
+        let Ok(x) = legendre_inverse(self.lagrangian, t, &state, &near) else { return [0.0; 2] };
+        let (l, g) = gradient_rounding(self.lagrangian, t, &x);
+        // The stages of the integrating factor carry roundings the further, the more it changes in the step.
+        let (of, h) = (|part: &SVector<f64, N>| max_abs_or_nan(part.iter().copied()), self.h.abs());
+        let carried = ROUNDINGS * (1.0 + self.sigma().ln().abs());
+        // No bound where the derivatives have none. What is below the normal numbers has lost its digits.
+        [max_or_nan(of(&g.x) * h, of(&g.y)), value_rounding(l, &g.x, &x.q) * h]
+            .map(|once| if (carried * once).is_finite() { carried * once + f64::MIN_POSITIVE } else { 0.0 })
+    }
+}
+
+/// The stages of the last step, for a look between them.
+struct LookAtStages<'b, 'a, L, const N: usize> {
+    run: &'b GaussStepper<'a, L, N>,
+}
+
+impl<L: Lagrangian<N>, const N: usize> WithSimd for LookAtStages<'_, '_, L, N> {
+    type Output = Option<Curve<N>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Option<Curve<N>> {
+        let GaussStepper { s, h, route, solved, from, k, t0, .. } = self.run;
+        if !solved {
+            return None;
+        }
+        let start = self.run.phase(from);
+        let t = t0 + k.checked_sub(1)? as f64 * h;
+        let mut curve = Curve::new(*s, t, *h, &start);
+        match &**route {
+            Route::Linear(run, table) => {
+                let a = run.accelerations(&from.q, &from.y);
+                let x = table.positions(&from.q, &from.y, &a);
+                let [a, x] = [a, x].map(|y| y.map(crate::numbers::registers::Stages));
+                let mass = self.run.mass.as_deref();
+                curve.of_accelerations::<S, L>(self.run.lagrangian, table, mass, &from.y, [&a, &x]);
+            }
+            Route::Condensed(run) => {
+                let mass = self.run.mass.as_deref();
+                curve.of_accelerations::<S, L>(self.run.lagrangian, &run.table, mass, &from.y, [&run.a, &run.x]);
+            }
+            Route::General(run) => curve.of_solved(&run.solved()),
+        }
+        Some(curve)
+    }
+}

@@ -1,0 +1,48 @@
+//! A run of contact Gauss collocation as words.
+
+use crate::gauss::stepper::{GaussStepper, Route, Sequence, Solution};
+use crate::numbers::state_words::{Saved, load_option, save_option};
+use contact_geom::Lagrangian;
+
+impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
+    /// All that changes from step to step.
+    pub(crate) fn words(&self) -> Vec<u64> {
+        let mut to = Vec::new();
+        match &*self.route {
+            Route::Linear(run, _) => run.save(&mut to),
+            Route::Condensed(run) => run.save(&mut to),
+            Route::General(run) => run.save(&mut to),
+        }
+        self.k.save(&mut to);
+        self.from.save(&mut to);
+        self.solved.save(&mut to);
+        (self.solution as u32).save(&mut to);
+        [self.pause, self.pauses].save(&mut to);
+        self.newton_steps.save(&mut to);
+        save_option(self.sequence.as_deref(), &mut to);
+        self.watch.save(&mut to);
+        to
+    }
+
+    /// The same back.
+    pub(crate) fn read(&mut self, from: &mut &[u64]) -> Option<()> {
+        match &mut *self.route {
+            Route::Linear(run, _) => run.load(from)?,
+            Route::Condensed(run) => run.load(from)?,
+            Route::General(run) => run.load(from)?,
+        }
+        self.k.load(from)?;
+        self.from.load(from)?;
+        self.solved.load(from)?;
+        let mut solution = 0u32;
+        solution.load(from)?;
+        self.solution =
+            [Solution::FixedPointIteration, Solution::Simplified, Solution::Newton].get(solution as usize).copied()?;
+        self.pause.load(from)?;
+        self.pauses.load(from)?;
+        self.newton_steps.load(from)?;
+        let start = self.from;
+        self.sequence = load_option(from, || *Sequence::new(start))?.map(Box::new);
+        self.watch.load(from)
+    }
+}

@@ -1,0 +1,183 @@
+//! Dense output: a step as a curve.
+
+use crate::numbers::registers::MAX_STAGES;
+use contact_geom::PhasePoint;
+use contact_geom::nalgebra::SVector;
+use std::sync::OnceLock;
+
+/// The Legendre polynomials that integrals of the largest degree need.
+pub(crate) const POLYNOMIALS: usize = MAX_STAGES + 1;
+
+/// A step as a curve: the collocation polynomial of [`GaussStepper`](crate::gauss::GaussStepper), with `tau` from 0 to h
+///
+/// `q(tau) = q0 + int V`, `z(tau) = z0 + int L`, `rho(tau) = 1 - int rho L_z`, `p(tau) = (p0 + int rho L_q) / rho(tau)`,
+///
+/// where V, L, `rho L_z` and `rho L_q` are the polynomials of degree `s - 1` through the stages.
+///
+/// At its ends it is the states of the run to round-off, which have order 2s; between them its order is s. So the curve of
+/// a run is continuous, and its velocity jumps from step to step by `O(h^s)`. Where the action is not requested
+/// and z decouples, z stays what it was at the start.
+#[derive(Clone, Copy, Debug)]
+pub struct DenseStep<const N: usize> {
+    s: usize,
+    t: f64,
+    h: f64,
+    start: PhasePoint<N>,
+    v: [Series; N],
+    force: [Series; N],
+    rate: Series,
+    l: Series,
+}
+
+impl<const N: usize> DenseStep<N> {
+    /// From the Legendre series of V, `rho L_q`, `rho L_z` and L on the step, each with `s` coefficients.
+    pub(crate) fn new(
+        s: usize,
+        (t, h): (f64, f64),
+        start: PhasePoint<N>,
+        [v, force]: [[Series; N]; 2],
+        [rate, l]: [Series; 2],
+    ) -> Self {
+        DenseStep { s, t, h, start, v, force, rate, l }
+    }
+
+    /// The times of the step's start and end.
+    pub fn span(&self) -> (f64, f64) {
+        (self.t, self.t + self.h)
+    }
+
+    /// The state at a time of the [`span`](Self::span); beyond it the polynomials are continued.
+    pub fn at(&self, t: f64) -> PhasePoint<N> {
+        self.at_fraction((t - self.t) / self.h)
+    }
+
+    /// The velocity `dq/dt` of the curve at a time: a polynomial of degree `s - 1`, the stages' velocities at their times.
+    pub fn velocity(&self, t: f64) -> SVector<f64, N> {
+        let p = polynomials(self.s, (t - self.t) / self.h);
+        SVector::from_fn(|d, _| self.v[d].value(&p, self.s))
+    }
+
+    /// Velocity, value of L and rho at a fraction of the step.
+    pub(crate) fn stage(&self, fraction: f64) -> (SVector<f64, N>, f64, f64) {
+        let p = polynomials(self.s, fraction);
+        let v = SVector::from_fn(|d, _| self.v[d].value(&p, self.s));
+        let rho = 1.0 - self.h * self.rate.value(&integrals(self.s, &p, fraction), self.s);
+        (v, self.l.value(&p, self.s), rho)
+    }
+
+    /// The length of the step.
+    pub(crate) fn length(&self) -> f64 {
+        self.h
+    }
+
+    /// The parts in which [`sketch`](Self::sketch) divides the step.
+    pub(crate) fn parts(&self) -> usize {
+        self.s + 2
+    }
+
+    /// The states between the parts of the step, all at once.
+    pub(crate) fn sketch(&self, to: &mut Vec<PhasePoint<N>>) {
+        let table = integrals_to_parts(self.s);
+        let along = |series: &Series| {
+            let mut sums = [0.0; BETWEEN_PARTS];
+            for (row, c) in table.iter().zip(&series.0).take(self.s) {
+                for (sum, integral) in sums.iter_mut().zip(row) {
+                    *sum += self.h * c * integral;
+                }
+            }
+            sums
+        };
+        let (moved, pushed) = (self.v.each_ref().map(along), self.force.each_ref().map(along));
+        let (rate, action) = (along(&self.rate), along(&self.l));
+        to.extend((0..self.parts() - 1).map(|i| PhasePoint {
+            q: SVector::from_fn(|d, _| self.start.q[d] + moved[d][i]),
+            p: SVector::from_fn(|d, _| (self.start.p[d] + pushed[d][i]) / (1.0 - rate[i])),
+            z: self.start.z + action[i],
+        }));
+    }
+
+    /// The state at a fraction of the step.
+    pub(crate) fn at_fraction(&self, fraction: f64) -> PhasePoint<N> {
+        let p = polynomials(self.s, fraction);
+        let integrals = integrals(self.s, &p, fraction);
+        let integral = |series: &Series| self.h * series.value(&integrals, self.s);
+        let rho = 1.0 - integral(&self.rate);
+        PhasePoint {
+            q: SVector::from_fn(|d, _| self.start.q[d] + integral(&self.v[d])),
+            p: SVector::from_fn(|d, _| (self.start.p[d] + integral(&self.force[d])) / rho),
+            z: self.start.z + integral(&self.l),
+        }
+    }
+}
+
+/// The factors of the recurrence `P_(k+1) = (2k + 1)/(k + 1) x P_k - k/(k + 1) P_(k-1)`.
+const RECURRENCE: [[f64; 2]; MAX_STAGES] = {
+    let (mut factors, mut k) = ([[0.0; 2]; MAX_STAGES], 0);
+    while k < MAX_STAGES {
+        factors[k] = [(2 * k + 1) as f64 / (k + 1) as f64, k as f64 / (k + 1) as f64];
+        k += 1;
+    }
+    factors
+};
+
+/// The Legendre polynomials `P_0` to `P_s` of `2 x - 1`, without divisions.
+fn polynomials(s: usize, fraction: f64) -> [f64; POLYNOMIALS] {
+    let x = 2.0 * fraction - 1.0;
+    let mut p = [1.0; POLYNOMIALS];
+    p[1] = x;
+    for k in 1..s.min(MAX_STAGES) {
+        let [first, second] = RECURRENCE[k];
+        p[k + 1] = first * x * p[k] - second * p[k - 1];
+    }
+    p
+}
+
+/// The integrals of the Legendre polynomials from 0 to a fraction of `[0, 1]`: `(2k + 1) P_k` is the derivative of `P_(k+1) - P_(k-1)`.
+fn integrals(s: usize, p: &[f64; POLYNOMIALS], fraction: f64) -> [f64; POLYNOMIALS] {
+    let mut integrals = [0.0; POLYNOMIALS];
+    integrals[0] = fraction;
+    for k in 1..s {
+        integrals[k] = (p[k + 1] - p[k - 1]) * HALF_OF_ODD[k];
+    }
+    integrals
+}
+
+/// The most states between the parts of a step.
+const BETWEEN_PARTS: usize = MAX_STAGES + 1;
+
+/// The integrals of the Legendre polynomials to the ends of the parts of a step, of which there are s + 2: `[k][i]` to the end of part i.
+fn integrals_to_parts(s: usize) -> &'static [[f64; BETWEEN_PARTS]; MAX_STAGES] {
+    static TABLES: [OnceLock<Box<[[f64; BETWEEN_PARTS]; MAX_STAGES]>>; MAX_STAGES] =
+        [const { OnceLock::new() }; MAX_STAGES];
+    TABLES[s.clamp(1, MAX_STAGES) - 1].get_or_init(|| {
+        let mut table = Box::new([[0.0; BETWEEN_PARTS]; MAX_STAGES]);
+        for i in 0..=s {
+            let fraction = (i + 1) as f64 / (s + 2) as f64;
+            let p = polynomials(s, fraction);
+            for (row, integral) in table.iter_mut().zip(integrals(s, &p, fraction)) {
+                row[i] = integral;
+            }
+        }
+        table
+    })
+}
+
+/// `1 / (2 (2k + 1))`.
+const HALF_OF_ODD: [f64; MAX_STAGES] = {
+    let (mut numbers, mut k) = ([0.0; MAX_STAGES], 0);
+    while k < MAX_STAGES {
+        numbers[k] = 0.5 / (2 * k + 1) as f64;
+        k += 1;
+    }
+    numbers
+};
+
+/// The coefficients of a polynomial on `[0, 1]` in the Legendre polynomials of `2 x - 1`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Series(pub [f64; MAX_STAGES]);
+
+impl Series {
+    fn value(&self, p: &[f64; POLYNOMIALS], s: usize) -> f64 {
+        (0..s).fold(0.0, |sum, k| sum + self.0[k] * p[k])
+    }
+}

@@ -1,0 +1,190 @@
+//! Problems: a Lagrangian with a start.
+
+use crate::integration::check_claims::check_claims;
+use crate::{
+    DiscreteLagrangian, InputError, Interrupt, StepError, discrete_regularity, legendre_inverse, legendre_minus,
+};
+use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::{
+    Derivatives, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Regularity, Structure, VelocityPoint, legendre,
+    max_abs_or_nan,
+};
+
+/// Where a motion starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start<const N: usize> {
+    /// At a point `(q, v, z)` of TQ x R.
+    Velocity(VelocityPoint<N>),
+    /// At a point `(q, p, z)` of T\*Q x R, with a guess of the velocity that belongs to it; needed where several have the same momentum.
+    Momentum(PhasePoint<N>, SVector<f64, N>),
+}
+
+impl<const N: usize> From<VelocityPoint<N>> for Start<N> {
+    fn from(x: VelocityPoint<N>) -> Self {
+        Start::Velocity(x)
+    }
+}
+
+/// With a velocity that is found from 0.
+impl<const N: usize> From<PhasePoint<N>> for Start<N> {
+    fn from(x: PhasePoint<N>) -> Self {
+        Start::Momentum(x, SVector::zeros())
+    }
+}
+
+/// A motion to be computed: a Lagrangian with a start, checked once.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use discrete_herglotz::{Problem, Rows, Until};
+///
+/// let pendulum = Pendulum { gamma: -0.01 };
+/// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [1.0], 0.0))?;
+/// let mut rows = Rows::at((0..=100).map(f64::from))?;
+/// let outcome = problem.accuracy(1e-9).observe(&mut rows).run(Until::Time(100.0))?;
+/// println!("{}: q = {} after {} steps", outcome.status, outcome.q[0], outcome.steps);
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+#[derive(Debug)]
+pub struct Problem<'a, L, const N: usize> {
+    pub(crate) lagrangian: &'a L,
+    pub(crate) t0: f64,
+    /// The start with its velocity, and with its momentum.
+    pub(crate) start: VelocityPoint<N>,
+    pub(crate) state: PhasePoint<N>,
+    /// What the Lagrangian claims, probed at the start.
+    pub(crate) structure: Structure,
+    /// Whether its trial runs are to end.
+    pub(crate) interrupt: Option<Interrupt<'a>>,
+}
+
+impl<L, const N: usize> Clone for Problem<'_, L, N> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<L, const N: usize> Copy for Problem<'_, L, N> {}
+
+impl<'a, L: Lagrangian<N>, const N: usize> Problem<'a, L, N> {
+    /// The motion of a Lagrangian from a point `(q, v, z)` or `(q, p, z)` at the time `t0`.
+    ///
+    /// # Errors
+    /// [`InputError`]: a time or a state that is not finite, a start at which L or a derivative is not defined, a singular `W = L_vv`, a
+    /// momentum without a velocity, a false claim of structure.
+    pub fn new(lagrangian: &'a L, t0: f64, start: impl Into<Start<N>>) -> Result<Self, InputError> {
+        check_time(t0)?;
+        if N == 0 {
+            return Err(InputError::Dimension);
+        }
+        let (start, state) = match start.into() {
+            Start::Velocity(x) => {
+                PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
+                (x, None)
+            }
+            Start::Momentum(x, guess) => {
+                x.check()?;
+                (legendre_inverse(lagrangian, t0, &x, &guess).map_err(InputError::FirstStep)?, Some(x))
+            }
+        };
+        check_regular(lagrangian, t0, &start)?;
+        let structure = check_claims(lagrangian, t0, &start)?;
+        let state = state.unwrap_or_else(|| legendre(lagrangian, t0, &start));
+        Ok(Problem { lagrangian, t0, start, state, structure, interrupt: None })
+    }
+
+    /// The motion from two positions and the action, as the paper starts: its state at `t0` is `F-L_d (q0, q1, z0)`.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new); [`InputError::Sigma`] where `sigma_d <= 0`; [`InputError::FirstStep`] where the discrete Lagrangian is
+    /// not regular at the point, [`InputError::EqualPoints`] where that is because `q0 = q1`.
+    pub fn from_points(
+        lagrangian: &'a L,
+        ld: &impl DiscreteLagrangian<N>,
+        t0: f64,
+        x: DiscretePoint<N>,
+    ) -> Result<Self, InputError> {
+        check_time(t0)?;
+        let state = start_of(ld, t0, &x)?;
+        Self::new(lagrangian, t0, Start::Momentum(state, (x.q1 - x.q0) / ld.step_size()))
+    }
+
+    /// The same with a question that its trial runs, and estimates of its error, ask from time to time. Runs themselves are ended by an
+    /// [`Observer`](crate::Observer), which sees how far they have come.
+    pub fn with_interrupt(self, interrupt: Interrupt<'a>) -> Self {
+        Problem { interrupt: Some(interrupt), ..self }
+    }
+
+    /// The Lagrangian.
+    pub fn lagrangian(&self) -> &'a L {
+        self.lagrangian
+    }
+
+    /// The time of the start.
+    pub fn t0(&self) -> f64 {
+        self.t0
+    }
+
+    /// The start `(q, v, z)`.
+    pub fn start(&self) -> &VelocityPoint<N> {
+        &self.start
+    }
+
+    /// The structure that the Lagrangian claims, probed at the start.
+    pub fn structure(&self) -> &Structure {
+        &self.structure
+    }
+
+    /// The start `(q, p, z)`.
+    pub fn state(&self) -> &PhasePoint<N> {
+        &self.state
+    }
+}
+
+/// The state at the first of two points.
+pub(crate) fn start_of<const N: usize>(
+    ld: &impl DiscreteLagrangian<N>,
+    t0: f64,
+    x: &DiscretePoint<N>,
+) -> Result<PhasePoint<N>, InputError> {
+    x.check()?;
+    let bad = |cause| if x.q0 == x.q1 { InputError::EqualPoints } else { InputError::FirstStep(cause) };
+    let regularity = discrete_regularity(ld, t0, x).map_err(bad)?;
+    let sigma = regularity.sigma;
+    if sigma <= 0.0 {
+        return Err(InputError::Sigma { sigma });
+    }
+    // Not `condition() >= 1/eps`: that would let a NaN pass.
+    let regular = regularity.fibre.condition() < 1.0 / f64::EPSILON;
+    if !(sigma.is_finite() && regular) {
+        return Err(bad(StepError::Singular { pivot: regularity.fibre.smallest }));
+    }
+    legendre_minus(ld, t0, x).map_err(bad)
+}
+
+/// Refuses a time that is not finite.
+pub(crate) fn check_time(t0: f64) -> Result<(), GeometryError> {
+    if t0.is_finite() { Ok(()) } else { Err(GeometryError::NonFinite { what: "t0", index: 0, value: t0 }) }
+}
+
+/// Refuses a start at which L is not defined, or not regular.
+fn check_regular<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    t0: f64,
+    start: &VelocityPoint<N>,
+) -> Result<(), InputError> {
+    let (g, w) = (lagrangian.gradient(t0, start), lagrangian.hessian(t0, start).vv);
+    let value = lagrangian.value(t0, &start.q, &start.v, start.z);
+    if !(value.is_finite() && g.is_finite() && w.iter().all(|e| e.is_finite())) {
+        return Err(InputError::Undefined);
+    }
+    // In units of the coordinates in which its rows are of size one: masses may differ by any factor.
+    let unit = SVector::<f64, N>::from_fn(|i, _| max_abs_or_nan(w.row(i).iter().copied()).sqrt());
+    let scaled = DMatrix::from_fn(N, N, |i, j| w[(i, j)] / (unit[i] * unit[j]));
+    let Regularity { smallest, max_abs_or_nan } = Regularity::of(scaled);
+    // A matrix of zeros has no such units, and counts as singular.
+    if smallest > 4.0 * N as f64 * f64::EPSILON * max_abs_or_nan {
+        return Ok(());
+    }
+    Err(InputError::FirstStep(StepError::Singular { pivot: smallest }))
+}

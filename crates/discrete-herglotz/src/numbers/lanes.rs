@@ -1,0 +1,478 @@
+//! Lanes of a vector register as numbers that a Lagrangian can be written over.
+
+use crate::numbers::sine::{REDUCIBLE, Register, cosine, sine};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Scalar, scalar_operators};
+use pulp::{Simd, WithSimd, bytemuck};
+use std::cell::Cell;
+use std::fmt::{Debug, Formatter};
+use std::ops::Neg;
+
+/// As many numbers as a register of the instruction set `S` has lanes, worked on at once.
+///
+/// The instruction set is found at run time: kernels are generic over `S` and entered through `Instructions::dispatch`, so that a
+/// default build uses what the processor has. Lanes are made inside such kernels only, and never leave them.
+#[derive(Clone, Copy)]
+pub(crate) struct Lanes<S: Simd>(pub S::f64s);
+
+/// The token of an instruction set, out of nothing.
+#[allow(unsafe_code)] // The trait has no other way to a token; why it is sound is said below.
+#[inline(always)]
+pub(crate) fn token<S: Simd>() -> S {
+    const { assert!(size_of::<S>() == 0, "a token carries nothing") };
+    // SAFETY: a token is a proof, of size 0, that the processor has the instructions. `Lanes<S>` is private to this crate, which
+    // makes them only below `Instructions::dispatch`, which has handed out a token of the same type there.
+    unsafe { std::mem::zeroed() }
+}
+
+thread_local! {
+    /// Whether one value was asked of lanes that differ.
+    static ASKED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether, since [`forget_branches`], one value was asked on this thread of lanes that differ, by `re`, `extent` or `==`: a
+/// formula has branched, in the same way for all of them. What was computed from it may be wrong.
+#[inline(always)]
+pub(crate) fn branched() -> bool {
+    ASKED.get()
+}
+
+/// Notes that a formula has branched.
+#[cold]
+pub(crate) fn note_branch() {
+    ASKED.set(true);
+}
+
+/// Begins anew to watch for branches.
+#[inline(always)]
+pub(crate) fn forget_branches() {
+    ASKED.set(false);
+}
+
+/// A vector of registers, by a loop: nalgebra's `from_fn` may be compiled by itself, and for no vector instructions.
+#[inline(always)]
+pub(crate) fn vector<T: Scalar, const N: usize>(of: impl Fn(usize) -> T) -> SVector<T, N> {
+    let mut x = [T::from(0.0); N];
+    for (d, x) in x.iter_mut().enumerate() {
+        *x = of(d);
+    }
+    x.into()
+}
+
+impl<S: Simd> Lanes<S> {
+    /// The lanes of a register.
+    pub const COUNT: usize = S::F64_LANES;
+
+    #[inline(always)]
+    pub fn splat(x: f64) -> Self {
+        Lanes(token::<S>().splat_f64s(x))
+    }
+
+    /// `self * b + c`, fused where the instruction set can.
+    #[inline(always)]
+    pub fn mul_add(self, b: Self, c: Self) -> Self {
+        Lanes(token::<S>().mul_add_e_f64s(self.0, b.0, c.0))
+    }
+
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        // Not by the set's own, which is a call in some of them.
+        let set = token::<S>();
+        Lanes(set.and_f64s(self.0, set.splat_f64s(f64::from_bits(u64::MAX >> 1))))
+    }
+
+    /// Lane by lane the larger; where one is not a number, the result may be either, other than that of [`Scalar::max`].
+    #[inline(always)]
+    pub fn max(self, b: Self) -> Self {
+        Lanes(token::<S>().max_f64s(self.0, b.0))
+    }
+
+    #[inline(always)]
+    pub fn sum(self) -> f64 {
+        token::<S>().reduce_sum_f64s(self.0)
+    }
+
+    #[inline(always)]
+    pub fn max_abs_or_nan(self) -> f64 {
+        token::<S>().reduce_max_f64s(self.0)
+    }
+
+    /// The lanes as a slice.
+    #[inline(always)]
+    pub fn lanes(&self) -> &[f64] {
+        bytemuck::cast_slice(std::slice::from_ref(&self.0))
+    }
+
+    /// A function of one number, lane by lane: for the functions that are rare in mechanics.
+    #[inline]
+    fn each(mut self, f: impl Fn(f64) -> f64) -> Self {
+        for x in bytemuck::cast_slice_mut::<_, f64>(std::slice::from_mut(&mut self.0)) {
+            *x = f(*x);
+        }
+        self
+    }
+
+    /// Whether all lanes are within the range of the argument reduction.
+    #[inline(always)]
+    fn reducible(self) -> bool {
+        self.abs().max_abs_or_nan() < REDUCIBLE
+    }
+}
+
+impl<S: Simd> Register for Lanes<S> {
+    /// The sets with four lanes and more have it.
+    const FUSED: bool = S::F64_LANES >= 4;
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Lanes::splat(x)
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Lanes::mul_add(self, b, c)
+    }
+    #[inline(always)]
+    fn turned(self, of: Self) -> Self {
+        let set = token::<S>();
+        let last = set.and_u64s(set.transmute_u64s_f64s(of.0), set.splat_u64s(1));
+        Lanes(set.select_f64s(set.equal_u64s(last, set.splat_u64s(0)), self.0, (-self).0))
+    }
+}
+
+impl<S: Simd> Debug for Lanes<S> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        self.lanes().fmt(f)
+    }
+}
+
+impl<S: Simd> PartialEq for Lanes<S> {
+    fn eq(&self, b: &Self) -> bool {
+        let (a, b) = (self.lanes(), b.lanes());
+        let equal = a.iter().zip(b).filter(|(a, b)| a == b).count();
+        if equal != 0 && equal != a.len() {
+            ASKED.set(true);
+        }
+        equal == a.len()
+    }
+}
+
+impl<S: Simd> From<f64> for Lanes<S> {
+    #[inline(always)]
+    fn from(x: f64) -> Self {
+        Self::splat(x)
+    }
+}
+
+impl<S: Simd> Neg for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        // Not by the set's own, which is a call in some of them.
+        let set = token::<S>();
+        Lanes(set.xor_f64s(self.0, set.splat_f64s(-0.0)))
+    }
+}
+
+scalar_operators! { [S: Simd] Lanes<S>;
+    a + b = Lanes(token::<S>().add_f64s(a.0, b.0));
+    c - d = Lanes(token::<S>().sub_f64s(c.0, d.0));
+    e * f = Lanes(token::<S>().mul_f64s(e.0, f.0));
+    g / h = Lanes(token::<S>().div_f64s(g.0, h.0));
+}
+
+impl<S: Simd> Scalar for Lanes<S> {
+    #[inline(always)]
+    fn re(self) -> f64 {
+        let lanes = self.lanes();
+        if lanes.iter().all(|x| *x == lanes[0] || (x.is_nan() && lanes[0].is_nan())) {
+            return lanes[0];
+        }
+        ASKED.set(true);
+        f64::NAN
+    }
+    #[inline(always)]
+    fn pivot_size(self) -> f64 {
+        self.lanes().iter().fold(f64::INFINITY, |m, x| if x.abs() < m || x.is_nan() { x.abs() } else { m })
+    }
+    #[inline(always)]
+    fn extent(self) -> f64 {
+        Scalar::extent(self.re())
+    }
+    #[inline(always)]
+    fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
+        let set = token::<S>();
+        let less = set.less_than_f64s(self.0, than.0);
+        let not_less = set.less_than_or_equal_f64s(than.0, self.0);
+        let unordered = set.splat_f64s(f64::NAN);
+        Lanes(set.select_f64s(less, then.0, set.select_f64s(not_less, otherwise.0, unordered)))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Lanes::abs(self)
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self::splat(1.0) / self
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Lanes(token::<S>().sqrt_f64s(self.0))
+    }
+    #[inline(always)]
+    fn powi(self, n: i32) -> Self {
+        let (mut power, mut base, mut left) = (Self::splat(1.0), self, n.unsigned_abs());
+        while left > 0 {
+            if left % 2 == 1 {
+                power *= base;
+            }
+            base *= base;
+            left /= 2;
+        }
+        if n < 0 { power.recip() } else { power }
+    }
+    fn powf(self, a: f64) -> Self {
+        self.each(|x| x.powf(a))
+    }
+    fn exp(self) -> Self {
+        self.each(f64::exp)
+    }
+    fn exp_m1(self) -> Self {
+        self.each(f64::exp_m1)
+    }
+    fn ln(self) -> Self {
+        self.each(f64::ln)
+    }
+    fn ln_1p(self) -> Self {
+        self.each(f64::ln_1p)
+    }
+    /// Two polynomials with nothing shared: where one of the results is not used, its work is dropped.
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        (Scalar::sin(self), Scalar::cos(self))
+    }
+    #[inline(always)]
+    fn sin(self) -> Self {
+        if !self.reducible() {
+            return self.each(f64::sin);
+        }
+        sine(self)
+    }
+    #[inline(always)]
+    fn cos(self) -> Self {
+        if !self.reducible() {
+            return self.each(f64::cos);
+        }
+        cosine(self)
+    }
+    #[inline(always)]
+    fn sin_versine(self) -> (Self, Self) {
+        let half = Scalar::sin(self * 0.5);
+        (Scalar::sin(self), half * half * 2.0)
+    }
+    fn sinh(self) -> Self {
+        self.each(f64::sinh)
+    }
+    fn cosh(self) -> Self {
+        self.each(f64::cosh)
+    }
+    fn tanh(self) -> Self {
+        self.each(f64::tanh)
+    }
+    fn atan(self) -> Self {
+        self.each(f64::atan)
+    }
+    #[inline(never)]
+    fn apart<R>(work: impl FnOnce() -> R) -> R {
+        struct Work<F>(F);
+        impl<R, F: FnOnce() -> R> WithSimd for Work<F> {
+            type Output = R;
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, _simd: S) -> R {
+                (self.0)()
+            }
+        }
+        token::<S>().vectorize(Work(work))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sine and cosine of arguments, as many as there are lanes at a time.
+    struct Evaluate<'a>(&'a [f64]);
+
+    impl WithSimd for Evaluate<'_> {
+        type Output = Vec<[f64; 3]>;
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+            let mut out = Vec::new();
+            for x in self.0.chunks_exact(Lanes::<S>::COUNT) {
+                let (sin, cos) = Lanes::<S>(S::as_simd_f64s(x).0[0]).sin_cos();
+                out.extend((0..x.len()).map(|i| [x[i], sin.lanes()[i], cos.lanes()[i]]));
+            }
+            out
+        }
+    }
+
+    /// Within 2 units in the last place, and the `1e-33 x` that two parts of pi leave out, of the standard library's, which are exact to half of
+    /// one, at random arguments of all sizes and beside the multiples of pi/2; beyond the range of the reduction they are those functions.
+    #[test]
+    fn sines_are_those_of_one_number() {
+        let mut arguments = Vec::new();
+        let mut random = 0.5;
+        for k in 0..40_000 {
+            random = (random + 0.618_033_988_749_894_9f64).fract();
+            let size = 10f64.powi(k % 24 - 16);
+            arguments.push((2.0 * random - 1.0) * size);
+            // The neighbours of multiples, where the rest after the reduction is smallest.
+            let multiple = f64::from(k * 8) * std::f64::consts::FRAC_PI_2;
+            arguments.extend([multiple, multiple.next_up(), -multiple, f64::from(k) * std::f64::consts::FRAC_PI_2]);
+        }
+        let mut sets =
+            vec![pulp::Scalar::new().vectorize(Evaluate(&arguments)), pulp::Arch::new().dispatch(Evaluate(&arguments))];
+        #[cfg(target_arch = "x86_64")]
+        {
+            sets.extend(pulp::x86::V3::try_new().map(|set| Simd::vectorize(set, Evaluate(&arguments))));
+            sets.extend(pulp::x86::V4::try_new().map(|set| Simd::vectorize(set, Evaluate(&arguments))));
+        }
+        let ulp = |b: f64| b.abs().next_up() - b.abs();
+        for set in sets {
+            assert_eq!(set.len(), arguments.len());
+            for [x, sin, cos] in set {
+                let (s, c) = x.sin_cos();
+                for (what, y, exact) in [("sin", sin, s), ("cos", cos, c)] {
+                    let within = (y - exact).abs() <= 2.0 * ulp(exact) + 1e-33 * x.abs();
+                    assert!(within, "{what} {x:e}: {y:e}, not {exact:e}");
+                }
+            }
+        }
+    }
+
+    /// Choices of numbers by pairs, as many as there are lanes at a time.
+    struct ChooseLanes<'a>(&'a [f64], &'a [f64]);
+
+    /// `if_less` of a, b and 10, 20; the larger, the smaller, the size and the sign of a.
+    fn choices<T: Scalar>(a: T, b: T) -> [T; 5] {
+        [a.if_less(b, 10.0.into(), 20.0.into()), Scalar::max(a, b), Scalar::min(a, b), Scalar::abs(a), a.signum()]
+    }
+
+    impl WithSimd for ChooseLanes<'_> {
+        type Output = Vec<[f64; 5]>;
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+            let (mut out, n) = (Vec::new(), Lanes::<S>::COUNT);
+            for (a, b) in self.0.chunks_exact(n).zip(self.1.chunks_exact(n)) {
+                let chosen = choices(Lanes::<S>(S::as_simd_f64s(a).0[0]), Lanes::<S>(S::as_simd_f64s(b).0[0]));
+                out.extend((0..n).map(|i| chosen.map(|x| x.lanes()[i])));
+            }
+            out
+        }
+    }
+
+    #[test]
+    fn choices_are_those_of_one_number() {
+        let values = [0.0, -0.0, 1.0, -1.0, 2.5, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
+        let pairs = values.iter().flat_map(|a| values.iter().map(move |b| (*a, *b)));
+        let (a, b): (Vec<_>, Vec<_>) = pairs.unzip();
+        let mut sets = vec![pulp::Scalar::new().vectorize(ChooseLanes(&a, &b))];
+        #[cfg(target_arch = "x86_64")]
+        {
+            sets.extend(pulp::x86::V3::try_new().map(|set| Simd::vectorize(set, ChooseLanes(&a, &b))));
+            sets.extend(pulp::x86::V4::try_new().map(|set| Simd::vectorize(set, ChooseLanes(&a, &b))));
+        }
+        for set in sets {
+            assert_eq!(set.len(), a.len());
+            for ((a, b), found) in a.iter().zip(&b).zip(set) {
+                let expected = choices(*a, *b);
+                let same = found.iter().zip(&expected).all(|(x, y)| x == y || (x.is_nan() && y.is_nan()));
+                assert!(same, "{a}, {b}: {found:?}, not {expected:?}");
+                assert!(!(a.is_nan() || b.is_nan()) || found[..3].iter().all(|x| x.is_nan()));
+            }
+        }
+    }
+
+    /// Powers of numbers, and of their squares, with their slopes; as many as there are lanes at a time.
+    struct Powers<'a>(&'a [f64]);
+
+    /// The slopes of powers and of a choice by x.
+    fn slopes<T: Scalar>(x: T) -> [T; 5] {
+        let x = contact_geom::KernelDual { re: x, d: SVector::<T, 1>::new(T::one()) };
+        let zero = num_traits::Zero::zero();
+        let chosen = x.if_less(zero, zero, x.powf(2.5) + x.sqrt());
+        [Scalar::abs(x).powf(2.5), (x * x).powf(1.5), (x * x).powf(0.5), x.sqrt(), chosen].map(|y| y.d[0])
+    }
+
+    impl WithSimd for Powers<'_> {
+        type Output = Vec<[f64; 5]>;
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+            let mut out = Vec::new();
+            for x in self.0.chunks_exact(Lanes::<S>::COUNT) {
+                let found = slopes(Lanes::<S>(S::as_simd_f64s(x).0[0]));
+                out.extend((0..x.len()).map(|i| found.map(|y| y.lanes()[i])));
+            }
+            out
+        }
+    }
+
+    #[test]
+    fn slopes_of_powers_are_those_of_one_number() {
+        let x = [0.0, 1.0, -0.0, -2.0, 1e-9, f64::NAN, f64::INFINITY, 0.3];
+        let mut sets = vec![pulp::Scalar::new().vectorize(Powers(&x))];
+        #[cfg(target_arch = "x86_64")]
+        {
+            sets.extend(pulp::x86::V3::try_new().map(|set| Simd::vectorize(set, Powers(&x))));
+            sets.extend(pulp::x86::V4::try_new().map(|set| Simd::vectorize(set, Powers(&x))));
+        }
+        assert_eq!(slopes(0.0), [0.0, 0.0, 0.0, f64::INFINITY, f64::INFINITY]);
+        assert_eq!(slopes(-2.0)[4], 0.0);
+        for set in sets {
+            for (x, found) in x.iter().zip(set) {
+                let expected = slopes(*x);
+                let same = found.iter().zip(&expected).all(|(a, b)| a == b || (a.is_nan() && b.is_nan()));
+                assert!(same, "{x}: {found:?}, not {expected:?}");
+            }
+        }
+    }
+
+    /// Asks for one value of the lanes of two numbers in turn, in all ways that there are.
+    struct Ask(f64, f64);
+
+    impl WithSimd for Ask {
+        type Output = [bool; 4];
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+            let mut x = Lanes::<S>::splat(self.0);
+            bytemuck::cast_slice_mut::<_, f64>(std::slice::from_mut(&mut x.0))[0] = self.1;
+            let zero = <Lanes<S> as num_traits::Zero>::zero();
+            let asked = |ask: &dyn Fn() -> bool| {
+                forget_branches();
+                ask();
+                branched()
+            };
+            [
+                asked(&|| x.re() > 0.0),
+                asked(&|| x.extent() > 0.0),
+                asked(&|| x == zero),
+                asked(&|| num_traits::Zero::is_zero(&x)),
+            ]
+        }
+    }
+
+    #[test]
+    fn one_value_of_lanes_that_differ_is_noticed() {
+        assert_eq!(pulp::Scalar::new().vectorize(Ask(0.0, 1.0)), [false; 4]);
+        for (a, b) in [(1.0, 1.0), (0.0, -0.0), (f64::NAN, f64::NAN)] {
+            assert_eq!(pulp::Arch::new().dispatch(Ask(a, b)), [false; 4], "{a}, {b}");
+        }
+        if !matches!(pulp::Arch::new(), pulp::Arch::Scalar) {
+            assert_eq!(pulp::Arch::new().dispatch(Ask(0.0, 1.0)), [true; 4]);
+            assert_eq!(pulp::Arch::new().dispatch(Ask(f64::NAN, 0.0)), [true; 4]);
+        }
+        forget_branches();
+    }
+}

@@ -1,0 +1,12 @@
+//! Numbers that the kernels compute with: vector registers, batches of them, sums that lose nothing, double-double numbers.
+
+pub(crate) mod compensated;
+pub(crate) mod compensated_batch;
+pub(crate) mod double_double;
+pub(crate) mod instructions;
+pub(crate) mod lanes;
+pub(crate) mod pair;
+pub(crate) mod registers;
+pub(crate) mod simd_batch;
+pub(crate) mod sine;
+pub(crate) mod state_words;

@@ -1,0 +1,248 @@
+//! Several registers of lanes as one number, each lane a trajectory of its own.
+
+use crate::numbers::lanes::{Lanes, note_branch, token};
+use crate::numbers::sine::{REDUCIBLE, Register, cosine, sine};
+use contact_geom::{Scalar, scalar_operators};
+use pulp::{Simd, bytemuck};
+use std::fmt::{Debug, Formatter};
+use std::ops::Neg;
+
+/// `K` registers of the instruction set `S`: while one of them waits for its last operation, the others keep the processor busy.
+///
+/// A lane's bits depend on that lane alone, and are the same in all instruction sets: products that are fused are so in all of them. A formula that asks for one value of the lanes
+/// (`re`, `extent`, `==`) gets none, whether they agree or not: see [`branched`](crate::numbers::lanes::branched).
+#[derive(Clone, Copy)]
+#[repr(align(64))] // Registers that lie across cache lines are slow to read after they were written.
+pub(crate) struct SimdBatch<S: Simd, const K: usize>(pub [S::f64s; K]);
+
+impl<S: Simd, const K: usize> SimdBatch<S, K> {
+    /// The lanes of all registers.
+    pub const COUNT: usize = S::F64_LANES * K;
+
+    #[inline(always)]
+    pub fn splat(x: f64) -> Self {
+        SimdBatch([token::<S>().splat_f64s(x); K])
+    }
+
+    /// The lanes from a function of their index.
+    #[inline(always)]
+    pub fn from_lanes(mut f: impl FnMut(usize) -> f64) -> Self {
+        let mut pack = Self::splat(0.0);
+        for (i, x) in pack.lanes_mut().iter_mut().enumerate() {
+            *x = f(i);
+        }
+        pack
+    }
+
+    pub fn lanes(&self) -> &[f64] {
+        bytemuck::cast_slice(&self.0)
+    }
+
+    fn lanes_mut(&mut self) -> &mut [f64] {
+        bytemuck::cast_slice_mut(&mut self.0)
+    }
+
+    /// `self b + c` with one rounding, in every instruction set.
+    #[inline(always)]
+    pub fn mul_add(self, b: Self, c: Self) -> Self {
+        let set = token::<S>();
+        SimdBatch(std::array::from_fn(|k| set.mul_add_f64s(self.0[k], b.0[k], c.0[k])))
+    }
+
+    #[inline(always)]
+    fn map(self, f: impl Fn(S::f64s) -> S::f64s) -> Self {
+        SimdBatch(self.0.map(f))
+    }
+
+    /// A function of one number, lane by lane.
+    #[inline]
+    fn each(mut self, f: impl Fn(f64) -> f64) -> Self {
+        self.lanes_mut().iter_mut().for_each(|x| *x = f(*x));
+        self
+    }
+
+    /// `then` in lanes that are at most those of `b`, `otherwise` in all others, those that are not numbers among them.
+    #[inline(always)]
+    pub fn at_most(self, b: Self, then: Self, otherwise: Self) -> Self {
+        let set = token::<S>();
+        SimdBatch(std::array::from_fn(|k| {
+            set.select_f64s(set.less_than_or_equal_f64s(self.0[k], b.0[k]), then.0[k], otherwise.0[k])
+        }))
+    }
+
+    /// Lane by lane the larger; where one is not a number, the result may be either.
+    #[inline(always)]
+    pub fn max_or_nan(self, b: Self) -> Self {
+        let set = token::<S>();
+        SimdBatch(std::array::from_fn(|k| set.max_f64s(self.0[k], b.0[k])))
+    }
+
+    /// Whether a lane is not 0.
+    #[inline(always)]
+    pub fn any(self) -> bool {
+        self.lanes().iter().any(|x| *x != 0.0)
+    }
+
+    /// A function of an argument that is within the range of the reduction; not a number where the argument is beyond it.
+    ///
+    /// A lane that gets there leaves the pack, and is run by itself. A branch to the function of the standard library would have all registers
+    /// wait in memory for it.
+    #[inline(always)]
+    fn within_range(self, argument: Self) -> Self {
+        let set = token::<S>();
+        let (range, none) = (set.splat_f64s(REDUCIBLE), set.splat_f64s(f64::NAN));
+        SimdBatch(std::array::from_fn(|k| {
+            set.select_f64s(set.less_than_f64s(Lanes::<S>(argument.0[k]).abs().0, range), self.0[k], none)
+        }))
+    }
+}
+
+impl<S: Simd, const K: usize> Register for SimdBatch<S, K> {
+    const FUSED: bool = true;
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        SimdBatch::splat(x)
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        SimdBatch::mul_add(self, b, c)
+    }
+    #[inline(always)]
+    fn turned(self, of: Self) -> Self {
+        SimdBatch(std::array::from_fn(|k| Lanes::<S>(self.0[k]).turned(Lanes(of.0[k])).0))
+    }
+}
+
+impl<S: Simd, const K: usize> Debug for SimdBatch<S, K> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        self.lanes().fmt(f)
+    }
+}
+
+impl<S: Simd, const K: usize> PartialEq for SimdBatch<S, K> {
+    fn eq(&self, _: &Self) -> bool {
+        note_branch();
+        false
+    }
+}
+
+impl<S: Simd, const K: usize> From<f64> for SimdBatch<S, K> {
+    #[inline(always)]
+    fn from(x: f64) -> Self {
+        Self::splat(x)
+    }
+}
+
+impl<S: Simd, const K: usize> Neg for SimdBatch<S, K> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.map(|x| token::<S>().neg_f64s(x))
+    }
+}
+
+scalar_operators! { [S: Simd, const K: usize] SimdBatch<S, K>;
+    a + b = SimdBatch(std::array::from_fn(|k| token::<S>().add_f64s(a.0[k], b.0[k])));
+    c - d = SimdBatch(std::array::from_fn(|k| token::<S>().sub_f64s(c.0[k], d.0[k])));
+    e * f = SimdBatch(std::array::from_fn(|k| token::<S>().mul_f64s(e.0[k], f.0[k])));
+    g / h = SimdBatch(std::array::from_fn(|k| token::<S>().div_f64s(g.0[k], h.0[k])));
+}
+
+impl<S: Simd, const K: usize> Scalar for SimdBatch<S, K> {
+    fn re(self) -> f64 {
+        note_branch();
+        f64::NAN
+    }
+    fn pivot_size(self) -> f64 {
+        self.re()
+    }
+    fn extent(self) -> f64 {
+        self.re()
+    }
+    #[inline(always)]
+    fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
+        let set = token::<S>();
+        let unordered = set.splat_f64s(f64::NAN);
+        SimdBatch(std::array::from_fn(|k| {
+            let less = set.less_than_f64s(self.0[k], than.0[k]);
+            let not_less = set.less_than_or_equal_f64s(than.0[k], self.0[k]);
+            set.select_f64s(less, then.0[k], set.select_f64s(not_less, otherwise.0[k], unordered))
+        }))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.map(|x| Lanes::<S>(x).abs().0)
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self::splat(1.0) / self
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.map(|x| token::<S>().sqrt_f64s(x))
+    }
+    /// The products of `f64::powi`, in its order.
+    #[inline(always)]
+    fn powi(self, n: i32) -> Self {
+        let (mut power, mut base, mut left) = (Self::splat(1.0), self, n.unsigned_abs());
+        while left > 0 {
+            if left % 2 == 1 {
+                power *= base;
+            }
+            left /= 2;
+            if left > 0 {
+                base *= base;
+            }
+        }
+        if n < 0 { power.recip() } else { power }
+    }
+    fn powf(self, a: f64) -> Self {
+        self.each(|x| x.powf(a))
+    }
+    fn exp(self) -> Self {
+        self.each(f64::exp)
+    }
+    fn exp_m1(self) -> Self {
+        self.each(f64::exp_m1)
+    }
+    fn ln(self) -> Self {
+        self.each(f64::ln)
+    }
+    fn ln_1p(self) -> Self {
+        self.each(f64::ln_1p)
+    }
+    /// Two polynomials with nothing shared: where one of the results is not used, its work is dropped.
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        (Scalar::sin(self), Scalar::cos(self))
+    }
+    #[inline(always)]
+    fn sin(self) -> Self {
+        sine(self).within_range(self)
+    }
+    #[inline(always)]
+    fn cos(self) -> Self {
+        cosine(self).within_range(self)
+    }
+    #[inline(always)]
+    fn sin_versine(self) -> (Self, Self) {
+        let half = Scalar::sin(self * 0.5);
+        (Scalar::sin(self), half * half * 2.0)
+    }
+    fn sinh(self) -> Self {
+        self.each(f64::sinh)
+    }
+    fn cosh(self) -> Self {
+        self.each(f64::cosh)
+    }
+    fn tanh(self) -> Self {
+        self.each(f64::tanh)
+    }
+    fn atan(self) -> Self {
+        self.each(f64::atan)
+    }
+    #[inline(always)]
+    fn apart<R>(work: impl FnOnce() -> R) -> R {
+        Lanes::<S>::apart(work)
+    }
+}

@@ -1,0 +1,3 @@
+//! Whether steps resolve the motion.
+
+pub(crate) mod monitor;

@@ -1,0 +1,42 @@
+//! The error of a run with given steps, estimated.
+
+use crate::Interrupt;
+use crate::run::accuracy::track::Track;
+use crate::run::accuracy::velocities::Velocities;
+use crate::run::{Near, Plan};
+use contact_geom::{Lagrangian, PhasePoint};
+
+/// The steps between two looks at whether it is to end.
+const CHUNK: usize = 1024;
+
+impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
+    /// The distance of (q, p) and v after some steps from those of a run with twice as many of half their length, as
+    /// [`Track::distance_at_end`] measures it: of the error of an order `p` this is the part `1 - 2^-p`. Infinite where the other run does not come as far,
+    /// or is interrupted.
+    pub(crate) fn distance_from_halves(&self, taken: usize, t: f64, (end, near): (&PhasePoint<N>, Near<N>)) -> f64 {
+        let Ok(mut fine) = self.make_stepper(self.problem, 0.5 * self.h, false) else { return f64::INFINITY };
+        let steps = if self.info.in_transformed_time { usize::MAX } else { 2 * taken };
+        let mut velocities = Velocities::new(self.problem, self.scales);
+        let mut done = 0;
+        while done < steps && (fine.time() - t) * self.h < 0.0 {
+            if self.problem.interrupt.is_some_and(Interrupt::is_wanted) {
+                return f64::INFINITY;
+            }
+            // Few steps at first, so that the velocity is seen at more than one phase of an oscillation.
+            match fine.advance_until((steps - done).min(CHUNK).min(done.max(1)), t) {
+                Ok(more) if more > 0 => done += more,
+                Ok(_) => break,
+                Err(_) => return f64::INFINITY,
+            }
+            velocities.at(fine.time(), &fine.state(), fine.last_velocity());
+        }
+        let mut seen = |state: &PhasePoint<N>, near| {
+            let v = velocities.at(t, state, near);
+            let (speed, scales) = (velocities.speed(done), self.scales);
+            Track { speed, scales, ..Track::of_end(state, v) }
+        };
+        let coarse = seen(end, near);
+        let distance = coarse.distance_at_end(&seen(&fine.state(), fine.last_velocity()));
+        if distance.is_nan() { f64::INFINITY } else { distance }
+    }
+}

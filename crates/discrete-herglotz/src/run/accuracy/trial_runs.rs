@@ -1,0 +1,481 @@
+//! trial runs: a motion followed with some number of steps, seen at a few common times, and looked at between its steps.
+
+use crate::gauss::{DefectSample, SAMPLE_SETS, UNDERFLOWN};
+use crate::integration::check_claims::violated_claim;
+use crate::run::accuracy::StepSelection;
+use crate::run::accuracy::noise::{DECAYED, all_together};
+use crate::run::accuracy::track::{Track, norm};
+use crate::run::accuracy::velocities::Velocities;
+use crate::run::{Plan, Request, Shared};
+use crate::switching::{DividedGauss, Reach, SwitchingStepper, has_switching_functions};
+use crate::{
+    GaussCollocation, GaussRoute, GaussStepper, InputError, StepError, StepFailure, Stepper, TransformedGauss,
+};
+use crate::{Interrupt, Problem, StepperOptions};
+use contact_geom::{Defect, Lagrangian, max_or_nan};
+
+/// What all trial runs of a plan may cost together, in evaluations of L at one stage: some seconds.
+pub(crate) const BUDGET: u64 = 1 << 26;
+
+/// What those may cost together that come to their end, as those of long motions do: so that the budget grows with the run itself.
+pub(crate) const RESERVE: u64 = 1 << 29;
+
+/// The misfit between the nodes beyond which a step does not resolve the motion: its momenta would be off by a twentieth.
+const RESOLVED: f64 = 0.05;
+
+/// The misfit in units of the largest momentum that is round-off: some hundred units for the sums that forces are made of.
+const AT_REST: f64 = 1e-13;
+
+/// The roundings of a force that a misfit may hold.
+const ROUNDINGS: f64 = 64.0;
+
+/// The same of the values of L, whose polynomials follow twice the frequencies.
+const RESOLVED_VALUE: f64 = 0.2;
+
+/// How many times the expected misfit is more than a smooth motion has: something narrow lies between the nodes.
+const NARROW: f64 = 30.0;
+
+/// The points of a span at which a run is looked at, at least: what is wider than the distance of two is seen.
+const POINTS: usize = 2000;
+
+/// The steps between two looks at budget and progress.
+const CHUNK: usize = 1024;
+
+/// The looks between two at whether the plan is to end.
+const LOOKS: usize = 16;
+
+/// The parts of a span at whose ends runs are compared.
+const PARTS: usize = 10;
+
+/// How many times fewer steps a time transformation must take at the least, for its steps to be tried: each costs about so many of equal steps of the
+/// same error. Of Kepler's orbits those do of which the eccentricity is above one half.
+const PROFIT: f64 = 3.5;
+
+/// The steps that Newton's method may solve before other stages are tried, and the part of all. Where it solves fewer of a coarse run, one with
+/// twice as many steps needs it hardly at all.
+const FEW_NEWTON: f64 = 2.0;
+const PART_NEWTON: f64 = 0.25;
+
+/// The times of a span at which runs are compared.
+#[derive(Clone, Debug)]
+pub(crate) enum ComparisonGrid {
+    /// Ends of steps of a run with `base` steps, which divides the steps of all others.
+    Steps { base: usize, at: Vec<usize> },
+    /// The ends of the tenths of a span, on which steps in transformed time are made to end.
+    Times,
+}
+
+impl ComparisonGrid {
+    /// The ends of the tenths of a span, each moved to the end of the step in which it lies; of all steps where they are fewer.
+    pub fn of(base: usize) -> Self {
+        let parts = base.min(PARTS);
+        ComparisonGrid::Steps { base, at: (1..=parts).map(|i| (i * base).div_ceil(parts)).collect() }
+    }
+
+    /// Equal parts of a span, as many as tenths and as steps.
+    pub fn equal(steps: usize) -> Self {
+        ComparisonGrid::of(steps.min(PARTS))
+    }
+
+    /// The fewest steps from a number on that they divide.
+    pub fn whole(&self, steps: f64) -> usize {
+        let base = if let ComparisonGrid::Steps { base, .. } = self { *base } else { 1 };
+        (steps / base as f64).ceil().max(1.0) as usize * base
+    }
+
+    /// The number of steps and the time, whichever a run with so many steps over a span reaches first, at the i-th mark.
+    fn stop(&self, i: usize, count: usize, t0: f64, span: f64) -> Option<(usize, f64)> {
+        match self {
+            ComparisonGrid::Steps { base, at } => {
+                at.get(i).map(|mark| (mark * (count / base), f64::INFINITY.copysign(span)))
+            }
+            ComparisonGrid::Times => (i < PARTS).then(|| (usize::MAX, t0 + span * ((i + 1) as f64 / PARTS as f64))),
+        }
+    }
+}
+
+/// How a trial run has ended.
+#[derive(Clone, Debug)]
+pub(crate) enum TrialEnd<const N: usize> {
+    /// At the end of the span.
+    Followed(Track<N>),
+    /// At a step that does not resolve the motion, after this part of the span.
+    Unresolved { part: f64 },
+    /// The same, where the misfit is that of something narrow.
+    Narrow { part: f64 },
+    /// Where another integrator is seen to be cheaper.
+    SwitchReason(SwitchReason),
+    /// At a step that could not be taken.
+    Halted { part: f64, cause: StepError },
+    /// No evaluations are left.
+    Exhausted,
+    /// From outside.
+    Interrupted,
+}
+
+/// What is cheaper than the steps of a run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum SwitchReason {
+    /// Steps in the motion's own transformed time, since they are much fewer.
+    TimeTransformation,
+    /// Steps of fewer stages, since these need Newton's method.
+    FewerStages,
+    /// Steps that are divided where the motion is fast: equal ones are many times more than it asked for at its start.
+    Divided,
+}
+
+/// A misfit in units of a size; as it is where that is 0.
+fn relative_to(defect: f64, size: f64) -> f64 {
+    if defect == 0.0 || size == 0.0 { defect } else { defect / size }
+}
+
+/// What the looks at a run have seen.
+#[derive(Default)]
+struct DefectHistory {
+    before: Option<DefectSample>,
+    /// The largest momentum, and the largest of what misfits of values change, on the way.
+    size: f64,
+    kinetic: f64,
+    /// The largest misfits, in the units of these: of a motion that comes to rest only round-off is left, and one that begins at rest has all
+    /// of its size before it.
+    of_momentum: f64,
+    of_value: f64,
+}
+
+impl DefectHistory {
+    /// Takes in a look at the next step, and says whether the step resolves the motion.
+    fn resolves(&mut self, look: &DefectSample) -> bool {
+        let before = self.before.replace(*look).filter(|_| !look.follows_a_jump);
+        let jump = before.map_or(0.0, |before| before.jump_to(look));
+        (self.size, self.kinetic) = (max_or_nan(self.size, look.size), max_or_nan(self.kinetic, look.kinetic));
+        let of_value = max_or_nan(look.of_value, jump);
+        // What does not move crosses nothing, and values of L that have underflowed tell nothing.
+        let told = of_value != 0.0 && (self.kinetic >= UNDERFLOWN || self.kinetic.is_nan());
+        let of_value = if told { of_value } else { 0.0 };
+        let of_momentum = look.defect * if look.size > 0.0 { look.size } else { 1.0 };
+        self.of_momentum = max_or_nan(self.of_momentum, of_momentum);
+        self.of_value = max_or_nan(self.of_value, of_value);
+        // A NaN resolves nothing.
+        (look.defect <= RESOLVED || of_momentum <= AT_REST * self.size || look.is_underflown())
+            && relative_to(of_value, self.kinetic) <= RESOLVED_VALUE
+    }
+
+    /// The largest misfit, relative to the largest momentum and to what misfits of values change.
+    fn defect(&self) -> f64 {
+        max_or_nan(relative_to(self.of_momentum, self.size), relative_to(self.of_value, self.kinetic))
+    }
+}
+
+/// What a time transformation would make of the equal steps of a run so far.
+#[derive(Default)]
+struct Uneven {
+    steps: f64,
+    /// The sum of the reciprocal rates, which is the span of the transformed time in units of the step, and the largest of them.
+    sum: f64,
+    max_abs_or_nan: f64,
+}
+
+impl Uneven {
+    /// Takes in the rate at the end of the next step, and says how many times fewer steps of the time transformation, all as short as the shortest of
+    /// these in its own time, lead as far.
+    fn profit(&mut self, rate: f64) -> f64 {
+        let speed = 1.0 / rate;
+        (self.steps, self.sum) = (self.steps + 1.0, self.sum + speed);
+        self.max_abs_or_nan = max_or_nan(self.max_abs_or_nan, speed);
+        self.max_abs_or_nan * self.steps / self.sum
+    }
+}
+
+/// trial runs of a request, with what is left of their budget.
+pub(crate) struct TrialRuns<'t, 'p, L, const N: usize> {
+    pub request: &'t Request<'p, L, N>,
+    pub left: u64,
+    /// What is left of the reserve for runs that come to their end.
+    pub reserve: u64,
+    /// The error that is wanted.
+    pub wanted: f64,
+    /// Whether runs with equal steps end where a time transformation would take much fewer.
+    pub watches_transformation: bool,
+    /// Whether they end where Newton's method is needed for many of the steps.
+    pub watches_newton: bool,
+    /// Whether a search ends where it meets something that asks for many times more steps than the start.
+    pub watches_uneven: bool,
+}
+
+impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
+    /// For a request, with the whole budget.
+    pub fn new(request: &'t Request<'p, L, N>, wanted: f64) -> Self {
+        let (watches_transformation, watches_newton, watches_uneven) = (false, false, false);
+        TrialRuns {
+            request,
+            left: BUDGET,
+            reserve: RESERVE,
+            wanted,
+            watches_transformation,
+            watches_newton,
+            watches_uneven,
+        }
+    }
+
+    /// Follows the motion by contact Gauss collocation, with a look between the nodes of each step: closely, at so many points of the
+    /// span that nothing is narrower, or at a few of each step; and for what is narrow beside the steps or not.
+    pub fn gauss(
+        &mut self,
+        stages: usize,
+        count: usize,
+        marks: &ComparisonGrid,
+        closely: bool,
+        narrow: bool,
+    ) -> Result<TrialEnd<N>, InputError> {
+        let (problem, h) = (self.request.problem, self.step(count, marks));
+        let points = if closely { POINTS.div_ceil(stages * count).min(SAMPLE_SETS) } else { 1 };
+        let course = TrialSettings { count, marks, points, narrow, price: EvaluationCost::of::<N>(stages) };
+        if const { L::HAS_TIME_TRANSFORMATION } && matches!(marks, ComparisonGrid::Times) {
+            let mut stepper = match (TransformedGauss { stages }).run(problem, h) {
+                Ok(stepper) => stepper,
+                Err(error) => return halted_at_the_start(error),
+            };
+            let ending = self.watch(&mut stepper, &course, 1, |run, sets| (run.look(sets), 0))?;
+            return Ok(ending.with_tau(stepper.tau()));
+        }
+        let gauss = GaussCollocation { stages };
+        if const { L::HAS_SWITCHING_FUNCTIONS }
+            && has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?
+        {
+            let make = |problem: &Problem<'p, L, N>, h: f64, _: bool| gauss.run(problem, h, StepperOptions::default());
+            let mut stepper = match SwitchingStepper::new(problem, h, Reach::Inside, make) {
+                Ok(stepper) => stepper.keeping_parts(),
+                Err(error) => return halted_at_the_start(error),
+            };
+            return self.watch(&mut stepper, &course, 1, |run, sets| {
+                let parts = run.last_step();
+                let looks = parts.iter().map(|part| part.look(sets)).reduce(|a, b| Some(a?.joined(b?)));
+                let look = looks.flatten().map(|look| if run.has_switched() { look.after_a_jump() } else { look });
+                (look, parts.iter().map(GaussStepper::newton_steps).sum())
+            });
+        }
+        let mut stepper = match gauss.run(problem, h, StepperOptions::default()) {
+            Ok(stepper) => stepper,
+            Err(error) => return halted_at_the_start(error),
+        };
+        // Of a linear motion nothing is to be seen between the nodes that the order does not show.
+        let linear = stepper.route() == GaussRoute::Linear;
+        let (stride, points) = if linear { (CHUNK, 0) } else { (1, course.points) };
+        let course = TrialSettings { points, ..course };
+        self.watch(&mut stepper, &course, stride, |run, sets| (run.look(sets), run.newton_steps()))
+    }
+
+    /// Follows the motion by Gauss collocation with steps that are divided where their misfit is larger than this.
+    pub fn divided(
+        &mut self,
+        integrator: DividedGauss,
+        count: usize,
+        marks: &ComparisonGrid,
+    ) -> Result<TrialEnd<N>, InputError> {
+        let (problem, h) = (self.request.problem, self.step(count, marks));
+        let mut stepper = match integrator.run(problem, h, StepperOptions::default()) {
+            Ok(stepper) => stepper,
+            Err(error) => return halted_at_the_start(error),
+        };
+        // Each step is looked at, which costs twice its stages.
+        let look = |run: &_, _: f64| (None, 2 * Stepper::evaluations(run));
+        self.follow(&mut stepper, count, marks, 1, look).unless_interrupted()
+    }
+
+    /// The length of steps of which so many fill the span; in transformed time, if its rate stayed what it is at the start.
+    pub fn step(&self, count: usize, marks: &ComparisonGrid) -> f64 {
+        let Problem { lagrangian, start, .. } = self.request.problem;
+        let h = self.request.span / count as f64;
+        if let ComparisonGrid::Times = marks { h / lagrangian.dt_dtau(&start.q) } else { h }
+    }
+
+    /// Follows the motion with looks, by `look` at so many sets of points, which also counts the steps of Newton's method.
+    fn watch<R: Stepper<N>>(
+        &mut self,
+        run: &mut R,
+        course: &TrialSettings<'_>,
+        stride: usize,
+        look: impl Fn(&R, usize) -> (Option<DefectSample>, u64),
+    ) -> Result<TrialEnd<N>, InputError> {
+        let TrialSettings { count, marks, points, narrow, price } = course;
+        let Problem { lagrangian, start, .. } = *self.request.problem;
+        let (floor, h) = (max_or_nan(0.1 * self.wanted, 1e-11), (self.request.span / *count as f64).abs());
+        let Self { watches_transformation, watches_newton, .. } = *self;
+        let (mut looks, mut cost, mut seen, mut uneven) = (0, 0, DefectHistory::default(), Uneven::default());
+        let ending = self.follow(run, *count, marks, stride, |run, part| {
+            let (look, newton_steps) = look(run, *points);
+            cost = run.evaluations() + newton_steps * price.newton;
+            let spent = |looks: u64| cost + looks * price.look;
+            if const { L::HAS_TIME_TRANSFORMATION }
+                && watches_transformation
+                && uneven.profit(lagrangian.dt_dtau(&run.state().q)) > PROFIT
+            {
+                return (Some(TrialEnd::SwitchReason(SwitchReason::TimeTransformation)), spent(looks));
+            }
+            if watches_newton && newton_steps as f64 > FEW_NEWTON + PART_NEWTON * part * *count as f64 {
+                return (Some(TrialEnd::SwitchReason(SwitchReason::FewerStages)), spent(looks));
+            }
+            let ending = look.and_then(|look| {
+                looks += *points as u64 + 1;
+                if !seen.resolves(&look) {
+                    return Some(TrialEnd::Unresolved { part });
+                }
+                let narrow = *narrow
+                    && !look.is_underflown()
+                    && look.defect > NARROW * look.expected + floor
+                    && look.of_momenta > ROUNDINGS * self.request.noise(run.time(), &run.state()).force * h;
+                narrow.then_some(TrialEnd::Narrow { part })
+            });
+            (ending, spent(looks))
+        });
+        // What is met nowhere else may be what a claim denies.
+        if let TrialEnd::Narrow { .. } | TrialEnd::Unresolved { .. } = ending
+            && let Some(Defect { claim, size }) = violated_claim(lagrangian, run.time(), &run.state(), &start.v)
+        {
+            return Err(InputError::FalseClaim { claim, size });
+        }
+        Ok(match ending {
+            TrialEnd::Followed(track) => TrialEnd::Followed(Track { defect: seen.defect(), cost, ..track }),
+            other => other.unless_interrupted()?,
+        })
+    }
+
+    /// Follows the motion by the integrator of the request.
+    pub fn own(
+        &mut self,
+        integrator: &Shared<'p, L, N>,
+        count: usize,
+        marks: &ComparisonGrid,
+    ) -> Result<TrialEnd<N>, InputError> {
+        let choice = StepSelection {
+            integrator: integrator.clone(),
+            count,
+            h: self.step(count, marks),
+            error: None,
+            ended: None,
+        };
+        let stepper = Plan::new(&self.request.bare(), &choice).and_then(|plan| plan.stepper());
+        let mut stepper = match stepper {
+            Ok(stepper) => stepper,
+            Err(error) => return halted_at_the_start(error),
+        };
+        let price = integrator.info().cost_per_evaluation;
+        let look = |run: &(dyn Stepper<N> + '_), _: f64| (None, run.evaluations().saturating_mul(price));
+        self.follow(&mut *stepper, count, marks, CHUNK, look).unless_interrupted()
+    }
+
+    /// Takes `count` steps, at most `stride` at a time; `look` sees the run in between with the part that is done, may end it, and says
+    /// what it has cost. The cost is taken off the budget.
+    fn follow<R: Stepper<N> + ?Sized>(
+        &mut self,
+        run: &mut R,
+        count: usize,
+        marks: &ComparisonGrid,
+        stride: usize,
+        mut look: impl FnMut(&R, f64) -> (Option<TrialEnd<N>>, u64),
+    ) -> TrialEnd<N> {
+        let &Request { problem, span, .. } = self.request;
+        let t0 = problem.t0;
+        let (mut states, mut noise, mut taken, mut spent) =
+            (Vec::with_capacity(PARTS), Vec::with_capacity(PARTS), 0, 0);
+        let mut reach = norm(&[problem.state.q, problem.state.p]);
+        let (mut velocities, mut seen) = (Vec::with_capacity(PARTS), Velocities::new(problem, self.request.scales));
+        let (mut ending, mut looks) = (None, 0_usize);
+        while ending.is_none()
+            && let Some((steps, time)) = marks.stop(states.len(), count, t0, span)
+        {
+            // Single steps are short.
+            let asks = stride > 1 || looks.is_multiple_of(LOOKS);
+            if asks && self.request.problem.interrupt.is_some_and(Interrupt::is_wanted) {
+                ending = Some(TrialEnd::Interrupted);
+                break;
+            }
+            looks += 1;
+            // Few steps at first, so that the velocity is seen at more than one phase of an oscillation.
+            let chunk = stride.min(taken.max(1)).min(steps - taken);
+            let (done, cause) = match run.advance_until(chunk, time) {
+                Ok(done) => (done, None),
+                Err(StepFailure { taken, cause }) => (taken, Some(cause)),
+            };
+            taken += done;
+            let part = (run.time() - t0) / span;
+            let by_look;
+            (by_look, spent) = look(run, part);
+            ending = cause.map(|cause| TrialEnd::Halted { part, cause }).or(by_look);
+            let marked = taken == steps || (run.time() - time) * span >= 0.0;
+            let x = run.state();
+            if marked || stride > 1 {
+                let v = seen.at(run.time(), &x, run.last_velocity());
+                velocities.extend(marked.then_some(v));
+            } else {
+                seen.pass(run.time(), &x.q);
+            }
+            if marked {
+                let state = [x.q, x.p];
+                let size = norm(&state);
+                reach = max_or_nan(reach, size);
+                let decayed = size < DECAYED * reach;
+                let of_all = || all_together(taken) * self.request.noise(run.time(), &x).displacement;
+                noise.push(if decayed { of_all() } else { 0.0 });
+                states.push(state);
+            }
+            // A run whose end is in sight may go on.
+            if spent > self.left && spent as f64 > part * self.reserve as f64 {
+                ending = Some(TrialEnd::Exhausted);
+            }
+        }
+        self.left = self.left.saturating_sub(spent);
+        self.reserve = self.reserve.saturating_sub(spent);
+        let (speed, scales) = (seen.speed(taken), self.request.scales);
+        let track = Track { states, noise, velocities, speed, scales, defect: 0.0, cost: spent, tau: span };
+        ending.unwrap_or(TrialEnd::Followed(track))
+    }
+}
+
+/// What a run that is watched is asked for.
+struct TrialSettings<'m> {
+    count: usize,
+    marks: &'m ComparisonGrid,
+    /// The sets of points of a look.
+    points: usize,
+    /// Whether it ends at what is narrow beside the steps.
+    narrow: bool,
+    price: EvaluationCost,
+}
+
+impl<const N: usize> TrialEnd<N> {
+    /// Itself; an interruption ends the whole search.
+    fn unless_interrupted(self) -> Result<Self, InputError> {
+        if let TrialEnd::Interrupted = self { Err(InputError::Interrupted) } else { Ok(self) }
+    }
+
+    /// With the span in transformed time.
+    fn with_tau(self, tau: f64) -> Self {
+        if let TrialEnd::Followed(track) = self { TrialEnd::Followed(Track { tau, ..track }) } else { self }
+    }
+}
+
+/// What parts of a run cost, in evaluations of L at one stage.
+struct EvaluationCost {
+    /// A step that Newton's method solves: a few solutions of the dense equations of all stages, with second derivatives at each.
+    newton: u64,
+    /// A look at as many points as there are stages, maps included.
+    look: u64,
+}
+
+impl EvaluationCost {
+    fn of<const N: usize>(stages: usize) -> Self {
+        let (unknowns, stages) = ((stages * (N + 2)) as u64, stages as u64);
+        // An evaluation takes as long as about 32 products; second derivatives are not in lanes.
+        EvaluationCost { newton: 4 * (unknowns.pow(3) / 96 + 8 * stages * (2 * N as u64 + 1)), look: 2 * stages }
+    }
+}
+
+/// A first step that cannot be taken calls for shorter steps; bad input ends the search.
+fn halted_at_the_start<const N: usize>(error: InputError) -> Result<TrialEnd<N>, InputError> {
+    match error {
+        InputError::Sigma { sigma } => Ok(TrialEnd::Halted { part: 0.0, cause: StepError::SigmaVanished { sigma } }),
+        InputError::FirstStep(cause) => Ok(TrialEnd::Halted { part: 0.0, cause }),
+        bad => Err(bad),
+    }
+}

@@ -1,0 +1,73 @@
+//! The velocities of a motion at some times, and the largest speed between them.
+
+use crate::run::accuracy::noise::all_together;
+use crate::run::accuracy::track::{in_units, norm};
+use crate::run::{Near, Problem, Request};
+use crate::solve::mass_matrix::inverted;
+use crate::{InputError, SelectionFailure, legendre_inverse};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, max_or_nan};
+
+/// The velocities of one run, and what their errors are relative to.
+pub(crate) struct Velocities<'r, 'p, L, const N: usize> {
+    problem: &'r Problem<'p, L, N>,
+    scales: Option<SVector<f64, N>>,
+    /// The largest speed so far, and the largest position.
+    speed: f64,
+    reach: f64,
+    /// The last time and position.
+    before: (f64, SVector<f64, N>),
+}
+
+impl<'r, 'p, L: Lagrangian<N>, const N: usize> Velocities<'r, 'p, L, N> {
+    /// Those of a run of a problem, at its start, with scales of the coordinates where they are given.
+    pub fn new(problem: &'r Problem<'p, L, N>, scales: Option<SVector<f64, N>>) -> Self {
+        let size = |x: &SVector<f64, N>| norm(&[in_units(x, scales.as_ref())]);
+        let (speed, reach) = (size(&problem.start.v), size(&problem.start.q));
+        Velocities { problem, scales, speed, reach, before: (problem.t0, problem.start.q) }
+    }
+
+    /// Takes in the end of a step: the mean velocity of the step is one of the motion's.
+    pub fn pass(&mut self, t: f64, q: &SVector<f64, N>) {
+        let (t_before, q_before) = std::mem::replace(&mut self.before, (t, *q));
+        self.reach = max_or_nan(self.reach, norm(&[in_units(q, self.scales.as_ref())]));
+        if t != t_before {
+            self.take_in(&((q - q_before) / (t - t_before)));
+        }
+    }
+
+    /// The velocity of a state, of several the one next to another. 0 where none is found: the run itself ends where it needs one.
+    pub fn at(&mut self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> SVector<f64, N> {
+        self.pass(t, &state.q);
+        let near = near.unwrap_or(self.problem.start.v);
+        let v = legendre_inverse(self.problem.lagrangian, t, state, &near).map_or(SVector::zeros(), |x| x.v);
+        self.take_in(&v);
+        v
+    }
+
+    fn take_in(&mut self, v: &SVector<f64, N>) {
+        self.speed = max_or_nan(self.speed, norm(&[in_units(v, self.scales.as_ref())]));
+    }
+
+    /// The largest speed of a run of so many steps; infinite where the motion moves by no more than the rounding of its positions, so that its
+    /// velocity tells nothing.
+    pub fn speed(&self, steps: usize) -> f64 {
+        let moved = self.speed * (self.before.0 - self.problem.t0).abs();
+        if moved <= all_together(steps) * f64::EPSILON * self.reach { f64::INFINITY } else { self.speed }
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> Request<'_, L, N> {
+    /// An accuracy that is refused, for the rounding of the velocity where that alone is larger: a momentum `p = v + A(q)` determines v up to the
+    /// rounding of A.
+    pub(crate) fn by_rounding_of_velocity(&self, refused: InputError) -> InputError {
+        let Problem { lagrangian, start, state, t0, .. } = self.problem;
+        let InputError::Accuracy { wanted, .. } = refused else { return refused };
+        let rounding = inverted(&lagrangian.hessian(*t0, start).vv)
+            .map_or(0.0, |inverse| (inverse.abs() * state.p.abs()).norm() * f64::EPSILON / start.v.norm());
+        if rounding > wanted && rounding.is_finite() {
+            return InputError::Accuracy { wanted, reached: rounding, cause: SelectionFailure::RoundOff };
+        }
+        refused
+    }
+}

@@ -1,0 +1,199 @@
+//! Claims of structure along a run: what is constant at its start must be so wherever it goes.
+
+use crate::resolution::monitor::size;
+use crate::run::Plan;
+use crate::solve::hermite::hermite;
+use crate::{Stepper, legendre_inverse};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{
+    Defect, Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint, gradient_rounding, max_abs_or_nan,
+    max_or_nan,
+};
+
+/// The part of what a motion has covered, in any coordinate or momentum, that it moves at least between two looks.
+const MOVED: f64 = 0.125;
+
+/// The points within a step that has covered more than that by itself.
+const WITHIN: usize = 8;
+
+/// The difference of what is claimed to be constant, relative to its size, from which on it is not: whatever is rounded by less than ten
+/// digits, and then some thousand units of that.
+const DIFFERENT: f64 = 1e-6;
+const ROUNDINGS: f64 = 1e4;
+
+/// Compares what the claims say is constant, the mass matrix, `L_z` and second derivatives, with what it is at the start of a run. It
+/// looks after eight steps in each doubling of their number, where the motion has moved by a part of all that it has covered, so that
+/// what lies between the places of two looks is narrower than that; and within a step that does so by itself.
+///
+/// This costs about as much as a step; [`Structure::defects`] sees more, and is taken less often.
+pub(crate) struct ClaimMonitor<const N: usize> {
+    structure: Structure,
+    /// At the start; at other times of a system that depends on time it is taken anew.
+    reference: Option<Constants<N>>,
+    /// The box that the motion has covered, and where the last look was.
+    low: [SVector<f64, N>; 2],
+    high: [SVector<f64, N>; 2],
+    last: [SVector<f64, N>; 2],
+    guess: SVector<f64, N>,
+}
+
+/// What claims say is constant.
+struct Constants<const N: usize> {
+    rate: f64,
+    mass: SMatrix<f64, N, N>,
+    qq: Option<SMatrix<f64, N, N>>,
+}
+
+impl<const N: usize> Constants<N> {
+    fn at<L: Lagrangian<N>>(structure: &Structure, lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Option<Self> {
+        let constants = if structure.quadratic {
+            let h = lagrangian.hessian(t, x);
+            Constants { rate: lagrangian.gradient(t, x).z, mass: h.vv, qq: Some(h.qq) }
+        } else {
+            Constants { rate: lagrangian.gradient(t, x).z, mass: lagrangian.mass_matrix(t, x), qq: None }
+        };
+        let entries = constants.mass.iter().chain(constants.qq.iter().flatten());
+        let finite = constants.rate.is_finite() && entries.into_iter().all(|e| e.is_finite());
+        finite.then_some(constants)
+    }
+}
+
+impl<const N: usize> ClaimMonitor<N> {
+    /// That of a run whose Lagrangian claims something that is constant, and has not proved it.
+    pub fn of<L: Lagrangian<N>>(plan: &Plan<'_, L, N>) -> Option<Self> {
+        if const { L::PROVED } {
+            return None;
+        }
+        let problem = plan.problem;
+        let structure = problem.structure;
+        if !(structure.is_affine_in_z() || structure.separable || structure.constant_mass || structure.quadratic) {
+            return None;
+        }
+        let here = [problem.state.q, problem.state.p];
+        // What is quadratic may have coefficients that depend on time.
+        let reference = structure.autonomous || structure.z_free && structure.constant_mass && !structure.quadratic;
+        let reference = if reference {
+            Some(Constants::at(&structure, problem.lagrangian, problem.t0, &problem.start)?)
+        } else {
+            None
+        };
+        Some(ClaimMonitor { structure, reference, low: here, high: here, last: here, guess: problem.start.v })
+    }
+
+    /// The number of steps after which it looks next.
+    pub fn next(&self, taken: usize) -> usize {
+        taken.saturating_add((taken / 8).max(1))
+    }
+
+    /// Looks at the end of a step, and within it.
+    pub fn look<L: Lagrangian<N>>(
+        &mut self,
+        plan: &Plan<'_, L, N>,
+        stepper: &dyn Stepper<N>,
+        before: Option<&(f64, PhasePoint<N>)>,
+    ) -> Option<Defect> {
+        let (t, state) = (stepper.time(), stepper.state());
+        if self.cover(&state) < MOVED {
+            return None;
+        }
+        self.last = [state.q, state.p];
+        let lagrangian = plan.problem.lagrangian;
+        let guess = stepper.last_velocity().unwrap_or(self.guess);
+        let x = legendre_inverse(lagrangian, t, &state, &guess).ok()?;
+        self.guess = x.v;
+        let fractions = (1..WITHIN).map(|i| i as f64 / WITHIN as f64);
+        if let Some(curve) = stepper.dense() {
+            let (start, end) = curve.span();
+            let from = curve.at_fraction(0.0);
+            if self.part([from.q - state.q, from.p - state.p]) > MOVED {
+                for fraction in fractions {
+                    let (t, state) = (start + fraction * (end - start), curve.at_fraction(fraction));
+                    let within = legendre_inverse(lagrangian, t, &state, &self.guess);
+                    if let Some(defect) = within.ok().and_then(|x| self.compare(plan, t, &x)) {
+                        return Some(defect);
+                    }
+                }
+            }
+        } else if let Some((start, from)) = before
+            && self.part([from.q - state.q, from.p - state.p]) > MOVED
+            && let Ok(from) = legendre_inverse(lagrangian, *start, from, &self.guess)
+        {
+            for fraction in fractions {
+                let at = fraction * (t - start);
+                if let Some(defect) = self.compare(plan, start + at, &hermite(&from, &x, t - start, at)) {
+                    return Some(defect);
+                }
+            }
+        }
+        self.compare(plan, t, &x)
+    }
+
+    /// Takes a state into the box, and says how far it is from the last look.
+    fn cover(&mut self, state: &PhasePoint<N>) -> f64 {
+        for (x, (low, high)) in [&state.q, &state.p].into_iter().zip(self.low.iter_mut().zip(&mut self.high)) {
+            // A run has ended before it is not finite.
+            *low = low.zip_map(x, |low, x| if x < low { x } else { low });
+            *high = high.zip_map(x, |high, x| if x > high { x } else { high });
+        }
+        self.part([state.q - self.last[0], state.p - self.last[1]])
+    }
+
+    /// A distance as a part of the box, in the direction in which it is the largest part.
+    fn part(&self, distance: [SVector<f64, N>; 2]) -> f64 {
+        let mut part = 0.0;
+        for (distance, (low, high)) in distance.iter().zip(self.low.iter().zip(&self.high)) {
+            for i in 0..N {
+                if distance[i] != 0.0 {
+                    part = max_or_nan(part, distance[i].abs() / (high[i] - low[i]));
+                }
+            }
+        }
+        part
+    }
+
+    fn compare<L: Lagrangian<N>>(&self, plan: &Plan<'_, L, N>, t: f64, x: &VelocityPoint<N>) -> Option<Defect> {
+        let (lagrangian, structure) = (plan.problem.lagrangian, self.structure);
+        let here = Constants::at(&structure, lagrangian, t, x)?;
+        let then;
+        let reference = match &self.reference {
+            Some(reference) => reference,
+            None => {
+                then = Constants::at(&structure, lagrangian, t, &plan.problem.start)?;
+                &then
+            }
+        };
+        let rounding = |part: usize| {
+            let (_, r) = gradient_rounding(lagrangian, t, x);
+            let of = |part: &SVector<f64, N>, by: f64| max_abs_or_nan(part.iter().copied()) / by;
+            ROUNDINGS * [of(&r.x, size(&x.q)), of(&r.y, size(&x.v)), r.z][part]
+        };
+        let mut found = None;
+        let mut claim = |made: bool, claim: &'static str, part: usize, difference: Option<(f64, f64)>| {
+            if let (true, None, Some((apart, size))) = (made, &found, difference)
+                && apart > rounding(part)
+            {
+                found = Some(Defect { claim, size });
+            }
+        };
+        let rate = difference(&[here.rate], &[reference.rate]);
+        let Structure { z_free, z_affine, constant_rate, separable, quadratic, constant_mass, .. } = structure;
+        claim(z_free, "z_free", 2, rate);
+        claim(constant_rate, "constant_rate", 2, rate);
+        claim(z_affine, "z_affine", 2, rate);
+        let mass = difference(here.mass.as_slice(), reference.mass.as_slice());
+        claim(constant_mass, "constant_mass", 1, mass);
+        claim(separable, "separable", 1, mass);
+        claim(quadratic, "quadratic", 1, mass);
+        if let (Some(a), Some(b)) = (&here.qq, &reference.qq) {
+            claim(true, "quadratic", 0, difference(a.as_slice(), b.as_slice()));
+        }
+        found
+    }
+}
+
+/// The largest difference of two sets of numbers, and that relative to the largest of them; `None` where they are the same.
+fn difference(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
+    let apart = max_abs_or_nan(a.iter().zip(b).map(|(a, b)| a - b));
+    let size = max_abs_or_nan(a.iter().chain(b).copied());
+    (apart > DIFFERENT * size).then(|| (apart, apart / size))
+}

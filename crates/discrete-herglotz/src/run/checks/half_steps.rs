@@ -1,0 +1,194 @@
+//! Steps against twice as many of half their length: whether given steps resolve the motion at all.
+
+use crate::error::step_error;
+use crate::resolution::monitor::{LEAST, rounding};
+use crate::run::{Plan, Problem};
+use crate::{StepError, Stepper, SuspectInterval, legendre_inverse};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint, max_abs_or_nan, max_or_nan};
+
+/// The difference from two halves, relative to the motion, from which on a step does not resolve it. Of the orders that there are
+/// a step then has an error of its own of a twentieth, or a fifteenth with order one.
+const APART: f64 = 0.05;
+
+/// The steps from rest in which a method of order one is off by as much as it moves.
+const FIRST_STEPS: f64 = 16.0;
+
+impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
+    /// The misfit of some steps; above one where they do not resolve the motion. `None` where there is nothing to compare with.
+    pub(crate) fn against_halves(
+        &self,
+        SuspectInterval { steps, t, from, to, .. }: &SuspectInterval<N>,
+    ) -> Option<f64> {
+        let Problem { lagrangian, start, .. } = *self.problem;
+        let end = t + *steps as f64 * self.h;
+        // Of several velocities that of the motion.
+        let mean = (to.q - from.q) / (end - t);
+        let guess = if self.problem.structure.constant_mass { start.v } else { mean };
+        let VelocityPoint { v, .. } = legendre_inverse(lagrangian, *t, from, &guess).ok()?;
+        let at_end = |x: &PhasePoint<N>| legendre_inverse(lagrangian, end, x, &v).map(|x| x.v).ok();
+        if self.info.in_transformed_time {
+            return None;
+        }
+        let Ok(fine) = self.advanced((*t, from), &v, 0.5 * self.h, (2 * steps, end), |_| ()) else {
+            // What shorter steps do not get over a longer one should not.
+            return Some(f64::INFINITY);
+        };
+        let fine = fine.state();
+        let (coarse_v, fine_v) = (at_end(to)?, at_end(&fine)?);
+        let size = |x: [&SVector<f64, N>; 3]| max_abs_or_nan(x.into_iter().flat_map(|x| x.iter().copied()));
+        let apart = |a: &SVector<f64, N>, b: &SVector<f64, N>| max_abs_or_nan((a - b).iter().copied());
+        let relative = |apart: f64, size: f64| if apart == 0.0 { 0.0 } else { apart / size };
+        // From rest, steps of order one are off by what they move over their number.
+        let moved =
+            if self.info.order == 1 { FIRST_STEPS * size([&coarse_v, &fine_v, &v]) * self.h.abs() } else { 0.0 };
+        let width =
+            max_or_nan(max_or_nan(size([&from.q, &to.q, &fine.q]), moved), rounding(&start.q, &start.v, self.h));
+        let of_v = apart(&coarse_v, &fine_v);
+        let of_v =
+            if of_v * self.h.abs() > LEAST * width { relative(of_v, size([&v, &coarse_v, &fine_v])) } else { 0.0 };
+        Some(max_or_nan(relative(apart(&to.q, &fine.q), width), of_v) / APART)
+    }
+
+    /// A stepper after steps of another length, from a state with its velocity, so many or until a time; in transformed time, steps of the
+    /// same length in its time: they are cut where they pass the time that they are to reach.
+    ///
+    /// A few steps of a linear motion are worth no matrix, not even a cheap one, unless their stages cannot be solved for without it:
+    /// the sweeps lose with an ill-conditioned mass matrix what they gain.
+    pub(crate) fn advanced(
+        &self,
+        (t, from): (f64, &PhasePoint<N>),
+        v: &SVector<f64, N>,
+        h: f64,
+        (steps, t_end): (usize, f64),
+        guess: impl Fn(&mut dyn Stepper<N>),
+    ) -> Result<Box<dyn Stepper<N> + 'p>, StepError> {
+        let Structure { quadratic: linear, separable, .. } = self.problem.structure;
+        let by = |quadratic: bool| {
+            let start = VelocityPoint { q: from.q, v: *v, z: from.z };
+            // The tables of twice the working precision depend on the length of the step: a few steps are not worth them.
+            let separable = separable && (quadratic || self.info.collocation.is_none());
+            let structure = Structure { quadratic, separable, ..self.problem.structure };
+            let problem = Problem { t0: t, start, state: *from, structure, ..*self.problem };
+            let h = if self.info.in_transformed_time { self.h } else { h };
+            let mut stepper = self.make_stepper(&problem, h, false).map_err(step_error)?;
+            guess(&mut *stepper);
+            stepper.advance_until(steps, t_end).map_err(|halt| halt.cause)?;
+            Ok(stepper)
+        };
+        by(false).or_else(|cause| if linear { by(true) } else { Err(cause) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{GaussCollocation, Plan, Problem, Stepper, Steps, Until};
+    use contact_geom::nalgebra::SVector;
+    use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint};
+
+    /// Oscillators with drag, of frequencies 1, 2 .. N: `v.v/2 - (k x_k)^2/2 - z/10`.
+    struct Oscillators;
+
+    impl<const N: usize> Lagrangian<N> for Oscillators {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
+            (0..N).fold(-z * 0.1, |l, k| l + (v[k] * v[k] - q[k] * q[k] * ((k + 1) as f64).powi(2)) * 0.5)
+        }
+        fn structure(&self) -> Structure {
+            Structure {
+                autonomous: true,
+                separable: true,
+                quadratic: true,
+                z_affine: true,
+                constant_rate: true,
+                constant_mass: true,
+                ..Structure::default()
+            }
+        }
+    }
+
+    const H: f64 = 0.0625;
+
+    /// The plan of so many steps from `q = 1, v = 0`.
+    fn plan<'a, const N: usize>(
+        problem: &'a Problem<'a, Oscillators, N>,
+        stages: usize,
+        steps: usize,
+    ) -> Plan<'a, Oscillators, N> {
+        let run = problem.by(GaussCollocation { stages }).steps(Steps::Size(H));
+        run.plan(Until::Time(H * steps as f64)).unwrap()
+    }
+
+    fn problem<const N: usize>() -> Problem<'static, Oscillators, N> {
+        Problem::new(&Oscillators, 0.0, VelocityPoint::new([1.0; N], [0.0; N], 0.0)).unwrap()
+    }
+
+    /// Whether a stepper multiplies with a matrix: then it evaluates nothing.
+    fn by_one_matrix<const N: usize>(mut stepper: Box<dyn Stepper<N> + '_>) -> bool {
+        stepper.advance(1).unwrap();
+        stepper.evaluations() == 0
+    }
+
+    /// The matrix of a linear motion is made for many steps of one length, and not for one of another: not at any time at which a row or an event
+    /// is asked for.
+    #[test]
+    fn a_step_of_another_length_makes_no_matrix() {
+        let problem = problem::<2>();
+        let plan = plan(&problem, 8, 100);
+        assert!(by_one_matrix(plan.stepper().unwrap()));
+        for h in [0.3 * H, -0.5 * H] {
+            let part = plan.advanced((0.0, &problem.state), &problem.start.v, h, (1, h), |_| ()).unwrap();
+            assert!(part.evaluations() > 0);
+            // x = e^(-t/20) (cos w t + sin w t / (20 w)), w^2 = k^2 - 1/400; to round-off, of ten terms.
+            let (t, state) = (h, part.state());
+            for k in 0..2 {
+                let w = (((k + 1) * (k + 1)) as f64 - 0.0025f64).sqrt();
+                let exact = (-0.05 * t).exp() * ((w * t).cos() + 0.05 * (w * t).sin() / w);
+                assert!((state.q[k] - exact).abs() <= 10.0 * f64::EPSILON, "{h}: {:e}, {exact:e}", state.q[k]);
+            }
+        }
+    }
+
+    /// Nor for so few steps that it costs more than it spares: of 96 unknowns it is solved for as long as a thousand steps take, of half as many an eighth of that.
+    #[test]
+    fn a_few_steps_of_many_coordinates_make_no_matrix() {
+        let problem = problem::<6>();
+        for (steps, stages, expected) in [(500, 16, false), (1000, 16, true), (50, 8, false), (200, 8, true)] {
+            let plan = plan(&problem, stages, steps);
+            assert_eq!(by_one_matrix(plan.stepper().unwrap()), expected, "{steps} steps of {stages} stages");
+        }
+    }
+
+    /// An oscillator in two coordinates that are nearly one: the mass matrix, and that of the spring, have the condition 1e10.
+    struct NearlyOne;
+
+    impl Lagrangian<2> for NearlyOne {
+        fn value<T: Scalar>(&self, t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
+            let turned = |x: &SVector<T, 2>| {
+                let (sin, cos) = 0.6f64.sin_cos();
+                SVector::from([x[0] * cos + x[1] * sin, (x[1] * cos - x[0] * sin) * 1e-5])
+            };
+            Oscillators.value(t, &turned(q), &turned(v), z) + turned(q)[1] * turned(q)[1] * 1.5
+        }
+        fn structure(&self) -> Structure {
+            Lagrangian::<2>::structure(&Oscillators)
+        }
+    }
+
+    /// Without the matrix the stages of such a motion are not solved for: its steps are compared, and looked into, by one.
+    #[test]
+    fn an_ill_conditioned_mass_matrix_is_no_flaw_of_the_steps() {
+        let start = VelocityPoint::new([1.0, -0.4], [0.3, 0.8], 0.0);
+        let problem = Problem::new(&NearlyOne, 0.0, start).unwrap();
+        for stages in [1, 2] {
+            let run = problem.by(GaussCollocation { stages }).steps(Steps::Count(64));
+            assert_eq!(run.run(Until::Time(4.0)).unwrap().unresolved, None, "{stages} stages");
+            let plan = problem.by(GaussCollocation { stages }).steps(Steps::Count(64)).plan(Until::Time(4.0)).unwrap();
+            let part = plan.advanced((0.0, &problem.state), &start.v, 0.03, (1, 0.03), |_| ()).unwrap();
+            // By the whole step's matrix: to rounding through the inverse of the mass matrix.
+            let mut whole = problem.by(GaussCollocation { stages }).steps(Steps::Count(1));
+            whole = whole.without_action();
+            let whole = whole.run(Until::Time(0.03)).unwrap();
+            assert!((part.state().q - whole.q).norm() <= 1e10 * 8.0 * f64::EPSILON);
+        }
+    }
+}

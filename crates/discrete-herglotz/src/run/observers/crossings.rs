@@ -1,0 +1,400 @@
+//! The changes of sign of the function of an event, step by step.
+
+use crate::StepError;
+use crate::run::observers::events::{Crossing, Event};
+use crate::run::observers::observer::Beside;
+use crate::run::{LastStep, Motion, Near, RunInfo};
+use crate::solve::roots::{bracketed_root, bracketed_root_within};
+use contact_geom::PhasePoint;
+
+/// A time is told to so many of its roundings, and a state to so many of its own: those of the sums of a step, of the iteration that
+/// finds it, and of the search for a root.
+const ROUNDINGS: f64 = 16.0 * f64::EPSILON;
+
+/// The part of its size in a step below which a function may be on its surface, or has another sign on the motion than on a sketch.
+const NEAR: f64 = 0.01;
+
+/// Parts of the distance of two points: to which the root of a sketch between them is found, and over which the slope there is taken.
+const SKETCHED: f64 = 1e-9;
+const ASIDE: f64 = 1e-3;
+
+/// The corrections after which a root is looked for between two points of the motion.
+const CORRECTIONS: usize = 6;
+
+/// The function of an event at the last point seen.
+#[derive(Clone, Copy)]
+pub(crate) struct LastSign<const N: usize> {
+    pub value: f64,
+    /// The last sign that was not 0; 0 before there was one.
+    pub sign: f64,
+    /// Where the function has vanished since then.
+    pub zero: Option<(f64, PhasePoint<N>)>,
+    /// Where it has the sign, if that is not at the point itself, which is on the surface.
+    pub left: Option<Left>,
+}
+
+/// Where a function that begins on its surface has left it: the time, and its value there.
+#[derive(Clone, Copy)]
+pub(crate) struct Left {
+    pub t: f64,
+    pub value: f64,
+}
+
+/// A change of sign from one point to the next.
+enum Change<const N: usize> {
+    /// None that counts.
+    None,
+    /// At a point that is known.
+    There(f64, PhasePoint<N>),
+    /// Between the two, with these values.
+    Between([f64; 2]),
+}
+
+/// How the parts of a step are looked at.
+#[derive(Clone, Copy)]
+struct Scan<'s, const N: usize> {
+    /// About the states between them; those of the motion where there is none, or where the function is smaller than `near`.
+    sketch: Option<&'s [PhasePoint<N>]>,
+    parts: usize,
+    near: f64,
+    /// Where the function leaves its surface after the end, which is on it.
+    left: Option<Left>,
+}
+
+/// The times of a run, as far as the nearness of a surface depends on them.
+#[derive(Clone, Copy)]
+pub(crate) struct Pace {
+    /// About the length of a step, in the sense of the run.
+    h: f64,
+    /// What the rounding of times is measured by, beside the time itself.
+    span: f64,
+}
+
+impl Pace {
+    pub(crate) fn of(RunInfo { t0, t_end, h, count }: &RunInfo) -> Self {
+        let span = t_end - t0;
+        let h = h.unwrap_or(span / count.map_or(64.0, |count| count.max(1) as f64));
+        // Of a long run a part, so that what counts as rounding stays far below a step.
+        Pace { h, span: span.abs().min(4096.0 * h.abs()) }
+    }
+
+    /// The difference of times that is rounding.
+    pub(crate) fn rounding(self, t: f64) -> f64 {
+        ROUNDINGS * (t.abs() + self.span)
+    }
+}
+
+/// The motion of a run with its times.
+#[derive(Clone, Copy)]
+pub(crate) struct Way<'r, const N: usize> {
+    pub motion: &'r dyn Motion<N>,
+    pub pace: Pace,
+    pub near: Near<N>,
+}
+
+impl<const N: usize> Event<'_, N> {
+    /// Its changes of sign in a step of which there is a sketch.
+    pub(crate) fn in_step(
+        &mut self,
+        index: usize,
+        (step, way): (&mut LastStep<'_, N>, Way<'_, N>),
+        sketch: &[PhasePoint<N>],
+        seen: &mut LastSign<N>,
+        found: &mut Vec<Crossing<N>>,
+    ) -> Result<(), StepError> {
+        let ((_, end), parts) = (step.ends(), sketch.len() + 1);
+        let value = self.value(end.0, &end.1);
+        let (mut quiet, mut size) = (value * seen.sign > 0.0, seen.value.abs());
+        for (k, x) in (1..parts).zip(sketch) {
+            // A sketch may leave the domain of the function where the motion does not.
+            let there = self.value(step.time(k as f64 / parts as f64), x);
+            quiet &= there * seen.sign > 0.0;
+            size = size.max(there.abs());
+        }
+        // What is nearer to its surface than a hundredth of its size in the step may be on it.
+        let left = if value.abs() < NEAR * size { self.leaves(way, (end.0, &end.1), value) } else { None };
+        if quiet && seen.zero.is_none() && left.is_none() {
+            (seen.value, seen.left) = (value, None);
+            return Ok(());
+        }
+        let (before, count) = (*seen, found.len());
+        let scan = Scan { sketch: Some(sketch), parts, near: NEAR * size, left };
+        if !self.scan(index, step, scan, seen, found)? {
+            (*seen, _) = (before, found.truncate(count));
+            self.scan(index, step, Scan { sketch: None, ..scan }, seen, found)?;
+        }
+        seen.left = left;
+        Ok(())
+    }
+
+    /// The changes of sign between parts of a step; `false` where the sketch has told of one that the motion does not have.
+    fn scan(
+        &mut self,
+        index: usize,
+        step: &mut LastStep<'_, N>,
+        Scan { sketch, parts, near, left }: Scan<'_, N>,
+        seen: &mut LastSign<N>,
+        found: &mut Vec<Crossing<N>>,
+    ) -> Result<bool, StepError> {
+        let (start, end) = step.ends();
+        for k in 1..=parts {
+            let tau = k as f64 / parts as f64;
+            let sketched = sketch.and_then(|sketch| sketch.get(k - 1)).map(|x| (step.time(tau), *x));
+            let sketched = sketched.filter(|(t, x)| (near..=f64::MAX).contains(&self.value(*t, x).abs()));
+            let (t, state) = match sketched {
+                _ if k == parts => end,
+                Some(sketched) => sketched,
+                None => (step.time(tau), step.at(step.time(tau))?),
+            };
+            let value = self.value(t, &state);
+            let mut from = (k - 1) as f64 / parts as f64;
+            if let Some(Left { t, value: there }) = seen.left {
+                let fraction = (t - start.0) / (end.0 - start.0);
+                if fraction >= tau {
+                    // It is still on the surface.
+                    continue;
+                }
+                (from, seen.value, seen.left) = (fraction, there, None);
+            }
+            if !value.is_finite() {
+                found.extend(self.before_its_domain_ends(step, [from, tau], seen)?.map(|(t, state)| Crossing {
+                    t,
+                    event: index,
+                    state,
+                }));
+                return Err(StepError::Event { t });
+            }
+            let side = if k == parts { left.map_or(value, |left| left.value) } else { value };
+            match self.between(seen, [value, side], (t, &state)) {
+                Change::None => {}
+                Change::There(t, state) => found.push(Crossing { t, event: index, state }),
+                Change::Between(values) => {
+                    let root = match sketch {
+                        Some(_) => self.root_by_sketch(step, [from, tau])?,
+                        None => Some(self.root(step, [from, tau], values)?),
+                    };
+                    let Some((t, state)) = root else { return Ok(false) };
+                    found.push(Crossing { t, event: index, state });
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// The root between two points of a step at which the function has different signs, to round-off.
+    fn root(
+        &mut self,
+        step: &LastStep<'_, N>,
+        ends: [f64; 2],
+        values: [f64; 2],
+    ) -> Result<(f64, PhasePoint<N>), StepError> {
+        let tau = bracketed_root(ends, values, |tau| self.at(step.time(tau), &step.at(step.time(tau))?))?;
+        Ok((step.time(tau), step.at(step.time(tau))?))
+    }
+
+    /// The same from the root of the sketch, which is near, by Newton's method with the slope of the sketch: two states of the motion
+    /// are enough where the step resolves it. `None` where that does not converge, as where the function jumps.
+    fn root_by_sketch(
+        &mut self,
+        step: &mut LastStep<'_, N>,
+        [a, b]: [f64; 2],
+    ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
+        let mut about = |tau: f64| step.about(tau).map(|x| self.value(step.time(tau), &x));
+        let ends = [about(a)?, about(b)?];
+        // A NaN has no sign.
+        let brackets = ends[0] * ends[1] < 0.0;
+        if !brackets {
+            return Ok(None);
+        }
+        let mut tau = bracketed_root_within(SKETCHED * (b - a), [a, b], ends, &mut about)?;
+        let aside = ASIDE * (b - a);
+        let (lower, upper) = ((tau - aside).max(0.0), (tau + aside).min(1.0));
+        let mut slope = (about(upper)? - about(lower)?) / (upper - lower);
+        let mut last: Option<(f64, f64, (f64, PhasePoint<N>))> = None;
+        for _ in 0..CORRECTIONS {
+            let at = (step.time(tau), step.at(step.time(tau))?);
+            let g = self.value(at.0, &at.1);
+            if let Some((before, g_before, _)) = last
+                && (tau - before).abs() > 0.1 * aside
+            {
+                slope = (g - g_before) / (tau - before);
+            }
+            let change = g / slope;
+            // A slope that overflows would make any place a root.
+            if !(slope.is_finite() && change.is_finite()) {
+                return Ok(None);
+            }
+            if change.abs() <= 0.5 * ROUNDINGS {
+                return Ok(Some(at));
+            }
+            if change.abs() <= Beside::<N>::REACH
+                && let Some(found) = self.root_beside(step, (tau, &at.1), slope, change)?
+            {
+                return Ok(Some(found));
+            }
+            // So near to two states the motion is a line to round-off, and another correction would change nothing.
+            if let Some((before, _, (_, from))) = last
+                && let gap = tau - before
+                && (change * gap).abs() <= f64::EPSILON / 16.0
+                && change * change < 0.5 * ROUNDINGS * gap.abs()
+            {
+                let part = -change / gap;
+                let (q, p) = (at.1.q + (at.1.q - from.q) * part, at.1.p + (at.1.p - from.p) * part);
+                let state = PhasePoint { q, p, z: at.1.z + (at.1.z - from.z) * part };
+                return Ok(Some((step.time(tau - change), state)));
+            }
+            // Of two that only rounding tells from each other that which is nearer.
+            if let Some((_, g_before, before)) = last
+                && g.abs() > 0.25 * g_before.abs()
+                && change.abs() <= 0.01 * aside
+            {
+                return Ok(Some(if g.abs() < g_before.abs() { at } else { before }));
+            }
+            last = Some((tau, g, at));
+            tau -= change;
+            if !(a - aside..=b + aside).contains(&tau) || !(0.0..=1.0).contains(&tau) {
+                return Ok(None);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The root beside a state of the motion, where that of the sketch leads so near to it that a second state is not needed.
+    fn root_beside(
+        &mut self,
+        step: &mut LastStep<'_, N>,
+        (tau, state): (f64, &PhasePoint<N>),
+        slope: f64,
+        mut ahead: f64,
+    ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
+        let Some(beside) = step.beside(tau, state)? else { return Ok(None) };
+        ahead = -ahead;
+        for _ in 0..CORRECTIONS {
+            let (t, there) = (step.time(tau + ahead), beside.at(ahead));
+            let change = self.value(t, &there) / slope;
+            if change.abs() <= 0.5 * ROUNDINGS {
+                return Ok(Some((t, there)));
+            }
+            ahead -= change;
+            // A NaN is within nothing.
+            let within = ahead.abs() <= 2.0 * Beside::<N>::REACH && (0.0..=1.0).contains(&(tau + ahead));
+            if !within {
+                return Ok(None);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The change of sign that counts between the point last seen and one where the function is not defined, if there is one.
+    fn before_its_domain_ends(
+        &mut self,
+        step: &LastStep<'_, N>,
+        [mut from, mut to]: [f64; 2],
+        seen: &mut LastSign<N>,
+    ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
+        let before = seen.sign;
+        loop {
+            let tau = 0.5 * (from + to);
+            if tau <= from || tau >= to {
+                return Ok(None);
+            }
+            let (t, state) = (step.time(tau), step.at(step.time(tau))?);
+            let value = self.value(t, &state);
+            if !value.is_finite() {
+                to = tau;
+                continue;
+            }
+            match self.between(seen, [value, value], (t, &state)) {
+                Change::None if value * before >= 0.0 => from = tau,
+                Change::None => return Ok(None),
+                Change::There(t, state) => return Ok(Some((t, state))),
+                Change::Between(values) => return self.root(step, [from, tau], values).map(Some),
+            }
+        }
+    }
+
+    /// The change of sign between the point last seen and the next one, where the function has a value and a side, if there is one that
+    /// counts.
+    fn between(
+        &mut self,
+        seen: &mut LastSign<N>,
+        [value, side]: [f64; 2],
+        (t, state): (f64, &PhasePoint<N>),
+    ) -> Change<N> {
+        let before = std::mem::replace(&mut seen.value, value);
+        if side == 0.0 {
+            seen.zero = seen.zero.or(Some((t, *state)));
+            return Change::None;
+        }
+        let (old, zero) = (std::mem::replace(&mut seen.sign, side.signum()), seen.zero.take());
+        if !self.counts(old, side) {
+            return Change::None;
+        }
+        match zero {
+            Some((t, state)) => Change::There(t, state),
+            // It is on the surface, and about to leave it.
+            None if value * before >= 0.0 => Change::There(t, *state),
+            None => Change::Between([before, value]),
+        }
+    }
+
+    /// Where the function leaves its surface after a point that is on it up to rounding; `None` where it is not on it, or does not leave it
+    /// within half a step.
+    ///
+    /// With g its value, it is on the surface where `|g|` is at most what the motion changes it by in the rounding of the time, and
+    /// the rounding of the state. It has left where it is beyond twice that, so that the sign is none of rounding.
+    pub(crate) fn leaves(
+        &mut self,
+        Way { motion, pace, near }: Way<'_, N>,
+        (t, state): (f64, &PhasePoint<N>),
+        g: f64,
+    ) -> Option<Left> {
+        let (rounding, noise) = (pace.rounding(t), self.rounding(t, state, g));
+        let shortest = (f64::powi(2.0, -20) * pace.h.abs()).max(64.0 * rounding);
+        for ahead in (0..5).map(|k| shortest * f64::powi(16.0, k)).take_while(|ahead| *ahead <= 0.5 * pace.h.abs()) {
+            let Some(left) = self.after((motion, near), (t, state), ahead.copysign(pace.h)) else { continue };
+            let window = noise + (left.value - g).abs() * (rounding / ahead);
+            let on = g.abs() <= window
+                // It may jump.
+                || g * left.value < 0.0
+                    && self.after((motion, near), (t, state), rounding.copysign(pace.h)).is_some_and(|x| g * x.value < 0.0);
+            if !on {
+                return None;
+            }
+            if left.value.abs() > 2.0 * window {
+                return Some(left);
+            }
+        }
+        None
+    }
+
+    /// The function on the motion some time after a point, where both are defined.
+    fn after(
+        &mut self,
+        (motion, near): (&dyn Motion<N>, Near<N>),
+        (t, state): (f64, &PhasePoint<N>),
+        ahead: f64,
+    ) -> Option<Left> {
+        let there = t + ahead;
+        let (x, _) = motion.inside(&(t, *state), there, near, None).ok()?;
+        let value = self.value(there, &x);
+        value.is_finite().then_some(Left { t: there, value })
+    }
+
+    /// What the rounding of a state changes the function by, each of q, p and z by its own size. Where it is not defined aside, nothing.
+    fn rounding(&mut self, t: f64, state: &PhasePoint<N>, g: f64) -> f64 {
+        let [q, p, z] = [state.q.amax(), state.p.amax(), state.z.abs()].map(|size| ROUNDINGS * size);
+        let mut change =
+            |x: PhasePoint<N>| Some((self.value(t, &x) - g).abs()).filter(|d| d.is_finite()).unwrap_or(0.0);
+        let mut sum = change(PhasePoint { z: state.z + z, ..*state });
+        for i in 0..N {
+            let mut aside = *state;
+            aside.q[i] += q;
+            sum += change(aside);
+            aside = *state;
+            aside.p[i] += p;
+            sum += change(aside);
+        }
+        sum
+    }
+}

@@ -1,0 +1,123 @@
+//! Rows as a CSV file, written while the run goes on.
+
+use crate::InputError;
+use crate::run::{Observer, OutputRequest, Rows, RunInfo, StepView, Stop};
+use std::io::Write;
+use std::ops::ControlFlow;
+
+/// Writes rows as CSV as they come, and keeps none of them: a header, then the numbers of each row with all their digits.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use discrete_herglotz::{CsvRows, GaussCollocation, Problem, Rows, Steps, Until};
+/// let pendulum = Pendulum { gamma: -0.1 };
+/// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;
+/// let mut csv = CsvRows::new(Rows::every(10)?.with_energy(), std::io::stdout());
+/// problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.1)).observe(&mut csv).run(Until::Time(10.0))?;
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+pub struct CsvRows<'f, W: Write, const N: usize> {
+    rows: Rows<'f, N>,
+    writer: csv::Writer<W>,
+    /// Why a row could not be written; the run then ends.
+    pub error: Option<csv::Error>,
+}
+
+impl<'f, W: Write, const N: usize> CsvRows<'f, W, N> {
+    /// These rows, to a file or another writer.
+    pub fn new(rows: Rows<'f, N>, to: W) -> Self {
+        CsvRows { rows, writer: csv::Writer::from_writer(to), error: None }
+    }
+
+    fn write(&mut self, k: usize, last: bool) -> csv::Result<()> {
+        if k == 0 {
+            self.writer.write_record(self.rows.header())?;
+        }
+        for row in self.rows.rows.drain(..) {
+            self.writer.write_record(row.numbers().map(|x| format!("{x:e}")))?;
+        }
+        if last { Ok(self.writer.flush()?) } else { Ok(()) }
+    }
+
+    fn written(&mut self, seen: ControlFlow<Stop<N>>, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if let Err(error) = self.write(at.k, at.last || seen.is_break()) {
+            self.error = Some(error);
+            return ControlFlow::Break(Stop::here("a row that could not be written"));
+        }
+        seen
+    }
+}
+
+impl<W: Write, const N: usize> Observer<N> for CsvRows<'_, W, N> {
+    fn needs(&self) -> OutputRequest {
+        self.rows.needs()
+    }
+
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
+        self.rows.prepare(course)
+    }
+
+    fn next(&self, taken: usize) -> usize {
+        self.rows.next(taken)
+    }
+
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        let seen = self.rows.start(at);
+        self.written(seen, at)
+    }
+
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        let seen = self.rows.step(at);
+        self.written(seen, at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{GaussCollocation, Problem, Status, Steps, Until};
+    use contact_geom::{VelocityPoint, systems::Pendulum};
+
+    fn run(observer: &mut impl Observer<1>) -> Status {
+        let pendulum = Pendulum { gamma: -0.1 };
+        let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.3], 0.0)).unwrap();
+        let run = problem.by(GaussCollocation { stages: 3 }).steps(Steps::Size(0.1)).observe(observer);
+        run.run(Until::Time(2.0)).unwrap().status
+    }
+
+    fn rows<'f>() -> Rows<'f, 1> {
+        Rows::every(3).unwrap().with_energy().column("q^2", |_, x| x.q[0] * x.q[0])
+    }
+
+    /// What is read is what the rows have, to the last bit.
+    #[test]
+    fn the_file_has_the_rows() {
+        let (mut kept, mut text) = (rows(), Vec::new());
+        assert_eq!(run(&mut kept), Status::Completed);
+        let mut csv = CsvRows::new(rows(), &mut text);
+        assert_eq!((run(&mut csv), csv.error.is_none()), (Status::Completed, true));
+        drop(csv);
+        let mut reader = csv::Reader::from_reader(text.as_slice());
+        assert_eq!(reader.headers().unwrap(), vec!["t", "q0", "p0", "z", "energy", "q^2"]);
+        let read: Vec<Vec<f64>> = reader.deserialize().map(Result::unwrap).collect();
+        assert_eq!(read, kept.rows.iter().map(|row| row.numbers().collect::<Vec<_>>()).collect::<Vec<_>>());
+    }
+
+    /// A full disk ends the run, with the cause.
+    #[test]
+    fn a_row_that_cannot_be_written_ends_the_run() {
+        struct Full;
+        impl Write for Full {
+            fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+                Err(std::io::ErrorKind::StorageFull.into())
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        let mut csv = CsvRows::new(rows(), Full);
+        let status = run(&mut csv);
+        assert!(matches!(status, Status::Stopped { by: "a row that could not be written", .. }), "{status:?}");
+        assert!(csv.error.is_some());
+    }
+}

@@ -1,0 +1,253 @@
+//! Events: where functions of the state change sign along a run.
+
+use crate::run::observers::crossings::{LastSign, Pace, Way};
+use crate::run::{LastStep, Observer, OutputRequest, RunInfo, StepView, Stop, Terminal};
+use crate::{InputError, StepError};
+use contact_geom::PhasePoint;
+use std::cell::RefCell;
+use std::ops::ControlFlow;
+
+/// Which changes of sign count, in the sense of the run.
+#[derive(Clone, Copy)]
+enum Direction {
+    Rising,
+    Falling,
+    Both,
+}
+
+/// `g(t, state)`.
+type Function<'f, const N: usize> = Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 'f>;
+
+/// A function `g(t, state)` whose changes of sign are to be found: a section of Poincare, a collision, a turning point.
+pub struct Event<'f, const N: usize> {
+    /// Trial runs call it as well.
+    function: RefCell<Function<'f, N>>,
+    direction: Direction,
+    terminal: bool,
+}
+
+impl<'f, const N: usize> Event<'f, N> {
+    /// All changes of sign of a function, which do not end the run.
+    pub fn new(function: impl FnMut(f64, &PhasePoint<N>) -> f64 + 'f) -> Self {
+        Event { function: RefCell::new(Box::new(function)), direction: Direction::Both, terminal: false }
+    }
+
+    /// Those from negative to positive alone, in the sense of the run.
+    pub fn rising(self) -> Self {
+        Event { direction: Direction::Rising, ..self }
+    }
+
+    /// Those from positive to negative alone.
+    pub fn falling(self) -> Self {
+        Event { direction: Direction::Falling, ..self }
+    }
+
+    /// The first one ends the run.
+    pub fn terminal(self) -> Self {
+        Event { terminal: true, ..self }
+    }
+
+    /// The same for a trial run.
+    fn borrowed(&self) -> Event<'_, N> {
+        let function = |t: f64, x: &PhasePoint<N>| self.function.try_borrow_mut().map_or(f64::NAN, |mut f| f(t, x));
+        Event { function: RefCell::new(Box::new(function)), direction: self.direction, terminal: self.terminal }
+    }
+
+    pub(crate) fn value(&mut self, t: f64, state: &PhasePoint<N>) -> f64 {
+        self.function.get_mut()(t, state)
+    }
+
+    pub(crate) fn at(&mut self, t: f64, state: &PhasePoint<N>) -> Result<f64, StepError> {
+        let value = self.value(t, state);
+        if value.is_finite() { Ok(value) } else { Err(StepError::Event { t }) }
+    }
+
+    pub(crate) fn counts(&self, from: f64, to: f64) -> bool {
+        from * to < 0.0
+            && match self.direction {
+                Direction::Both => true,
+                Direction::Rising => to > 0.0,
+                Direction::Falling => to < 0.0,
+            }
+    }
+}
+
+/// A change of sign that was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing<const N: usize> {
+    /// The time.
+    pub t: f64,
+    /// The index of the event.
+    pub event: usize,
+    /// The state there, from which another run can start.
+    pub state: PhasePoint<N>,
+}
+
+/// Finds events along a run, each to round-off of the time, by any integrator.
+///
+/// The motion between the ends of a step is looked at in a few parts, `s + 2` of a Gauss step of s stages and four of others, by a curve
+/// through the step: where the function has different signs at two neighbours, or at the ends, the change is found on states as exact as
+/// those of the run, by steps of the same integrator that end there, of which two are enough where the step resolves the motion. Of two changes of sign within one part neither is seen, so a function that changes faster than
+/// the motion needs shorter steps; nor is a root that the function only touches. Where a function is not finite the run ends.
+///
+/// An event is a change of sign along the motion. It is counted once, and of two runs that join in exactly one:
+/// - A run that starts on the surface, where the function is 0 up to rounding, starts on the side to which the motion goes, and does not
+///   count that zero. So a run that starts from the state of a crossing goes on to the next one.
+/// - A step that ends on the surface ends on the side to which the motion goes. Where that is another side than before, the event is
+///   counted there, also at the end of the run.
+/// - Up to rounding means: the motion is off the surface by at most the rounding of the time, or the state by that of its coordinates.
+///   A function that stays 0 has no side until it is different from 0; if it does so from the start, its first sign is no change.
+///
+/// Events of one instant are told in the order of their index.
+///
+/// A terminal event ends the run with its own time and state; the other events of that instant are told too. Observers after
+/// this one do not see a step that ends in such an event.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use discrete_herglotz::{Event, Events, GaussCollocation, Problem, Steps, Until};
+/// let pendulum = Pendulum { gamma: -0.1 };
+/// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;
+/// let mut lowest = Events::new([Event::new(|_, x| x.q[0])]);
+/// problem.by(GaussCollocation { stages: 8 }).steps(Steps::Size(0.1)).observe(&mut lowest).run(Until::Time(10.0))?;
+/// println!("passes its lowest point at {:?}", lowest.crossings.iter().map(|c| c.t).collect::<Vec<_>>());
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+pub struct Events<'f, const N: usize> {
+    /// The changes of sign so far, in the order of the run.
+    pub crossings: Vec<Crossing<N>>,
+    events: Vec<Event<'f, N>>,
+    needs: OutputRequest,
+    seen: Vec<LastSign<N>>,
+    pace: Pace,
+    /// About the states inside of the last step.
+    sketch: Vec<PhasePoint<N>>,
+    /// The time of its end with the rates there, if they were asked for: they are those of the start of the next.
+    rates: Option<(f64, PhasePoint<N>)>,
+}
+
+impl<'f, const N: usize> Events<'f, N> {
+    /// These events, which crossings name by their place.
+    pub fn new(events: impl IntoIterator<Item = Event<'f, N>>) -> Self {
+        let events = events.into_iter().collect();
+        let (crossings, seen, sketch) = (Vec::new(), Vec::new(), Vec::new());
+        Events {
+            crossings,
+            events,
+            needs: OutputRequest::ACTION,
+            seen,
+            pace: Pace::of(&RunInfo::NONE),
+            sketch,
+            rates: None,
+        }
+    }
+
+    /// The same for functions that do not depend on the action: where no one else asks for it, it is not computed.
+    pub fn without_action(self) -> Self {
+        Events { needs: OutputRequest { action: false, ..self.needs }, ..self }
+    }
+
+    /// The crossings in a step, in the order of the run, and why there are no more.
+    fn in_step(&mut self, step: &mut LastStep<'_, N>, way: Way<'_, N>) -> (Vec<Crossing<N>>, Option<StepError>) {
+        let (mut found, mut cause) = (Vec::new(), None);
+        if let Err(cause) = step.sketch(&mut self.sketch) {
+            return (found, Some(cause));
+        }
+        let backward = step.span().1 < step.span().0;
+        let before = |a: f64, b: f64| if backward { a > b } else { a < b };
+        for (index, (event, seen)) in self.events.iter_mut().zip(&mut self.seen).enumerate() {
+            if let Err(error) = event.in_step(index, (step, way), &self.sketch, seen, &mut found) {
+                cause = match (cause, error) {
+                    (Some(StepError::Event { t: first }), StepError::Event { t }) if !before(t, first) => cause,
+                    _ => Some(error),
+                };
+            }
+        }
+        if let Some(StepError::Event { t }) = cause {
+            // What lies before the place where a function is not defined.
+            found.retain(|crossing| !before(t, crossing.t));
+        }
+        found.sort_by(|a, b| if backward { b.t.total_cmp(&a.t) } else { a.t.total_cmp(&b.t) });
+        // Those of one instant by their index.
+        let mut rest = found.as_mut_slice();
+        while let Some(first) = rest.first() {
+            let (t, rounding) = (first.t, way.pace.rounding(first.t));
+            let (together, later) = rest.split_at_mut(rest.partition_point(|c| (c.t - t).abs() <= rounding));
+            together.sort_by_key(|crossing| crossing.event);
+            rest = later;
+        }
+        (found, cause)
+    }
+
+    /// Whether a crossing is at the instant of an earlier one: by its time, or since it would be no event of a run that starts there.
+    fn together(&mut self, first: &Crossing<N>, other: &Crossing<N>, way: Way<'_, N>) -> bool {
+        let event = &mut self.events[other.event];
+        (other.t - first.t).abs() <= way.pace.rounding(first.t)
+            || event
+                .at(first.t, &first.state)
+                .is_ok_and(|value| event.leaves(way, (first.t, &first.state), value).is_some())
+    }
+}
+
+impl<const N: usize> Observer<N> for Events<'_, N> {
+    fn needs(&self) -> OutputRequest {
+        self.needs
+    }
+
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
+        self.pace = Pace::of(course);
+        self.seen.clear();
+        self.crossings.clear();
+        self.rates = None;
+        Ok(())
+    }
+
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        let way = Way { motion: at.motion, pace: self.pace, near: at.stepper.last_velocity() };
+        for event in &mut self.events {
+            match event.at(at.t, &at.state) {
+                Ok(value) => {
+                    let left = event.leaves(way, (at.t, &at.state), value);
+                    let side = left.map_or(value, |left| left.value);
+                    let zero = (side == 0.0).then_some((at.t, at.state));
+                    let sign = if side == 0.0 { 0.0 } else { side.signum() };
+                    self.seen.push(LastSign { value, sign, zero, left });
+                }
+                Err(cause) => return ControlFlow::Break(Stop::failed(cause)),
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        let Some(step) = at.last_step() else { return ControlFlow::Continue(()) };
+        let from = step.span().0;
+        let mut step = step.with_rates_at_start(self.rates.filter(|(t, _)| *t == from).map(|(_, rates)| rates));
+        let way = Way { motion: at.motion, pace: self.pace, near: at.stepper.last_velocity() };
+        let (found, cause) = self.in_step(&mut step, way);
+        self.rates = step.rates_at_end().map(|rates| (at.t, rates));
+        let mut end: Option<Crossing<N>> = None;
+        for crossing in found {
+            // The event that ends the run has no other crossing at its own instant.
+            if end.is_some_and(|end| end.event == crossing.event || !self.together(&end, &crossing, way)) {
+                continue;
+            }
+            self.crossings.push(crossing);
+            if self.events[crossing.event].terminal {
+                end = end.or(Some(crossing));
+            }
+        }
+        if let Some(end) = end {
+            return ControlFlow::Break(Stop { at: Some((end.t, end.state)), ..Stop::here("an event") });
+        }
+        match cause {
+            Some(cause) => ControlFlow::Break(Stop::failed(cause)),
+            None => ControlFlow::Continue(()),
+        }
+    }
+
+    fn terminal(&self) -> Option<Terminal<'_, N>> {
+        let events: Vec<_> = self.events.iter().filter(|event| event.terminal).map(Event::borrowed).collect();
+        (!events.is_empty()).then(|| Box::new(Events { needs: self.needs, ..Events::new(events) }) as Terminal<'_, N>)
+    }
+}

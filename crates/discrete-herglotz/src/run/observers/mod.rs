@@ -1,0 +1,13 @@
+//! Observers: what is recorded of a run, and what ends it.
+
+pub(crate) mod checkpoint;
+pub(crate) mod crossings;
+#[cfg(feature = "csv")]
+pub(crate) mod csv_rows;
+pub(crate) mod events;
+pub(crate) mod interruption;
+pub(crate) mod momentum;
+pub(crate) mod observer;
+pub(crate) mod progress;
+pub(crate) mod quotient;
+pub(crate) mod rows;

@@ -1,0 +1,57 @@
+//! Momenta of symmetries along a run.
+
+use crate::run::{Observer, OutputRequest, StepView, Stop};
+use contact_geom::OneParameterGroup;
+use std::ops::ControlFlow;
+
+/// A momentum at one step of a run, with what the theorem predicts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MomentumRow {
+    /// Time.
+    pub t: f64,
+    /// The momentum `J_k = p_k . xi_Q(q_k)`.
+    pub momentum: f64,
+    /// Its prediction `J_0 sigma_1 ... sigma_k`, by the sum of the logarithms.
+    pub predicted: f64,
+}
+
+impl MomentumRow {
+    /// The deviation from the prediction, relative to it.
+    pub fn defect(&self) -> f64 {
+        (self.momentum - self.predicted).abs() / self.predicted.abs()
+    }
+}
+
+/// Observes the momentum of a one-parameter group along a run, and its predicted decay by the product of the `sigma_d`.
+#[derive(Clone, Debug)]
+pub struct MomentumDecay<G> {
+    group: G,
+    /// The rows so far, the initial one included.
+    pub rows: Vec<MomentumRow>,
+}
+
+impl<G> MomentumDecay<G> {
+    /// Observes the momentum of this group.
+    pub fn new(group: G) -> Self {
+        MomentumDecay { group, rows: Vec::new() }
+    }
+}
+
+impl<const N: usize, G: OneParameterGroup<N>> Observer<N> for MomentumDecay<G> {
+    fn needs(&self) -> OutputRequest {
+        OutputRequest { conformal_factor: true, ..OutputRequest::default() }
+    }
+
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        self.rows.clear();
+        self.step(at)
+    }
+
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        let momentum = self.group.momentum(&at.state.q, &at.state.p);
+        let factor = at.log_factor.unwrap_or(f64::NAN).exp();
+        let predicted = self.rows.first().map_or(momentum, |row| row.momentum * factor);
+        self.rows.push(MomentumRow { t: at.t, momentum, predicted });
+        ControlFlow::Continue(())
+    }
+}

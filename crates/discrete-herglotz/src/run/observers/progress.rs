@@ -1,0 +1,62 @@
+//! The progress of a run.
+
+use crate::InputError;
+use crate::run::{Observer, OutputRequest, RunInfo, StepView, Stop};
+use std::ops::ControlFlow;
+
+/// The steps between two looks, where the number of all is not known.
+const STRIDE: usize = 1 << 10;
+
+/// Tells how much of the span a run has behind it, from 0 to 1, at each hundredth: for a progress bar.
+///
+/// ```
+/// use contact_geom::{VelocityPoint, systems::Pendulum};
+/// use discrete_herglotz::{GaussCollocation, Problem, Progress, Steps, Until};
+/// let pendulum = Pendulum { gamma: -0.1 };
+/// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;
+/// let mut bar = Progress::new(|part| print!("\r{:3.0} %", 100.0 * part));
+/// problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.1)).observe(&mut bar).run(Until::Time(1e4))?;
+/// # Ok::<(), discrete_herglotz::InputError>(())
+/// ```
+pub struct Progress<F> {
+    tell: F,
+    course: RunInfo,
+}
+
+impl<F: FnMut(f64)> Progress<F> {
+    /// Told to this function.
+    pub fn new(tell: F) -> Self {
+        Progress { tell, course: RunInfo::NONE }
+    }
+
+    fn stride(&self) -> usize {
+        self.course.count.map_or(STRIDE, |count| count.div_ceil(100))
+    }
+}
+
+impl<const N: usize, F: FnMut(f64)> Observer<N> for Progress<F> {
+    fn needs(&self) -> OutputRequest {
+        OutputRequest::default()
+    }
+
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
+        self.course = *course;
+        Ok(())
+    }
+
+    fn next(&self, taken: usize) -> usize {
+        (taken / self.stride() + 1).saturating_mul(self.stride())
+    }
+
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        self.step(at)
+    }
+
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if at.last || at.k.is_multiple_of(self.stride()) {
+            let RunInfo { t0, t_end, .. } = self.course;
+            (self.tell)(if at.last { 1.0 } else { (at.t - t0) / (t_end - t0) });
+        }
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,256 @@
+//! Rows: the states of a motion at steps or at times.
+
+use crate::run::{Observer, OutputRequest, RunInfo, StepView, Stop};
+use crate::{InputError, StepError};
+use contact_geom::PhasePoint;
+use contact_geom::nalgebra::SVector;
+use std::cmp::Ordering;
+use std::ops::ControlFlow;
+
+/// A state of a motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row<const N: usize> {
+    /// The time.
+    pub t: f64,
+    /// The position.
+    pub q: SVector<f64, N>,
+    /// The velocity, where the rows are [with](Rows::with_velocity) it.
+    pub v: Option<SVector<f64, N>>,
+    /// The momentum.
+    pub p: SVector<f64, N>,
+    /// The action, if the rows are not [without](Rows::without_action) it.
+    pub z: Option<f64>,
+    /// The energy `E_L = v.p - L`, where the rows are [with](Rows::with_energy) it.
+    pub energy: Option<f64>,
+    /// The logarithm of the conformal factor of the motion since the start, where the rows are [with](Rows::with_conformal_factor) it.
+    pub log_factor: Option<f64>,
+    /// The values of the [columns](Rows::column), in their order.
+    pub columns: Vec<f64>,
+}
+
+impl<const N: usize> Row<N> {
+    /// All numbers of the row, in the order of [`Rows::header`].
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        let vectors = self.q.iter().chain(self.v.iter().flatten()).chain(self.p.iter());
+        let numbers = [self.z, self.energy, self.log_factor].into_iter().flatten();
+        [self.t].into_iter().chain(vectors.copied()).chain(numbers).chain(self.columns.iter().copied())
+    }
+}
+
+/// A function of time and state, with its name.
+type Column<'f, const N: usize> = (String, Box<dyn FnMut(f64, &PhasePoint<N>) -> f64 + 'f>);
+
+/// Which states are recorded.
+#[derive(Clone, Debug)]
+enum RowTimes {
+    /// The start, every so many steps, and the end.
+    Every(usize),
+    /// These times, in the order of the run, of which so many are recorded.
+    At { times: Vec<f64>, recorded: usize },
+}
+
+/// Records the states of a motion.
+pub struct Rows<'f, const N: usize> {
+    /// The rows so far.
+    pub rows: Vec<Row<N>>,
+    when: RowTimes,
+    columns: Vec<Column<'f, N>>,
+    needs: OutputRequest,
+    velocity: bool,
+    energy: bool,
+    course: RunInfo,
+}
+
+/// The largest number of rows: a few gigabytes.
+const MAX_ROWS: usize = 1 << 26;
+
+impl<'f, const N: usize> Rows<'f, N> {
+    /// The start, the state after each `stride` steps, and the end.
+    ///
+    /// # Errors
+    /// [`InputError::Count`] for a stride of 0.
+    pub fn every(stride: usize) -> Result<Self, InputError> {
+        if stride == 0 {
+            return Err(InputError::Count { what: "the steps between two rows", least: 1, found: 0 });
+        }
+        Ok(Self::when(RowTimes::Every(stride)))
+    }
+
+    /// The states at these times exactly, ascending, or descending for a run that goes back; a run is refused that does not reach the
+    /// last of them. States between the ends of steps are as exact as those at the ends; see [`LastStep::at`](crate::run::LastStep::at).
+    /// A run that is [resumed](crate::run::Run::resume) records those after the time at which it goes on, so that each is in one of the two runs.
+    ///
+    /// # Errors
+    /// [`InputError::Times`] for times that are not finite or not in order.
+    pub fn at(times: impl IntoIterator<Item = f64>) -> Result<Self, InputError> {
+        let times: Vec<f64> = times.into_iter().collect();
+        let wanted = if times.len() < 2 || times[0] < times[1] { Ordering::Less } else { Ordering::Greater };
+        let out_of_order = |pair: &[f64]| pair[0].partial_cmp(&pair[1]) != Some(wanted);
+        let out_of_order = times.windows(2).position(out_of_order).map(|index| index + 1);
+        match times.iter().position(|t| !t.is_finite()).or(out_of_order) {
+            Some(index) => Err(InputError::Times { index, t: times[index] }),
+            None => Ok(Self::when(RowTimes::At { times, recorded: 0 })),
+        }
+    }
+
+    fn when(when: RowTimes) -> Self {
+        Rows {
+            rows: Vec::new(),
+            when,
+            columns: Vec::new(),
+            needs: OutputRequest::ACTION,
+            velocity: false,
+            energy: false,
+            course: RunInfo::NONE,
+        }
+    }
+
+    /// With one more column: a function of time and state, with a name.
+    pub fn column(mut self, name: impl Into<String>, f: impl FnMut(f64, &PhasePoint<N>) -> f64 + 'f) -> Self {
+        self.columns.push((name.into(), Box::new(f)));
+        self
+    }
+
+    /// Without the action, so that a run of which no one else wants it need not compute it.
+    pub fn without_action(self) -> Self {
+        Rows { needs: OutputRequest { action: false, ..self.needs }, ..self }
+    }
+
+    /// With the conformal factor.
+    pub fn with_conformal_factor(self) -> Self {
+        Rows { needs: OutputRequest { conformal_factor: true, ..self.needs }, ..self }
+    }
+
+    /// With the energy, which costs an inverse Legendre transformation and a value of L a row.
+    pub fn with_energy(self) -> Self {
+        Rows { energy: true, ..self }
+    }
+
+    /// With the velocity, which costs an inverse Legendre transformation a row.
+    pub fn with_velocity(self) -> Self {
+        Rows { velocity: true, ..self }
+    }
+
+    /// The names of the [numbers](Row::numbers) of a row: `t`, `q0`, .. `v0`, .. `p0`, .. `z`, `energy`, `log_factor`, and the columns' own.
+    pub fn header(&self) -> Vec<String> {
+        let of =
+            |letter: &'static str, there: bool| (0..if there { N } else { 0 }).map(move |i| format!("{letter}{i}"));
+        let one = |name: &str, there: bool| there.then(|| name.to_owned());
+        let vectors = of("q", true).chain(of("v", self.velocity)).chain(of("p", true));
+        let numbers =
+            [one("z", self.needs.action), one("energy", self.energy), one("log_factor", self.needs.conformal_factor)];
+        let columns = self.columns.iter().map(|(name, _)| name.clone());
+        one("t", true).into_iter().chain(vectors).chain(numbers.into_iter().flatten()).chain(columns).collect()
+    }
+
+    fn record(&mut self, at: &StepView<'_, N>) -> Result<(), StepError> {
+        let v = if self.velocity { Some(at.velocity()?) } else { None };
+        let energy = if self.energy { Some(at.energy()?) } else { None };
+        let StepView { t, state, log_factor, .. } = *at;
+        let columns = self.columns.iter_mut().map(|(_, f)| f(t, &state)).collect();
+        let z = self.needs.action.then_some(state.z);
+        let log_factor = log_factor.filter(|_| self.needs.conformal_factor);
+        self.rows.push(Row { t, q: state.q, v, p: state.p, z, energy, log_factor, columns });
+        Ok(())
+    }
+
+    /// Records the rows up to a moment.
+    fn record_up_to(&mut self, at: &StepView<'_, N>) -> Result<(), StepError> {
+        let (times, recorded) = match &self.when {
+            RowTimes::Every(stride) if at.k.is_multiple_of(*stride) || at.last => return self.record(at),
+            RowTimes::Every(_) => return Ok(()),
+            RowTimes::At { times, recorded } => (times, *recorded),
+        };
+        let backward = self.course.t_end < self.course.t0;
+        let passed = |t: f64| if backward { t >= at.t } else { t <= at.t };
+        // The last step ends where the span does but for its rounding.
+        let due: Vec<f64> = times[recorded..].iter().copied().take_while(|t| at.last || passed(*t)).collect();
+        for t in due {
+            if t == at.t {
+                self.record(at)?;
+            } else if passed(t) {
+                self.record(&at.inside(t)?)?;
+            } else {
+                self.record(&StepView { t, ..*at })?;
+            }
+            if let RowTimes::At { recorded, .. } = &mut self.when {
+                *recorded += 1;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<const N: usize> Observer<N> for Rows<'_, N> {
+    fn needs(&self) -> OutputRequest {
+        // The energy has L, and with it z.
+        OutputRequest { action: self.needs.action || self.energy, ..self.needs }
+    }
+
+    fn prepare(&mut self, course: &RunInfo) -> Result<(), InputError> {
+        self.course = *course;
+        self.rows.clear();
+        if let RowTimes::At { recorded, .. } = &mut self.when {
+            *recorded = 0;
+        }
+        let RunInfo { t0, t_end, count, .. } = *course;
+        let rows = match &self.when {
+            // In transformed time the number of steps shows at the end.
+            RowTimes::Every(stride) => count.map_or(2, |count| count / stride + 2),
+            RowTimes::At { times, .. } => {
+                let inside = |t: f64| (t0.min(t_end)..=t0.max(t_end)).contains(&t);
+                let forward = times.windows(2).all(|pair| pair[0] < pair[1]) == (t0 < t_end) || times.len() < 2;
+                if let Some(index) = times.iter().position(|t| !inside(*t) || !forward) {
+                    return Err(InputError::Times { index, t: times[index] });
+                }
+                times.len()
+            }
+        };
+        check(rows)?;
+        self.rows.try_reserve_exact(rows).map_err(|_| too_many(rows))
+    }
+
+    fn next(&self, taken: usize) -> usize {
+        match &self.when {
+            RowTimes::Every(stride) => (taken / stride + 1) * stride,
+            RowTimes::At { times, recorded } => {
+                let Some(t) = times.get(*recorded) else { return usize::MAX };
+                // The step in which it lies, or the one before by rounding, which then records nothing.
+                let step =
+                    self.course.h.map_or(0.0, |h| ((t - self.course.t0) / h * (1.0 - 4.0 * f64::EPSILON)).ceil());
+                (step as usize).max(taken + 1)
+            }
+        }
+    }
+
+    fn start(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        let backward = self.course.t_end < self.course.t0;
+        if let RowTimes::At { times, recorded } = &mut self.when
+            && at.k > 0
+        {
+            // A run that goes on: the times up to here were recorded by the one before it.
+            *recorded = times.partition_point(|t| if backward { *t >= at.t } else { *t <= at.t });
+        }
+        self.step(at)
+    }
+
+    fn step(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
+        if self.rows.len() >= MAX_ROWS {
+            return ControlFlow::Break(Stop::here("the rows, which are too many"));
+        }
+        match self.record_up_to(at) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(cause) => ControlFlow::Break(Stop::failed(cause)),
+        }
+    }
+}
+
+/// Refuses more rows at a time than are kept.
+pub(crate) fn check(rows: usize) -> Result<(), InputError> {
+    if rows > MAX_ROWS { Err(too_many(rows)) } else { Ok(()) }
+}
+
+fn too_many(count: usize) -> InputError {
+    let (found, most, remedy) = (count as f64, MAX_ROWS as f64, "record fewer rows");
+    InputError::TooMany { what: "the number of rows", found, most, remedy }
+}

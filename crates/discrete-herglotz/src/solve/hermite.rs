@@ -1,0 +1,28 @@
+//! Cubic Hermite interpolation of a motion.
+
+use contact_geom::VelocityPoint;
+
+/// The cubic curve through two points with their velocities, at some time after the first; straight on beside them.
+pub(crate) fn hermite<const N: usize>(
+    start: &VelocityPoint<N>,
+    end: &VelocityPoint<N>,
+    span: f64,
+    at: f64,
+) -> VelocityPoint<N> {
+    // In units of the span, which is negative where the run goes back.
+    let u = at / span;
+    if u <= 0.0 {
+        return VelocityPoint { q: start.q + start.v * at, ..*start };
+    }
+    if u >= 1.0 {
+        return VelocityPoint { q: end.q + end.v * (at - span), ..*end };
+    }
+    let left = 1.0 - u;
+    let q = start.q * (left * left * (1.0 + 2.0 * u))
+        + end.q * (u * u * (1.0 + 2.0 * left))
+        + (start.v * left - end.v * u) * (span * u * left);
+    let v = (end.q - start.q) * (6.0 * u * left / span)
+        + start.v * (left * (1.0 - 3.0 * u))
+        + end.v * (u * (3.0 * u - 2.0));
+    VelocityPoint { q, v, z: start.z * left + end.z * u }
+}
