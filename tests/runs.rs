@@ -1,5 +1,6 @@
 //! Runs: plans that say what they do, outcomes that do not depend on the route, bad input, and the way back.
 
+use crate::common::lagrangians::WithStructure;
 use crate::common::oracle::motion;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{
@@ -16,18 +17,6 @@ use discrete_herglotz::{
 };
 use exact_lagrangian::herglotz_flow;
 use std::f64::consts::PI;
-
-/// A system that claims another structure.
-struct Claiming<S>(S, Structure);
-
-impl<const N: usize, S: Lagrangian<N>> Lagrangian<N> for Claiming<S> {
-    fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
-        self.0.value(t, q, v, z)
-    }
-    fn structure(&self) -> Structure {
-        self.1
-    }
-}
 
 const START: [f64; 3] = [1.0, 1.0, 0.2];
 
@@ -54,7 +43,7 @@ fn ten_steps<'p, 'o, L: Lagrangian<N>, const N: usize>(
 
 /// The titles of what a plan computes, and of what it skips.
 fn said<L: Lagrangian<N>, const N: usize>(plan: &Plan<'_, L, N>, computed: bool) -> Vec<&'static str> {
-    plan.items().iter().filter(|item| item.computed == computed).map(|item| item.what).collect()
+    plan.entries().iter().filter(|item| item.computed == computed).map(|item| item.what).collect()
 }
 
 /// Every integrator that applies to a system of each kind leads to the motion that an independent code finds: to the error that its order
@@ -392,7 +381,7 @@ fn bad_runs() {
     assert!(matches!(Problem::new(&pendulum, 0.0, nowhere).err(), Some(InputError::Geometry(_))));
     // Hypotheses are named.
     let nystrom = AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6);
-    let unclaimed = Claiming(pendulum, Structure::default());
+    let unclaimed = WithStructure(pendulum, Structure::default());
     let refused = ten_steps(&from_start(&unclaimed), nystrom).plan(until).err();
     assert_eq!(refused, Some(InputError::Unclaimed { claim: "separable" }));
     let refused = ten_steps(&from_start(&square), nystrom).plan(until).err();
@@ -402,7 +391,7 @@ fn bad_runs() {
     let of_rectangle = AnyIntegrator::Composition(Method::Rectangle, SplittingScheme::YOSHIDA_4);
     assert!(matches!(by(of_rectangle), Some(InputError::Hypothesis { .. })));
     // A false claim is found by the probe.
-    let quadratic = Claiming(pendulum, Structure { quadratic: true, ..pendulum.structure() });
+    let quadratic = WithStructure(pendulum, Structure { quadratic: true, ..pendulum.structure() });
     let refused = Problem::new(&quadratic, 0.0, start()).err();
     assert!(matches!(refused, Some(InputError::FalseClaim { claim: "quadratic", .. })));
 }

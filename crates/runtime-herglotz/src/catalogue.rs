@@ -1,14 +1,14 @@
-//! Systems by name, as formulas.
+//! Named systems, given as formulas.
 
 use crate::RuntimeError;
 use formula_lagrangian::{Formula, nearest_name};
 
-/// A system with a name: a formula with values of its parameters, and a start from which its motion shows what it is about.
+/// A named system: a formula with values of its parameters, and an initial state with a typical motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CatalogueEntry {
     /// The name, in lower case with underscores.
     pub name: &'static str,
-    /// What it is, in a few words.
+    /// A short description.
     pub about: &'static str,
     /// The coordinates.
     pub coordinates: &'static [&'static str],
@@ -202,7 +202,7 @@ pub const CATALOGUE: &[CatalogueEntry] = &[
 ];
 
 impl CatalogueEntry {
-    /// The system of this name.
+    /// The entry with this name.
     ///
     /// # Errors
     /// [`RuntimeError::UnknownSystem`], with the nearest name.

@@ -1,13 +1,13 @@
-//! Whether a motion is contact.
+//! Whether the steps of a motion are contact transformations.
 
 use contact_geom::Statement;
 
-/// What a symmetry's momentum is at a place, and what the theorem of Noether predicts.
+/// The momentum of a symmetry at a place, and the prediction of Noether's theorem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentumSample {
     /// The momentum.
     pub momentum: f64,
-    /// That of the start times the conformal factor.
+    /// The initial momentum times the conformal factor.
     pub predicted: f64,
 }
 
@@ -20,44 +20,47 @@ pub struct Place {
     pub sigma: f64,
     /// The logarithm of the conformal factor of the motion up to there.
     pub log_factor: f64,
-    /// How far the pullback of `dz - p dq` by the step is from `sigma_d` times it, relative to its size; by differences of sixth order,
-    /// which see some 1e-11.
+    /// The distance of the pullback of `dz - p dq` by the step from `sigma_d (dz - p dq)`, relative to its size; from
+    /// differences of sixth order, which are accurate to about 1e-11.
     pub contact_defect: f64,
-    /// How fast the steps depart from Herglotz' equations: the distance of (q, p, z) from two steps of half the length by contact Gauss
-    /// collocation with 16 stages, relative to their size, for a unit of time.
+    /// The rate at which the steps depart from Herglotz' equations: the distance of (q, p, z) from two steps of half
+    /// the length by contact Gauss collocation with 16 stages, relative to the size of the state and per unit of time.
     pub herglotz_defect: f64,
-    /// The momenta of the symmetries that are seen, in their order.
+    /// The momenta of the recognised symmetries, in their order.
     pub momenta: Vec<MomentumSample>,
 }
 
-/// A statement of the paper on the discrete theory, evaluated on two points of the motion.
+/// A statement of the paper on the discrete theory, evaluated at two points of the motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StatementResidual {
     /// The statement.
     pub statement: Statement,
     /// The discrete Lagrangian, by the name of its method.
     pub method: String,
-    /// The time between its points: the step, or a part of it where points so far apart have no discrete Lagrangian.
+    /// The time between the two points: the step, or a fraction of it where points so far apart have no discrete
+    /// Lagrangian.
     pub step_size: f64,
-    /// The residual, relative to the size of its terms: round-off times the condition of the matrices in it.
+    /// The residual relative to the size of its terms; it is of the size of round-off times the condition number of the
+    /// matrices in it.
     pub residual: f64,
 }
 
-/// Whether the steps of a motion are contact, and the theorems of the discrete theory on it.
+/// Whether the steps of a motion are contact transformations, and the residuals of the theorems of the discrete theory
+/// along it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Check {
     /// The integrator.
     pub integrator: String,
     /// The step.
     pub step_size: f64,
-    /// Along the motion.
+    /// The places along the motion.
     pub places: Vec<Place>,
-    /// The theorems, worst of a few places.
+    /// The theorems, with the largest residual over a few places.
     pub statements: Vec<StatementResidual>,
 }
 
-/// The largest defect of a step that counts as contact: what differences of sixth order see of steps of the catalogue's systems is
-/// 1e-11; a step of the classical method of Runge and Kutta that moves a pendulum by a tenth of its period has 1e-4.
+/// The largest defect of a step that counts as contact. Differences of sixth order give 1e-11 for steps of the
+/// catalogue's systems; a step of the classical Runge-Kutta method over a tenth of a pendulum's period gives 1e-4.
 pub const CONTACT: f64 = 1e-9;
 
 impl Check {
@@ -66,19 +69,20 @@ impl Check {
         contact_geom::max_abs_or_nan(self.places.iter().map(|place| place.contact_defect))
     }
 
-    /// Whether every step that was looked at is contact, to [`CONTACT`]: with a factor that is a number other than 0, since what a factor 0
-    /// pulls back is no contact form.
+    /// Whether every step that was checked is contact to within [`CONTACT`], with a conformal factor that is finite and
+    /// not 0: with the factor 0 the pullback is not a contact form.
     pub fn is_contact(&self) -> bool {
         self.contact_defect() <= CONTACT && !self.loses_the_form()
     }
 
-    /// Whether the conformal factor of a step is 0 or not finite, as where drag within one step is beyond all numbers.
+    /// Whether the conformal factor of a step is 0 or not finite, as where the drag within one step exceeds the range
+    /// of floating-point numbers.
     pub fn loses_the_form(&self) -> bool {
         self.places.iter().any(|place| place.sigma == 0.0 || !place.sigma.is_finite())
     }
 
-    /// The largest departure of a momentum from its prediction, in units of the largest momentum of any symmetry: one that vanishes has no
-    /// size of its own.
+    /// The largest difference between a momentum and its prediction, in units of the largest momentum of any symmetry,
+    /// since a momentum that vanishes gives no scale.
     pub fn momentum_defect(&self) -> f64 {
         let all = || self.places.iter().flat_map(|place| &place.momenta);
         let size = contact_geom::max_abs_or_nan(all().map(|m| m.predicted));

@@ -1,9 +1,9 @@
-//! What a row of a motion has.
+//! Columns of the rows recorded along a motion.
 
 use crate::RuntimeError;
 use formula_lagrangian::{Expression, Formula};
 
-/// A number of a row.
+/// A quantity recorded in each row.
 #[derive(Clone, Debug)]
 pub enum Column {
     /// The time.
@@ -16,7 +16,7 @@ pub enum Column {
     Momentum(usize),
     /// The action z.
     Action,
-    /// The energy `E_L = v.p - L`, which holds all of L, its terms in z too: `-gamma z` for a drag `gamma z`.
+    /// The energy `E_L = v.p - L`, including the terms of L in z: `-gamma z` for a drag `gamma z`.
     Energy,
     /// The logarithm of the conformal factor since the start: the integral of `L_z`.
     LogFactor,
@@ -25,11 +25,12 @@ pub enum Column {
 }
 
 impl Column {
-    /// Reads a column over the names of a formula: `t`, `x`, `x'`, `z`; `p_x` for the momentum of `x` (`p_q[0]` in an array), `energy`,
-    /// `sigma`, `log_factor`, unless a coordinate or a parameter has the name; else any expression of all these, with a name or without.
+    /// Parses a column over the names of a formula: `t`, `x`, `x'`, `z`; `p_x` for the momentum of `x` (`p_q[0]` in an
+    /// array), `energy`, `sigma`, `log_factor`, unless a coordinate or a parameter has that name. Any other text is an
+    /// expression in all of these, with or without a name.
     ///
     /// # Errors
-    /// [`RuntimeError::Formula`] with the place in the text.
+    /// [`RuntimeError::Formula`] with the position in the text.
     pub fn parse(text: &str, formula: &Formula) -> Result<Self, RuntimeError> {
         let name = text.trim();
         let coordinates = formula.coordinates();
@@ -54,7 +55,7 @@ impl Column {
         Ok(Column::Expression(Box::new(formula.named_expression(text)?)))
     }
 
-    /// Whether it needs the conformal factor of the motion.
+    /// Whether the column needs the conformal factor of the motion.
     pub fn has_conformal_factor(&self) -> bool {
         match self {
             Column::LogFactor => true,
@@ -63,7 +64,7 @@ impl Column {
         }
     }
 
-    /// All that a state has: `t`, the coordinates, the velocities and `z`, with their names.
+    /// The columns of a full state with their names: `t`, the coordinates, the velocities and `z`.
     pub fn state(formula: &Formula) -> Vec<(String, Column)> {
         let names = formula.coordinates();
         let positions = names.iter().cloned().enumerate().map(|(i, name)| (name, Column::Position(i)));

@@ -1,4 +1,4 @@
-//! Run time against error on a motion, for all integrators that apply.
+//! Work-precision comparison (run time against error) of all integrators that apply to a motion.
 
 use crate::{FirstOrder, Interrupt, Motion, Outcome, Peer, PeerEnd, RunMonitor, RuntimeError, StepControl, System};
 use contact_geom::max_abs_or_nan;
@@ -6,29 +6,31 @@ use discrete_herglotz::{AnyIntegrator, InputError, Steps};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-/// The errors that are asked of the reference, until one is had.
+/// Accuracies requested of the reference, tried in this order until one is accepted.
 const REFERENCES: [f64; 5] = [1e-13, 1e-12, 1e-10, 1e-8, 1e-6];
 
-/// The time for all integrators together, in which each has an equal part: so that a comparison is short where its motion is.
+/// Time budget of all integrators together, shared equally, so that the comparison of a short motion is short.
 const BUDGET: Duration = Duration::from_millis(2000);
 
-/// The part of an integrator is at least so many times what the reference takes by half its steps: of a long motion enough to be compared.
+/// The share of an integrator is at least this multiple of the run time of the reference with half its steps, so that
+/// long motions get enough time for a comparison.
 const OF_REFERENCE: u32 = 4;
 
-/// The runs of each integrator that do not depend on the time they take, so that each is seen; the first ones are short.
+/// The number of runs of each integrator that are made regardless of their run time, so that every integrator appears;
+/// the first runs have few steps.
 const LEAST: usize = 6;
 
-/// A run is repeated for so long, and so often, for the least time.
+/// A run is repeated until this time, or this number of repetitions, is reached; the smallest time counts.
 const REPEATED: Duration = Duration::from_millis(2);
 const REPETITIONS: usize = 5;
 
-/// The halvings of the step of an integrator.
+/// The maximal number of step sizes of an integrator, each half the one before.
 const HALVINGS: u32 = 20;
 
-/// The tolerances of a peer: a tenth, a hundredth, and so on.
+/// The number of tolerances of a peer: 0.1, 0.01, and so on.
 const TOLERANCES: u32 = 14;
 
-/// A peer has as many parts of the time: there are few of them, and each is drawn.
+/// A peer has this multiple of the share of an integrator: there are few peers, and the plot shows each of them.
 const OF_PEER: u32 = 8;
 
 /// One run of a [`Comparison`].
@@ -44,36 +46,37 @@ pub struct Work {
     pub steps: usize,
     /// The evaluations of forces or gradients.
     pub evaluations: u64,
-    /// The error of (q, p) at the end, relative to its size there, and not less than that of the reference.
+    /// The error of (q, p) at the end, relative to its size there, and not less than the error of the reference.
     pub error: f64,
-    /// The seconds that it took with all checks of a run, the least of a few.
+    /// The run time in seconds, including all checks of a run: the smallest of a few repetitions.
     pub seconds: f64,
 }
 
 /// Run time against error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
-    /// All runs, by integrator and falling step.
+    /// All runs, sorted by integrator and decreasing step.
     pub rows: Vec<Work>,
-    /// The runs of peers, by falling tolerance; their step is the mean one.
+    /// The runs of peers, by decreasing tolerance; their step is the mean one.
     pub peers: Vec<Work>,
     /// How the reference was computed.
     pub reference: String,
-    /// The error of the reference: its distance from a run by half as many steps.
+    /// The error of the reference: its distance from a run with half as many steps.
     pub reference_error: f64,
-    /// Integrators that do not apply, and why; not those by a clock, which no formula states.
+    /// Integrators that do not apply, with the reason. Integrators in transformed time are omitted, since no formula
+    /// has a time transformation.
     pub left_out: Vec<(String, String)>,
-    /// Whether it was ended before all integrators were tried.
+    /// Whether the comparison was ended before all integrators were tried.
     pub ended: bool,
 }
 
 impl Comparison {
-    /// The fastest run with at most this error, of the library.
+    /// The fastest run of the library with at most this error.
     pub fn best(&self, error: f64) -> Option<&Work> {
         fastest(&self.rows, error)
     }
 
-    /// The fastest run with at most this error, of the peers.
+    /// The fastest run of a peer with at most this error.
     pub fn best_of_peers(&self, error: f64) -> Option<&Work> {
         fastest(&self.peers, error)
     }
@@ -91,7 +94,7 @@ fn apart((q, p): (&[f64], &[f64]), b: &Outcome) -> f64 {
     if square == 0.0 { 0.0 } else { (square / size).sqrt() }
 }
 
-/// Ends a run that is to be interrupted.
+/// Ends a run when its interrupt is set.
 struct Asking<'i>(Option<&'i Interrupt>);
 
 impl RunMonitor for Asking<'_> {
@@ -101,12 +104,14 @@ impl RunMonitor for Asking<'_> {
 }
 
 impl System {
-    /// Runs a motion by all integrators that apply, with steps from long to short, and measures time and error of each. Of `motion` the start
-    /// and the end are taken. `progress` is told the part that is done; `false` ends it there. Steps are halved until round-off, or until
-    /// the integrator has used its part of two seconds, or four times what the reference takes. The peers are run to one tolerance after the other.
+    /// Runs a motion with all integrators that apply, with steps from long to short, and measures run time and error of
+    /// each. Only the start and the end of `motion` are used. `progress` is called with the completed fraction; the
+    /// comparison ends where it returns `false`. Steps are halved until round-off dominates, or until the integrator
+    /// has used its share of two seconds or four times the run time of the reference with half its steps, whichever is
+    /// longer. The peers are run with a decreasing sequence of tolerances.
     ///
     /// # Errors
-    /// Those of the reference, which is by contact Gauss collocation with 16 stages.
+    /// Those of the reference, which is contact Gauss collocation with 16 stages.
     pub fn compare(
         &self,
         motion: &Motion,
@@ -155,7 +160,7 @@ impl System {
                 comparison.ended = true;
                 return Ok(comparison);
             }
-            // No formula states a clock.
+            // Formulas have no time transformation.
             if let AnyIntegrator::TransformedGauss { .. } = by {
                 continue;
             }
@@ -163,7 +168,7 @@ impl System {
                 comparison.left_out.push((by.to_string(), RuntimeError::from(why).to_string()));
                 continue;
             }
-            // So long that the reference would need as many evaluations.
+            // The longest step is eight times that of the coarser reference run.
             let first = count.div_ceil(8).max(1);
             let run = |halving: u32| {
                 let outcome = run(by, first.checked_shl(halving)?).ok().filter(|outcome| outcome.t == reference.t)?;
@@ -181,7 +186,7 @@ impl System {
             };
             let error = |state: &Vec<f64>| motion.end_of(self, state).map(|(q, p)| apart((&q, &p), &reference));
             let measure = Measure { span, part: OF_PEER * part, reference_error, of: (peer.name(), peer.order()) };
-            // It may give up late.
+            // A peer may fail only after a long time.
             comparison.peers.extend(work_of(&measure, TOLERANCES, &run, &error, 1));
         }
         progress(1.0);
@@ -189,27 +194,28 @@ impl System {
     }
 }
 
-/// The end of a run, with what it took.
+/// The end of a run, with the work it took.
 struct Done<E> {
     end: E,
     steps: usize,
     evaluations: u64,
 }
 
-/// What a run is measured against.
+/// Data of a measurement that all runs of one integrator share.
 struct Measure<'m> {
-    /// The span of time, by which a mean step is told.
+    /// The time span, from which the mean step follows.
     span: f64,
-    /// What all runs together may take.
+    /// The time that all runs together may take.
     part: Duration,
     /// The error of the reference.
     reference_error: f64,
-    /// The name and the order of what is measured.
+    /// The name and the order of the integrator that is measured.
     of: (&'m str, u32),
 }
 
-/// The runs of one integrator, each about twice as long as the one before, and what they give. `run` is timed; `None` is a run that does not end
-/// where it should. `error` is that of an end. So many runs do not depend on the time that they take.
+/// The runs of one integrator, each about twice as long as the one before, with their errors. `run` is timed; it
+/// returns `None` for a run that does not reach the end. `error` is the error of a final state. The first `least_runs`
+/// runs are made regardless of their run time.
 fn work_of<E>(
     by: &Measure<'_>,
     runs: u32,
@@ -247,7 +253,7 @@ fn work_of<E>(
                     seconds: seconds.as_secs_f64(),
                 });
             }
-            // Round-off: halving the step does not better it.
+            // Halving the step no longer reduces the error: round-off dominates.
             worse = if error > 0.5 * least { worse + 1 } else { 0 };
             least = least.min(error);
             if error <= by.reference_error || worse == 2 && least < 1e-9 {

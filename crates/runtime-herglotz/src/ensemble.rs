@@ -4,7 +4,7 @@ use crate::{Column, Crossing, Event, Interrupt, OutputTimes, RuntimeError, Start
 use discrete_herglotz::{InputError, Status, Tally, UnresolvedStep};
 use std::ops::ControlFlow;
 
-/// The values of parameters as functions of a member's index.
+/// Parameter values as functions of a member's index.
 pub struct Varied<'a> {
     /// The parameters, by name.
     pub names: &'a [&'a str],
@@ -12,50 +12,50 @@ pub struct Varied<'a> {
     pub values: &'a (dyn Fn(usize) -> Vec<f64> + Sync),
 }
 
-/// Many motions of one formula, over threads: their starts, and parameters, are functions of the index. Members without rows and
-/// events whose parameters are the same are advanced together in the lanes of vector registers.
+/// Many motions of one formula, run on several threads: starts and parameters are functions of the index. Members
+/// without rows and events that have the same parameters are advanced together in SIMD lanes.
 pub struct Ensemble<'a> {
-    /// How many.
+    /// The number of members.
     pub count: usize,
-    /// The start of each; all at one time.
+    /// The start of each member; all start at the same time.
     pub start: &'a (dyn Fn(usize) -> Start + Sync),
     /// The time of all starts.
     pub t0: f64,
     /// The parameters that differ among members.
     pub varied: Option<Varied<'a>>,
-    /// The time at which they end.
+    /// The final time.
     pub end: f64,
-    /// How they are advanced.
+    /// How the motions are advanced.
     pub way: StepControl,
-    /// The states that are recorded.
+    /// The times at which rows are recorded.
     pub rows: Option<OutputTimes>,
-    /// What a row has, and what is told of the end.
+    /// The columns of a row, which are also evaluated at the end.
     pub columns: &'a [Column],
-    /// The changes of sign that are to be found in each; a terminal one ends its member alone.
+    /// The events that are located in each motion; a terminal event ends the motion of its member only.
     pub events: &'a [Event],
-    /// As many as there are processors where it is `None`.
+    /// The number of threads; the number of processors where it is `None`.
     pub threads: Option<usize>,
 }
 
-/// A member of an ensemble at its end.
+/// The result of a member of an ensemble.
 #[derive(Clone, Debug)]
 pub struct MemberEnd {
-    /// Which one, counted from 0.
+    /// The index of the member, counted from 0.
     pub index: usize,
-    /// Where it has led to; an error where it could not begin.
+    /// The final state; an error where the motion could not start.
     pub ending: Result<Ending, InputError>,
     /// The recorded rows.
     pub rows: Vec<Vec<f64>>,
-    /// The events that were found, in their order.
+    /// The sign changes of events that were found, in order of occurrence.
     pub crossings: Vec<Crossing>,
 }
 
-/// Where the motion of a member has led to.
+/// The final state of a member's motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending {
     /// How it ended.
     pub status: Status,
-    /// The first step that was seen not to have resolved the motion.
+    /// The first step that was found not to resolve the motion.
     pub unresolved: Option<UnresolvedStep>,
     /// The steps taken.
     pub steps: usize,
@@ -63,7 +63,7 @@ pub struct Ending {
     pub t: f64,
     /// The position there.
     pub q: Vec<f64>,
-    /// The velocity; not a number where none belongs to the momentum.
+    /// The velocity; NaN where no velocity corresponds to the momentum.
     pub v: Vec<f64>,
     /// The momentum.
     pub p: Vec<f64>,
@@ -73,17 +73,19 @@ pub struct Ending {
     pub columns: Vec<f64>,
 }
 
-/// What is handed the members in the order of their index.
+/// Receives the members in the order of their index.
 pub trait EnsembleMonitor {
-    /// A member at its end; `Break` ends the ensemble after the members under way.
+    /// A member that has ended; `Break` ends the ensemble after the members that are running.
     fn member(&mut self, member: MemberEnd) -> ControlFlow<()>;
 
-    /// Whether the members under way are to end: asked on the threads of their runs, where [`poll`](Self::poll) waits for them.
+    /// A condition that ends the running members. It is evaluated on the threads of the runs, whereas
+    /// [`poll`](Self::poll) is called only after they have ended.
     fn interrupt(&self) -> Option<Interrupt> {
         None
     }
 
-    /// Is called every few thousand members, or fewer where each has rows, events or parameters of its own, or where they take long.
+    /// Called every few thousand members; more often where members have rows, events or parameters of their own, or
+    /// where they take long.
     fn poll(&mut self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -96,11 +98,11 @@ impl<F: FnMut(MemberEnd) -> ControlFlow<()>> EnsembleMonitor for F {
 }
 
 impl System {
-    /// Runs an ensemble; a member that cannot begin, or fails, is handed on with the cause, and the others go on. The result of a member does
-    /// not depend on the number of threads.
+    /// Runs an ensemble. A member that cannot start, or that fails, is passed on with the cause, and the others
+    /// continue. The result of a member does not depend on the number of threads.
     ///
     /// # Errors
-    /// What holds for all members.
+    /// Errors that concern all members.
     pub fn ensemble(&self, ensemble: &Ensemble<'_>, watch: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
         self.kernel.ensemble(ensemble, watch)
     }

@@ -1,4 +1,4 @@
-//! What can be wrong with a request.
+//! Errors of a request.
 
 use assembled_herglotz::AssemblyError;
 use contact_geom::GeometryError;
@@ -6,7 +6,7 @@ use discrete_herglotz::{CheckpointError, EnsembleError, InputError, StepError};
 use formula_lagrangian::FormulaError;
 use thiserror::Error;
 
-/// Bad input to a system that is known when the program runs.
+/// Invalid input to a system that is defined at run time.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
     /// A formula, a column or the function of an event.
@@ -15,22 +15,22 @@ pub enum RuntimeError {
     /// The start, the span, the integrator or the steps.
     #[error("{}", in_words(.0))]
     Input(#[from] InputError),
-    /// What holds for all members of an ensemble, or for one of them.
+    /// An error that concerns all members of an ensemble, or one of them.
     #[error("{}", of_ensemble(.0))]
     Ensemble(#[from] EnsembleError),
     /// A point at which the geometry is not defined.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
-    /// A step of a map that is looked at could not be taken.
+    /// A step of a map that is checked could not be taken.
     #[error("a step could not be taken: {0}")]
     Step(#[from] StepError),
-    /// A checkpoint.
+    /// An error of a checkpoint.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// The system has no room for a thread.
+    /// A thread could not be started.
     #[error("a thread could not be started: {0}; end other programs and try again")]
     Thread(#[from] std::io::Error),
-    /// A vector has not as many entries as there are coordinates.
+    /// The length of a vector differs from the number of coordinates.
     #[error("`{what}` has {found} numbers, where the system has {expected} coordinates")]
     Length {
         /// Which vector.
@@ -43,12 +43,12 @@ pub enum RuntimeError {
     /// A vector or number is not finite.
     #[error("`{what}` is {value}, where a finite number is needed")]
     NotFinite {
-        /// Which one.
+        /// The name of the vector component or number.
         what: String,
         /// Its value.
         value: f64,
     },
-    /// L does not depend on the square, or any curved function, of some velocities.
+    /// L is linear in some velocities, so that it is not regular.
     #[error(
         "the Lagrangian is not regular at the start: it is linear in {velocities}, so that no acceleration follows; add a kinetic term"
     )]
@@ -56,17 +56,17 @@ pub enum RuntimeError {
         /// The velocities, by name.
         velocities: String,
     },
-    /// An event, or a column of one, has the conformal factor of a motion whose rate is not one number.
+    /// An event, or a column of one, contains the conformal factor, and the rate `L_z` of the motion is not constant.
     #[error(
         "an event or one of its columns has `sigma` or `log_factor`, which are known between the ends of steps where L_z is constant alone; take a column of rows, or an event of time and state"
     )]
     FactorInEvent,
-    /// A parameter is in no formula.
+    /// A parameter is used in no formula.
     #[error("the parameter `{name}` is not in the Lagrangian, nor in an event or a column: {hint}")]
     UnusedParameter {
         /// The parameter.
         name: String,
-        /// The nearest one that is used, or all.
+        /// The nearest name that is used, or all names that are used.
         hint: String,
     },
     /// A system of many coordinates, or its integrator.
@@ -77,10 +77,10 @@ pub enum RuntimeError {
     Part {
         /// Which part.
         part: &'static str,
-        /// What is wrong with it.
+        /// The error of the formula.
         error: FormulaError,
     },
-    /// An argument of a system of many coordinates.
+    /// An invalid argument of a system of many coordinates.
     #[error("`{argument}` {why}")]
     Argument {
         /// Its name.
@@ -95,13 +95,13 @@ pub enum RuntimeError {
         name: String,
         /// The nearest known one.
         nearest: Option<String>,
-        /// All known.
+        /// All known names.
         known: String,
     },
 }
 
-/// What is wrong with a run, to those who have written a formula or a function: what is proved of it cannot be claimed, it states no clock, and they
-/// know no names of Rust.
+/// Error message for users who wrote a formula or a function. The structure of such a Lagrangian is proved and cannot
+/// be claimed, it has no time transformation, and the message has no Rust names.
 pub fn in_words(error: &InputError) -> String {
     match error {
         InputError::Unclaimed { claim } => {
@@ -128,7 +128,7 @@ pub fn in_words(error: &InputError) -> String {
     }
 }
 
-/// The same of an ensemble.
+/// The same for an ensemble.
 fn of_ensemble(error: &EnsembleError) -> String {
     match error {
         EnsembleError::Member { index, cause } => format!("member {index}: {}", in_words(cause)),

@@ -1,24 +1,24 @@
-//! Whether what is computed is to end before its time.
+//! Interruption of a computation.
 
 use std::fmt::{Debug, Formatter};
 use std::sync::Arc;
 
-/// A question that is asked from time to time while something is computed: whether to end it, as a user may wish who has pressed Ctrl-C.
+/// A condition that is polled during a computation and ends it, for example when the user has pressed Ctrl-C.
 #[derive(Clone)]
 pub struct Interrupt(Arc<dyn Fn() -> bool + Send + Sync>);
 
 impl Interrupt {
-    /// Ends what is computed once this is true.
+    /// Ends the computation once the condition is true.
     pub fn when(is_wanted: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         Interrupt(Arc::new(is_wanted))
     }
 
-    /// Whether it is.
+    /// Whether the condition is true.
     pub fn is_wanted(&self) -> bool {
         (self.0)()
     }
 
-    /// The same as integrators ask it.
+    /// The same condition in the form that integrators take.
     pub(crate) fn asked(&self) -> discrete_herglotz::Interrupt<'_> {
         discrete_herglotz::Interrupt::when(&*self.0)
     }

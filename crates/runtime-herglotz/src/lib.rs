@@ -1,9 +1,9 @@
-//! Motions of Lagrangians whose formula and dimension are known when the program runs.
+//! Motions of Lagrangians whose formula and dimension are known at run time only.
 //!
-//! The libraries below are generic in the number of coordinates and in the Lagrangian; here is one type for all formulas of 1 to 16
-//! coordinates, behind which they are compiled once. [`System`] is a formula with its integrators, [`Motion`] what is asked of a
-//! motion, [`Ensemble`] of many, [`BoundaryProblem`] of a path between two ends. More coordinates have a [`Lattice`], by the formulas
-//! of a site and of a bond, and [`Bodies`].
+//! The libraries below this one are generic in the number of coordinates and in the Lagrangian. This crate has one type
+//! for all formulas in 1 to 16 coordinates, for which the generic code is compiled once. [`System`] is a formula with
+//! its integrators, [`Motion`] a request for one motion, [`Ensemble`] for many, and [`BoundaryProblem`] for a path
+//! between two ends. [`Lattice`], given by the formulas of a site and of a bond, and [`Bodies`] have more coordinates.
 //!
 //! ```
 //! use runtime_herglotz::{Column, Motion, Start, System, StepControl, OutputTimes};

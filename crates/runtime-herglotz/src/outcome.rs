@@ -1,13 +1,13 @@
-//! What a motion has led to.
+//! Results of a motion.
 
 use discrete_herglotz::{MethodInfo, PlanEntry, Status, UnresolvedStep};
 
-/// What a motion has led to. Where it was ended before its time, that is what was computed before.
+/// The result of a motion. Where the motion was ended early, it describes the part that was computed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// How it ended.
     pub status: Status,
-    /// The first step that cannot have resolved the motion, where one was seen.
+    /// The first step that was found not to resolve the motion.
     pub unresolved: Option<UnresolvedStep>,
     /// The steps taken.
     pub steps: usize,
@@ -17,19 +17,19 @@ pub struct Outcome {
     pub q: Vec<f64>,
     /// The momentum there.
     pub p: Vec<f64>,
-    /// The velocity there; `None` where none belongs to the momentum.
+    /// The velocity there; `None` where no velocity corresponds to the momentum.
     pub v: Option<Vec<f64>>,
-    /// The action there, where it was asked for.
+    /// The action there, where it was requested.
     pub z: Option<f64>,
-    /// The logarithm of the conformal factor, where it was asked for.
+    /// The logarithm of the conformal factor, where it was requested.
     pub log_factor: Option<f64>,
-    /// The error of (q, p) relative to its size, or of v relative to the largest speed, where it was asked for.
+    /// The error of (q, p) relative to its size, or of v relative to the largest speed, where it was requested.
     pub error_estimate: Option<f64>,
     /// The evaluations of forces or gradients.
     pub evaluations: u64,
 }
 
-/// A change of sign of an event.
+/// A sign change of an event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crossing {
     /// The time.
@@ -38,70 +38,73 @@ pub struct Crossing {
     pub event: usize,
     /// The position there.
     pub q: Vec<f64>,
-    /// The velocity; not a number where none belongs to the momentum.
+    /// The velocity; NaN where no velocity corresponds to the momentum.
     pub v: Vec<f64>,
     /// The momentum.
     pub p: Vec<f64>,
     /// The action.
     pub z: f64,
-    /// The [columns](crate::Event::columns) of the event; not numbers where they are not defined.
+    /// The [columns](crate::Event::columns) of the event; NaN where they are not defined.
     pub columns: Vec<f64>,
 }
 
-/// What will be computed, and what is skipped.
+/// The plan of a run: what will be computed, and what is skipped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// In words.
+    /// A description in plain text.
     pub text: String,
-    /// What is known of the integrator that was named or chosen.
+    /// The properties of the integrator that was named or chosen.
     pub integrator: MethodInfo,
-    /// The step, negative where the motion goes back.
+    /// The step, negative where the motion runs backward.
     pub step_size: f64,
     /// The number of steps.
     pub steps: usize,
-    /// The error that the trial runs found or predict, where an accuracy was asked for.
+    /// The error that the trial runs measured or predict, where an accuracy was requested.
     pub error: Option<f64>,
-    /// The lines of the text.
+    /// The entries of the plan, one for each line of the text.
     pub items: Vec<PlanEntry>,
 }
 
-/// What is seen of a motion while it goes on. `Break` ends it, with all that was seen kept.
+/// Callbacks during a motion. Where a callback returns `Break`, the motion ends and all that was recorded is kept.
 pub trait RunMonitor {
     /// A recorded row.
     fn row(&mut self, _numbers: &[f64]) -> std::ops::ControlFlow<()> {
         std::ops::ControlFlow::Continue(())
     }
 
-    /// A change of sign of an event.
+    /// A sign change of an event.
     fn crossing(&mut self, _crossing: &Crossing) -> std::ops::ControlFlow<()> {
         std::ops::ControlFlow::Continue(())
     }
 
-    /// The end of a step, or the start: time, position, momentum and action; where [nodes](crate::Motion::nodes) are asked for.
+    /// The start, or the end of a step: time, position, velocity, momentum and action. It is called where
+    /// [nodes](crate::Motion::nodes) are requested.
     fn node(&mut self, _t: f64, [_q, _v, _p]: [&[f64]; 3], _z: f64) {}
 
-    /// Is called every few steps with the part of the span that is done, from 0 to 1: for progress, and to end a motion from outside.
+    /// Called every few steps with the completed fraction of the span, from 0 to 1: for progress, and to end a motion
+    /// from outside.
     fn poll(&mut self, _part: f64) -> std::ops::ControlFlow<()> {
         std::ops::ControlFlow::Continue(())
     }
 
-    /// The motion as it would go on from where [`poll`](Self::poll) has ended it, where its steps can be saved; those of a
-    /// [resumable](crate::Motion::resumable) one can.
+    /// The state from which a motion that was ended by [`poll`](Self::poll) can be resumed, if its steps can be saved;
+    /// those of a [resumable](crate::Motion::resumable) motion can.
     fn interrupted(&mut self, _at: discrete_herglotz::ResumeState) {}
 
-    /// Is asked after each [`poll`](Self::poll) whether the motion is to be saved there, and goes on.
+    /// Called after each [`poll`](Self::poll): whether the motion is to be saved there and then continued.
     fn wants_checkpoint(&mut self) -> bool {
         false
     }
 
-    /// The motion after so many steps as it would go on from there, where a [checkpoint](Self::wants_checkpoint) is wanted and its steps can
-    /// be saved. All rows and crossings up to there were handed on.
+    /// The number of steps taken and the state from which the motion can be resumed, where a
+    /// [checkpoint](Self::wants_checkpoint) is requested and its steps can be saved. All rows and crossings up to there
+    /// have been passed on.
     fn checkpoint(&mut self, _steps: usize, _at: discrete_herglotz::ResumeState) -> std::ops::ControlFlow<()> {
         std::ops::ControlFlow::Continue(())
     }
 }
 
-/// Nothing is watched.
+/// Ignores everything.
 impl RunMonitor for () {}
 
 /// Keeps the rows of a motion.

@@ -1,9 +1,10 @@
-//! Parameters that are in no formula: most are misspelt.
+//! Detection of parameters that are not used by any formula, most often misspelt ones.
 
 use crate::RuntimeError;
 use formula_lagrangian::{Formula, nearest_name};
 
-/// Refuses parameters of a formula that are neither in its value nor, as a word, in the texts of expressions beside it.
+/// Rejects parameters of a formula that are neither used in its value nor occur, as a word, in the texts of the
+/// additional expressions.
 ///
 /// ```
 /// use runtime_herglotz::{Formula, check_parameters};
@@ -30,7 +31,7 @@ pub fn check_parameters(formula: &Formula, texts: &[&str]) -> Result<(), Runtime
     Err(RuntimeError::UnusedParameter { name: (*name).to_owned(), hint })
 }
 
-/// The names in a text.
+/// The identifiers in a text.
 fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| !(c.is_alphanumeric() || c == '_'))
 }

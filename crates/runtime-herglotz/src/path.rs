@@ -4,7 +4,8 @@ use crate::kernel::path;
 use crate::{RuntimeError, System};
 use discrete_herglotz::{AnyIntegrator, PathStatus, UnresolvedStep};
 
-/// A path between two positions that is to be found: critical for the discrete action of Herglotz' principle.
+/// A discrete boundary value problem: find a path between two positions that is critical for the discrete action of
+/// Herglotz' principle.
 ///
 /// ```
 /// use runtime_herglotz::{AnyIntegrator, BoundaryProblem, System};
@@ -19,51 +20,54 @@ use discrete_herglotz::{AnyIntegrator, PathStatus, UnresolvedStep};
 pub struct BoundaryProblem {
     /// The positions at the start and at the end.
     pub ends: [Vec<f64>; 2],
-    /// The times there.
+    /// The times of the start and of the end.
     pub span: (f64, f64),
     /// The action at the start.
     pub z0: f64,
-    /// Whose discrete Lagrangian it is.
+    /// The integrator whose discrete Lagrangian is used.
     pub by: AnyIntegrator,
-    /// The number of steps, of one length.
+    /// The number of steps, all of the same length.
     pub steps: usize,
-    /// The points from which the search starts, the coordinates of one after those of the other; the straight line where it is `None`.
+    /// The points of the initial guess, point by point; the straight line where it is `None`.
     pub guess: Option<Vec<f64>>,
 }
 
 impl BoundaryProblem {
-    /// Between two positions over a time, from the straight line, with an action that starts with 0.
+    /// A path between two positions over a time span, starting from the straight line and with initial action 0.
     pub fn new(ends: [Vec<f64>; 2], span: (f64, f64), by: AnyIntegrator, steps: usize) -> Self {
         BoundaryProblem { ends, span, z0: 0.0, by, steps, guess: None }
     }
 }
 
-/// The last path of a search, with what it is worth. Of vectors the coordinates of one point follow those of the other.
+/// The last path of a search, with measures of its quality. Vectors are stored point by point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundPath {
     /// The times of the points.
     pub t: Vec<f64>,
     /// The positions.
     pub q: Vec<f64>,
-    /// The velocities that belong to the momenta; not numbers where none do.
+    /// The velocities that correspond to the momenta; NaN where there is none.
     pub v: Vec<f64>,
-    /// The momenta; not numbers where they are not defined, as they are along every path that is found.
+    /// The momenta; NaN where they are not defined, which does not happen along a path that was found.
     pub p: Vec<f64>,
     /// The actions.
     pub z: Vec<f64>,
-    /// How the search ended, with what to do where no path was found.
+    /// How the search ended, with advice where no path was found.
     pub status: PathStatus,
-    /// The largest residual of a discrete Herglotz equation, a momentum.
+    /// The largest residual of a discrete Herglotz equation, in units of momentum.
     pub residual: f64,
     /// The logarithm of the conformal factor of the whole path.
     pub log_factor: f64,
-    /// The smallest pivot of the last linearised equations, relative to its size: small where the ends are nearly conjugate.
+    /// The smallest pivot of the last linearised equations, relative to its size before the elimination: small where
+    /// the ends are nearly conjugate.
     pub regularity: f64,
-    /// By how much the steps move the path, in units of its range, where that is known: by a discrete Lagrangian of order one or two.
+    /// The estimated displacement of the path by the truncation error of the steps, in units of its range. It is known
+    /// for discrete Lagrangians of order one or two.
     pub error_estimate: Option<f64>,
-    /// Why a path that was found may be far from every motion: its steps do not resolve it, or its ends are conjugate to within their error.
+    /// The reason why a path that was found may be far from every motion: its steps do not resolve the motion, or its
+    /// ends are conjugate to within the truncation error.
     pub unresolved: Option<UnresolvedStep>,
-    /// The corrections that were made.
+    /// The number of corrections that were made.
     pub iterations: u32,
 }
 
@@ -83,10 +87,11 @@ impl FoundPath {
 }
 
 impl System {
-    /// Searches for a path between two positions, of a system of one to eight coordinates. That none was found is told by its status.
+    /// Searches for a path between two positions, of a system of one to eight coordinates. The status of the result
+    /// says whether a path was found.
     ///
     /// # Errors
-    /// [`RuntimeError`] for all that is wrong with the problem.
+    /// [`RuntimeError`] for an invalid problem.
     pub fn path(&self, problem: &BoundaryProblem) -> Result<FoundPath, RuntimeError> {
         path::search(self.formula(), problem)
     }

@@ -1,10 +1,10 @@
-//! The motion as a system of first order, for integrators of others.
+//! The equations of motion as a first-order system, for external integrators.
 
 use crate::kernel::Kernel;
 use crate::{Motion, Outcome, RuntimeError, Start, System};
 use std::sync::Arc;
 
-/// An integrator of others that a [comparison](System::compare) measures beside those of the library.
+/// An external integrator that a [comparison](System::compare) measures along with those of the library.
 pub trait Peer {
     /// Its name.
     fn name(&self) -> &str;
@@ -12,22 +12,23 @@ pub trait Peer {
     /// Its order.
     fn order(&self) -> u32;
 
-    /// The end of a motion to a relative tolerance of its variables; `None` where it gives up.
+    /// The end of a motion, computed to a relative tolerance of its variables; `None` where the integrator fails.
     fn run(&self, motion: &FirstOrder, tolerance: f64) -> Option<PeerEnd>;
 }
 
-/// Where a peer has led a motion.
+/// The final state that a peer computed, and the work it took.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PeerEnd {
-    /// The variables, as those of [`FirstOrder::start`].
+    /// The variables, ordered as in [`FirstOrder::start`].
     pub state: Vec<f64>,
     /// The steps taken.
     pub steps: usize,
-    /// The evaluations of the field.
+    /// The evaluations of the vector field.
     pub evaluations: u64,
 }
 
-/// A motion as a system `y' = f(t, y)` of first order: `y` is `(q, v)`, and the action `z` where accelerations depend on it.
+/// The equations of motion as a first-order system `y' = f(t, y)`: `y` is `(q, v)`, followed by the action `z` where
+/// accelerations depend on it.
 pub struct FirstOrder {
     kernel: Arc<dyn Kernel>,
     /// The variables at the start.
@@ -36,18 +37,19 @@ pub struct FirstOrder {
     pub t0: f64,
     /// The time of the end.
     pub end: f64,
-    /// The size of `(q, v)` at the end, to which the error there is relative: absolute tolerances are in units of it.
+    /// The size of `(q, v)` at the end, relative to which the error there is measured; absolute tolerances are in units
+    /// of it.
     pub size: f64,
 }
 
 impl FirstOrder {
-    /// Of a motion, and where it leads.
+    /// The first-order system of a motion whose end is known.
     ///
     /// # Errors
     /// Those of [`System::geometry`] at the start.
     pub(crate) fn new(system: &System, motion: &Motion, end: &Outcome) -> Result<Self, RuntimeError> {
         let (start, n) = (&motion.start, system.dimension());
-        // The velocity of a momentum, too.
+        // The Herglotz field has the velocity, also where the start has a momentum.
         let field = system.geometry(start)?.herglotz_field;
         let mut y = [start.q.as_slice(), field.get(..n).unwrap_or_default()].concat();
         if !system.structure().has_constant_rate() {
@@ -58,7 +60,7 @@ impl FirstOrder {
         Ok(FirstOrder { kernel: system.kernel.clone(), start: y, t0: start.t, end: motion.end, size })
     }
 
-    /// The rates `f(t, y)`; not numbers where L is not defined or not regular.
+    /// The right-hand side `f(t, y)`; NaN where L is not defined or not regular.
     pub fn rates(&self, t: f64, y: &[f64], to: &mut [f64]) {
         self.kernel.rates(t, y, to);
     }

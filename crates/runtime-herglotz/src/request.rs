@@ -1,18 +1,18 @@
-//! What is asked of a motion.
+//! Requests for a motion.
 
 use crate::{Column, Interrupt};
 use discrete_herglotz::{AnyIntegrator, Steps};
 use formula_lagrangian::Expression;
 
-/// What a motion starts with beside its position.
+/// Initial velocities or momenta of a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub enum InitialVelocity {
     /// The velocities.
     Velocity(Vec<f64>),
     /// The momenta `L_v`.
     Momentum(Vec<f64>),
-    /// The momenta with velocities near those that belong to them, as at the end of another motion: where a momentum has several, these are
-    /// the ones of it.
+    /// The momenta, with velocities close to those that correspond to them, as at the end of another motion. Where the
+    /// Legendre transformation is not injective, they select the branch.
     MomentumNear {
         /// The momenta.
         p: Vec<f64>,
@@ -21,7 +21,7 @@ pub enum InitialVelocity {
     },
 }
 
-/// Where a motion starts: as many numbers in each vector as there are coordinates.
+/// Initial state of a motion; each vector has one entry per coordinate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Start {
     /// The time.
@@ -44,14 +44,14 @@ impl Start {
 /// How a motion is advanced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepControl {
-    /// To a relative error of (q, p) and v, by this integrator, or by one that is chosen for it.
+    /// To a relative error of (q, p) and of v, with this integrator or with one that is chosen automatically.
     Accuracy {
         /// The error.
         wanted: f64,
         /// The integrator.
         by: Option<AnyIntegrator>,
     },
-    /// By given steps.
+    /// With given steps.
     Steps {
         /// The integrator.
         by: AnyIntegrator,
@@ -69,7 +69,7 @@ pub enum OutputTimes {
     At(Vec<f64>),
 }
 
-/// Which changes of sign of an event count, in the sense of the motion.
+/// Which sign changes of an event function count, in the direction of the motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Direction {
     /// From negative to positive.
@@ -81,24 +81,25 @@ pub enum Direction {
     Both,
 }
 
-/// A function of the state whose changes of sign are to be found.
+/// A function of time and state whose sign changes are located.
 #[derive(Clone, Debug)]
 pub struct Event {
     /// The function.
     pub function: Expression,
-    /// Which changes count.
+    /// Which sign changes count.
     pub direction: Direction,
-    /// Whether the first one ends the motion.
+    /// Whether the first sign change ends the motion.
     pub terminal: bool,
-    /// The time from which they count, in the sense of the motion, so that transients are left out; from the start where it is `None`, as
-    /// it is of a terminal event.
+    /// The time from which sign changes count, in the direction of the motion, so that transients are left out. `None`
+    /// means from the start, and is required of a terminal event.
     pub from: Option<f64>,
-    /// What is evaluated at each, beside the state there. `sigma` and `log_factor` are known where `L_z` is constant.
+    /// Expressions that are evaluated at each sign change, in addition to the state there. `sigma` and `log_factor` are
+    /// known where `L_z` is constant.
     pub columns: Vec<Expression>,
 }
 
 impl Event {
-    /// All changes of sign of a function, which do not end the motion, with nothing beside the state.
+    /// All sign changes of a function; they do not end the motion, and only the state is recorded.
     pub fn new(function: Expression) -> Self {
         Event { function, direction: Direction::Both, terminal: false, from: None, columns: Vec::new() }
     }
@@ -108,13 +109,13 @@ impl Event {
         std::iter::once(&self.function).chain(&self.columns)
     }
 
-    /// The same, to be changed.
+    /// The function and the columns, mutable.
     pub(crate) fn expressions_mut(&mut self) -> impl Iterator<Item = &mut Expression> {
         std::iter::once(&mut self.function).chain(&mut self.columns)
     }
 }
 
-/// A motion to be computed, with all that is to be recorded of it.
+/// A motion to be computed, and what is recorded of it.
 ///
 /// ```
 /// use runtime_herglotz::{Column, Motion, Start, System, StepControl, OutputTimes};
@@ -130,36 +131,39 @@ impl Event {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Motion {
-    /// Where it starts.
+    /// The initial state.
     pub start: Start,
-    /// The time at which it ends, before or after that of the start.
+    /// The final time, before or after the initial time.
     pub end: f64,
-    /// How it is advanced.
+    /// How the motion is advanced.
     pub way: StepControl,
-    /// The states that are recorded, as rows of the columns.
+    /// The times at which rows of the columns are recorded.
     pub rows: Option<OutputTimes>,
-    /// What a row has.
+    /// The columns of a row.
     pub columns: Vec<Column>,
-    /// The changes of sign that are to be found.
+    /// The events to be located.
     pub events: Vec<Event>,
-    /// Whether the outcome has the action.
+    /// Whether the action is in the outcome.
     pub action: bool,
-    /// Whether the outcome has the conformal factor.
+    /// Whether the conformal factor is in the outcome.
     pub conformal_factor: bool,
-    /// Whether the outcome has an estimate of its error: of given steps by a run with half of them, which costs twice as much.
+    /// Whether an error estimate is in the outcome. For given steps it takes a second run with twice as many steps of
+    /// half the length, which costs twice as much as the run.
     pub estimate: bool,
-    /// The scale of each coordinate that errors are measured by; without it they are relative to the size of the whole state.
+    /// The scale of each coordinate by which errors are measured; without it errors are relative to the size of the
+    /// whole state.
     pub scales: Option<Vec<f64>>,
-    /// Whether every step is handed to [`RunMonitor::node`](crate::RunMonitor::node).
+    /// Whether every step is passed to [`RunMonitor::node`](crate::RunMonitor::node).
     pub nodes: bool,
-    /// Whether it is refused where it could not be interrupted and [resumed](crate::System::resume).
+    /// Whether the motion is refused if it could not be interrupted and [resumed](crate::System::resume).
     pub resumable: bool,
-    /// Whether its plan, its check or its comparison is to end; the motion itself is ended by its [`RunMonitor`](crate::RunMonitor).
+    /// When to interrupt the plan, the check or the comparison of the motion; the motion itself is ended by its
+    /// [`RunMonitor`](crate::RunMonitor).
     pub interrupt: Option<Interrupt>,
 }
 
 impl Motion {
-    /// From a start to a time, with nothing recorded but the end.
+    /// From a start to a time, recording the final state only.
     pub fn new(start: Start, end: f64, way: StepControl) -> Self {
         Motion {
             start,

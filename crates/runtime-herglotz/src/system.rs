@@ -1,4 +1,4 @@
-//! Systems by their formula.
+//! Systems given by a formula.
 
 use crate::kernel::{Kernel, kernel_of};
 use crate::outcome::KeptRows;
@@ -8,16 +8,16 @@ use discrete_herglotz::{AnyIntegrator, InputError, ResumeState};
 use formula_lagrangian::Formula;
 use std::sync::Arc;
 
-/// A symmetry that is seen in a formula; its momentum decays as the conformal factor.
+/// A symmetry that is recognised in a formula; its momentum decays with the conformal factor.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SeenSymmetry {
-    /// Moving these coordinates by one length leaves L as it is.
+    /// L is invariant under translation of these coordinates by a common length.
     Translation(Vec<usize>),
-    /// Turning these pairs of coordinates by one angle leaves L as it is.
+    /// L is invariant under rotation of these pairs of coordinates by a common angle.
     Rotation(Vec<(usize, usize)>),
 }
 
-/// A Lagrangian by its formula, in 1 to 16 coordinates, with all that integrators need. Cloning is cheap.
+/// A Lagrangian given by its formula, in 1 to 16 coordinates, with all that integrators need. Cloning is inexpensive.
 ///
 /// ```
 /// use runtime_herglotz::{Motion, Start, System, StepControl};
@@ -41,15 +41,15 @@ impl System {
         Ok(System { kernel: kernel_of(formula)? })
     }
 
-    /// The same from a text over coordinates and parameters; see [`Formula::parse`].
+    /// The system of a formula that is parsed from a text over coordinates and parameters; see [`Formula::parse`].
     ///
     /// # Errors
-    /// [`RuntimeError::Formula`] with the place in the text.
+    /// [`RuntimeError::Formula`] with the position in the text.
     pub fn parse(text: &str, coordinates: &[&str], parameters: &[(&str, f64)]) -> Result<Self, RuntimeError> {
         Self::new(&Formula::parse(text, coordinates, parameters)?)
     }
 
-    /// The same with other values of some parameters; nothing is read or derived anew.
+    /// The same system with other values of some parameters; the formula is not parsed or differentiated again.
     ///
     /// # Errors
     /// [`RuntimeError::Formula`] where there is no such parameter, or a value is not finite.
@@ -57,7 +57,7 @@ impl System {
         Ok(System { kernel: self.kernel.with_parameters(values)? })
     }
 
-    /// The formula, with the present values of its parameters.
+    /// The formula, with the current values of its parameters.
     pub fn formula(&self) -> &Formula {
         self.kernel.formula()
     }
@@ -67,7 +67,7 @@ impl System {
         self.formula().dimension()
     }
 
-    /// What is proved of the structure of L.
+    /// The structure of L that is proved from its formula.
     pub fn structure(&self) -> Structure {
         self.kernel.structure()
     }
@@ -77,21 +77,21 @@ impl System {
         self.kernel.is_smooth()
     }
 
-    /// The symmetries that are seen.
+    /// The symmetries that are recognised.
     pub fn symmetries(&self) -> Vec<SeenSymmetry> {
         self.kernel.symmetries()
     }
 
-    /// The same Lagrangian as a source file in Rust, for those who outgrow the text; see
+    /// The same Lagrangian as a Rust source file, for use beyond what a formula allows; see
     /// [`FormulaLagrangian::to_rust`](formula_lagrangian::FormulaLagrangian::to_rust).
     ///
     /// # Errors
-    /// [`RuntimeError::Formula`] where `name` cannot be that of a type.
+    /// [`RuntimeError::Formula`] where `name` is not a valid type name.
     pub fn to_rust(&self, name: &str) -> Result<String, RuntimeError> {
         Ok(self.kernel.to_rust(name)?)
     }
 
-    /// Whether the system meets the hypotheses of an integrator.
+    /// Checks whether the system satisfies the hypotheses of an integrator.
     ///
     /// # Errors
     /// [`RuntimeError::Input`] with the claim that is missing.
@@ -99,15 +99,15 @@ impl System {
         self.kernel.check_integrator(integrator)
     }
 
-    /// Checks a motion, chooses its step and route, and says what will be computed and what is skipped.
+    /// Checks a motion, chooses its step and numerical method, and describes what will be computed and what is skipped.
     ///
     /// # Errors
-    /// [`RuntimeError`] for all that is wrong with it.
+    /// [`RuntimeError`] for invalid input.
     pub fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError> {
         self.kernel.plan(motion)
     }
 
-    /// Runs a motion. What goes wrong on the way is the status of the outcome.
+    /// Runs a motion. A failure during the run is reported in the status of the outcome.
     ///
     /// # Errors
     /// Those of [`plan`](Self::plan).
@@ -115,8 +115,9 @@ impl System {
         self.kernel.run(motion, watch, None)
     }
 
-    /// Goes on with a motion where it was interrupted, to the last bit. The events and the rows that follow are seen; of rows at steps the
-    /// first is that at which it goes on, of rows at times the first is after it.
+    /// Continues an interrupted motion; the result is bitwise that of an uninterrupted run. Events and rows from there
+    /// on are reported. With `OutputTimes::Every` rows start with the step at which the motion continues, with
+    /// `OutputTimes::At` after it.
     ///
     /// # Errors
     /// Those of [`run`](Self::run); [`InputError::AnotherRun`].
@@ -147,7 +148,7 @@ impl System {
         self.kernel.geometry(at)
     }
 
-    /// Whether the steps of a motion are contact: looked at in so many places along it.
+    /// Checks at this number of places along a motion whether its steps are contact transformations.
     ///
     /// # Errors
     /// Those of [`plan`](Self::plan).

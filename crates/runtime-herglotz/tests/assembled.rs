@@ -1,4 +1,4 @@
-//! Systems of many coordinates, against small systems of the same Lagrangian and against what is known of them.
+//! Systems of many coordinates, compared with small systems of the same Lagrangian and with known results.
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
@@ -9,7 +9,7 @@ use runtime_herglotz::{
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
-/// Every kind of integrator of such systems.
+/// Every kind of integrator of these systems.
 const ALL: [&str; 6] = ["strang", "blanes_moan_6", "mclachlan_4", "midpoint", "gauss_1", "gauss_2"];
 
 fn by(name: &str) -> AnyIntegrator {
@@ -27,7 +27,7 @@ fn chain(sites: usize, boundary: Boundary) -> Lattice {
     }
 }
 
-/// The rows of a small system by the same integrator: those of an assembled one.
+/// The rows of a small system with the same integrator, in the form of those of an assembled system.
 fn small_rows(text: &str, coordinates: &str, parameters: &[(&str, f64)], motion: &AssembledMotion) -> Vec<Vec<f64>> {
     let system = System::parse(text, &[coordinates], parameters).unwrap();
     let n = system.dimension();
@@ -54,7 +54,7 @@ fn distance(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     pairs.fold(0.0, |m: f64, (a, b)| if (a - b).abs() <= m { m } else { (a - b).abs() })
 }
 
-/// So many positions between -1 and 1.
+/// Positions between -1 and 1.
 fn waves(n: usize) -> Vec<f64> {
     (0..n).map(|i| (1.3 * i as f64).sin()).collect()
 }
@@ -85,7 +85,8 @@ fn a_short_lattice_is_the_small_system_of_its_formula() {
             let parameters = [("m", 1.5), ("gamma", -0.1), ("k", 2.0)];
             let small = small_rows(&format!("{sites} + {inner} {ends}"), "q[5]", &parameters, &motion);
             let off = distance(&found, &small);
-            // Twenty steps on numbers of order one, and a row inside of a step: round-off, with that of Newton's method.
+            // Twenty steps on numbers of order one, and a row within a step: the bound is round-off, including that of
+            // Newton's method.
             assert!(off < 1e-12, "{boundary:?} by {name}: {off:e}");
         }
     }
@@ -101,7 +102,7 @@ fn rates_in_time_and_several_components_are_those_of_the_small_system() {
         boundary: Boundary::Free,
         ..Lattice::default()
     };
-    // The coordinates of a site follow each other.
+    // The coordinates of a site are contiguous.
     let small = "\
         sum(i, 0, 3, v[2*i]^2/2 + v[2*i+1]^2 - (q[2*i]^2 + q[2*i+1]^2)^2/4 + 0.3*sin(t)*q[2*i]) - 0.2*(1 + sin(t)^2)*z";
     let bonds: String = [(0, 1), (2, 3), (0, 2), (1, 3)]
@@ -119,7 +120,8 @@ fn rates_in_time_and_several_components_are_those_of_the_small_system() {
         let (_, found) = system.record(&motion).unwrap();
         let expected = small_rows(&format!("{small}{bonds}"), "q[8]", &[], &motion);
         let off = distance(&found, &expected);
-        // As above; rates in time are integrated by formulas of different order, which agree to round-off over such steps.
+        // The bound is as above. Rates in time are integrated by formulas of different order, which agree to round-off
+        // over these steps.
         assert!(off < 1e-12, "by {name}: {off:e}");
     }
 }
@@ -155,7 +157,7 @@ fn few_bodies_are_the_small_system_of_their_formula() {
 
 #[test]
 fn a_thousand_sites_move_in_their_normal_modes() {
-    // A linear chain between walls: each mode has the frequency 2 sin(pi k/(2 (n + 1))), and is damped alone.
+    // In a linear chain between walls each mode has the frequency 2 sin(pi k/(2 (n + 1))), and is damped independently.
     let (n, gamma, k, time) = (1000, -0.02, 37.0, 50.0);
     let lattice = Lattice {
         site: "x'^2/2 + gamma*z".into(),
@@ -178,7 +180,8 @@ fn a_thousand_sites_move_in_their_normal_modes() {
     assert_eq!(rows.len(), 11);
     for row in rows {
         for (x, s) in row[1..=n].iter().zip(&shape) {
-            // The error of order 6 of steps omega h = 0.01 is far below round-off, of which 500 steps gather less than this.
+            // The truncation error of order 6 with omega h = 0.01 is far below round-off, which accumulates to less
+            // than this in 500 steps.
             assert!((x - s * amplitude(row[0])).abs() < 1e-12, "at {}", row[0]);
         }
     }
@@ -197,11 +200,11 @@ fn energy_over_sigma_is_conserved() {
         };
         let (_, rows) = lattice.record(&motion).unwrap();
         let scaled = |row: &Vec<f64>| row[row.len() - 2] / row[row.len() - 1].exp();
-        // Of the size of the error of the method, of order 6, 4 and 2, without a drift.
+        // The bounds are the errors of the methods, of order 6, 4 and 2, without a drift.
         let off = rows.iter().map(|row| (scaled(row) / scaled(&rows[0]) - 1.0).abs()).fold(0.0, f64::max);
         assert!(off < bound, "{name}: {off:e}");
         let factor = rows.last().unwrap().last().copied().unwrap();
-        // sigma is e^(gamma t); of collocation to its order.
+        // sigma is e^(gamma t); for collocation it is accurate to the order of the method.
         assert!((factor + 2.0).abs() < 1e-8, "{name}: {factor}");
     }
 }
@@ -312,7 +315,7 @@ fn what_is_wrong_is_said_with_the_argument() {
     assert!(matches!(system.run(&none, &mut ()), Err(RuntimeError::Input(_))));
 }
 
-/// Ends a motion after so many rows.
+/// Ends a motion after a number of rows.
 struct Until(usize);
 
 impl RunMonitor for Until {
@@ -330,7 +333,7 @@ fn a_motion_that_is_stopped_or_fails_has_a_state_of_numbers() {
     let stopped = lattice.run(&motion, &mut Until(4)).unwrap();
     assert!(matches!(stopped.status, Status::Stopped { step: 3, .. }), "{}", stopped.status);
     assert_eq!((stopped.steps, stopped.t), (3, 1.0 / 10.0 * 3.0));
-    // Steps far beyond the limit of stability.
+    // Steps far beyond the stability limit.
     let start = Start::new(0.0, waves(30), vec![0.0; 30], 0.0);
     let motion = AssembledMotion {
         rows: OutputTimes::Every(1000),

@@ -1,4 +1,4 @@
-//! Paths between two ends, by a formula.
+//! Paths between two ends, for a formula.
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
@@ -16,13 +16,15 @@ fn search(system: &System, problem: &BoundaryProblem) -> FoundPath {
     system.path(problem).unwrap()
 }
 
-/// Against x'' = -x + gamma x' from 0 to 1 in closed form, and its action by a run from the start that was found.
+/// Compared with the closed-form solution of x'' = -x + gamma x' from 0 to 1; the action is compared with that of a run
+/// from the initial state that was found.
 #[test]
 fn the_oscillator_between_two_positions() {
     let (system, t1) = (oscillator(), 3.0);
     let w = (1.0 - GAMMA * GAMMA / 4.0).sqrt();
     let a = 1.0 / (f64::exp(0.5 * GAMMA * (t1 - 1.0)) * (w * (t1 - 1.0)).sin());
-    // Of the order of the method: h^8 of a size below one, and h^2/4 of one.
+    // The bounds follow from the orders of the methods: h^8 with a constant below one, and h^2/4 with a constant of
+    // about one.
     for (name, error) in [("gauss_4", 1e-11), ("midpoint", 6e-4)] {
         let by: AnyIntegrator = name.parse().unwrap();
         let problem = BoundaryProblem { z0: 0.5, ..BoundaryProblem::new([vec![0.0], vec![1.0]], (1.0, t1), by, 40) };
@@ -35,20 +37,21 @@ fn the_oscillator_between_two_positions() {
             let (x, v) =
                 (a * (0.5 * GAMMA * t).exp() * sin, a * (0.5 * GAMMA * t).exp() * (0.5 * GAMMA * sin + w * cos));
             assert!((found.q[k] - x).abs() < error && (found.v[k] - v).abs() < 10.0 * error, "{name}, {k}");
-            // v is p: to the rounding of Newton's method.
+            // The momentum equals the velocity, up to the rounding of Newton's method.
             assert!((found.v[k] - found.p[k]).abs() < 1e-14, "{name}, {k}");
         }
         let start = Start::new(1.0, [0.0], [found.v[0]], 0.5);
         let motion = Motion::new(start, t1, StepControl::Accuracy { wanted: 1e-12, by: None });
         let z = system.run(&motion, &mut ()).unwrap().z.unwrap();
         assert!((found.z[40] - z).abs() < 10.0 * error && (found.action() - (z - 0.5)).abs() < 10.0 * error);
-        // What the steps leave out is known of orders one and two.
+        // The truncation error is estimated for discrete Lagrangians of order one and two.
         assert_eq!(found.error_estimate.is_some(), name == "midpoint");
         assert!(found.error_estimate.is_none_or(|estimate| estimate > 1e-5 && estimate < 1e-2), "{found:?}");
     }
 }
 
-/// Coordinates beyond those of the formula, in which a larger dimension is compiled, are not seen; a guess is where the search starts.
+/// The additional coordinates of a kernel with a larger dimension are not visible, and a guess is the start of the
+/// search.
 #[test]
 fn five_coordinates_and_a_guess() {
     let system = System::parse("sum(i, 0, 4, x'[i]^2/2 + cos(x[i])) - 0.1*z", &["x[5]"], &[]).unwrap();
@@ -56,7 +59,7 @@ fn five_coordinates_and_a_guess() {
     let ends = [vec![0.0; 5], vec![0.0; 5]];
     let straight = search(&system, &BoundaryProblem::new(ends.clone(), (0.0, 8.0), by, 80));
     assert!(straight.is_found() && straight.q.len() == 5 * 81 && straight.q.iter().all(|x| *x == 0.0));
-    // A pendulum's bob swings out and back in the time, if it is guessed.
+    // With a suitable guess, the pendulum swings out and back within the time span.
     let arc = |k: usize| 2.0 * (std::f64::consts::PI * k as f64 / 80.0).sin();
     let guess = (0..=80).flat_map(|k| [arc(k), 0.0, 0.0, 0.0, -arc(k)]).collect();
     let swung =
@@ -84,7 +87,7 @@ fn what_cannot_be_searched_for_is_refused() {
     let nine = System::parse("sum(i, 0, 8, x'[i]^2/2)", &["x[9]"], &[]).unwrap();
     let problem = BoundaryProblem { ends: [vec![0.0; 9], vec![1.0; 9]], ..good.clone() };
     assert!(matches!(nine.path(&problem), Err(RuntimeError::Argument { argument: "coordinates", .. })));
-    // Half a period apart it is found nowhere, or flagged.
+    // With ends half a period apart, no path is found, or it is flagged as unresolved.
     let free = system.with_parameters(&[("gamma", 0.0)]).unwrap();
     let by: AnyIntegrator = "midpoint".parse().unwrap();
     let conjugate = search(&free, &BoundaryProblem { by, span: (0.0, std::f64::consts::PI), ..good });

@@ -1,4 +1,4 @@
-//! Systems that are known when the program runs, against the types of the libraries.
+//! Systems that are defined at run time, compared with the types of the libraries.
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
@@ -30,7 +30,7 @@ fn start_of(entry: &CatalogueEntry) -> Start {
     Start::new(entry.t, entry.q, entry.v, 0.2)
 }
 
-/// The Herglotz field of an entry is that of the type.
+/// Checks that the Herglotz field of a catalogue entry is that of the type.
 fn same<const N: usize>(name: &str, lagrangian: &impl Lagrangian<N>) {
     let entry = CatalogueEntry::find(name).unwrap();
     let system = System::new(&entry.formula().unwrap()).unwrap();
@@ -78,7 +78,7 @@ fn every_entry_runs_and_its_steps_are_contact() {
         assert!(check.is_contact(), "{}: {:e}", entry.name, check.contact_defect());
         assert!(check.momentum_defect() <= 1e-11, "{}: {:e}", entry.name, check.momentum_defect());
         for place in &check.places {
-            // A step to 1e-9 of a whole motion is nearer to the motion than that.
+            // The whole motion has an error of 1e-9, so the error of a single step is below this bound.
             assert!(place.herglotz_defect <= 1e-8, "{}: {:e}", entry.name, place.herglotz_defect);
         }
         assert!(check.statements.len() >= 12, "{}", entry.name);
@@ -88,7 +88,7 @@ fn every_entry_runs_and_its_steps_are_contact() {
     }
 }
 
-/// In any number of coordinates the energy decays as the conformal factor, to the accuracy that was asked for.
+/// The energy decays with the conformal factor, to the requested accuracy, in any number of coordinates.
 #[test]
 fn one_to_sixteen_coordinates() {
     for n in 1..=16 {
@@ -110,7 +110,8 @@ fn one_to_sixteen_coordinates() {
     assert!(error.to_string().contains("1 to 16"), "{error}");
 }
 
-/// What is general in sixteen coordinates, within the stack of a thread: masses that depend on all positions, a rate that depends on z.
+/// The general case in sixteen coordinates fits into the stack of a thread: masses that depend on all positions, a rate
+/// that depends on z.
 #[test]
 fn sixteen_coupled_coordinates() {
     let mass = "sum(i, 0, n-1, v[i]^2) + 0.05*sum(i, 0, n-1, v[i]*cos(q[i]))^2";
@@ -143,11 +144,11 @@ fn sixteen_coupled_coordinates() {
     }
 }
 
-/// Ten coordinates are computed among sixteen, and nothing is seen of the other six: the motion is that of its two halves, which have kernels
-/// of their own, and the geometry is that of ten.
+/// Ten coordinates are computed with the kernel for sixteen, and the other six are not visible: the motion is that of
+/// its two parts, which have kernels of their own, and the geometry is that of ten coordinates.
 #[test]
 fn what_fills_a_kernel_is_not_seen() {
-    // Pendula of masses 1, 2, ... with springs.
+    // Pendula with masses 1, 2, ..., coupled by springs.
     let chain = |from: usize, to: usize, mass: usize| {
         let springs = format!("sum(i, {from}+1, {to}, (q[i] - q[i-1])^4)");
         format!("(sum(i, {from}, {to}, v[i]^2*(i + {mass})) + sum(i, {from}, {to}, cos(q[i])) - {springs})/2")
@@ -215,13 +216,13 @@ fn what_fills_a_kernel_is_not_seen() {
     assert!(system.to_rust("Halves").unwrap().contains("impl Lagrangian<10> for Halves"));
 }
 
-/// What is watched of a motion.
+/// Records of a motion.
 #[derive(Default)]
 struct Seen {
     rows: Vec<Vec<f64>>,
     crossings: Vec<Crossing>,
     nodes: usize,
-    /// The polls after which the motion is ended.
+    /// The number of polls after which the motion is ended.
     polls: Option<usize>,
     interrupted: Option<ResumeState>,
 }
@@ -284,7 +285,7 @@ fn a_run_is_that_of_the_typed_formula() {
     }
 }
 
-/// Energy, momenta and conformal factor by their names in columns and events, of one motion and of many.
+/// Energy, momenta and conformal factor by name in columns and events, for one motion and for an ensemble.
 #[test]
 fn quantities_in_columns_and_events() {
     let system = System::parse("x'^2 - x^2/2 + gamma*z", &["x"], &[("gamma", -0.2)]).unwrap();
@@ -307,12 +308,12 @@ fn quantities_in_columns_and_events() {
     system.run(&motion, &mut seen).unwrap();
     for row in &seen.rows {
         let exact = f64::exp(-0.2 * (row[0] - 1.0));
-        // Those of steps to round-off: gauss_8 at h = 0.1.
+        // The steps are exact to round-off: gauss_8 with h = 0.1.
         assert!((row[1] - 0.5).abs() < 1e-13 && (row[2] - exact).abs() < 1e-14, "{row:?}");
         assert!((row[3] - 1.0 - exact.ln()).abs() < 1e-14 && row[4].abs() < 1e-14, "{row:?}");
         assert!((row[5] - row[6]).abs() < 1e-14, "{row:?}");
     }
-    // sigma = 1/2 where e^(gamma (t - t0)) is, and the energy, which is sigma/2, is 1/4 there.
+    // e^(gamma (t - t0)) = sigma = 1/2 at this time, where the energy sigma/2 is 1/4.
     let half = 1.0 + f64::ln(0.5) / -0.2;
     let times = |event: usize| seen.crossings.iter().filter(|c| c.event == event).map(|c| c.t).collect::<Vec<_>>();
     for event in 0..2 {
@@ -342,7 +343,7 @@ fn quantities_in_columns_and_events() {
         assert!(member.crossings.iter().all(|c| (gamma * (c.t - 1.0) - f64::ln(0.75)).abs() < 1e-12));
     }
 
-    // A rate that depends on the motion is known in rows, not in events.
+    // A rate that depends on the motion is known in rows, but not in events.
     let system = System::parse("x'^2/2 - x^2/2 - z^2/8", &["x"], &[]).unwrap();
     let function = system.formula().expression("sigma - 0.5").unwrap();
     let motion = Motion {
@@ -373,7 +374,7 @@ fn a_terminal_event_ends_the_rows_too() {
     let mut seen = Seen::default();
     let outcome = system.run(&motion, &mut seen).unwrap();
     assert!(matches!(outcome.status, Status::Stopped { .. }) && outcome.q[0].abs() < 1e-15, "{outcome:?}");
-    // All rows before it, and none after it.
+    // All rows before the event, and none after it.
     let times: Vec<f64> = seen.rows.iter().map(|row| row[0]).collect();
     let expected = (0..=40).map(|k| 0.1 * f64::from(k)).filter(|t| *t <= outcome.t).collect::<Vec<_>>();
     assert_eq!(times, expected);
@@ -383,7 +384,7 @@ fn a_terminal_event_ends_the_rows_too() {
 #[test]
 fn an_interrupted_motion_goes_on_to_the_last_bit() {
     goes_on(OutputTimes::Every(100), 100.0);
-    // Rows at all times of the whole motion, one of which is that of the interruption, on and back.
+    // Rows at given times of the whole motion, one of which is the time of the interruption; forward and backward.
     let times = |end: f64| (0..=1000).map(move |k| if k == 1000 { end } else { end * f64::from(k) / 1000.0 }).collect();
     goes_on(OutputTimes::At(times(100.0)), 100.0);
     goes_on(OutputTimes::At(times(-100.0)), -100.0);
@@ -425,7 +426,7 @@ fn members(system: &System, ensemble: &Ensemble<'_>) -> Vec<MemberEnd> {
 fn members_are_single_runs_whatever_the_threads() {
     let system = pendulum();
     let start = |i: usize| Start::new(0.0, [0.1 + 0.01 * i as f64], [0.0], 0.0);
-    // One of them has no value.
+    // One member has an invalid parameter.
     let values = |i: usize| vec![if i == 7 { f64::NAN } else { -0.05 - 0.001 * i as f64 }];
     let columns = [Column::Position(0), Column::Energy];
     let of = |threads| Ensemble {
@@ -442,7 +443,7 @@ fn members_are_single_runs_whatever_the_threads() {
     };
     let (one, three) = (members(&system, &of(1)), members(&system, &of(3)));
     for (i, (a, b)) in one.iter().zip(&three).enumerate() {
-        // As text: what is not a number is not equal to itself.
+        // Compared as text, since NaN is not equal to itself.
         assert_eq!((a.index, format!("{:?}", a.ending)), (i, format!("{:?}", b.ending)));
         let Ok(ending) = &a.ending else {
             assert_eq!(i, 7);
@@ -450,25 +451,26 @@ fn members_are_single_runs_whatever_the_threads() {
         };
         let own = system.with_parameters(&[("gamma", values(i)[0])]).unwrap();
         let outcome = own.run(&Motion::new(start(i), 10.0, by_steps(40)), &mut ()).unwrap();
-        // Lanes have a sine of their own: some units in the last place, grown by a motion that grows nothing.
+        // The sine of the SIMD lanes differs by some units in the last place, and the motion does not amplify the
+        // difference.
         let near = |x: f64, y: f64| (x - y).abs() < 1e-14;
         assert!(near(ending.q[0], outcome.q[0]) && near(ending.p[0], outcome.p[0]), "{i}: {ending:?} {outcome:?}");
         assert_eq!(ending.columns[0], ending.q[0]);
     }
     assert!(one[7].ending.is_err());
 
-    // Rows: those of a run of its own.
+    // Rows are those of a single run.
     let recorded = Ensemble { rows: Some(OutputTimes::At(vec![0.0, 5.0, 10.0])), varied: None, ..of(2) };
     let all = members(&system, &recorded);
     let motion =
         Motion { rows: recorded.rows.clone(), columns: columns.to_vec(), ..Motion::new(start(4), 10.0, by_steps(40)) };
     assert_eq!(all[4].rows, system.record(&motion).unwrap().1);
-    // Rows that end before the motion does: the end is its own.
+    // The final state does not depend on the rows, also where the last row is before the end.
     let early = Ensemble { rows: Some(OutputTimes::At(vec![0.0, 5.0])), varied: None, ..of(2) };
     let ending = members(&system, &early).swap_remove(4).ending.unwrap();
     let end_of_all = all[4].ending.clone().unwrap();
     assert_eq!((ending.v, ending.columns), (end_of_all.v, end_of_all.columns));
-    // To an accuracy.
+    // With a requested accuracy.
     let accurate = Ensemble { way: accurate(1e-8), ..of(2) };
     for (a, b) in members(&system, &accurate).iter().zip(&one) {
         if let (Ok(a), Ok(b)) = (&a.ending, &b.ending) {
@@ -477,17 +479,18 @@ fn members_are_single_runs_whatever_the_threads() {
     }
 }
 
-/// Of each by itself, with its own parameters; a terminal event ends its member alone, and what lies beyond it is not told.
+/// The events of each member are those of a single run with its parameters. A terminal event ends its member only, and
+/// nothing beyond it is reported.
 #[test]
 fn events_of_members_are_those_of_single_runs() {
     let system = pendulum();
-    // Below the top, and damped weakly: all pass the bottom.
+    // All start below the upper equilibrium with weak damping, so that all pass the lower equilibrium.
     let start = |i: usize| Start::new(0.0, [0.3 + 0.05 * i as f64], [0.0], 0.0);
     let values = |i: usize| vec![-0.01 * i as f64];
     let columns = [Column::Time, Column::Velocity(0)];
     let of = |text: &str| system.formula().expression(text).unwrap();
     for terminal in [false, true] {
-        // One has a parameter of the member in it.
+        // One event contains a parameter of the member.
         let slow = Event::new(of("theta' - gamma*theta"));
         let down = Event { direction: Direction::Falling, terminal, ..Event::new(of("theta")) };
         let events = [slow, down];
@@ -507,7 +510,7 @@ fn events_of_members_are_those_of_single_runs() {
         for member in members(&system, &many) {
             let i = member.index;
             let own = system.with_parameters(&[("gamma", values(i)[0])]).unwrap();
-            // Events that are written anew have the values of their own.
+            // Events that are parsed again have the parameter values of the member.
             let of = |text: &str| own.formula().expression(text).unwrap();
             let slow = Event { function: of("theta' - gamma*theta"), ..events[0].clone() };
             let motion = Motion {
@@ -526,12 +529,12 @@ fn events_of_members_are_those_of_single_runs() {
     }
 }
 
-/// The orders show, and the best is the fastest of those that are exact enough.
+/// The comparison shows the orders, and the best run is the fastest of those that are accurate enough.
 #[test]
 fn a_comparison_ranks_integrators() {
     let system = System::new(&CatalogueEntry::find("quadratic_in_z").unwrap().formula().unwrap()).unwrap();
     let motion = Motion::new(Start::new(0.0, [1.0], [0.0], 1.0), 5.0, accurate(1e-9));
-    // What comes first in the table is enough.
+    // The first integrators of the table are enough.
     let comparison = system.compare(&motion, &[], &mut |part| part < 0.2).unwrap();
     assert!(comparison.ended && comparison.reference_error < 1e-13, "{comparison:?}");
     for (name, order) in [("midpoint", 2), ("gauss_2", 4), ("gauss_3", 6)] {

@@ -2,8 +2,8 @@
 
 use super::{EnsembleError, SHARD, Shard};
 use crate::ensemble::member::{Ending, Member};
+use crate::numbers::state_words::digest;
 use crate::numbers::state_words::{Saved, load_option, save_option};
-use crate::run::digest;
 use crate::{CheckpointError, InputError, Row, Status, UnresolvedStep};
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;

@@ -22,8 +22,9 @@ pub use sharded::{Merge, ShardedEnsemble};
 
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::{branched, forget_branches};
+use crate::numbers::state_words::digest;
 use crate::run::may_drift;
-use crate::run::{digest, rows};
+use crate::run::rows;
 use crate::switching::has_switching_functions;
 use crate::{BatchKernel, InputError, Integrator, Interrupt, Observer, Problem, Rows, Start, Status, Steps, Until};
 use accuracy::StepControl;

@@ -422,7 +422,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for GaussStepper<'_, L, N> {
         self.mark()
     }
 
-    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
         self.watch.doubt.take()
     }
 }

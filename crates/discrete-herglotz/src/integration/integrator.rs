@@ -55,7 +55,7 @@ impl MethodInfo {
 pub struct StepperOptions {
     /// The action, also where it does not act back on the motion.
     pub action: bool,
-    /// That it watches whether its steps resolve the motion, where that has a price; see [`Stepper::unresolved`] and [`Stepper::doubt`].
+    /// That it watches whether its steps resolve the motion, where that has a price; see [`Stepper::unresolved`] and [`Stepper::suspect_interval`].
     pub watched: bool,
 }
 

@@ -80,7 +80,7 @@ pub trait Stepper<const N: usize> {
     }
 
     /// The last steps since the last call that are in doubt: they may not have resolved the motion.
-    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
         None
     }
 }

@@ -138,3 +138,8 @@ pub(crate) fn load_option<T: Saved>(from: &mut &[u64], make: impl FnOnce() -> T)
     x.load(from)?;
     Some(Some(x))
 }
+
+/// FNV-1a, by words.
+pub(crate) fn digest(words: &[u64]) -> u64 {
+    words.iter().fold(0xcbf2_9ce4_8422_2325, |sum, word| (sum ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29))
+}

@@ -249,7 +249,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Composition<D, N> 
         self.watch.first
     }
 
-    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
         self.watch.doubt.take()
     }
 }

@@ -239,7 +239,7 @@ impl<D: DiscreteLagrangian<N>, const N: usize> Stepper<N> for Flow<D, N> {
         self.watch.first
     }
 
-    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
         self.watch.doubt.take()
     }
 }

@@ -197,7 +197,7 @@ impl<L: Lagrangian<N>, const N: usize> Stepper<N> for Splitting<'_, L, N> {
         self.progress.watch.first
     }
 
-    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
+    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
         self.progress.watch.doubt.take()
     }
 }

@@ -489,8 +489,8 @@ where
         first(self.unresolved, of_base)
     }
 
-    fn doubt(&mut self) -> Option<SuspectInterval<N>> {
-        let doubt = self.base.stepper_mut().doubt()?;
+    fn suspect_interval(&mut self) -> Option<SuspectInterval<N>> {
+        let doubt = self.base.stepper_mut().suspect_interval()?;
         Some(SuspectInterval { step: doubt.step + self.before, ..doubt })
     }
 }

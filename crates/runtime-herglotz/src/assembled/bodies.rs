@@ -1,12 +1,12 @@
-//! Bodies that attract each other.
+//! Gravitating bodies.
 
 use super::{Assembled, argument};
 use crate::RuntimeError;
 use assembled_herglotz::systems::Gravitation;
 use assembled_herglotz::{AssembledSystem, Difference, Potential};
 
-/// Bodies in the plane or in space with Newton's gravitation of each pair and linear drag,
-/// `L = sum m_i |v_i|^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z`. Total and angular momentum decay as `e^(gamma t)`.
+/// Bodies in the plane or in space with Newtonian gravitation of each pair and linear drag, `L = sum m_i |v_i|^2/2 +
+/// sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z`. Total and angular momentum decay as `e^(gamma t)`.
 ///
 /// ```
 /// use runtime_herglotz::{AssembledMotion, Bodies, Start, Steps};
@@ -20,20 +20,20 @@ use assembled_herglotz::{AssembledSystem, Difference, Potential};
 pub struct Bodies {
     /// The mass of each body.
     pub masses: Vec<f64>,
-    /// Those of space: 2 or 3.
+    /// The dimension of space: 2 or 3.
     pub dimensions: usize,
-    /// The constant of gravitation.
+    /// The gravitational constant.
     pub g: f64,
     /// The rate of the drag, negative for dissipation.
     pub gamma: f64,
 }
 
 impl Bodies {
-    /// The system, to be run.
+    /// The assembled system.
     ///
     /// # Errors
-    /// [`RuntimeError::Argument`] for fewer than two bodies, a mass that is none, and another number of dimensions;
-    /// [`RuntimeError::NotFinite`] of `G` and `gamma`.
+    /// [`RuntimeError::Argument`] for fewer than two bodies, an invalid mass, or another number of dimensions;
+    /// [`RuntimeError::NotFinite`] for `G` and `gamma`.
     pub fn system(&self) -> Result<Assembled, RuntimeError> {
         let Bodies { masses, dimensions, g, gamma } = self;
         if masses.len() < 2 {
@@ -62,7 +62,7 @@ impl Bodies {
     }
 }
 
-/// With the attraction of each pair.
+/// Adds the attraction of each pair.
 fn attracting<const D: usize, const K: usize>(
     system: AssembledSystem,
     masses: &[f64],
@@ -72,7 +72,8 @@ where
     Difference<Gravitation>: Potential<K, 1>,
 {
     let n = masses.len();
-    // Pairs of the same distance in the list follow each other, so that their coordinates do in memory.
+    // Pairs are ordered by the difference of their indices, so that consecutive pairs have consecutive coordinates in
+    // memory.
     let pairs = (1..n).flat_map(|apart| {
         masses.iter().zip(masses.iter().skip(apart)).enumerate().map(move |(i, m)| (i, i + apart, m))
     });

@@ -1,4 +1,4 @@
-//! Lattices by the formulas of a site and of a bond.
+//! Lattices given by the formulas of a site and of a bond.
 
 use super::term::AtRest;
 use super::{Assembled, argument};
@@ -9,15 +9,15 @@ use contact_geom::{Lagrangian, VelocityPoint};
 use formula_lagrangian::{Formula, FormulaLagrangian};
 use std::str::FromStr;
 
-/// What is beyond the ends of a lattice.
+/// Boundary conditions of a lattice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Boundary {
-    /// The other end.
+    /// The ends are joined.
     #[default]
     Periodic,
     /// Walls: a site before the first and one after the last, held at 0.
     Fixed,
-    /// Nothing: there is no bond.
+    /// No bonds beyond the ends.
     Free,
 }
 
@@ -33,29 +33,30 @@ impl FromStr for Boundary {
     }
 }
 
-/// A lattice of equal sites with a bond between neighbours along each direction, by formulas:
-/// `L = sum_sites l(t, x, x') + sum_bonds b(t, xl, xr) + gamma(t) z`.
+/// A lattice of equal sites with a bond between neighbours along each direction, given by formulas: `L = sum_sites l(t,
+/// x, x') + sum_bonds b(t, xl, xr) + gamma(t) z`.
 ///
-/// The Lagrangian of a site is `x'^2 m/2 - V(t, x) + gamma(t) z`. Each site has Herglotz' equation of its own with the forces of its bonds in it; so the
-/// term `gamma(t) z` is that of the whole lattice, whose action z is, and counts once.
+/// The Lagrangian of a site is `x'^2 m/2 - V(t, x) + gamma(t) z`. Each site satisfies its own Herglotz equation, which
+/// includes the forces of its bonds. The action z is that of the whole lattice, so the term `gamma(t) z` counts once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
-    /// The names of the components at a site, 1 to 3 of them: `x`. In a bond, `xl` is that of the site before, `xr` that of the one after.
+    /// The names of the components at a site, 1 to 3 of them, such as `x`. In a bond, `xl` is the component at the site
+    /// before, `xr` at the site after.
     pub coordinates: Vec<String>,
     /// The Lagrangian of a site.
     pub site: String,
-    /// That of a bond, without velocities and z; none where sites do not act on each other.
+    /// The Lagrangian of a bond, without velocities and z; `None` where sites do not interact.
     pub bond: Option<String>,
-    /// The number of sites along each direction. Sites along the last one follow each other.
+    /// The number of sites along each direction. Sites along the last direction are contiguous.
     pub sizes: Vec<usize>,
-    /// What is beyond the ends, of each direction.
+    /// The boundary condition, the same for each direction.
     pub boundary: Boundary,
     /// The parameters of the formulas, with their values.
     pub parameters: Vec<(String, f64)>,
 }
 
 impl Default for Lattice {
-    /// No sites, in one coordinate `x`.
+    /// An empty lattice in one coordinate `x`.
     fn default() -> Self {
         Lattice {
             coordinates: vec!["x".into()],
@@ -69,11 +70,11 @@ impl Default for Lattice {
 }
 
 impl Lattice {
-    /// The system, to be run.
+    /// The assembled system.
     ///
     /// # Errors
-    /// [`RuntimeError::Part`] with the formula and the place in it; [`RuntimeError::Argument`] where a formula is not one of a site or a bond, for a
-    /// parameter that neither has, and for sizes that are none.
+    /// [`RuntimeError::Part`] with the formula and the position in it; [`RuntimeError::Argument`] where a formula does
+    /// not have the form of a site or a bond, for a parameter that neither formula uses, and for invalid sizes.
     pub fn system(&self) -> Result<Assembled, RuntimeError> {
         match self.coordinates.len() {
             1 => self.of::<1, 2>(),
@@ -83,7 +84,7 @@ impl Lattice {
         }
     }
 
-    /// The number of sites.
+    /// The number of sites, validated.
     fn sites(&self) -> Result<usize, RuntimeError> {
         let least = if self.boundary == Boundary::Periodic && self.bond.is_some() { 2 } else { 1 };
         if let Some(size) = self.sizes.iter().find(|size| **size < least) {
@@ -126,7 +127,7 @@ impl Lattice {
             let timed = site.clone();
             system.with_timed_drag(move |t| rate(&timed, t))
         };
-        // Component by component, so that those of neighbours follow each other in memory.
+        // Component by component, so that the components of neighbours are contiguous in memory.
         let places = (0..sites).map(|i| -> [usize; D] { std::array::from_fn(|c| c * sites + i) });
         let mut system = system.with_potential(AtRest(site), places)?;
         if let Some(bond) = bond {
@@ -167,7 +168,7 @@ fn lagrangian<const N: usize>(part: &'static str, formula: &Formula) -> Result<F
     formula.lagrangian::<N>().map_err(|error| RuntimeError::Part { part, error })
 }
 
-/// The origin, at which what does not depend on the state is evaluated.
+/// The origin, where quantities that do not depend on the state are evaluated.
 fn origin<const N: usize>() -> VelocityPoint<N> {
     VelocityPoint { q: SVector::zeros(), v: SVector::zeros(), z: 0.0 }
 }
@@ -202,7 +203,7 @@ fn masses<const N: usize>(site: &FormulaLagrangian<N>) -> Result<[f64; N], Runti
     }
 }
 
-/// Refuses what stands in a bond and belongs to a site.
+/// Rejects terms of a bond that belong to a site.
 fn check_bond<const N: usize>(bond: &FormulaLagrangian<N>) -> Result<(), RuntimeError> {
     let proved = bond.proved();
     if !proved.z_free {

@@ -1,4 +1,4 @@
-//! Systems of many coordinates: lattices by the formulas of a site and of a bond, and bodies that attract each other.
+//! Systems of many coordinates: lattices given by the formulas of a site and of a bond, and gravitating bodies.
 
 mod bodies;
 mod lattice;
@@ -35,12 +35,12 @@ use assembled_herglotz::AssembledSystem;
 /// ```
 pub struct Assembled {
     system: AssembledSystem,
-    /// What a state has: the number of places, and of components at each.
+    /// The number of sites or bodies, and of components at each.
     places: usize,
     components: usize,
     /// The mass of each coordinate, in the order of the assembled system.
     masses: Vec<f64>,
-    /// Whether all coordinates act on each other, so that no matrix of theirs is sparse.
+    /// Whether all coordinates interact, so that the matrices of a step are full.
     full: bool,
 }
 
@@ -50,11 +50,13 @@ impl Assembled {
         self.places * self.components
     }
 
-    /// Runs a motion; each row has `t`, the positions, the velocities, the momenta, `z` and the energy, and the logarithm of the conformal factor
-    /// where it is asked for. What goes wrong on the way is the status of the outcome, which then has the state of the last row.
+    /// Runs a motion. Each row has `t`, the positions, the velocities, the momenta, `z` and the energy, followed by the
+    /// logarithm of the conformal factor where it is requested. A failure during the run is reported in the status of
+    /// the outcome, whose state is then that of the last row.
     ///
     /// # Errors
-    /// [`RuntimeError::Argument`], [`RuntimeError::Length`] and [`RuntimeError::NotFinite`] with the argument; [`RuntimeError::Assembly`].
+    /// [`RuntimeError::Argument`], [`RuntimeError::Length`] and [`RuntimeError::NotFinite`] with the argument;
+    /// [`RuntimeError::Assembly`].
     pub fn run(&self, motion: &AssembledMotion, watch: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
         run::run(self, motion, watch)
     }
@@ -69,21 +71,21 @@ impl Assembled {
         Ok((outcome, kept.0))
     }
 
-    /// From the order of users, the components of each place together, to that of the assembled system, each component of all places: then
-    /// neighbours follow each other in memory.
+    /// Reorders from the order of users (the components of each place together) to that of the assembled system (each
+    /// component of all places), in which neighbours are contiguous in memory.
     fn inward(&self, x: &[f64]) -> Vec<f64> {
         let (n, d) = (self.places, self.components);
         (0..n * d).map(|k| x.get(k % n * d + k / n).copied().unwrap_or(f64::NAN)).collect()
     }
 
-    /// The other way, to the end of a row.
+    /// The inverse reordering, appended to a row.
     fn outward(&self, x: &[f64], row: &mut Vec<f64>) {
         let (n, d) = (self.places, self.components);
         row.extend((0..n * d).map(|k| x.get(k % d * n + k / d).copied().unwrap_or(f64::NAN)));
     }
 }
 
-/// An argument with what is wrong with it.
+/// The error of an invalid argument.
 fn argument(argument: &'static str, why: impl Into<String>) -> RuntimeError {
     RuntimeError::Argument { argument, why: why.into() }
 }

@@ -7,34 +7,35 @@ use discrete_herglotz::{AnyIntegrator, InputError, Status, StepError, StepFailur
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-/// The time that steps take between two looks at what is asked from outside, and the most steps.
+/// The time between two polls, and the maximal number of steps between them.
 const BETWEEN: Duration = Duration::from_millis(20);
 const MOST: usize = 256;
 
 /// A motion of a system of many coordinates.
 #[derive(Clone, Debug)]
 pub struct AssembledMotion {
-    /// Where it starts: the components of one site or body follow each other.
+    /// The initial state; the components of one site or body follow each other.
     pub start: Start,
-    /// The time at which it ends, before or after that of the start.
+    /// The final time, before or after the initial time.
     pub end: f64,
     /// The integrator: a splitting, `midpoint`, `gauss_1` or `gauss_2`.
     pub by: AnyIntegrator,
-    /// The length of its steps, made a little shorter so that a whole number of them fills the span; or their number.
+    /// The length of a step, reduced slightly so that a whole number of steps fills the span, or the number of steps.
     pub steps: Steps,
-    /// The states that are recorded. One at a time inside of a step is by a shorter step of the same integrator.
+    /// The times at which rows are recorded. A row at a time within a step is computed by a shorter step of the same
+    /// integrator.
     pub rows: OutputTimes,
     /// Whether rows and the outcome have the logarithm of the conformal factor.
     pub conformal_factor: bool,
 }
 
 impl AssembledMotion {
-    /// From a start to a time by given steps, with a row of each.
+    /// From a start to a time with given steps, with a row at each step.
     pub fn new(start: Start, end: f64, by: AnyIntegrator, steps: Steps) -> Self {
         AssembledMotion { start, end, by, steps, rows: OutputTimes::Every(1), conformal_factor: false }
     }
 
-    /// The length of a step, and how many there are.
+    /// The length of a step, and the number of steps.
     fn step(&self) -> Result<(f64, usize), RuntimeError> {
         let span = self.end - self.start.t;
         if !(span != 0.0 && span.is_finite()) {
@@ -54,11 +55,12 @@ impl AssembledMotion {
                         format!("is {h}, where a positive number is needed; the end says the direction"),
                     ));
                 }
-                // As of small systems: a quotient that is an integer but for its rounding is that.
+                // As for small systems: a quotient that differs from an integer by rounding only is taken for that
+                // integer.
                 (span.abs() / h * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0)
             }
         };
-        // Steps are counted exactly up to there.
+        // Integers up to here are exact in floating point.
         const LARGEST: f64 = (1u64 << 53) as f64;
         if count > LARGEST {
             return Err(argument(
@@ -70,7 +72,7 @@ impl AssembledMotion {
     }
 }
 
-/// A motion that is under way.
+/// The state of a run in progress.
 struct RunInfo<'a, 'w> {
     of: &'a Assembled,
     motion: &'a AssembledMotion,
@@ -78,7 +80,7 @@ struct RunInfo<'a, 'w> {
     h: f64,
     count: usize,
     taken: usize,
-    /// The steps of one look.
+    /// The number of steps between two polls.
     some: usize,
     log_factor: f64,
     last: Place,
@@ -86,13 +88,13 @@ struct RunInfo<'a, 'w> {
     watch: &'w mut dyn RunMonitor,
 }
 
-/// Why a motion ends before its time.
+/// Why a motion ends early.
 enum Ended {
-    /// From outside.
+    /// Ended from outside.
     Stopped,
-    /// By a step.
+    /// A step failed.
     Failed(StepError),
-    /// A part of a step cannot be begun.
+    /// The shorter step to a row within a step could not be set up.
     Refused(RuntimeError),
 }
 
@@ -129,7 +131,7 @@ pub(super) fn run(
     Ok(course.outcome(status))
 }
 
-/// Checks the times of rows.
+/// Checks the times of the rows.
 fn check_rows(motion: &AssembledMotion) -> Result<(), RuntimeError> {
     let times = match &motion.rows {
         OutputTimes::Every(0) => return Err(argument("every", "is 0, where at least 1 is needed")),
@@ -148,7 +150,7 @@ fn check_rows(motion: &AssembledMotion) -> Result<(), RuntimeError> {
     Ok(())
 }
 
-/// The start, checked.
+/// The start, validated.
 fn place(of: &Assembled, start: &Start) -> Result<Place, RuntimeError> {
     for (what, value) in [("t", start.t), ("z", start.z)] {
         if !value.is_finite() {
@@ -174,7 +176,7 @@ fn place(of: &Assembled, start: &Start) -> Result<Place, RuntimeError> {
 }
 
 impl RunInfo<'_, '_> {
-    /// The time after so many steps.
+    /// The time after a number of steps.
     fn time(&self, taken: usize) -> f64 {
         if taken == self.count { self.motion.end } else { self.motion.start.t + taken as f64 * self.h }
     }
@@ -199,11 +201,11 @@ impl RunInfo<'_, '_> {
         Ok(())
     }
 
-    /// Takes steps up to so many.
+    /// Takes steps until this number has been taken.
     fn advance(&mut self, to: usize) -> Result<(), Ended> {
         while self.taken < to {
             let begin = Instant::now();
-            // The factors of single steps are seen after each.
+            // The conformal factor is that of a single step, so it is read after each.
             let some = if self.motion.conformal_factor { 1 } else { self.some.min(to - self.taken) };
             if let Err(StepFailure { taken, cause }) = self.stepper.advance(some) {
                 self.taken += taken;
@@ -222,19 +224,19 @@ impl RunInfo<'_, '_> {
         Ok(())
     }
 
-    /// Keeps the present place.
+    /// Stores the current state.
     fn look(&mut self) -> Result<(), Ended> {
         self.last = Place { t: self.time(self.taken), ..self.stepper.place()? };
         Ok(())
     }
 
-    /// A row of the present place.
+    /// A row of the current state.
     fn row(&mut self) -> Result<(), Ended> {
         self.look()?;
         self.write(self.log_factor)
     }
 
-    /// A row at a time: at the end of a step, or of a part of one.
+    /// A row at a time: at the end of a step, or within one.
     fn row_at(&mut self, time: f64) -> Result<(), Ended> {
         let steps = (time - self.motion.start.t) / self.h;
         let (nearest, rounding) =
@@ -257,7 +259,7 @@ impl RunInfo<'_, '_> {
         self.write(log_factor)
     }
 
-    /// Hands on a row of the last place.
+    /// Passes on a row of the stored state.
     fn write(&mut self, log_factor: f64) -> Result<(), Ended> {
         let Place { t, q, v, z } = &self.last;
         let energy = self.of.energy(&self.last)?;
@@ -276,7 +278,7 @@ impl RunInfo<'_, '_> {
 
     fn outcome(mut self, status: Status) -> Outcome {
         if matches!(status, Status::Stopped { .. }) {
-            // Where it can go on; the last row if it is not there.
+            // The state from which the motion could continue; that of the last row if it is not finite.
             if let Ok(place) = self.stepper.place() {
                 self.last = Place { t: self.time(self.taken), ..place };
             }

@@ -1,18 +1,18 @@
-//! The integrators of systems of many coordinates behind one type.
+//! The integrators of systems of many coordinates, behind one type.
 
 use super::{Assembled, argument};
 use crate::RuntimeError;
 use assembled_herglotz::{AssembledGauss, AssembledMidpoint, AssembledSplitting, State};
 use discrete_herglotz::{AnyIntegrator, Method, StepError, StepFailure, UnresolvedStep};
 
-/// An integrator at work, with the action.
+/// An integrator of a motion, including its action.
 pub(super) enum Stepper<'a> {
     Splitting(Box<AssembledSplitting<'a>>, u64),
     Midpoint(Box<AssembledMidpoint<'a>>),
     Gauss(Box<AssembledGauss<'a>>, u64),
 }
 
-/// Where a motion is, in the order of the assembled system.
+/// A state of a motion, in the order of the assembled system.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
     pub t: f64,
@@ -28,7 +28,7 @@ impl Place {
 }
 
 impl<'a> Stepper<'a> {
-    /// At a start, by steps of h.
+    /// An integrator with steps h from a start.
     pub fn new(of: &'a Assembled, by: AnyIntegrator, h: f64, start: &Place) -> Result<Self, RuntimeError> {
         let (system, start) = (&of.system, start.state());
         Ok(match by {
@@ -56,7 +56,7 @@ impl<'a> Stepper<'a> {
         })
     }
 
-    /// Takes steps.
+    /// Takes a number of steps.
     pub fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         match self {
             Stepper::Splitting(stepper, _) => stepper.advance(steps),
@@ -65,14 +65,14 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    /// Where it is; of the time the step counts.
+    /// The current state. The caller replaces its time by one that follows from the number of steps.
     pub fn place(&mut self) -> Result<Place, StepError> {
         let State { t, q, v, z } = match self {
             Stepper::Splitting(stepper, _) => stepper.state(),
             Stepper::Midpoint(stepper) => stepper.state(),
             Stepper::Gauss(stepper, _) => stepper.state()?,
         };
-        // It began with one.
+        // The action is known, since the stepper was started with one.
         let z = z.unwrap_or(f64::NAN);
         if q.iter().chain(v).chain([&z]).all(|x| x.is_finite()) {
             return Ok(Place { t, q: q.to_vec(), v: v.to_vec(), z });
@@ -80,7 +80,7 @@ impl<'a> Stepper<'a> {
         Err(StepError::NonFinite)
     }
 
-    /// The first look at which the steps were seen not to resolve the motion.
+    /// The first check at which the steps were found not to resolve the motion.
     pub fn unresolved(&mut self) -> Option<UnresolvedStep> {
         match self {
             Stepper::Splitting(stepper, _) => stepper.unresolved(),
@@ -98,7 +98,7 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    /// The evaluations of forces in so many steps.
+    /// The number of evaluations of forces in a number of steps.
     pub fn evaluations(&self, steps: usize) -> u64 {
         match self {
             Stepper::Splitting(_, stages) => stages.saturating_mul(steps as u64),
@@ -109,14 +109,14 @@ impl<'a> Stepper<'a> {
 }
 
 impl Assembled {
-    /// The momenta of velocities, `m v`.
+    /// The momenta `m v` of velocities.
     pub(super) fn momenta(&self, v: &[f64]) -> Vec<f64> {
         self.masses.iter().zip(v).map(|(m, v)| m * v).collect()
     }
 
-    /// The energy at a place.
+    /// The energy of a state.
     pub(super) fn energy(&self, at: &Place) -> Result<f64, StepError> {
-        // What is wrong with a place was seen before.
+        // Other errors of a state have been excluded before.
         self.system.energy(at.state()).map_err(|_| StepError::NonFinite)
     }
 }

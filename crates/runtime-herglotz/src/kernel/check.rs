@@ -1,4 +1,4 @@
-//! Steps of a motion as maps.
+//! The steps of a motion as maps: contact defects, Herglotz defects and residuals of the theorems.
 
 use super::theorems::{Points, theorems};
 use super::{Sized, coordinates};
@@ -8,22 +8,23 @@ use discrete_herglotz::{AnyIntegrator, InputError, Problem, Start, Steps, Stop, 
 use formula_lagrangian::FormulaLagrangian;
 use std::ops::ControlFlow;
 
-/// The distance of differences, relative to the size of a state.
+/// The distance of the finite differences, relative to the size of a state.
 const DISTANCE: f64 = 1e-3;
 
-/// The places at which the theorems are evaluated.
+/// The number of places at which the theorems are evaluated.
 const PLACES: usize = 3;
 
-/// The steps between two looks at whether it is to end.
+/// The number of steps between two polls of the interrupt.
 const POLL: usize = 256;
 
-/// The stages of the statements' discrete Lagrangian, where the motion's own has none.
+/// The number of stages of the discrete Lagrangian for the theorems, where the integrator of the motion is not a
+/// collocation method.
 const STAGES: usize = 4;
 
-/// The part of a step at which the theorems are given up.
+/// The theorems are given up when the step has been divided by this.
 const SHORTEST: f64 = 64.0;
 
-/// One step from a state, and its conformal factor.
+/// The state after a time h in `count` steps, and the conformal factor of the last step.
 fn step<const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
     (by, h, count): (AnyIntegrator, f64, usize),
@@ -37,7 +38,7 @@ fn step<const N: usize>(
     Ok((stepper.state(), stepper.sigma()))
 }
 
-/// How far the pullback of `dz - p dq` by a step is from `sigma` times it.
+/// The distance of the pullback of `dz - p dq` by a step from `sigma (dz - p dq)`, relative to its size.
 fn contact_defect<const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
     way: (AnyIntegrator, f64, usize),
@@ -70,7 +71,7 @@ fn contact_defect<const N: usize>(
     Ok(if apart == 0.0 { 0.0 } else { apart / max_abs_or_nan(differences.iter().map(|d| d.1)) })
 }
 
-/// How far a step is from the motion, relative to its size, for a unit of time.
+/// The distance of a step from the exact motion, relative to the size of the state and per unit of time.
 fn herglotz_defect<const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
     way: (AnyIntegrator, f64, usize),
@@ -137,7 +138,7 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
             return Err(InputError::Interrupted.into());
         }
         match theorems_with(system, stages, (shorter, &of_theorems)) {
-            // The discrete Lagrangian is defined for points that are near enough.
+            // The discrete Lagrangian is defined for points that are close enough to each other.
             Err(RuntimeError::Geometry(_) | RuntimeError::Step(_)) if (h / shorter) < SHORTEST => shorter *= 0.5,
             ended => break ended?,
         }
@@ -145,7 +146,8 @@ pub(super) fn check<const N: usize>(system: &Sized<N>, motion: &Motion, places: 
     Ok(Check { integrator: plan.integrator.name.to_string(), step_size: h, places: along, statements: stated })
 }
 
-/// The theorems for the discrete Lagrangian of contact Gauss collocation with a step, worst of the steps from some places.
+/// The theorems for the discrete Lagrangian of contact Gauss collocation with step h: the largest residuals over the
+/// steps from some places.
 fn theorems_with<const N: usize>(
     system: &Sized<N>,
     stages: usize,

@@ -1,4 +1,4 @@
-//! Many motions at once.
+//! Ensembles: many motions at once.
 
 use super::observed::{Observed, Seen};
 use super::recorder::{Crossings, check_events, number};
@@ -12,17 +12,18 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-/// The members that are computed together in lanes, and those of which each is observed in a run of its own.
+/// The number of members that are computed together in SIMD lanes, and of members that are observed, each in a run of
+/// its own.
 const SHARD: usize = 384;
 const OBSERVED: usize = 16;
 
-/// The most of these between two polls.
+/// The maximal number of these shards between two polls.
 const SHARDS: usize = 24;
 
-/// A time between two polls that is long for the one who waits.
+/// The time between two polls above which blocks are made smaller.
 const LONG: Duration = Duration::from_millis(100);
 
-/// Runs it block by block, so that it can be ended and its memory does not grow.
+/// Runs an ensemble block by block, so that it can be interrupted and its memory does not grow.
 pub(super) fn run<const N: usize>(
     system: &Sized<N>,
     ensemble: &crate::Ensemble<'_>,
@@ -38,7 +39,7 @@ pub(super) fn run<const N: usize>(
     check_events(&system.0, ensemble.events)?;
     let has_factor = ensemble.columns.iter().any(Column::has_conformal_factor);
     let observed = ensemble.rows.is_some() || !ensemble.events.is_empty() || has_factor;
-    // In lanes the steps for an accuracy are those of a block, which then is not to depend on the time it takes.
+    // In lanes, the step for an accuracy is chosen for a block, so the size of a block must not depend on run times.
     let (shard, mut shards, fixed) = match (&ensemble.way, &ensemble.varied) {
         _ if observed => (OBSERVED, 2, false),
         (_, Some(_)) => (SHARD, 1, true),
@@ -78,7 +79,7 @@ struct Block<'b, const N: usize> {
 impl<const N: usize> Block<'_, N> {
     fn run(&mut self, observed: bool) -> Result<(), RuntimeError> {
         match self.run_as_one(self.members.clone(), observed) {
-            // Some members that were looked at before cannot begin: each by itself.
+            // A member that is checked before the run cannot start: run each member by itself.
             Err(EnsembleError::Member { cause, .. }) if !is_common(&cause) => {}
             Err(error) => return Err(error.into()),
             Ok(()) => return Ok(()),
@@ -124,7 +125,7 @@ impl<const N: usize> Block<'_, N> {
         let lagrangian = |i: usize| own_of(i).map_or(Some(&system.0), |own| own.map(|own| &own.lagrangian));
         let many = match &own {
             None => Ensemble::new(&system.0, t0, members.len(), start),
-            // One whose parameters are no numbers has no start either.
+            // A member with invalid parameters gets an invalid start, so that it is refused.
             Some(_) => Ensemble::of(t0, members.len(), |i| match lagrangian(i) {
                 Some(lagrangian) => (lagrangian, start(i)),
                 None => (&system.0, no_start()),
@@ -199,13 +200,13 @@ impl<const N: usize> Block<'_, N> {
     }
 }
 
-/// A member with parameters of its own.
+/// The Lagrangian and the events of a member with parameters of its own.
 struct Own<const N: usize> {
     lagrangian: FormulaLagrangian<N>,
     events: Vec<Event>,
 }
 
-/// Whether what is wrong holds for all members, whatever their starts and parameters.
+/// Whether an error concerns all members, independently of their starts and parameters.
 fn is_common(cause: &InputError) -> bool {
     use InputError as E;
     matches!(
@@ -225,10 +226,10 @@ fn is_common(cause: &InputError) -> bool {
     )
 }
 
-/// Gives an expression the parameters of a member.
+/// Sets the parameters of a member in an expression.
 fn set(expression: &mut Expression, names: &[&str], values: &[f64]) {
     for (name, value) in names.iter().zip(values) {
-        // One that cannot be set has refused the member.
+        // A value that cannot be set has already caused the member to be refused.
         let _ = expression.set(name, *value);
     }
 }
@@ -244,7 +245,7 @@ fn with_parameters(columns: &[Column], varied: &Varied<'_>, index: usize) -> Vec
     own
 }
 
-/// No start, which a run refuses.
+/// An invalid start, which every run refuses.
 fn no_start<const N: usize>() -> Start<N> {
     let none = SVector::repeat(f64::NAN);
     VelocityPoint { q: none, v: none, z: f64::NAN }.into()
@@ -263,7 +264,7 @@ fn end_of<const N: usize>(
     last: Option<&Row<N>>,
 ) -> Row<N> {
     let (t, x) = (ending.t, &ending.state);
-    // One of another time is the end of the step in which the member ended.
+    // A row at another time belongs to the end of the step in which the member ended.
     let of_the_end = last.filter(|row| row.t == t);
     let v = of_the_end.and_then(|row| row.v).or_else(|| {
         let guess = last.map_or_else(SVector::zeros, |row| row.p);

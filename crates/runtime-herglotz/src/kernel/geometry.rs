@@ -8,13 +8,13 @@ use contact_geom::{
     legendre,
 };
 
-/// The components of a vector on TQ x R over the first so many coordinates.
+/// The components of a vector on TQ x R in the first n coordinates.
 fn components<const N: usize>(x: &ChartVector<N>, n: usize) -> Vec<f64> {
     [coordinates(&x.x, n), coordinates(&x.y, n), &[x.z]].concat()
 }
 
-/// How many times as large `eta ^ (d eta)^n`, which is `(-1)^(n(n-1)/2) n! det W` of the coordinate vectors, is with `all` of them in place of
-/// n, where W is one on those that were added.
+/// The factor by which `eta ^ (d eta)^n = (-1)^(n(n-1)/2) n! det W`, evaluated on the coordinate vectors, grows when n
+/// coordinates are extended to `all` and W is the identity on the additional ones.
 fn added(n: usize, all: usize) -> f64 {
     (n + 1..=all).map(|k| if k.is_multiple_of(2) { -(k as f64) } else { k as f64 }).product()
 }
@@ -41,7 +41,7 @@ pub(super) fn at<const N: usize>(system: &Sized<N>, at: &Start) -> Result<Geomet
     })
 }
 
-/// The Herglotz field at `y`, which is `(q, v)`, with or without z.
+/// The Herglotz field at `y = (q, v)` or `y = (q, v, z)`.
 pub(super) fn rates<const N: usize>(system: &Sized<N>, t: f64, y: &[f64], to: &mut [f64]) {
     let n = system.0.formula().dimension();
     let part = |first: usize| {

@@ -1,4 +1,4 @@
-//! One kernel for each dimension: all that is compiled with a number of coordinates is in this module.
+//! One kernel for each dimension: all code that is compiled for a fixed number of coordinates is in this module.
 
 mod check;
 mod ensemble;
@@ -19,7 +19,7 @@ use discrete_herglotz::{AnyIntegrator, InputError, Problem, ResumeState, StepErr
 use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
 use std::sync::Arc;
 
-/// A system without its dimension.
+/// A system whose dimension is not part of its type.
 pub(crate) trait Kernel: Send + Sync {
     fn formula(&self) -> &Formula;
     fn structure(&self) -> Structure;
@@ -51,20 +51,21 @@ pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, FormulaErr
             }
         };
     }
-    // Beyond eight each would cost more to compile than what is unused costs a motion.
+    // Above eight, compiling every dimension would cost more than the unused coordinates cost a motion.
     of!(1 2 3 4 5 6 7 8 16)
 }
 
-/// A system with its dimension, or with more: what is beyond the coordinates of its formula is at rest, and not seen from outside.
+/// A system compiled for N coordinates, at least as many as its formula has. The additional coordinates are at rest and
+/// are not visible from outside.
 struct Sized<const N: usize>(FormulaLagrangian<N>);
 
-/// The first so many coordinates of a vector.
+/// The first n coordinates of a vector.
 fn coordinates<const N: usize>(x: &SVector<f64, N>, n: usize) -> &[f64] {
     x.as_slice().get(..n).unwrap_or(&[])
 }
 
 impl<const N: usize> Sized<N> {
-    /// A vector of so many numbers as there are coordinates, all finite.
+    /// A vector with one finite number per coordinate.
     fn vector(&self, what: &'static str, numbers: &[f64]) -> Result<SVector<f64, N>, RuntimeError> {
         let expected = self.formula().dimension();
         if numbers.len() != expected {
@@ -93,13 +94,13 @@ impl<const N: usize> Sized<N> {
         })
     }
 
-    /// The problem of a start, checked.
+    /// The problem of a start, validated.
     fn problem(&self, start: &Start) -> Result<Problem<'_, FormulaLagrangian<N>, N>, RuntimeError> {
         let at = self.start(start)?;
         Problem::new(&self.0, start.t, at).map_err(|error| self.explained(error, start.t, &at))
     }
 
-    /// That of a motion, whose trial runs may be interrupted.
+    /// The problem of a motion, with the interrupt of the motion for its trial runs.
     fn problem_of<'m>(&'m self, motion: &'m Motion) -> Result<Problem<'m, FormulaLagrangian<N>, N>, RuntimeError> {
         let problem = self.problem(&motion.start)?;
         Ok(match &motion.interrupt {
@@ -108,7 +109,7 @@ impl<const N: usize> Sized<N> {
         })
     }
 
-    /// A singular start with the velocities in which L is linear, where it is for those.
+    /// Replaces the error of a singular start by one that names the velocities in which L is linear, if there are any.
     fn explained(&self, error: InputError, t: f64, at: &discrete_herglotz::Start<N>) -> RuntimeError {
         if let (InputError::FirstStep(StepError::Singular { .. }), discrete_herglotz::Start::Velocity(x)) = (&error, at)
         {
@@ -193,10 +194,10 @@ impl<const N: usize> Kernel for Sized<N> {
     }
 }
 
-/// The stack of what takes third derivatives: in sixteen coordinates a number with those has 300 kB.
+/// Stack size for computations with third derivatives: in 16 coordinates a number that carries them takes 300 kB.
 const ROOM: usize = 1 << 26;
 
-/// Does work with a large stack, whatever that of the caller.
+/// Runs a closure on a thread with a large stack, whatever the stack of the caller.
 fn with_room<R: Send>(work: impl FnOnce() -> Result<R, RuntimeError> + Send) -> Result<R, RuntimeError> {
     std::thread::scope(|scope| {
         let worker = std::thread::Builder::new().stack_size(ROOM).spawn_scoped(scope, work)?;

@@ -1,14 +1,15 @@
-//! What is recorded of the members of an ensemble.
+//! Recording of the members of an ensemble.
 
 use super::recorder::{Crossings, rows};
 use crate::{Column, Crossing, OutputTimes};
 use discrete_herglotz::{InputError, Observer, OutputRequest, Row, Rows, RunInfo, StepView, Stop, Terminal};
 use std::ops::ControlFlow;
 
-/// What was recorded of a member.
+/// The records of a member.
 pub(super) struct Seen<const N: usize> {
     pub rows: Vec<Row<N>>,
-    /// The end as a row, if it is that of a step, and the conformal factor is asked for, which is known there alone.
+    /// The row at the end of the last step, where the conformal factor is requested, which is known only at the ends of
+    /// steps.
     pub last: Option<Row<N>>,
     pub crossings: Vec<Crossing>,
 }
@@ -19,7 +20,7 @@ impl<const N: usize> Default for Seen<N> {
     }
 }
 
-/// Records a member.
+/// Observer that records a member.
 pub(super) struct Observed<'r, const N: usize> {
     rows: Option<Rows<'r, N>>,
     last: Option<Rows<'r, N>>,
@@ -90,7 +91,7 @@ impl<const N: usize> Observer<N> for Observed<'_, N> {
             ControlFlow::Continue(())
         });
         if let (ControlFlow::Break(Stop { at: Some((end, _)), .. }), Some(rows)) = (&ended, &mut self.rows) {
-            // The motion ends before the step does.
+            // A terminal event ends the motion before the end of the step.
             let forward = self.forward;
             rows.rows.retain(|row| if forward { row.t <= *end } else { row.t >= *end });
         }

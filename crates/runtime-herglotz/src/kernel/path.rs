@@ -9,8 +9,8 @@ use discrete_herglotz::{
 };
 use formula_lagrangian::{Formula, FormulaLagrangian};
 
-/// The search for a path of a formula. It is compiled for fewer numbers of coordinates than motions are: more would cost more to compile than
-/// what is unused costs a search.
+/// Searches for a path of a formula. It is compiled for fewer dimensions than motions are: compiling more would cost
+/// more than the unused coordinates cost a search.
 pub(crate) fn search(formula: &Formula, problem: &BoundaryProblem) -> Result<FoundPath, RuntimeError> {
     match formula.dimension() {
         1 => within::<1>(formula, problem),
@@ -29,7 +29,7 @@ fn argument(argument: &'static str, why: String) -> RuntimeError {
     RuntimeError::Argument { argument, why }
 }
 
-/// The first coordinates of a vector; what is beyond them is 0.
+/// The coordinates as a vector of N; the additional components are 0.
 fn point<const N: usize>(x: &[f64]) -> SVector<f64, N> {
     SVector::from_fn(|i, _| x.get(i).copied().unwrap_or(0.0))
 }
@@ -47,12 +47,12 @@ fn within<const N: usize>(formula: &Formula, problem: &BoundaryProblem) -> Resul
             return Err(RuntimeError::NotFinite { what: what.into(), value });
         }
     }
-    // Two steps are the fewest; what is wrong with fewer is said below.
+    // The minimum is two steps; the error for fewer is raised below.
     let h = (t1 - t0) / problem.steps.max(1) as f64;
     match problem.by {
         AnyIntegrator::Gauss { stages } => by(&lagrangian, Gauss::new::<N>(&lagrangian, stages, h)?, problem),
         AnyIntegrator::Discrete(method) => {
-            // A splitting reads its form at a state.
+            // The discrete Lagrangian of a splitting is determined at a state.
             let start = VelocityPoint { q: point(&problem.ends[0]), v: SVector::zeros(), z: problem.z0 };
             let state = legendre(&lagrangian, t0, &start);
             by(&lagrangian, method.discretise::<N, _>(&lagrangian, h, t0, &state)?, problem)
@@ -67,7 +67,7 @@ fn within<const N: usize>(formula: &Formula, problem: &BoundaryProblem) -> Resul
     }
 }
 
-/// The search by a discrete Lagrangian.
+/// Searches with a discrete Lagrangian.
 fn by<D: DiscreteLagrangian<N>, const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
     ld: D,
@@ -81,7 +81,7 @@ fn by<D: DiscreteLagrangian<N>, const N: usize>(
         path = path.from_path(DiscretePath::new(points)?)?;
     }
     let found = path.search();
-    // The last one to the bit.
+    // The final time is exact.
     let time = |k: usize| if k == problem.steps { problem.span.1 } else { t0 + k as f64 * h };
     let momenta = momenta(&ld, t0, h, &found);
     let velocities = velocities(lagrangian, h, &time, &found, &momenta);
@@ -102,8 +102,8 @@ fn by<D: DiscreteLagrangian<N>, const N: usize>(
     })
 }
 
-/// The momenta at the points, by the discrete Legendre transformation of the step before each, that of the first by the step after it. Not
-/// numbers where they are not defined.
+/// The momenta at the points, by the discrete Legendre transformation of the step before each point, and of the first
+/// step at the first point. NaN where they are not defined.
 fn momenta<D: DiscreteLagrangian<N>, const N: usize>(
     ld: &D,
     t0: f64,
@@ -122,7 +122,7 @@ fn momenta<D: DiscreteLagrangian<N>, const N: usize>(
     std::iter::once(first).chain(others).map(|p| p.unwrap_or_else(|| SVector::repeat(f64::NAN))).collect()
 }
 
-/// The velocities of the momenta.
+/// The velocities that correspond to the momenta.
 fn velocities<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     h: f64,
@@ -132,7 +132,7 @@ fn velocities<const N: usize>(
 ) -> Vec<SVector<f64, N>> {
     let of = |(k, p): (usize, &SVector<f64, N>)| {
         let (q, z) = (*path.points.get(k)?, *path.actions.get(k)?);
-        // That of the step before is near; of the first the step after it.
+        // The mean velocity of the preceding step is a good initial guess; at the first point that of the first step.
         let (a, b) = (path.points.get(k.saturating_sub(1))?, path.points.get(k.max(1))?);
         let x = legendre_inverse(lagrangian, time(k), &PhasePoint { q, p: *p, z }, &((b - a) / h)).ok()?;
         Some(x.v)

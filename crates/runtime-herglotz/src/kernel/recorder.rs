@@ -1,4 +1,4 @@
-//! The one observer of a motion: rows, events, nodes, and whether it is to go on.
+//! The observer of a motion: rows, events, nodes, and polling for interruption.
 
 use super::coordinates;
 use crate::{Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start};
@@ -12,14 +12,14 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::rc::Rc;
 
-/// The steps between two polls.
+/// The number of steps between two polls.
 const POLL: usize = 256;
 
-/// Sees a motion for a [`RunMonitor`].
+/// Observes a motion on behalf of a [`RunMonitor`].
 pub(super) struct Recorder<'r, const N: usize> {
     rows: Option<Rows<'r, N>>,
     columns: &'r [Column],
-    /// The numbers of a row.
+    /// The numbers of a row, in a buffer that is reused.
     numbers: Vec<f64>,
     crossings: Option<Crossings<'r, N>>,
     nodes: bool,
@@ -55,7 +55,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
         })
     }
 
-    /// Hands on the rows up to a time, if one is given.
+    /// Passes on the rows, up to a time if one is given.
     fn hand_on(&mut self, until: Option<f64>) -> ControlFlow<Stop<N>> {
         let Some(rows) = &mut self.rows else { return ControlFlow::Continue(()) };
         let backward = self.course.is_some_and(|course| course.t_end < course.t0);
@@ -73,7 +73,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
     fn see(&mut self, at: &StepView<'_, N>) -> ControlFlow<Stop<N>> {
         if self.nodes {
             let PhasePoint { q, p, z } = &at.state;
-            // Where it is not found the momentum alone goes on.
+            // The velocity is set to zero where none corresponds to the momentum; q and p are valid.
             let v = at.velocity().unwrap_or_else(|_| SVector::zeros());
             self.watch.node(at.t, [q, &v, p].map(|x| coordinates(x, self.dimension)), *z);
         }
@@ -97,7 +97,7 @@ impl<'r, const N: usize> Recorder<'r, N> {
     }
 }
 
-/// The rows that columns need.
+/// The rows that have the quantities of these columns.
 pub(super) fn rows<'r, const N: usize>(when: &OutputTimes, columns: &[Column]) -> Result<Rows<'r, N>, InputError> {
     let rows = match when {
         OutputTimes::Every(stride) => Rows::every(*stride)?,
@@ -120,7 +120,7 @@ pub(super) fn rows<'r, const N: usize>(when: &OutputTimes, columns: &[Column]) -
     Ok(if action { rows } else { rows.without_action() })
 }
 
-/// A number of a row; not a number where the row has it not.
+/// The value of a column in a row; NaN where the row does not have it.
 pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
     let of = |vector: Option<&SVector<f64, N>>, i: usize| vector.and_then(|v| v.get(i)).copied().unwrap_or(f64::NAN);
     match column {
@@ -132,7 +132,7 @@ pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
         Column::Energy => row.energy.unwrap_or(f64::NAN),
         Column::LogFactor => row.log_factor.unwrap_or(f64::NAN),
         Column::Expression(e) => {
-            // Neither is in an expression that does not have it.
+            // An expression that does not contain v or z ignores the zeros here.
             let v = row.v.unwrap_or_else(SVector::zeros);
             let state = (row.q.as_slice(), v.as_slice(), row.z.unwrap_or(0.0));
             e.at_factor(row.t, state, row.log_factor.unwrap_or(f64::NAN))
@@ -140,7 +140,8 @@ pub(super) fn number<const N: usize>(column: &Column, row: &Row<N>) -> f64 {
     }
 }
 
-/// Refuses events that have the conformal factor where it is not known at all times, and terminal ones that count from a time.
+/// Rejects events with the conformal factor where it is not known at all times, and terminal events that count from a
+/// given time.
 pub(super) fn check_events<const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
     events: &[crate::Event],
@@ -154,21 +155,21 @@ pub(super) fn check_events<const N: usize>(
     if has_factor && lagrangian.constant_rate().is_none() { Err(RuntimeError::FactorInEvent) } else { Ok(()) }
 }
 
-/// What functions of states `(q, p, z)` need of the motion beside them.
+/// Data of a motion that functions of a state `(q, p, z)` need in addition to the state.
 struct Beside<const N: usize> {
-    /// The time at which it begins.
+    /// The initial time.
     began: Cell<f64>,
-    /// The last velocity that was found, which is near the next.
+    /// The last velocity that was found, the initial guess for the next.
     velocity: Cell<SVector<f64, N>>,
 }
 
-/// The value of an expression at states `(q, p, z)` of a motion.
+/// An expression as a function of time and of a state `(q, p, z)` of a motion.
 fn at_states<'r, const N: usize>(
     lagrangian: &'r FormulaLagrangian<N>,
     function: &'r Expression,
     beside: Rc<Beside<N>>,
 ) -> impl FnMut(f64, &PhasePoint<N>) -> f64 + 'r {
-    // Known where it is needed: see `check_events`.
+    // `check_events` ensures that the rate is constant wherever it is needed.
     let rate = lagrangian.constant_rate().unwrap_or(f64::NAN);
     move |t, state| {
         if function.has_velocity() {
@@ -182,16 +183,16 @@ fn at_states<'r, const N: usize>(
     }
 }
 
-/// The events of a motion, with what belongs to their states.
+/// The events of a motion, with the data needed to evaluate them.
 pub(super) struct Crossings<'r, const N: usize> {
     events: Events<'r, N>,
-    /// What was asked of them.
+    /// The events as they were requested.
     asked: &'r [crate::Event],
-    /// `L_z`, where it is one number: known where a column needs it, see `check_events`.
+    /// `L_z`, where it is constant: `check_events` ensures that it is known where a column needs it.
     rate: f64,
-    /// Whether one of them has the action in it.
+    /// Whether an event or a column contains the action.
     action: bool,
-    /// Whether one of them has the velocity in it.
+    /// Whether an event contains the velocity.
     velocity: bool,
     beside: Rc<Beside<N>>,
     backward: bool,
@@ -240,12 +241,12 @@ impl<'r, const N: usize> Crossings<'r, N> {
         self.events.start(at)
     }
 
-    /// What ends trial runs at the terminal events.
+    /// The terminal events, at which trial runs end.
     pub fn terminal(&self) -> Option<Terminal<'_, N>> {
         self.events.terminal()
     }
 
-    /// Hands on what is found in a step; `Break` at a terminal event.
+    /// Passes on the sign changes in a step; `Break` at a terminal event.
     pub fn step(
         &mut self,
         at: &StepView<'_, N>,
@@ -259,7 +260,7 @@ impl<'r, const N: usize> Crossings<'r, N> {
                 continue;
             }
             let PhasePoint { q, p, z } = crossing.state;
-            // The velocity of the step's end is near enough to find it from.
+            // The velocity at the end of the step is close enough as an initial guess.
             let v = at.velocity_at(crossing.t, &crossing.state).unwrap_or_else(|_| SVector::repeat(f64::NAN));
             let log_factor = self.rate * (t - self.beside.began.get());
             let columns = asked.map_or(&[][..], |event| &event.columns).iter();

@@ -1,4 +1,4 @@
-//! One motion.
+//! Runs of one motion.
 
 use super::recorder::Recorder;
 use super::{Sized, coordinates};
@@ -9,7 +9,7 @@ use formula_lagrangian::FormulaLagrangian;
 /// The run of a motion, without its observer.
 ///
 /// # Errors
-/// [`RuntimeError::Length`] where there are not as many scales as coordinates.
+/// [`RuntimeError::Length`] where the number of scales is not the number of coordinates.
 fn of<'p, 'o, const N: usize>(
     system: &Sized<N>,
     problem: &'p Problem<'p, FormulaLagrangian<N>, N>,
@@ -41,7 +41,7 @@ pub(super) fn plan<const N: usize>(system: &Sized<N>, motion: &Motion) -> Result
         step_size: plan.step_size(),
         steps: plan.count(),
         error: plan.error(),
-        items: plan.items(),
+        items: plan.entries(),
     })
 }
 

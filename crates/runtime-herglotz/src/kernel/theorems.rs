@@ -1,4 +1,4 @@
-//! The theorems of the discrete theory on points of a motion.
+//! The theorems of the discrete theory, evaluated at points of a motion.
 
 use crate::{RuntimeError, StatementResidual};
 use contact_geom::nalgebra::SVector;
@@ -6,7 +6,7 @@ use contact_geom::{DiscretePoint, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, DiscreteLagrangian, Gauss, statements};
 use formula_lagrangian::{Formula, FormulaError};
 
-/// Two positions of a motion that are a step apart, and the action at the first.
+/// Two positions of a motion that are one step apart, and the action at the first.
 pub(super) struct Points {
     pub t: f64,
     pub q0: Vec<f64>,
@@ -14,10 +14,10 @@ pub(super) struct Points {
     pub z0: f64,
 }
 
-/// The theorems for the discrete Lagrangian of contact Gauss collocation, worst of some points.
+/// The theorems for the discrete Lagrangian of contact Gauss collocation: the largest residuals over some points.
 ///
-/// They are compiled for a few numbers of coordinates, the others among the next of these: with second derivatives of second
-/// derivatives they are the longest code that there is for each, and nobody waits for them.
+/// They are compiled for a few dimensions; a formula in another one uses the next larger. With second derivatives of
+/// second derivatives this is the longest code of each dimension, and its run time is not critical.
 pub(super) fn theorems(
     formula: &Formula,
     stages: usize,
@@ -46,7 +46,8 @@ fn within<const N: usize>(
     let vector = |q: &[f64]| SVector::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0));
     let point = |p: &Points| (p.t, DiscretePoint { q0: vector(&p.q0), q1: vector(&p.q1), z0: p.z0 });
     let mut points: Vec<(f64, DiscretePoint<N>)> = points.iter().map(point).collect();
-    // Newton's method for the discrete Lagrangian measures the momentum at its start by itself, and finds no end where that is 0.
+    // Newton's method for the discrete Lagrangian measures its residual relative to the momentum at the start, and does
+    // not converge where that is 0. Such points are dropped, unless all points fail.
     if points.iter().any(|(t, x)| gauss.second_jet(*t, x).is_ok()) {
         points.retain(|(t, x)| gauss.second_jet(*t, x).is_ok());
     }

@@ -1,8 +1,10 @@
 //! Steps of varying length for an accuracy, where equal steps would be too many.
 
+use crate::run::accuracy::failure::obstacle;
+use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::track::Track;
 use crate::run::accuracy::trial_runs::{ComparisonGrid, TrialEnd, TrialRuns};
-use crate::run::accuracy::{StepSelection, first_guess, obstacle};
+use crate::run::request::StepSelection;
 use crate::switching::DividedGauss;
 use crate::{InputError, SelectionFailure};
 use contact_geom::{Lagrangian, max_or_nan};

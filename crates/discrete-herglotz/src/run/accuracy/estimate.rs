@@ -3,18 +3,19 @@
 use crate::Interrupt;
 use crate::run::accuracy::track::Track;
 use crate::run::accuracy::velocities::Velocities;
-use crate::run::{Near, Plan};
+use crate::run::discretization::Discretization;
+use crate::run::motion::Near;
 use contact_geom::{Lagrangian, PhasePoint};
 
 /// The steps between two looks at whether it is to end.
 const CHUNK: usize = 1024;
 
-impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
+impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
     /// The distance of (q, p) and v after some steps from those of a run with twice as many of half their length, as
     /// [`Track::distance_at_end`] measures it: of the error of an order `p` this is the part `1 - 2^-p`. Infinite where the other run does not come as far,
     /// or is interrupted.
     pub(crate) fn distance_from_halves(&self, taken: usize, t: f64, (end, near): (&PhasePoint<N>, Near<N>)) -> f64 {
-        let Ok(mut fine) = self.make_stepper(self.problem, 0.5 * self.h, false) else { return f64::INFINITY };
+        let Ok(mut fine) = self.stepper_of(self.problem, 0.5 * self.h, false) else { return f64::INFINITY };
         let steps = if self.info.in_transformed_time { usize::MAX } else { 2 * taken };
         let mut velocities = Velocities::new(self.problem, self.scales);
         let mut done = 0;

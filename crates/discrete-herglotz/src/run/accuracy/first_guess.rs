@@ -1,7 +1,7 @@
 //! The steps with which the search for an accuracy begins.
 
-use super::Request;
 use crate::Problem;
+use crate::run::request::Request;
 use crate::solve::mass_matrix::inverted;
 use contact_geom::nalgebra::SMatrix;
 use contact_geom::{Derivatives, Lagrangian, max_or_nan};

@@ -1,7 +1,7 @@
 //! What rounding keeps in motion at an equilibrium.
 
 use crate::legendre_inverse;
-use crate::run::Request;
+use crate::run::request::Request;
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, max_abs_or_nan};
 

@@ -1,6 +1,13 @@
 //! Steps of any integrator for a wanted error, by a reference.
 
-use super::*;
+use crate::run::accuracy::converge::{Converged, MAX_SEARCHES, chosen};
+use crate::run::accuracy::trial_runs::{TrialEnd, TrialRuns};
+use crate::run::request::{MOST_STEPS, Shared, StepSelection};
+use crate::{InputError, SelectionFailure};
+use contact_geom::Lagrangian;
+
+/// The stages of the reference for other methods.
+pub(crate) const REFERENCE_STAGES: usize = 12;
 
 /// The steps of any integrator, whose runs are compared with the reference.
 pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
@@ -12,12 +19,12 @@ pub(crate) fn by_reference<'p, L: Lagrangian<N>, const N: usize>(
     let (order, marks) = (f64::from(integrator.info().order), &found.marks);
     let whole = |count: f64| marks.whole(count);
     let refuse = |reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
-    let mut count = whole((found.k * REFERENCE) as f64 / order.min(4.0));
+    let mut count = whole((found.k * REFERENCE_STAGES) as f64 / order.min(4.0));
     let (mut best, mut strikes) = (f64::INFINITY, 0);
     let (mut cause, mut before) = (SelectionFailure::Budget, None);
     // The fewest steps that were seen to be enough, with their error.
     let mut enough: Option<(usize, f64)> = None;
-    for _ in 0..ATTEMPTS {
+    for _ in 0..MAX_SEARCHES {
         if count as f64 > MOST_STEPS {
             break;
         }

@@ -1,8 +1,10 @@
 //! What the choice of steps costs.
 
-use super::choose_with;
+use crate::Problem;
+use crate::run::accuracy::select::choose_with;
 use crate::run::accuracy::trial_runs::{BUDGET, TrialRuns};
-use crate::run::{OutputRequest, Problem, Request, Shared, Until};
+use crate::run::request::{Request, Shared};
+use crate::run::{OutputRequest, Until};
 use crate::{AnyIntegrator, GaussCollocation, Stepper, StepperOptions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Duffing, Kepler, OneCoordinate, Pendulum, QuadraticInZ};

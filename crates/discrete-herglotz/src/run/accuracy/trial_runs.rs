@@ -2,11 +2,11 @@
 
 use crate::gauss::{DefectSample, SAMPLE_SETS, UNDERFLOWN};
 use crate::integration::check_claims::violated_claim;
-use crate::run::accuracy::StepSelection;
 use crate::run::accuracy::noise::{DECAYED, all_together};
 use crate::run::accuracy::track::{Track, norm};
 use crate::run::accuracy::velocities::Velocities;
-use crate::run::{Plan, Request, Shared};
+use crate::run::discretization::Discretization;
+use crate::run::request::{Request, Shared, StepSelection};
 use crate::switching::{DividedGauss, Reach, SwitchingStepper, has_switching_functions};
 use crate::{
     GaussCollocation, GaussRoute, GaussStepper, InputError, StepError, StepFailure, Stepper, TransformedGauss,
@@ -354,7 +354,7 @@ impl<'t, 'p, L: Lagrangian<N>, const N: usize> TrialRuns<'t, 'p, L, N> {
             error: None,
             ended: None,
         };
-        let stepper = Plan::new(&self.request.bare(), &choice).and_then(|plan| plan.stepper());
+        let stepper = Discretization::new(&self.request.bare(), &choice).and_then(|steps| steps.stepper(false));
         let mut stepper = match stepper {
             Ok(stepper) => stepper,
             Err(error) => return halted_at_the_start(error),

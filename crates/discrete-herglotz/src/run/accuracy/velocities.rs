@@ -1,8 +1,10 @@
 //! The velocities of a motion at some times, and the largest speed between them.
 
+use crate::Problem;
 use crate::run::accuracy::noise::all_together;
 use crate::run::accuracy::track::{in_units, norm};
-use crate::run::{Near, Problem, Request};
+use crate::run::motion::Near;
+use crate::run::request::Request;
 use crate::solve::mass_matrix::inverted;
 use crate::{InputError, SelectionFailure, legendre_inverse};
 use contact_geom::nalgebra::SVector;

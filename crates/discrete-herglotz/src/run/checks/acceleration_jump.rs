@@ -1,7 +1,8 @@
 //! Steps in doubt: whether what turned the velocity is narrower than they are.
 
+use crate::Problem;
 use crate::resolution::monitor::{ROUNDED, rounding, size};
-use crate::run::{Plan, Problem};
+use crate::run::discretization::Discretization;
 use crate::solve::hermite::hermite;
 use crate::{SuspectInterval, UnresolvedStep, legendre_inverse};
 use contact_geom::nalgebra::SVector;
@@ -14,7 +15,7 @@ const PARTS: usize = 32;
 /// is what a step may be wrong by that has all of it on the wrong side of the jump.
 const JUMP: f64 = 0.1;
 
-impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
+impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
     /// What becomes of a doubt: a mark, where shorter steps differ or the acceleration jumps.
     pub(crate) fn unresolved_within(&self, doubt: &SuspectInterval<N>) -> Option<UnresolvedStep> {
         let halves = self.against_halves(doubt).unwrap_or(0.0);

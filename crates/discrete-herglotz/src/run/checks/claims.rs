@@ -1,7 +1,7 @@
 //! Claims of structure along a run: what is constant at its start must be so wherever it goes.
 
 use crate::resolution::monitor::size;
-use crate::run::Plan;
+use crate::run::discretization::Discretization;
 use crate::solve::hermite::hermite;
 use crate::{Stepper, legendre_inverse};
 use contact_geom::nalgebra::{SMatrix, SVector};
@@ -60,11 +60,11 @@ impl<const N: usize> Constants<N> {
 
 impl<const N: usize> ClaimMonitor<N> {
     /// That of a run whose Lagrangian claims something that is constant, and has not proved it.
-    pub fn of<L: Lagrangian<N>>(plan: &Plan<'_, L, N>) -> Option<Self> {
+    pub fn of<L: Lagrangian<N>>(steps: &Discretization<'_, L, N>) -> Option<Self> {
         if const { L::PROVED } {
             return None;
         }
-        let problem = plan.problem;
+        let problem = steps.problem;
         let structure = problem.structure;
         if !(structure.is_affine_in_z() || structure.separable || structure.constant_mass || structure.quadratic) {
             return None;
@@ -86,9 +86,9 @@ impl<const N: usize> ClaimMonitor<N> {
     }
 
     /// Looks at the end of a step, and within it.
-    pub fn look<L: Lagrangian<N>>(
+    pub fn violated<L: Lagrangian<N>>(
         &mut self,
-        plan: &Plan<'_, L, N>,
+        steps: &Discretization<'_, L, N>,
         stepper: &dyn Stepper<N>,
         before: Option<&(f64, PhasePoint<N>)>,
     ) -> Option<Defect> {
@@ -97,7 +97,7 @@ impl<const N: usize> ClaimMonitor<N> {
             return None;
         }
         self.last = [state.q, state.p];
-        let lagrangian = plan.problem.lagrangian;
+        let lagrangian = steps.problem.lagrangian;
         let guess = stepper.last_velocity().unwrap_or(self.guess);
         let x = legendre_inverse(lagrangian, t, &state, &guess).ok()?;
         self.guess = x.v;
@@ -109,7 +109,7 @@ impl<const N: usize> ClaimMonitor<N> {
                 for fraction in fractions {
                     let (t, state) = (start + fraction * (end - start), curve.at_fraction(fraction));
                     let within = legendre_inverse(lagrangian, t, &state, &self.guess);
-                    if let Some(defect) = within.ok().and_then(|x| self.compare(plan, t, &x)) {
+                    if let Some(defect) = within.ok().and_then(|x| self.compare(steps, t, &x)) {
                         return Some(defect);
                     }
                 }
@@ -120,12 +120,12 @@ impl<const N: usize> ClaimMonitor<N> {
         {
             for fraction in fractions {
                 let at = fraction * (t - start);
-                if let Some(defect) = self.compare(plan, start + at, &hermite(&from, &x, t - start, at)) {
+                if let Some(defect) = self.compare(steps, start + at, &hermite(&from, &x, t - start, at)) {
                     return Some(defect);
                 }
             }
         }
-        self.compare(plan, t, &x)
+        self.compare(steps, t, &x)
     }
 
     /// Takes a state into the box, and says how far it is from the last look.
@@ -151,14 +151,19 @@ impl<const N: usize> ClaimMonitor<N> {
         part
     }
 
-    fn compare<L: Lagrangian<N>>(&self, plan: &Plan<'_, L, N>, t: f64, x: &VelocityPoint<N>) -> Option<Defect> {
-        let (lagrangian, structure) = (plan.problem.lagrangian, self.structure);
+    fn compare<L: Lagrangian<N>>(
+        &self,
+        steps: &Discretization<'_, L, N>,
+        t: f64,
+        x: &VelocityPoint<N>,
+    ) -> Option<Defect> {
+        let (lagrangian, structure) = (steps.problem.lagrangian, self.structure);
         let here = Constants::at(&structure, lagrangian, t, x)?;
         let then;
         let reference = match &self.reference {
             Some(reference) => reference,
             None => {
-                then = Constants::at(&structure, lagrangian, t, &plan.problem.start)?;
+                then = Constants::at(&structure, lagrangian, t, &steps.problem.start)?;
                 &then
             }
         };

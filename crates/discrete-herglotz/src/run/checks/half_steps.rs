@@ -1,11 +1,10 @@
 //! Steps against twice as many of half their length: whether given steps resolve the motion at all.
 
-use crate::error::step_error;
 use crate::resolution::monitor::{LEAST, rounding};
-use crate::run::{Plan, Problem};
-use crate::{StepError, Stepper, SuspectInterval, legendre_inverse};
+use crate::run::discretization::Discretization;
+use crate::{Problem, SuspectInterval, legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, Structure, VelocityPoint, max_abs_or_nan, max_or_nan};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
 
 /// The difference from two halves, relative to the motion, from which on a step does not resolve it. Of the orders that there are
 /// a step then has an error of its own of a twentieth, or a fifteenth with order one.
@@ -14,7 +13,7 @@ const APART: f64 = 0.05;
 /// The steps from rest in which a method of order one is off by as much as it moves.
 const FIRST_STEPS: f64 = 16.0;
 
-impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
+impl<L: Lagrangian<N>, const N: usize> Discretization<'_, L, N> {
     /// The misfit of some steps; above one where they do not resolve the motion. `None` where there is nothing to compare with.
     pub(crate) fn against_halves(
         &self,
@@ -48,35 +47,6 @@ impl<'p, L: Lagrangian<N>, const N: usize> Plan<'p, L, N> {
         let of_v =
             if of_v * self.h.abs() > LEAST * width { relative(of_v, size([&v, &coarse_v, &fine_v])) } else { 0.0 };
         Some(max_or_nan(relative(apart(&to.q, &fine.q), width), of_v) / APART)
-    }
-
-    /// A stepper after steps of another length, from a state with its velocity, so many or until a time; in transformed time, steps of the
-    /// same length in its time: they are cut where they pass the time that they are to reach.
-    ///
-    /// A few steps of a linear motion are worth no matrix, not even a cheap one, unless their stages cannot be solved for without it:
-    /// the sweeps lose with an ill-conditioned mass matrix what they gain.
-    pub(crate) fn advanced(
-        &self,
-        (t, from): (f64, &PhasePoint<N>),
-        v: &SVector<f64, N>,
-        h: f64,
-        (steps, t_end): (usize, f64),
-        guess: impl Fn(&mut dyn Stepper<N>),
-    ) -> Result<Box<dyn Stepper<N> + 'p>, StepError> {
-        let Structure { quadratic: linear, separable, .. } = self.problem.structure;
-        let by = |quadratic: bool| {
-            let start = VelocityPoint { q: from.q, v: *v, z: from.z };
-            // The tables of twice the working precision depend on the length of the step: a few steps are not worth them.
-            let separable = separable && (quadratic || self.info.collocation.is_none());
-            let structure = Structure { quadratic, separable, ..self.problem.structure };
-            let problem = Problem { t0: t, start, state: *from, structure, ..*self.problem };
-            let h = if self.info.in_transformed_time { self.h } else { h };
-            let mut stepper = self.make_stepper(&problem, h, false).map_err(step_error)?;
-            guess(&mut *stepper);
-            stepper.advance_until(steps, t_end).map_err(|halt| halt.cause)?;
-            Ok(stepper)
-        };
-        by(false).or_else(|cause| if linear { by(true) } else { Err(cause) })
     }
 }
 
@@ -136,7 +106,7 @@ mod tests {
         let plan = plan(&problem, 8, 100);
         assert!(by_one_matrix(plan.stepper().unwrap()));
         for h in [0.3 * H, -0.5 * H] {
-            let part = plan.advanced((0.0, &problem.state), &problem.start.v, h, (1, h), |_| ()).unwrap();
+            let part = plan.steps.advanced((0.0, &problem.state), &problem.start.v, h, (1, h), |_| ()).unwrap();
             assert!(part.evaluations() > 0);
             // x = e^(-t/20) (cos w t + sin w t / (20 w)), w^2 = k^2 - 1/400; to round-off, of ten terms.
             let (t, state) = (h, part.state());
@@ -183,7 +153,7 @@ mod tests {
             let run = problem.by(GaussCollocation { stages }).steps(Steps::Count(64));
             assert_eq!(run.run(Until::Time(4.0)).unwrap().unresolved, None, "{stages} stages");
             let plan = problem.by(GaussCollocation { stages }).steps(Steps::Count(64)).plan(Until::Time(4.0)).unwrap();
-            let part = plan.advanced((0.0, &problem.state), &start.v, 0.03, (1, 0.03), |_| ()).unwrap();
+            let part = plan.steps.advanced((0.0, &problem.state), &start.v, 0.03, (1, 0.03), |_| ()).unwrap();
             // By the whole step's matrix: to rounding through the inverse of the mass matrix.
             let mut whole = problem.by(GaussCollocation { stages }).steps(Steps::Count(1));
             whole = whole.without_action();

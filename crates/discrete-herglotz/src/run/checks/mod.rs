@@ -1,6 +1,205 @@
-//! What a run checks along its way: claims of structure, the energy, steps against two halves, jumps of the acceleration.
+//! What a run checks along its way: whether its steps resolve the motion, and whether the claims of structure hold where the motion goes.
+//!
+//! [`crate::resolution`] lists the measures and their thresholds.
 
 pub(crate) mod acceleration_jump;
 pub(crate) mod claims;
 pub(crate) mod energy;
+pub(crate) mod energy_drift;
 pub(crate) mod half_steps;
+pub(crate) mod rest;
+
+use crate::error::first;
+use crate::integration::check_claims::violated_claim;
+use crate::run::discretization::Discretization;
+use crate::run::findings::Findings;
+use crate::{Status, Stepper, SuspectInterval, UnresolvedStep};
+use claims::ClaimMonitor;
+use contact_geom::{Defect, Lagrangian, PhasePoint};
+use energy::EnergyMonitor;
+
+/// The number of steps between two checks of all claims in long runs: a check then costs less than a hundredth of the run.
+const PROBES: usize = 1 << 14;
+
+/// The number of steps by which a run may pass the end that its trial runs have met, which is known up to the error of both.
+const PASSED: usize = 2;
+
+/// The number of steps after which all claims are checked next: every power of two, and the multiples of [`PROBES`].
+pub(crate) fn next_probe(taken: usize) -> usize {
+    (taken + 1).checked_next_power_of_two().unwrap_or(usize::MAX).min((taken / PROBES + 1) * PROBES)
+}
+
+/// Steps that a run has just taken.
+pub(crate) struct TakenSteps<'s, const N: usize> {
+    pub stepper: &'s mut dyn Stepper<N>,
+    /// The time and the state before them, where a check or an observer needs them.
+    pub before: Option<(f64, PhasePoint<N>)>,
+    /// The number of steps before them, and with them.
+    pub first: usize,
+    pub taken: usize,
+    /// Whether the run ends with them.
+    pub over: bool,
+}
+
+impl<const N: usize> TakenSteps<'_, N> {
+    /// The start of the step, where it is one.
+    pub fn single(&self) -> Option<&(f64, PhasePoint<N>)> {
+        self.before.as_ref().filter(|_| self.taken == self.first + 1)
+    }
+
+    /// Whether all claims are checked after these steps.
+    pub fn probed(&self) -> bool {
+        self.over || self.taken == next_probe(self.taken - 1)
+    }
+}
+
+/// The checks of a run.
+pub(crate) struct Checks<'r, 'p, L, const N: usize> {
+    steps: &'r Discretization<'p, L, N>,
+    pub findings: Findings,
+    /// Whether the conformal factor is a product along the run, and whether it is a power of one `sigma_d`.
+    product: bool,
+    power: bool,
+    /// Whether steps are compared with two halves: those of few stages at powers of two, all where they are suspect.
+    halves: bool,
+    suspects: bool,
+    /// Whether the stepper's own findings count. Trial runs have compared the steps of other methods with a reference whose defect was sampled;
+    /// and a transient within a step of a motion that is proved to be linear leaves no error but that of the order.
+    of_stepper: bool,
+    claims: Option<ClaimMonitor<N>>,
+    energy: Option<EnergyMonitor<N>>,
+    ends_after: Option<usize>,
+}
+
+impl<'r, 'p, L: Lagrangian<N>, const N: usize> Checks<'r, 'p, L, N> {
+    /// The checks that a run of these steps needs: whether `sigma_d` is the same in all of them, and after how many an observer is expected
+    /// to end the run.
+    pub fn of(steps: &'r Discretization<'p, L, N>, constant_rate: bool, ends_after: Option<usize>) -> Self {
+        let given = steps.error.is_none();
+        let suspects = given && !steps.info.in_transformed_time;
+        let linear = const { L::PROVED } && steps.problem.structure.quadratic;
+        let energy = EnergyMonitor::of(steps, constant_rate);
+        Checks {
+            steps,
+            findings: Findings {
+                energy: energy.as_ref().map(|energy| energy.drift.sums).unwrap_or_default(),
+                ..Findings::default()
+            },
+            product: steps.needs.conformal_factor && !constant_rate,
+            power: constant_rate,
+            halves: suspects && !steps.many_stages(),
+            suspects,
+            of_stepper: given || steps.info.collocation.is_some() && !linear,
+            claims: ClaimMonitor::of(steps),
+            energy,
+            ends_after,
+        }
+    }
+
+    /// Continues the checks of a run that was interrupted.
+    pub fn resume(&mut self, findings: Findings) {
+        self.findings = findings;
+        if let Some(energy) = &mut self.energy {
+            energy.drift.sums = findings.energy;
+        }
+    }
+
+    /// The number of steps that are compared with two halves next, counted with the step: those that end at a power of two, and the last.
+    fn next_halves(&self, taken: usize) -> usize {
+        if self.halves && self.findings.unresolved.is_none() {
+            (taken + 1).checked_next_power_of_two().unwrap_or(usize::MAX).min(self.steps.most())
+        } else {
+            usize::MAX
+        }
+    }
+
+    /// The number of steps after which a check is due, at the latest.
+    pub fn next(&self, taken: usize) -> usize {
+        if self.product {
+            return taken + 1;
+        }
+        let claims = self.claims.as_ref().map_or(usize::MAX, |claims| claims.next(taken));
+        let energy = self.energy.as_ref().map_or(usize::MAX, |energy| energy.next(taken));
+        next_probe(taken).min(alone(taken, self.next_halves(taken))).min(claims).min(energy)
+    }
+
+    /// Whether a check needs the state before the next step.
+    pub fn needs_start(&self, taken: usize) -> bool {
+        self.next_halves(taken) == taken + 1
+            || self.claims.as_ref().is_some_and(|claims| claims.next(taken) == taken + 1)
+    }
+
+    /// Takes the factors of some steps into the conformal factor of the run.
+    pub fn multiply(&mut self, taken: usize, done: usize, sigma: f64) {
+        if self.power {
+            self.findings.log_factor = taken as f64 * sigma.ln();
+        } else if self.product {
+            self.findings.log_factor += done as f64 * sigma.ln();
+        }
+    }
+
+    /// Checks some steps; returns the status of a run that ends with a claim that is violated.
+    pub fn check(&mut self, step: &mut TakenSteps<'_, N>) -> Option<Status> {
+        self.compare_with_halves(step);
+        let next_claims = self.claims.as_ref().map_or(usize::MAX, |claims| claims.next(step.first));
+        let next_energy = self.energy.as_ref().map_or(usize::MAX, |energy| energy.next(step.first));
+        let status = |Defect { claim, size }| Status::FalseClaim { step: step.taken, claim, size };
+        if step.probed() {
+            let guess = step.stepper.last_velocity().unwrap_or(self.steps.problem.start.v);
+            let (t, state) = (step.stepper.time(), step.stepper.state());
+            if let Some(defect) = violated_claim(self.steps.problem.lagrangian, t, &state, &guess) {
+                return Some(status(defect));
+            }
+            self.ask_stepper(step.stepper);
+        }
+        if let Some(claims) = &mut self.claims
+            && (step.taken >= next_claims || step.over)
+            && let Some(defect) = claims.violated(self.steps, step.stepper, step.single())
+        {
+            return Some(status(defect));
+        }
+        if let Some(energy) = &mut self.energy
+            && (step.taken >= next_energy || step.over)
+        {
+            let drift = energy.drift(self.steps, step.stepper, (self.findings.log_factor, step.taken));
+            self.findings.energy = energy.drift.sums;
+            self.note(drift.map(|defect| UnresolvedStep { step: step.taken - 1, defect }));
+        }
+        // The trial runs have ended before.
+        if self.ends_after.is_some_and(|steps| step.taken > steps + PASSED) {
+            self.note(Some(UnresolvedStep { step: step.taken - 1, defect: f64::INFINITY }));
+        }
+        None
+    }
+
+    /// Compares the step with two of half its length, where that is due.
+    fn compare_with_halves(&mut self, step: &TakenSteps<'_, N>) {
+        if self.next_halves(step.first) == step.first + 1
+            && let Some(&(t, from)) = step.single()
+        {
+            let interval = SuspectInterval { step: step.first, steps: 1, t, from, to: step.stepper.state() };
+            self.note(self.steps.unresolved_within(&interval));
+        }
+    }
+
+    /// Takes over what the stepper has found in its steps.
+    fn ask_stepper(&mut self, stepper: &mut dyn Stepper<N>) {
+        let suspect = stepper.suspect_interval().filter(|_| self.suspects && self.findings.unresolved.is_none());
+        self.note(suspect.and_then(|suspect| self.steps.unresolved_within(&suspect)));
+        self.note(self.found_by(stepper));
+    }
+
+    /// The first step that the stepper found unresolved.
+    pub fn found_by(&self, stepper: &dyn Stepper<N>) -> Option<UnresolvedStep> {
+        if self.of_stepper { stepper.unresolved() } else { None }
+    }
+
+    fn note(&mut self, unresolved: Option<UnresolvedStep>) {
+        self.findings.unresolved = first(self.findings.unresolved, unresolved);
+    }
+}
+
+/// The number of steps at which a run stops so that the step which ends at `due` is taken by itself.
+pub(crate) fn alone(taken: usize, due: usize) -> usize {
+    if due > taken + 1 { due - 1 } else { due }
+}

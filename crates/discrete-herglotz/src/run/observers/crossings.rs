@@ -1,9 +1,11 @@
 //! The changes of sign of the function of an event, step by step.
 
 use crate::StepError;
-use crate::run::observers::events::{Crossing, Event};
-use crate::run::observers::observer::Beside;
-use crate::run::{LastStep, Motion, Near, RunInfo};
+use crate::run::motion::{Motion, Near};
+use crate::run::observers::event::{Crossing, Event};
+use crate::run::observers::last_step::Beside;
+use crate::run::observers::last_step::LastStep;
+use crate::run::observers::output_request::RunInfo;
 use crate::solve::roots::{bracketed_root, bracketed_root_within};
 use contact_geom::PhasePoint;
 
@@ -199,7 +201,7 @@ impl<const N: usize> Event<'_, N> {
         step: &mut LastStep<'_, N>,
         [a, b]: [f64; 2],
     ) -> Result<Option<(f64, PhasePoint<N>)>, StepError> {
-        let mut about = |tau: f64| step.about(tau).map(|x| self.value(step.time(tau), &x));
+        let mut about = |tau: f64| step.interpolate(tau).map(|x| self.value(step.time(tau), &x));
         let ends = [about(a)?, about(b)?];
         // A NaN has no sign.
         let brackets = ends[0] * ends[1] < 0.0;
@@ -376,7 +378,7 @@ impl<const N: usize> Event<'_, N> {
         ahead: f64,
     ) -> Option<Left> {
         let there = t + ahead;
-        let (x, _) = motion.inside(&(t, *state), there, near, None).ok()?;
+        let (x, _) = motion.state_within_step(&(t, *state), there, near, None).ok()?;
         let value = self.value(there, &x);
         value.is_finite().then_some(Left { t: there, value })
     }

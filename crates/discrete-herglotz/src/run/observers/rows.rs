@@ -169,7 +169,7 @@ impl<'f, const N: usize> Rows<'f, N> {
             if t == at.t {
                 self.record(at)?;
             } else if passed(t) {
-                self.record(&at.inside(t)?)?;
+                self.record(&at.within(t)?)?;
             } else {
                 self.record(&StepView { t, ..*at })?;
             }

@@ -1,0 +1,58 @@
+//! Motions that have come to rest.
+
+use crate::Problem;
+use crate::resolution::monitor::size;
+use crate::run::observers::output_request::OutputRequest;
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, max_or_nan};
+
+/// What ends a run that has come to rest, in its [`Status`](crate::Status).
+pub(crate) const REST: &str = "rest";
+
+/// Positions and momenta below this are at rest. Numbers smaller than it by some ten powers of ten lose digits in products, so that an error
+/// relative to the motion is no longer defined.
+const SMALLEST: f64 = 1e-280;
+
+/// The rate of the action at rest, in units of its rounding.
+const ROUNDINGS: f64 = 256.0;
+
+/// Whether `q = v = 0` is an equilibrium at which a motion stays that falls to it with this action: L does not depend on time, has no
+/// slope there, a positive definite mass, a potential with a minimum, and a drag that dissipates. So it is no maximum of the potential, which
+/// rounding would make the motion leave.
+pub(crate) fn rests_at_the_origin<L: Lagrangian<N>, const N: usize>(problem: &Problem<'_, L, N>, z: f64) -> bool {
+    if !problem.structure.autonomous {
+        return false;
+    }
+    let origin = VelocityPoint { q: SVector::zeros(), v: SVector::zeros(), z };
+    let (slope, h) =
+        (problem.lagrangian.gradient(problem.t0, &origin), problem.lagrangian.hessian(problem.t0, &origin));
+    let still = slope.x.iter().chain(&slope.y).all(|e| *e == 0.0);
+    // A momentum is constant where it does not depend on the action.
+    let free = h.qz.iter().chain(&h.vz).all(|e| *e == 0.0);
+    still && free && slope.z < 0.0 && h.vv.cholesky().is_some() && (-h.qq).cholesky().is_some()
+}
+
+/// Whether a motion of the problem is at rest in a state: its position and momentum are below [`SMALLEST`], and its action, where that is
+/// requested, is constant.
+pub(crate) fn is_at_rest<L: Lagrangian<N>, const N: usize>(
+    problem: &Problem<'_, L, N>,
+    needs: OutputRequest,
+    t: f64,
+    state: &PhasePoint<N>,
+) -> bool {
+    if max_or_nan(size(&state.q), size(&state.p)) >= SMALLEST || starts_at_rest(problem) {
+        return false;
+    }
+    let origin = VelocityPoint { q: SVector::zeros(), v: SVector::zeros(), z: state.z };
+    let steady = || {
+        let lagrangian = problem.lagrangian;
+        let rate = lagrangian.value(t, &origin.q, &origin.v, origin.z).abs();
+        rate <= ROUNDINGS * gradient_rounding(lagrangian, t, &origin).0
+    };
+    rests_at_the_origin(problem, state.z) && (!needs.action || steady())
+}
+
+/// Whether the start itself is below [`SMALLEST`].
+pub(crate) fn starts_at_rest<L, const N: usize>(problem: &Problem<'_, L, N>) -> bool {
+    max_or_nan(size(&problem.state.q), size(&problem.state.p)) < SMALLEST
+}

@@ -1,0 +1,183 @@
+//! A problem with the integrator and the steps that a run takes.
+
+use crate::error::step_error;
+use crate::gauss::FEW_STAGES;
+use crate::numbers::state_words::digest;
+use crate::run::motion::{Motion, Near};
+use crate::run::observers::output_request::OutputRequest;
+use crate::run::request::{Request, Shared, StepSelection};
+use crate::switching::{has_switching_functions, of_integrator};
+use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, StepperOptions, legendre_inverse};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
+
+/// The number of unknowns of a collocation step up to which the single matrix of a linear motion is always made, and the divisor of its cube
+/// that gives the number of steps from which on it is made for more unknowns: it is solved for in double-double precision.
+const MATRIX: (usize, usize) = (32, 1024);
+
+/// A problem with the integrator and the steps that are selected for it.
+pub(crate) struct Discretization<'p, L, const N: usize> {
+    pub problem: &'p Problem<'p, L, N>,
+    pub t_end: f64,
+    /// The step; negative where the run is backward in time.
+    pub h: f64,
+    pub count: usize,
+    /// The error that trial runs have found, where an accuracy was requested.
+    pub error: Option<f64>,
+    pub integrator: Shared<'p, L, N>,
+    pub info: MethodInfo,
+    pub needs: OutputRequest,
+    /// The scales of the coordinates in which errors are measured, where they are given.
+    pub scales: Option<SVector<f64, N>>,
+    /// Whether the Lagrangian states switching functions.
+    pub switches: bool,
+}
+
+impl<'p, L: Lagrangian<N>, const N: usize> Discretization<'p, L, N> {
+    /// The steps that are selected for a request.
+    pub fn new(request: &Request<'p, L, N>, selection: &StepSelection<'p, L, N>) -> Result<Self, InputError> {
+        let Request { problem, t_end, needs, scales, .. } = *request;
+        let StepSelection { integrator, count, h, error, .. } = selection.clone();
+        let switches = has_switching_functions(problem.lagrangian, problem.t0, &problem.start)?;
+        let info = integrator.info();
+        if switches && info.in_transformed_time {
+            let hypothesis = "a Lagrangian without kinks and jumps, since its steps are equal in transformed time";
+            return Err(InputError::Hypothesis { hypothesis });
+        }
+        Ok(Discretization { problem, t_end, h, count, error, integrator, info, needs, scales, switches })
+    }
+
+    /// The problem with the structure that its steps use: for few steps a linear motion is solved as a nonlinear one, since the matrix of a
+    /// step would cost more than the iterations.
+    pub fn problem_for_steps(&self) -> Problem<'p, L, N> {
+        let unknowns = self.info.collocation.unwrap_or(0) * N;
+        let by_matrix = unknowns <= MATRIX.0 || unknowns.pow(3) / MATRIX.1 <= self.count;
+        let structure = self.problem.structure;
+        Problem { structure: Structure { quadratic: structure.quadratic && by_matrix, ..structure }, ..*self.problem }
+    }
+
+    /// A stepper at the start of the run.
+    pub fn stepper(&self, watched: bool) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
+        self.stepper_of(&self.problem_for_steps(), self.h, watched)
+    }
+
+    /// A stepper at the start of a problem, with steps of h, which end on kinks and jumps where the Lagrangian states them.
+    pub fn stepper_of(
+        &self,
+        problem: &Problem<'p, L, N>,
+        h: f64,
+        watched: bool,
+    ) -> Result<Box<dyn Stepper<N> + 'p>, InputError> {
+        let options = StepperOptions { action: self.needs.action, watched };
+        if const { L::HAS_SWITCHING_FUNCTIONS } && self.switches && !self.info.divides {
+            return of_integrator(self.integrator.clone(), problem, h, options);
+        }
+        self.integrator.stepper(problem, h, options)
+    }
+
+    /// A stepper after steps of another length from a state with its velocity: after so many, or at the time `t_end`. In transformed
+    /// time the steps keep their length, and the last one ends at `t_end`.
+    ///
+    /// For these few steps the matrix of a linear motion is made only where the stages cannot be solved for without it, as with an
+    /// ill-conditioned mass matrix.
+    pub fn advanced(
+        &self,
+        (t, from): (f64, &PhasePoint<N>),
+        v: &SVector<f64, N>,
+        h: f64,
+        (steps, t_end): (usize, f64),
+        guess: impl Fn(&mut dyn Stepper<N>),
+    ) -> Result<Box<dyn Stepper<N> + 'p>, StepError> {
+        let Structure { quadratic: linear, separable, .. } = self.problem.structure;
+        let by = |quadratic: bool| {
+            let start = VelocityPoint { q: from.q, v: *v, z: from.z };
+            // The double-double tables of the separable route depend on the length of the step: they are not made for a few steps.
+            let separable = separable && (quadratic || self.info.collocation.is_none());
+            let structure = Structure { quadratic, separable, ..self.problem.structure };
+            let problem = Problem { t0: t, start, state: *from, structure, ..*self.problem };
+            let h = if self.info.in_transformed_time { self.h } else { h };
+            let mut stepper = self.stepper_of(&problem, h, false).map_err(step_error)?;
+            guess(&mut *stepper);
+            stepper.advance_until(steps, t_end).map_err(|failure| failure.cause)?;
+            Ok(stepper)
+        };
+        by(false).or_else(|cause| if linear { by(true) } else { Err(cause) })
+    }
+
+    /// A stepper after one step from a time and a state to another time. The iteration starts from the curve of a longer step, where one is given.
+    pub fn step_to(
+        &self,
+        (t0, from): &(f64, PhasePoint<N>),
+        t: f64,
+        near: Near<N>,
+        curve: Option<&DenseStep<N>>,
+    ) -> Result<Box<dyn Stepper<N> + 'p>, StepError> {
+        let v = self.velocity(*t0, from, near)?;
+        let guess = |run: &mut dyn Stepper<N>| {
+            if let Some(curve) = curve {
+                run.guess(curve);
+            }
+        };
+        self.advanced((*t0, from), &v, t - t0, (1, t), guess)
+    }
+
+    /// Whether the steps of a Gauss method have so many stages that their defect is sampled between the nodes.
+    pub fn many_stages(&self) -> bool {
+        self.info.collocation.is_some_and(|stages| stages > FEW_STAGES)
+    }
+
+    /// The number of steps after which the run ends at the latest.
+    pub fn most(&self) -> usize {
+        if self.info.in_transformed_time { usize::MAX } else { self.count }
+    }
+
+    /// Whether the run has reached its end after so many steps, at a time.
+    pub fn is_over(&self, taken: usize, t: f64) -> bool {
+        let passed = if self.h < 0.0 { t <= self.t_end } else { t >= self.t_end };
+        taken == self.most() || self.info.in_transformed_time && passed
+    }
+}
+
+impl<L: Lagrangian<N>, const N: usize> Motion<N> for Discretization<'_, L, N> {
+    fn velocity(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<SVector<f64, N>, StepError> {
+        // With a constant mass there is one velocity alone.
+        let near = near.filter(|_| !self.problem.structure.constant_mass);
+        legendre_inverse(self.problem.lagrangian, t, state, &near.unwrap_or(self.problem.start.v)).map(|x| x.v)
+    }
+
+    fn energy(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<f64, StepError> {
+        let v = self.velocity(t, state, near)?;
+        let energy = v.dot(&state.p) - self.problem.lagrangian.value(t, &state.q, &v, state.z);
+        if energy.is_finite() { Ok(energy) } else { Err(StepError::NonFinite) }
+    }
+
+    fn rates(&self, t: f64, state: &PhasePoint<N>, near: Near<N>) -> Result<PhasePoint<N>, StepError> {
+        let v = self.velocity(t, state, near)?;
+        let (value, g) = self.problem.lagrangian.with_gradient(t, &VelocityPoint { q: state.q, v, z: state.z });
+        Ok(PhasePoint { q: v, p: g.x + state.p * g.z, z: value })
+    }
+
+    /// Of the start, of L there, of the steps, and of the outputs.
+    fn fingerprint(&self) -> u64 {
+        let Problem { lagrangian, t0, start, state, .. } = self.problem;
+        let (value, slope) = lagrangian.with_gradient(*t0, start);
+        let numbers = [*t0, self.t_end, self.h, start.z, value, slope.z];
+        let vectors = [&start.q, &start.v, &state.p, &slope.x, &slope.y];
+        let numbers = numbers.iter().chain(vectors.into_iter().flat_map(|x| x.iter())).map(|x| x.to_bits());
+        let name = self.info.name.bytes().map(u64::from);
+        let OutputRequest { action, conformal_factor, .. } = self.needs;
+        let counts = [N as u64, self.count as u64, action.into(), conformal_factor.into()];
+        digest(&numbers.chain(name).chain(counts).collect::<Vec<u64>>())
+    }
+
+    fn state_within_step(
+        &self,
+        from: &(f64, PhasePoint<N>),
+        t: f64,
+        near: Near<N>,
+        curve: Option<&DenseStep<N>>,
+    ) -> Result<(PhasePoint<N>, f64), StepError> {
+        let run = self.step_to(from, t, near, curve)?;
+        Ok((run.state(), run.sigma()))
+    }
+}

@@ -1,0 +1,64 @@
+//! The end of a run by an observer within a step that cannot be taken as a whole.
+
+use crate::Stepper;
+use crate::run::Plan;
+use crate::run::findings::Findings;
+use crate::run::observers::observer::Observer;
+use crate::run::observers::output_request::RunInfo;
+use crate::run::observers::step_view::{StepView, Stop};
+use contact_geom::{Lagrangian, PhasePoint};
+use std::ops::ControlFlow;
+
+/// The number of bisections of such a step: the part of it that can be taken is then known to the rounding of the step.
+const BISECTIONS: usize = 48;
+
+/// The end of the run within the step, with the logarithm of the conformal factor there: all observers see the part of the step in which
+/// it lies. `None` where no observer ends the run.
+pub(crate) fn end_within_step<L: Lagrangian<N>, const N: usize>(
+    plan: &Plan<'_, L, N>,
+    observers: &mut Vec<Box<dyn Observer<N> + '_>>,
+    stepper: &dyn Stepper<N>,
+    info: RunInfo,
+    (findings, taken): (Findings, usize),
+) -> Option<(Stop<N>, Option<f64>)> {
+    let steps = &plan.steps;
+    let from = (stepper.time(), stepper.state());
+    let whole = if steps.info.in_transformed_time { steps.t_end - from.0 } else { steps.h };
+    let (mut possible, mut impossible) = (0.0, 1.0);
+    let mut ending = None;
+    let mut terminal = observers.terminal()?;
+    for _ in 0..BISECTIONS {
+        let fraction = 0.5 * (possible + impossible);
+        let Ok(part) = steps.step_to(&from, from.0 + fraction * whole, stepper.last_velocity(), None) else {
+            impossible = fraction;
+            continue;
+        };
+        // Observers see each part from the start of the step.
+        terminal.prepare(&info).ok()?;
+        if terminal.start(&plan.view(stepper, None, findings, (taken, false))).is_break() {
+            return None;
+        }
+        if let ControlFlow::Break(stop) = terminal.step(&view_of_part(plan, &*part, from, (findings, taken))) {
+            ending = stop.at.is_some().then_some(part);
+            break;
+        }
+        possible = fraction;
+    }
+    drop(terminal);
+    let part = ending?;
+    let end = view_of_part(plan, &*part, from, (findings, taken));
+    let stop = observers.step(&end).break_value()?;
+    let (t, _) = stop.at?;
+    Some((stop, end.within(t).ok().and_then(|there| there.log_factor)))
+}
+
+/// A part of a step as observers see it.
+fn view_of_part<'r, L: Lagrangian<N>, const N: usize>(
+    plan: &'r Plan<'_, L, N>,
+    part: &'r dyn Stepper<N>,
+    from: (f64, PhasePoint<N>),
+    (findings, taken): (Findings, usize),
+) -> StepView<'r, N> {
+    let findings = Findings { log_factor: findings.log_factor + part.sigma().ln(), ..findings };
+    StepView { in_failed_step: true, ..plan.view(part, Some(from), findings, (taken + 1, false)) }
+}

@@ -1,0 +1,219 @@
+//! The loop of every run.
+
+use crate::run::checks::rest::{REST, is_at_rest};
+use crate::run::checks::{Checks, TakenSteps, alone};
+use crate::run::end_within_step::end_within_step;
+use crate::run::findings::Findings;
+use crate::run::motion::Motion;
+use crate::run::observers::observer::Observer;
+use crate::run::observers::output_request::{OutputRequest, RunInfo};
+use crate::run::observers::step_view::{StepView, Stop};
+use crate::run::{Outcome, Plan, ResumeState};
+use crate::{InputError, Status, StepError, Stepper};
+use contact_geom::{Lagrangian, PhasePoint};
+
+/// The observers of a run, in the order in which they were added.
+pub(crate) type Observers<'o, const N: usize> = Vec<Box<dyn Observer<N> + 'o>>;
+
+/// Takes the steps of a plan, from its start or from where the run was interrupted: steps at which nothing is due are taken at once; then the
+/// checks, and then the observers, see the last of them.
+pub(crate) fn integrate<L: Lagrangian<N>, const N: usize>(
+    plan: &Plan<'_, L, N>,
+    observers: &mut Observers<'_, N>,
+    from: Option<&ResumeState>,
+) -> Result<Outcome<N>, InputError> {
+    let mut run = Integration::new(plan, observers, from)?;
+    run.start();
+    while run.status.is_none() && !run.over {
+        let first = run.taken;
+        let before = run.needs_start().then(|| (run.stepper.time(), run.stepper.state()));
+        let chunk = run.next() - first;
+        if let Err(cause) = run.advance(chunk) {
+            run.fail(cause);
+            break;
+        }
+        run.over = plan.steps.is_over(run.taken, run.stepper.time());
+        let (stepper, taken, over) = (&mut *run.stepper, run.taken, run.over);
+        let mut step = TakenSteps { stepper, before, first, taken, over };
+        let (before, probed) = (step.single().copied(), step.probed());
+        if let Some(false_claim) = run.checks.check(&mut step) {
+            run.status = Some(false_claim);
+            break;
+        }
+        let at_rest = run.is_at_rest(probed);
+        run.over |= at_rest;
+        run.observe(first, before, at_rest);
+    }
+    Ok(run.outcome())
+}
+
+impl<L: Lagrangian<N>, const N: usize> Plan<'_, L, N> {
+    /// Runs it with no observers.
+    ///
+    /// # Errors
+    /// Those of [`stepper`](Self::stepper). A failure during the run is the outcome's status.
+    pub fn run(&self) -> Result<Outcome<N>, InputError> {
+        integrate(self, &mut Vec::new(), None)
+    }
+}
+
+/// A run on its way.
+struct Integration<'r, 'p, 'o, L, const N: usize> {
+    plan: &'r Plan<'p, L, N>,
+    observers: &'r mut Observers<'o, N>,
+    info: RunInfo,
+    stepper: Box<dyn Stepper<N> + 'p>,
+    checks: Checks<'r, 'p, L, N>,
+    taken: usize,
+    /// Whether its last step is taken.
+    over: bool,
+    /// How it ended, where it did so before its last step.
+    status: Option<Status>,
+    /// The time and the state at its end, where they are within a step.
+    end: Option<(f64, PhasePoint<N>)>,
+}
+
+impl<'r, 'p, 'o, L: Lagrangian<N>, const N: usize> Integration<'r, 'p, 'o, L, N> {
+    fn new(
+        plan: &'r Plan<'p, L, N>,
+        observers: &'r mut Observers<'o, N>,
+        from: Option<&ResumeState>,
+    ) -> Result<Self, InputError> {
+        let steps = &plan.steps;
+        let mut stepper = plan.take_stepper()?;
+        if steps.needs.saved && stepper.save().is_none() {
+            return Err(InputError::Unsaved);
+        }
+        let in_transformed_time = steps.info.in_transformed_time;
+        // Where trial runs have met an event that ends the run, the steps until then.
+        let expected = plan.ends_after.map_or(steps.count, |ended| steps.count.min(ended.saturating_add(1)));
+        let info = RunInfo {
+            t0: steps.problem.t0,
+            t_end: plan.rests_until.unwrap_or(steps.t_end),
+            h: (!in_transformed_time).then_some(steps.h),
+            count: (!in_transformed_time || steps.error.is_some()).then_some(expected),
+        };
+        observers.prepare(&info)?;
+        let (mut checks, mut taken) = (Checks::of(steps, plan.constant_rate, plan.ends_after), 0);
+        if let Some(from) = from {
+            if from.fingerprint != steps.fingerprint() || !stepper.restore(&from.words) {
+                return Err(InputError::AnotherRun);
+            }
+            let ResumeState { log_factor, unresolved, energy, .. } = *from;
+            taken = from.taken;
+            checks.resume(Findings { log_factor, unresolved, energy });
+        }
+        // A run may be resumed at its end.
+        let over = steps.is_over(taken, stepper.time());
+        Ok(Integration { plan, observers, info, stepper, checks, taken, over, status: None, end: None })
+    }
+
+    /// Shows the start to the observers.
+    fn start(&mut self) {
+        let start = self.plan.view(&*self.stepper, None, self.checks.findings, (self.taken, self.over));
+        let stop = self.observers.start(&start).break_value();
+        self.stop(stop);
+    }
+
+    /// The number of steps after which an observer, or a check, is due.
+    fn next(&self) -> usize {
+        let seen = alone(self.taken, self.next_seen(self.taken));
+        seen.min(self.checks.next(self.taken)).min(self.plan.steps.most())
+    }
+
+    fn next_seen(&self, taken: usize) -> usize {
+        self.observers.next(taken).max(taken + 1)
+    }
+
+    /// Whether the state before the next step is needed.
+    fn needs_start(&self) -> bool {
+        self.checks.needs_start(self.taken) || self.next_seen(self.taken) == self.taken + 1
+    }
+
+    fn advance(&mut self, chunk: usize) -> Result<(), StepError> {
+        let (done, cause) = match self.stepper.advance_until(chunk, self.plan.steps.t_end) {
+            Ok(done) => (done, Ok(())),
+            Err(failure) => (failure.taken, Err(failure.cause)),
+        };
+        self.taken += done;
+        self.checks.multiply(self.taken, done, self.stepper.sigma());
+        cause
+    }
+
+    /// Ends the run with a step that cannot be taken: an observer may end it within that step.
+    fn fail(&mut self, cause: StepError) {
+        let (findings, taken) = (self.checks.findings, self.taken);
+        match end_within_step(self.plan, self.observers, &*self.stepper, self.info, (findings, taken)) {
+            Some((stop, log_factor)) => {
+                self.taken += 1;
+                self.checks.findings.log_factor = log_factor.unwrap_or(findings.log_factor);
+                self.stop(Some(stop));
+            }
+            None => self.status = Some(Status::Failed { step: taken, t: self.stepper.time(), cause }),
+        }
+    }
+
+    /// Whether the motion has come to rest: at the end that the plan has found, or where all claims are checked.
+    fn is_at_rest(&self, probed: bool) -> bool {
+        if self.over {
+            return self.plan.rests_until.is_some();
+        }
+        let steps = &self.plan.steps;
+        probed && is_at_rest(steps.problem, steps.needs, self.stepper.time(), &self.stepper.state())
+    }
+
+    /// Shows the end of the last step to the observers, where they are due.
+    fn observe(&mut self, first: usize, before: Option<(f64, PhasePoint<N>)>, at_rest: bool) {
+        if self.taken >= self.next_seen(first) || self.over {
+            let (findings, last) = (self.checks.findings, self.over && !at_rest);
+            let end = self.plan.view(&*self.stepper, before, findings, (self.taken, last));
+            let stop = self.observers.step(&end).break_value();
+            if let Some(Stop { at: Some((t, _)), .. }) = stop
+                && let Ok(StepView { log_factor: Some(there), .. }) = end.within(t)
+            {
+                self.checks.findings.log_factor = there;
+            }
+            self.stop(stop);
+        }
+        if at_rest && self.status.is_none() {
+            self.stop(Some(Stop::here(REST)));
+        }
+    }
+
+    /// Ends the run by an observer.
+    fn stop(&mut self, stop: Option<Stop<N>>) {
+        let Some(Stop { by, cause, at }) = stop else { return };
+        let step = self.taken;
+        let t = at.map_or(self.stepper.time(), |(t, _)| t);
+        self.end = at;
+        self.status = Some(match cause {
+            Some(cause) => Status::Failed { step, t, cause },
+            None => Status::Stopped { step, t, by },
+        });
+    }
+
+    fn outcome(self) -> Outcome<N> {
+        let Integration { plan, stepper, checks, taken, status, end, .. } = self;
+        let steps = &plan.steps;
+        let (t, state, near) = (stepper.time(), stepper.state(), stepper.last_velocity());
+        let error_estimate =
+            plan.estimated.then(|| steps.error.unwrap_or_else(|| steps.distance_from_halves(taken, t, (&state, near))));
+        let (t, state) = end.unwrap_or((t, state));
+        let OutputRequest { action, conformal_factor, .. } = steps.needs;
+        let Findings { log_factor, unresolved, .. } = checks.findings;
+        Outcome {
+            status: status.unwrap_or(Status::Completed),
+            unresolved: crate::error::first(unresolved, checks.found_by(&*stepper)),
+            steps: taken,
+            t,
+            q: state.q,
+            p: state.p,
+            v: steps.velocity(t, &state, near).ok(),
+            z: action.then_some(state.z),
+            log_factor: conformal_factor.then_some(log_factor),
+            error_estimate,
+            evaluations: stepper.evaluations(),
+            z_or_start: state.z,
+        }
+    }
+}

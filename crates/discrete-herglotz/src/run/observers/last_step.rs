@@ -1,0 +1,169 @@
+//! The last step of a run, with the motion between its ends.
+
+use crate::run::motion::Motion;
+use crate::{DenseStep, StepError, Stepper};
+use contact_geom::PhasePoint;
+use contact_geom::nalgebra::SVector;
+
+/// The parts in which a step without a curve of its own is looked at.
+const PARTS: usize = 4;
+
+/// The fraction of a step aside by which the curvature of a sketch is taken, and the relative difference of its slope from the motion's up to
+/// which it is used.
+const ASIDE: f64 = 1e-3;
+const AGREEING: f64 = 1e-4;
+
+/// A motion beside one of its states, to second order in the fraction of a step.
+pub(crate) struct Beside<const N: usize> {
+    state: PhasePoint<N>,
+    slope: PhasePoint<N>,
+    curvature: PhasePoint<N>,
+}
+
+impl<const N: usize> Beside<N> {
+    /// The fraction of a step up to which the third order is below rounding, where the step resolves the motion.
+    pub(crate) const REACH: f64 = 1e-6;
+
+    /// The state so much further, in fractions of the step.
+    pub(crate) fn at(&self, ahead: f64) -> PhasePoint<N> {
+        let Beside { state, slope, curvature } = self;
+        let half = 0.5 * ahead;
+        PhasePoint {
+            q: state.q + (slope.q + curvature.q * half) * ahead,
+            p: state.p + (slope.p + curvature.p * half) * ahead,
+            z: state.z + (slope.z + curvature.z * half) * ahead,
+        }
+    }
+}
+
+/// A step, with the motion between its ends.
+pub struct LastStep<'r, const N: usize> {
+    from: (f64, PhasePoint<N>),
+    to: (f64, PhasePoint<N>),
+    motion: &'r dyn Motion<N>,
+    stepper: &'r dyn Stepper<N>,
+    /// Its curve, if it has one, once it is asked for.
+    curve: Option<Option<DenseStep<N>>>,
+    /// The rates at both ends, once they are asked for.
+    rates: [Option<PhasePoint<N>>; 2],
+}
+
+impl<'r, const N: usize> LastStep<'r, N> {
+    /// The step between two times with their states.
+    pub(crate) fn new(
+        [from, to]: [(f64, PhasePoint<N>); 2],
+        motion: &'r dyn Motion<N>,
+        stepper: &'r dyn Stepper<N>,
+    ) -> Self {
+        LastStep { from, to, motion, stepper, curve: None, rates: [None; 2] }
+    }
+
+    /// The times of the step's start and end.
+    pub fn span(&self) -> (f64, f64) {
+        (self.from.0, self.to.0)
+    }
+
+    /// The times and states of both ends.
+    pub fn ends(&self) -> ((f64, PhasePoint<N>), (f64, PhasePoint<N>)) {
+        (self.from, self.to)
+    }
+
+    /// The time at a fraction of the step.
+    pub(crate) fn time(&self, fraction: f64) -> f64 {
+        if fraction == 1.0 { self.to.0 } else { self.from.0 + fraction * (self.to.0 - self.from.0) }
+    }
+
+    /// The state at a time between the ends: by a step of the same integrator that ends there. So it is as exact as the ends are, and its
+    /// map is as conformally contact.
+    ///
+    /// # Errors
+    /// Those of a step.
+    pub fn at(&self, t: f64) -> Result<PhasePoint<N>, StepError> {
+        if t == self.to.0 { Ok(self.to.1) } else { self.step_to(t).map(|(state, _)| state) }
+    }
+
+    /// The same by a step of its own, with its `sigma_d`.
+    pub(crate) fn step_to(&self, t: f64) -> Result<(PhasePoint<N>, f64), StepError> {
+        let curve = self.curve.as_ref().and_then(Option::as_ref);
+        if t == self.from.0 {
+            Ok((self.from.1, 1.0))
+        } else {
+            self.motion.state_within_step(&self.from, t, self.stepper.last_velocity(), curve)
+        }
+    }
+
+    /// With the rates at its start, as the step before has found them.
+    pub(crate) fn with_rates_at_start(self, rates: Option<PhasePoint<N>>) -> Self {
+        LastStep { rates: [rates, None], ..self }
+    }
+
+    /// The rates at its end, if they were asked for.
+    pub(crate) fn rates_at_end(&self) -> Option<PhasePoint<N>> {
+        self.rates[1]
+    }
+
+    /// About the states between the parts in which a search along the step looks at it, at no cost of a step.
+    pub(crate) fn sketch(&mut self, to: &mut Vec<PhasePoint<N>>) -> Result<(), StepError> {
+        to.clear();
+        if let Some(curve) = self.curve() {
+            curve.sketch(to);
+            return Ok(());
+        }
+        for k in 1..PARTS {
+            to.push(self.interpolate(k as f64 / PARTS as f64)?);
+        }
+        Ok(())
+    }
+
+    /// The motion beside a state of it, at a fraction of the step: by its rates there, and by the curvature of the sketch. `None` where the
+    /// slope of the sketch is another, so that its curvature may be, and where there are no rates.
+    pub(crate) fn beside(&mut self, fraction: f64, state: &PhasePoint<N>) -> Result<Option<Beside<N>>, StepError> {
+        let (t0, t1) = self.span();
+        let near = self.stepper.last_velocity();
+        let Ok(rates) = self.motion.rates(self.time(fraction), state, near) else { return Ok(None) };
+        let aside = ASIDE.min(fraction).min(1.0 - fraction);
+        let (below, here, above) =
+            (self.interpolate(fraction - aside)?, self.interpolate(fraction)?, self.interpolate(fraction + aside)?);
+        let part = |of: fn(&PhasePoint<N>) -> SVector<f64, N>| {
+            let slope = of(&rates) * (t1 - t0);
+            let [below, here, above] = [&below, &here, &above].map(of);
+            let agrees = ((above - below) / (2.0 * aside) - slope).amax() <= AGREEING * slope.amax();
+            (agrees, slope, (above - here * 2.0 + below) / (aside * aside))
+        };
+        let ((q_agrees, q_slope, q_curvature), (p_agrees, p_slope, p_curvature)) = (part(|x| x.q), part(|x| x.p));
+        let z_curvature = (above.z - 2.0 * here.z + below.z) / (aside * aside);
+        Ok((q_agrees && p_agrees).then_some(Beside {
+            state: *state,
+            slope: PhasePoint { q: q_slope, p: p_slope, z: rates.z * (t1 - t0) },
+            curvature: PhasePoint { q: q_curvature, p: p_curvature, z: z_curvature },
+        }))
+    }
+
+    fn curve(&mut self) -> Option<&DenseStep<N>> {
+        self.curve.get_or_insert_with(|| self.stepper.dense()).as_ref()
+    }
+
+    /// About the state at a fraction of the step, at no cost of a step: by the collocation polynomial where there is one, else by the
+    /// cubic polynomial through both ends with their rates.
+    pub(crate) fn interpolate(&mut self, fraction: f64) -> Result<PhasePoint<N>, StepError> {
+        if let Some(curve) = self.curve() {
+            return Ok(curve.at_fraction(fraction));
+        }
+        let ((t0, a), (t1, b)) = (self.from, self.to);
+        let ([ra, rb], near) = (self.rates, self.stepper.last_velocity());
+        let ra = ra.map_or_else(|| self.motion.rates(t0, &a, near), Ok)?;
+        let rb = rb.map_or_else(|| self.motion.rates(t1, &b, near), Ok)?;
+        self.rates = [Some(ra), Some(rb)];
+        let (u, left, h) = (fraction, 1.0 - fraction, t1 - t0);
+        let weights =
+            [left * left * (1.0 + 2.0 * u), u * u * (1.0 + 2.0 * left), h * u * left * left, -h * u * u * left];
+        let of = |a: &SVector<f64, N>, b: &SVector<f64, N>, ra: &SVector<f64, N>, rb: &SVector<f64, N>| {
+            a * weights[0] + b * weights[1] + ra * weights[2] + rb * weights[3]
+        };
+        Ok(PhasePoint {
+            q: of(&a.q, &b.q, &ra.q, &rb.q),
+            p: of(&a.p, &b.p, &ra.p, &rb.p),
+            z: a.z * weights[0] + b.z * weights[1] + ra.z * weights[2] + rb.z * weights[3],
+        })
+    }
+}

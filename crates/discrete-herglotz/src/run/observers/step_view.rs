@@ -1,0 +1,105 @@
+//! A step as observers see it, and the end of a run by one of them.
+
+use crate::run::findings::Findings;
+use crate::run::motion::Motion;
+use crate::run::observers::last_step::LastStep;
+use crate::run::resume_state::ResumeState;
+use crate::{StepError, Stepper};
+use contact_geom::PhasePoint;
+use contact_geom::nalgebra::SVector;
+
+/// The end of a run by one of its observers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop<const N: usize> {
+    /// Who ends it, for the status.
+    pub by: &'static str,
+    /// What went wrong, where that is why.
+    pub cause: Option<StepError>,
+    /// Where the run is to end, if not at the end of the step that the observer saw: a time in that step, and the state there.
+    pub at: Option<(f64, PhasePoint<N>)>,
+}
+
+impl<const N: usize> Stop<N> {
+    /// By this observer, at the end of the step that it saw.
+    pub fn here(by: &'static str) -> Self {
+        Stop { by, cause: None, at: None }
+    }
+
+    /// Since something that it needs cannot be computed.
+    pub fn failed(cause: StepError) -> Self {
+        Stop { by: "", cause: Some(cause), at: None }
+    }
+}
+
+/// The end of a step, or the start of a run.
+pub struct StepView<'r, const N: usize> {
+    /// The number of steps taken.
+    pub k: usize,
+    /// The time.
+    pub t: f64,
+    /// The state `(q, p, z)`; the action is the start's where no one has asked for it.
+    pub state: PhasePoint<N>,
+    /// `sigma_d` of the last step, the factor by which it contracts the contact form and every momentum of a symmetry; 1 at the start.
+    pub sigma: f64,
+    /// The logarithm of the conformal factor of the motion since the start, where someone has asked for it.
+    pub log_factor: Option<f64>,
+    /// Whether the run ends here.
+    pub last: bool,
+    pub(crate) findings: Findings,
+    pub(crate) before: Option<(f64, PhasePoint<N>)>,
+    pub(crate) motion: &'r dyn Motion<N>,
+    pub(crate) stepper: &'r dyn Stepper<N>,
+    /// Whether the step that leads here is a part of one that cannot be taken as a whole.
+    pub(crate) in_failed_step: bool,
+}
+
+impl<'r, const N: usize> StepView<'r, N> {
+    /// The velocity, the inverse of the Legendre transformation at the state.
+    ///
+    /// # Errors
+    /// A [`StepError`] where no velocity belongs to the momentum.
+    pub fn velocity(&self) -> Result<SVector<f64, N>, StepError> {
+        self.motion.velocity(self.t, &self.state, self.stepper.last_velocity())
+    }
+
+    /// The velocity that belongs to another state of the motion.
+    ///
+    /// # Errors
+    /// Those of [`velocity`](Self::velocity).
+    pub fn velocity_at(&self, t: f64, state: &PhasePoint<N>) -> Result<SVector<f64, N>, StepError> {
+        self.motion.velocity(t, state, self.stepper.last_velocity())
+    }
+
+    /// The run as it would go on from here, for [`Run::resume`](crate::run::Run::resume); `None` where its stepper cannot be saved, or the run
+    /// cannot go on.
+    pub fn resume_state(&self) -> Option<ResumeState> {
+        if self.in_failed_step {
+            return None;
+        }
+        let (fingerprint, words) = (self.motion.fingerprint(), self.stepper.save()?);
+        let Findings { unresolved, energy, .. } = self.findings;
+        let log_factor = self.log_factor.unwrap_or(0.0);
+        Some(ResumeState { fingerprint, taken: self.k, log_factor, unresolved, energy, words })
+    }
+
+    /// The moment at a time of the last step: see [`LastStep::at`].
+    pub(crate) fn within(&self, t: f64) -> Result<Self, StepError> {
+        let (state, sigma) = self.last_step().ok_or(StepError::NonFinite)?.step_to(t)?;
+        let log_factor = self.log_factor.map(|of_end| of_end - self.sigma.ln() + sigma.ln());
+        Ok(StepView { t, state, sigma, log_factor, before: None, ..*self })
+    }
+
+    /// The energy `E_L = v.p - L`.
+    ///
+    /// # Errors
+    /// Those of [`velocity`](Self::velocity).
+    pub fn energy(&self) -> Result<f64, StepError> {
+        self.motion.energy(self.t, &self.state, self.stepper.last_velocity())
+    }
+
+    /// The step that ends here; `None` at the start, and where several steps were taken at once.
+    pub fn last_step(&self) -> Option<LastStep<'r, N>> {
+        let from = self.before?;
+        Some(LastStep::new([from, (self.t, self.state)], self.motion, self.stepper))
+    }
+}

@@ -1,0 +1,131 @@
+//! From a request to a plan: the checks, the steps and the route.
+
+use crate::integration::check_claims::check_claims_over;
+use crate::run::Plan;
+use crate::run::observers::observer::Terminal;
+use crate::run::observers::output_request::OutputRequest;
+use crate::run::request::{MOST_STEPS, Request, Shared, StepControl, StepSelection, Steps};
+use crate::{GaussCollocation, InputError};
+use contact_geom::{Lagrangian, max_or_nan};
+use std::sync::Arc;
+
+impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {
+    pub(crate) fn plan(
+        &self,
+        length: StepControl<'p, L, N>,
+        terminal: Option<Terminal<'_, N>>,
+    ) -> Result<Plan<'p, L, N>, InputError> {
+        let Request { problem, span, .. } = *self;
+        if !span.is_finite() {
+            return Err(InputError::Span { span });
+        }
+        if span == 0.0 {
+            return self.plan_of_the_start(length);
+        }
+        // Beyond its rest no error relative to the motion can be told.
+        if let StepControl::For(..) = length
+            && let Some(t_end) = self.time_of_rest()
+        {
+            let request = Request { t_end, span: t_end - problem.t0, integrator: self.integrator.clone(), ..*self };
+            let mut plan = request.plan(length, terminal)?;
+            plan.rests_until = Some(self.t_end);
+            return Ok(plan);
+        }
+        if let Some(integrator) = &self.integrator {
+            integrator.check(problem.lagrangian)?;
+            let info = integrator.info();
+            if info.in_transformed_time {
+                self.dt_dtau()?;
+            }
+            // A step for an accuracy is a root of that order.
+            if info.order == 0 {
+                return Err(InputError::Hypothesis { hypothesis: "an order of at least one" });
+            }
+        }
+        // trial runs look at the equations of motion along the whole span.
+        let times = if let StepControl::For(..) = length { 4 } else { 16 };
+        check_claims_over(problem.lagrangian, problem.t0, span, &problem.start, times)?;
+        let choice = match length {
+            StepControl::For(wanted, choose) => choose(self, wanted, terminal)?,
+            StepControl::Given(steps) => self.given(steps)?,
+            StepControl::Exactly(count, h) => StepSelection { h, ..self.given(Steps::Count(count))? },
+        };
+        check_count(choice.count as f64)?;
+        let plan = Plan::new(self, &choice)?;
+        // trial runs have looked already.
+        if plan.error().is_none() {
+            plan.check_first_steps()?;
+        }
+        Ok(plan)
+    }
+
+    /// The plan of a run that ends where it starts: no step is taken.
+    fn plan_of_the_start(&self, length: StepControl<'p, L, N>) -> Result<Plan<'p, L, N>, InputError> {
+        let (integrator, error) = match (length, &self.integrator) {
+            (StepControl::For(wanted, _), _) if !(wanted > 0.0 && wanted.is_finite()) => {
+                return Err(InputError::Tolerance { wanted });
+            }
+            (StepControl::For(..), None) => (Arc::new(GaussCollocation { stages: 8 }) as Shared<'p, L, N>, Some(0.0)),
+            (StepControl::For(..), Some(integrator)) => (integrator.clone(), Some(0.0)),
+            (StepControl::Given(steps), _) => (self.given(steps)?.integrator, None),
+            (StepControl::Exactly(count, _), _) => (self.given(Steps::Count(count))?.integrator, None),
+        };
+        integrator.check(self.problem.lagrangian)?;
+        // Its stepper has a step, though it takes none.
+        let h = f64::EPSILON * max_or_nan(self.problem.t0.abs(), 1.0);
+        Plan::new(self, &StepSelection { integrator, count: 0, h, error, ended: None })
+    }
+
+    /// Given steps of a named integrator.
+    fn given(&self, steps: Steps) -> Result<StepSelection<'p, L, N>, InputError> {
+        let Some(integrator) = self.integrator.clone() else { return Err(InputError::NoIntegrator) };
+        let rate = if integrator.info().in_transformed_time { Some(self.dt_dtau()?) } else { None };
+        let span = self.span;
+        let of = |count: usize, integrator| StepSelection {
+            integrator,
+            count,
+            h: span / count as f64,
+            error: None,
+            ended: None,
+        };
+        match (steps, rate) {
+            (Steps::Count(0), _) => Err(NO_STEP),
+            (Steps::Count(_), Some(_)) => Err(InputError::Hypothesis { hypothesis: SIZED }),
+            (Steps::Count(count), None) => Ok(of(count, integrator)),
+            (Steps::Size(h), _) if !(h > 0.0 && h.is_finite()) => Err(InputError::Step { h }),
+            // A step that fits the span up to rounding is not made shorter.
+            (Steps::Size(h), _) => {
+                let count = (span.abs() / (h * rate.unwrap_or(1.0)) * (1.0 - 4.0 * f64::EPSILON)).ceil().max(1.0);
+                check_count(count)?;
+                let choice = of(count as usize, integrator);
+                Ok(if rate.is_some() { StepSelection { h: h.copysign(span), ..choice } } else { choice })
+            }
+        }
+    }
+
+    /// The rate of the Lagrangian's time transformation at the start.
+    fn dt_dtau(&self) -> Result<f64, InputError> {
+        let rate = self.problem.lagrangian.dt_dtau(&self.problem.start.q);
+        if rate > 0.0 && rate.is_finite() { Ok(rate) } else { Err(InputError::TimeTransformation { rate }) }
+    }
+
+    /// The same for the final (q, p) alone.
+    pub(crate) fn bare(&self) -> Self {
+        Request { needs: OutputRequest::default(), integrator: self.integrator.clone(), ..*self }
+    }
+}
+
+/// Runs have steps.
+pub(crate) const NO_STEP: InputError = InputError::Count { what: "the number of steps", least: 1, found: 0 };
+
+/// What an integrator in transformed time needs.
+const SIZED: &str =
+    "steps of a given size in its transformed time, or for a wanted accuracy, since it counts them itself";
+
+fn check_count(count: f64) -> Result<(), InputError> {
+    if count <= MOST_STEPS {
+        return Ok(());
+    }
+    let remedy = "take longer steps, or a shorter span";
+    Err(InputError::TooMany { what: "the number of steps", found: count, most: MOST_STEPS, remedy })
+}
