@@ -343,7 +343,8 @@ impl<const N: usize> BlockElimination<N> {
             if k == 0 && start.is_none() {
                 // The first position is given, or is the last unknown of a periodic path.
                 if PERIODIC {
-                    panel.open(&opening, &of.last_momentum(x)?);
+                    let at = HerglotzEquation::new(&of.last_momentum(x)?, &opening, &SVector::zeros());
+                    panel.open(at.here, at.next);
                 }
             } else {
                 if PERIODIC && k + 1 == steps {

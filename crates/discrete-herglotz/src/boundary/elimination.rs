@@ -1,8 +1,7 @@
 //! Block elimination of the linearised discrete Herglotz equations along a path.
 
-use super::block_elimination::HerglotzEquation;
+use contact_geom::DiscreteJet;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{DiscreteJet, SecondDiscreteJet};
 
 /// How much larger a pivot of the next point's equations must be than one of this point's to be taken. Growth stays below
 /// this, and away from conjugate points no row is exchanged between points, so that the elimination costs no more than
@@ -97,14 +96,13 @@ impl<const N: usize> Panel<N> {
         }
     }
 
-    /// Takes the first position of a periodic path for the unknown that is eliminated last. `opening` is the jet of the first
-    /// step; its equation, whose p is that of the last step, waits to be closed.
-    pub fn open(&mut self, opening: &SecondDiscreteJet<N>, p: &SVector<f64, N>) {
+    /// Takes the first position of a periodic path for the unknown that is eliminated last. The derivatives of the first point's equation, in
+    /// its own position and in the next, wait for [`close`](Self::close).
+    pub fn open(&mut self, here: SMatrix<f64, N, N>, next: SMatrix<f64, N, N>) {
         self.bottom.first += self.bottom.here;
         self.action.first += self.action.here;
-        let at = HerglotzEquation::new(p, opening, &SVector::zeros());
         // `next` becomes `here` of the second point.
-        self.closing = Some(BlockRows { next: at.next, first: at.here, ..BlockRows::zero() });
+        self.closing = Some(BlockRows { next, first: here, ..BlockRows::zero() });
     }
 
     /// At the last step of a periodic path: the last position is the first, and the equation that waited joins.

@@ -14,9 +14,10 @@ pub(crate) use dense::StepStart;
 pub(crate) use integrator::info;
 pub use integrator::{GaussCollocation, TransformedGauss};
 pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS, UNDERFLOWN};
+pub(crate) use resolution::sequence::FEW_STAGES;
 pub use routes::transformed::TransformedStepper;
-pub(crate) use stepper::FEW_STAGES;
-pub use stepper::{GaussRoute, GaussStepper};
+pub use stepper::GaussStepper;
+pub use work_summary::GaussRoute;
 
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};

@@ -6,6 +6,7 @@ mod state_words;
 
 use crate::gauss::consistent_start::ConsistentStart;
 use crate::gauss::dense::{Solved, StepStart};
+use crate::gauss::resolution::sequence::{FEW_STAGES, Sequence};
 use crate::gauss::resolution::tail;
 use crate::gauss::routes::general::General;
 use crate::gauss::routes::linear::Linear;
@@ -14,10 +15,10 @@ use crate::gauss::stages::equations::{Products, Workspace};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::stages::parametrization::{Extension, Physical};
-use crate::gauss::stepper::resolution::Sequence;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::gauss::tables::condensed::Condensed;
 use crate::gauss::tables::stage_table::StageTable;
+use crate::gauss::work_summary::GaussRoute;
 use crate::gauss::work_summary::work_summary;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
@@ -27,22 +28,8 @@ use crate::{DenseStep, InputError, PlanEntry, StepError, StepFailure, Stepper, S
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure};
 use pulp::{Simd, WithSimd};
-pub(crate) use resolution::FEW_STAGES;
 use retries::{PAUSE, Tried};
 use std::sync::Arc;
-
-/// How the steps of contact Gauss collocation are computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GaussRoute {
-    /// The motion is linear: one matrix, made once.
-    Linear,
-    /// Constant mass and constant rate of the conformal factor: the accelerations of the stages alone are iterated.
-    Condensed,
-    /// Velocities, actions and factors of the stages are iterated; the matrix W is constant.
-    ConstantMass,
-    /// The same with W taken at the stages of each step.
-    General,
-}
 
 /// The largest dimension whose linear motion is advanced by one matrix.
 const MOST_LINEAR: usize = 32;

@@ -1,9 +1,21 @@
 //! What steps of contact Gauss collocation compute and skip, in words.
 
-use super::GaussRoute;
 use crate::PlanEntry;
 use crate::integration::plan_entry::DECOUPLED;
 use contact_geom::Structure;
+
+/// How the steps of contact Gauss collocation are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GaussRoute {
+    /// The motion is linear: one matrix, made once.
+    Linear,
+    /// Constant mass and constant rate of the conformal factor: the accelerations of the stages alone are iterated.
+    Condensed,
+    /// Velocities, actions and factors of the stages are iterated; the matrix W is constant.
+    ConstantMass,
+    /// The same with W taken at the stages of each step.
+    General,
+}
 
 fn mass_matrix(constant: bool) -> PlanEntry {
     if constant {

@@ -7,6 +7,7 @@ mod integrator;
 mod left_midpoint;
 mod method;
 mod midpoint;
+mod node;
 mod quadrature;
 mod rectangle;
 pub(crate) mod step_equations;
@@ -18,6 +19,7 @@ pub use integrator::{CompositionMethod, CustomMethod, DiscretizationMethod, Quad
 pub use left_midpoint::{LeftMidpoint, LeftMidpointRule};
 pub use method::{AnyDiscreteLagrangian, Method, RuleVisitor, UnknownMethod};
 pub use midpoint::{Midpoint, MidpointRule};
-pub use quadrature::{ExtendedJet, Node, Quadrature, Rule};
+pub use node::Node;
+pub use quadrature::{ExtendedJet, Quadrature, Rule};
 pub use rectangle::{Rectangle, RectangleRule};
 pub use trapezoidal::{Trapezoidal, TrapezoidalRule};

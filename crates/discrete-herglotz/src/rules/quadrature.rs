@@ -1,6 +1,7 @@
 //! Discrete Lagrangians by quadrature of the action: what the rules of [`crate::rules`] share.
 
 use crate::resolution::monitor::{defect, factor_defect, value_rounding};
+use crate::rules::node::Node;
 use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
 use crate::solve::newton::{Linearised, NewtonStart, max_abs_or_nan, newton};
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
@@ -13,18 +14,6 @@ use std::marker::PhantomData;
 
 /// The roundings of L's terms that a residual may hold: of a few nodes, and a few units each.
 const ROUNDINGS: f64 = 64.0;
-
-/// A node of a quadrature rule on `Q x Q x R^2`: L is taken at the time `t + a h`, the position `(1 - a) q0 + a q1`, the
-/// velocity `(q1 - q0)/h` and the action `(1 - b) z0 + b z1`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Node {
-    /// The weight of the node; the weights sum to 1.
-    pub weight: f64,
-    /// The fraction `a` of the step at which position and time are taken.
-    pub place: f64,
-    /// The fraction `b` at which the action is taken; 0 at all nodes makes the rule explicit in z.
-    pub action: f64,
-}
 
 /// A quadrature rule for the action of one step.
 pub trait Rule: 'static {

@@ -7,10 +7,11 @@
 
 mod corner;
 mod divided;
+mod jumps;
 mod stepper;
 mod surfaces;
 
 pub use divided::DividedGauss;
+pub use jumps::jumps_between;
 pub(crate) use stepper::{Reach, SwitchingStepper, of_integrator};
 pub(crate) use surfaces::has_switching_functions;
-pub use surfaces::jumps_between;

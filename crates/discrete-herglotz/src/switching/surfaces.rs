@@ -1,12 +1,11 @@
 //! The switching functions of a Lagrangian along a step.
 
-use super::corner::{Corner, corner};
 use crate::gauss::StepStart;
 use crate::solve::hermite::hermite;
 use crate::solve::roots::bracketed_root;
 use crate::{DenseStep, InputError};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan};
+use contact_geom::{Lagrangian, PhasePoint, VelocityPoint};
 use std::convert::Infallible;
 
 /// The parts in which a step without a curve of its own is searched for changes of sign.
@@ -33,43 +32,6 @@ pub(crate) fn has_switching_functions<L: Lagrangian<N>, const N: usize>(
     }
 }
 
-/// Whether the Lagrangian itself jumps on the way between two points of a motion, across one of its [switching
-/// functions](Lagrangian::switching_functions): there the motion has a corner, and no vector field has a flow. The way is taken to be the cubic curve
-/// through both points with their velocities.
-pub fn jumps_between<const N: usize>(
-    lagrangian: &impl Lagrangian<N>,
-    [from, to]: [(f64, VelocityPoint<N>); 2],
-) -> bool {
-    let of = |(t, x): (f64, VelocityPoint<N>)| {
-        let state = PhasePoint { q: x.q, p: lagrangian.gradient(t, &x).y, z: x.z };
-        TimedState { t, state, v: x.v, rests: StepStart::ZERO }
-    };
-    let curve = StepCurve { from: of(from), to: of(to), dense: None };
-    let mut surfaces = Surfaces::at(lagrangian, from.0, &from.1);
-    let reach = curve.span() * max_abs_or_nan(from.1.v.iter().copied());
-    let parts = curve.parts();
-    for part in 1..=parts {
-        let ends = [part - 1, part].map(|part| part as f64 / parts as f64);
-        let (t, x) = curve.at(ends[1]);
-        for index in 0..surfaces.sides.len() {
-            let after = sign(surfaces.value(lagrangian, index, (t, &x)));
-            if surfaces.side(index) * after < 0.0 {
-                let about = surfaces.change(lagrangian, &curve, index, ends).about;
-                if !matches!(
-                    corner(lagrangian, &mut surfaces, index, &of(curve.at(about)), reach),
-                    Ok(Corner::Continuous)
-                ) {
-                    return true;
-                }
-            }
-            if let Some(side) = surfaces.sides.get_mut(index).filter(|_| after != 0.0) {
-                *side = after;
-            }
-        }
-    }
-    false
-}
-
 /// A time and a state of the motion, with its velocity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TimedState<const N: usize> {
@@ -94,7 +56,7 @@ pub(super) struct StepCurve<const N: usize> {
 }
 
 impl<const N: usize> StepCurve<N> {
-    fn parts(&self) -> usize {
+    pub(super) fn parts(&self) -> usize {
         self.dense.as_ref().map_or(PARTS, DenseStep::parts)
     }
 
@@ -102,7 +64,7 @@ impl<const N: usize> StepCurve<N> {
         self.to.t - self.from.t
     }
 
-    fn at(&self, fraction: f64) -> (f64, VelocityPoint<N>) {
+    pub(super) fn at(&self, fraction: f64) -> (f64, VelocityPoint<N>) {
         let t = self.from.t + fraction * self.span();
         if fraction == 1.0 {
             return (self.to.t, self.to.point());
@@ -219,7 +181,7 @@ impl Surfaces {
     }
 
     /// The zero of a function between two fractions of a step, at the second of which it is on the other side.
-    fn change<const N: usize>(
+    pub(super) fn change<const N: usize>(
         &mut self,
         lagrangian: &impl Lagrangian<N>,
         curve: &StepCurve<N>,
@@ -249,7 +211,7 @@ impl Surfaces {
 }
 
 /// 1, -1, or 0 for what is neither.
-fn sign(x: f64) -> f64 {
+pub(super) fn sign(x: f64) -> f64 {
     if x > 0.0 {
         1.0
     } else if x < 0.0 {

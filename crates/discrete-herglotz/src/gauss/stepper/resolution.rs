@@ -1,11 +1,11 @@
 //! What the steps of a run say of themselves: whether they resolve the motion.
 
-use crate::gauss::dense::StepStart;
 use crate::gauss::resolution::defect_sample::{Compare, Curve, DefectSample, SAMPLE_SETS};
+use crate::gauss::resolution::sequence::FEW_STAGES;
+use crate::gauss::resolution::sequence::Sequence;
 use crate::gauss::resolution::tail::ROUNDINGS;
 use crate::gauss::stages::parametrization::Physical;
 use crate::gauss::stepper::{GaussStepper, Route};
-use crate::numbers::state_words::saved;
 use crate::resolution::monitor::{defect, sharper, size, value_rounding};
 use crate::{Stepper, SuspectInterval, UnresolvedStep, legendre_inverse};
 use contact_geom::nalgebra::SVector;
@@ -15,25 +15,6 @@ use pulp::{Simd, WithSimd};
 /// The misfit between the nodes from which a step of at least three stages does not resolve the motion: of harmonics it then has an
 /// error of its own of 0.01 to 0.1.
 const UNRESOLVED: f64 = 0.1;
-
-/// The mean velocities of the last steps, in sequence, the last position, and the states after the last two steps.
-pub(crate) struct Sequence<const N: usize> {
-    pub velocities: [SVector<f64, N>; 4],
-    pub q: SVector<f64, N>,
-    pub ends: [StepStart<N>; 2],
-}
-
-impl<const N: usize> Sequence<N> {
-    /// Before the first step.
-    pub fn new(start: StepStart<N>) -> Box<Self> {
-        Box::new(Sequence { velocities: [SVector::zeros(); 4], q: SVector::from(start.q), ends: [start; 2] })
-    }
-}
-
-saved!([const N: usize] Sequence<N> { velocities, q, ends });
-
-/// The stages up to which the nodes of a step do not tell whether it resolves the motion.
-pub(crate) const FEW_STAGES: usize = 2;
 
 impl<L: Lagrangian<N>, const N: usize> GaussStepper<'_, L, N> {
     /// A look at the last step between its nodes, at some sets of points: the worst of all. `None` where there is no step.

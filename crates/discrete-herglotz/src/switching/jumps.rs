@@ -1,0 +1,43 @@
+//! Jumps of a Lagrangian between two points of a motion.
+
+use super::corner::{Corner, corner};
+use super::surfaces::{StepCurve, Surfaces, TimedState, sign};
+use crate::gauss::StepStart;
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan};
+
+/// Whether the Lagrangian itself jumps on the way between two points of a motion, across one of its [switching
+/// functions](Lagrangian::switching_functions): there the motion has a corner, and no vector field has a flow. The way is taken to be the cubic curve
+/// through both points with their velocities.
+pub fn jumps_between<const N: usize>(
+    lagrangian: &impl Lagrangian<N>,
+    [from, to]: [(f64, VelocityPoint<N>); 2],
+) -> bool {
+    let of = |(t, x): (f64, VelocityPoint<N>)| {
+        let state = PhasePoint { q: x.q, p: lagrangian.gradient(t, &x).y, z: x.z };
+        TimedState { t, state, v: x.v, rests: StepStart::ZERO }
+    };
+    let curve = StepCurve { from: of(from), to: of(to), dense: None };
+    let mut surfaces = Surfaces::at(lagrangian, from.0, &from.1);
+    let reach = curve.span() * max_abs_or_nan(from.1.v.iter().copied());
+    let parts = curve.parts();
+    for part in 1..=parts {
+        let ends = [part - 1, part].map(|part| part as f64 / parts as f64);
+        let (t, x) = curve.at(ends[1]);
+        for index in 0..surfaces.sides.len() {
+            let after = sign(surfaces.value(lagrangian, index, (t, &x)));
+            if surfaces.side(index) * after < 0.0 {
+                let about = surfaces.change(lagrangian, &curve, index, ends).about;
+                if !matches!(
+                    corner(lagrangian, &mut surfaces, index, &of(curve.at(about)), reach),
+                    Ok(Corner::Continuous)
+                ) {
+                    return true;
+                }
+            }
+            if let Some(side) = surfaces.sides.get_mut(index).filter(|_| after != 0.0) {
+                *side = after;
+            }
+        }
+    }
+    false
+}
