@@ -15,10 +15,10 @@ fn apart(system: &AssembledSystem, h: f64, start: State, steps: usize) -> (f64, 
     factors.advance(steps).unwrap();
     products.advance(steps).unwrap();
     let (a, b) = (factors.state(), products.state());
-    let max_abs_or_nan = |x: &[f64]| x.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let largest = |x: &[f64]| x.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let off = |a: &[f64], b: &[f64]| {
         let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
-        max_abs_or_nan(&differences) / max_abs_or_nan(b)
+        largest(&differences) / largest(b)
     };
     assert!(a.q != start.q && products.factorisations() == 0);
     let (a_z, b_z) = (a.z.unwrap(), b.z.unwrap());

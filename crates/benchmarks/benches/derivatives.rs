@@ -1,5 +1,5 @@
-//! The mixed second derivatives `L_qv` of the double pendulum: by this workspace's nested duals, by num-dual's hyper-dual
-//! vectors and by hand. Why the workspace has duals of its own.
+//! Time of the mixed second derivatives `L_qv` of the double pendulum: by the nested dual numbers of this workspace, by
+//! the hyper-dual vectors of num-dual, and by hand. The comparison is the reason for the workspace's own dual numbers.
 
 use contact_geom::nalgebra::{Matrix2, SVector, Vector2};
 use contact_geom::systems::DoublePendulum;
@@ -21,7 +21,7 @@ fn by_nested_duals(l: &DoublePendulum, q: Vector2<f64>, v: Vector2<f64>) -> Matr
     Matrix2::from_fn(|i, j| value.d[i].d[j])
 }
 
-/// The same formula over num-dual's numbers.
+/// The same formula with the numbers of num-dual.
 fn by_num_dual(l: &DoublePendulum, q: Vector2<f64>, v: Vector2<f64>) -> Matrix2<f64> {
     let ([m1, m2], [l1, l2]) = (l.masses, l.lengths);
     partial_hessian(

@@ -1,5 +1,5 @@
-//! Steps of contact Gauss collocation: Lagrangians of the catalogue with their gradients written out, the same by automatic
-//! differentiation, one defined as a user would, and a loop written by hand.
+//! Time of steps of contact Gauss collocation: for Lagrangians of the catalogue with gradients in closed form, for the
+//! same with automatic differentiation, for a Lagrangian as a user would define it, and for a hand-written loop.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, Kepler, Pendulum, QuadraticInZ, System};
@@ -8,10 +8,10 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use discrete_herglotz::{Gauss, Stepper};
 use std::hint::black_box;
 
-/// The steps of a sample: short, so that the motion does not leave the start's neighbourhood.
+/// The number of steps in a sample: few, so that the motion stays near its start.
 const STEPS: usize = 100;
 
-/// A user's pendulum, as in the documentation: nothing but the value.
+/// The pendulum as a user would define it in the documentation: only by its value.
 struct Users {
     gamma: f64,
 }
@@ -23,7 +23,7 @@ impl Lagrangian<1> for Users {
     }
 }
 
-/// A hundred steps from a start.
+/// Measures a hundred steps from a start.
 fn measure<L: Lagrangian<N>, const N: usize>(
     c: &mut Criterion,
     (group, name): (&str, &str),
@@ -44,8 +44,8 @@ fn measure<L: Lagrangian<N>, const N: usize>(
     group.finish();
 }
 
-/// The pendulum by Gauss' method with four stages, written as one would: fixed-point iteration of the accelerations from the last
-/// step's, to round-off, with z; 16-digit coefficients.
+/// The pendulum by the Gauss method with four stages, as one would write it: fixed-point iteration to round-off for the
+/// accelerations, started from those of the last step, with z; coefficients with 16 digits.
 fn by_hand(gamma: f64, start: [f64; 3], h: f64) -> [f64; 3] {
     const A: [[f64; 4]; 4] = [
         [0.08696371128436346, -0.026604180084998793, 0.012627462689404725, -0.0035551496857956832],

@@ -1,7 +1,7 @@
-//! What each skip saves: the same motion with something computed and with it left out, in one run, and how far the results are
-//! apart.
+//! The run time that each omitted computation saves: the same motion with and without the computation, measured in one
+//! run, and the difference of the results.
 //!
-//! Prints a table, and `skips.csv` into the directory that the environment variable `OUT` names, if it names one.
+//! Prints a table, and writes `skips.csv` into the directory that the environment variable `OUT` names, if it is set.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
@@ -13,7 +13,7 @@ use std::hint::black_box;
 use std::io::Write;
 use std::time::Instant;
 
-/// A Lagrangian that claims less than it is, so that a method does the work which the claim would save.
+/// A Lagrangian that claims less structure than it has, so that a method does the work that the claim would save.
 struct Claiming<L>(L, Structure);
 
 impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for Claiming<L> {
@@ -35,7 +35,7 @@ struct Line {
     apart: f64,
 }
 
-/// Runs of which a median is taken.
+/// The number of runs from which a median is taken.
 const RUNS: usize = 41;
 
 /// The median time of a motion, in microseconds, with its outcome.
@@ -47,7 +47,7 @@ fn median<const N: usize>(mut times: Vec<f64>, outcome: Outcome<N>) -> Timed<N> 
     Ok((times[RUNS / 2], outcome))
 }
 
-/// The steps of a run alone.
+/// The time of the steps of a run, without its set-up.
 fn steps<L: Lagrangian<N>, const N: usize>(run: &Run<'_, '_, L, N>, until: Until) -> Timed<N> {
     let plan = run.plan(until)?;
     let mut times = Vec::with_capacity(RUNS);
@@ -61,7 +61,7 @@ fn steps<L: Lagrangian<N>, const N: usize>(run: &Run<'_, '_, L, N>, until: Until
     median(times, plan.run()?)
 }
 
-/// A whole run, with what it does between its steps.
+/// The time of a whole run, with its work between the steps.
 fn whole<const N: usize>(run: impl Fn() -> Result<Outcome<N>, InputError>) -> Timed<N> {
     let mut times = Vec::with_capacity(RUNS);
     for _ in 0..RUNS {
@@ -72,7 +72,7 @@ fn whole<const N: usize>(run: impl Fn() -> Result<Outcome<N>, InputError>) -> Ti
     median(times, run()?)
 }
 
-/// A line from a motion that is computed with all and one that skips.
+/// A line of the table, from a motion with the full computation and one that skips a part of it.
 fn line<const N: usize>(
     (what, on): (&'static str, &'static str),
     full: Timed<N>,
@@ -101,13 +101,13 @@ fn lines() -> Result<Vec<Line>, InputError> {
         let swing = Problem::new(lagrangian, 0.0, start)?;
         steps(&swing.by(eight).steps(Steps::Size(1.0)).without_action(), late)
     };
-    // A plan is run without observers; so the plans of both are timed too.
+    // A plan has no observers, so that planning is part of the time with rows and without.
     let recorded = || {
         let mut rows = Rows::every(1)?.without_action();
         swing.by(nystrom).steps(Steps::Size(0.2)).without_action().observe(&mut rows).run(late)
     };
     let unrecorded = || swing.by(nystrom).steps(Steps::Size(0.2)).without_action().run(late);
-    // A row in each step, between its ends, and some three hundred crossings.
+    // One row within each step, and about three hundred crossings.
     let by_eight = || swing.by(eight).steps(Steps::Size(1.0)).without_action();
     let times: Vec<f64> = (0..1000).map(|k| f64::from(k) + 0.37).collect();
     let between = || {
@@ -171,7 +171,7 @@ fn lines() -> Result<Vec<Line>, InputError> {
 }
 
 fn main() {
-    // `cargo test --benches` passes `--test`: nothing is measured then.
+    // `cargo test --benches` passes `--test`; nothing is measured in that case.
     if std::env::args().any(|argument| argument == "--test") {
         return;
     }

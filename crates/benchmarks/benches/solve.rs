@@ -1,11 +1,12 @@
-//! Where the crossover lies between elimination on the stack and faer's LU, for the solve inside a Newton step.
+//! Time of the linear solve in a Newton step, by elimination on the stack and by faer's LU, to find the size from which
+//! faer is faster.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use discrete_herglotz::Solver;
 use discrete_herglotz::contact_geom::nalgebra::{SMatrix, SVector};
 use std::hint::black_box;
 
-/// Both routes for one size, on a matrix that needs no particular pivots.
+/// Measures both solvers for one size, with a matrix for which the choice of pivots is not critical.
 fn size<const N: usize>(c: &mut Criterion) {
     let a = SMatrix::<f64, N, N>::from_fn(|i, j| f64::from(u8::from(i == j)) * 2.0 + ((i * 7 + j * 3) as f64).sin());
     let b = SVector::<f64, N>::from_fn(|i, _| (i as f64).cos());

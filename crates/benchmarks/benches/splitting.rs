@@ -1,7 +1,9 @@
-//! Splittings by the library against loops written by hand for each problem: the same composition and arithmetic, the number
-//! of stages known to the compiler, kicks fused across steps, nothing checked. Ten thousand steps a sample.
+//! Time of splitting schemes of the library, compared with loops written by hand for each problem: the same composition
+//! and arithmetic, with the number of stages known to the compiler, kicks fused across steps, and no checks. A sample
+//! has ten thousand steps.
 //!
-//! The library takes the force from a Lagrangian's closed gradient, or derives it; both are measured, and compensated sums.
+//! The library takes the force from the closed gradient of a Lagrangian, or derives it by automatic differentiation.
+//! Both are measured, and compensated sums too.
 
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum};
@@ -12,7 +14,7 @@ use std::hint::black_box;
 
 const STEPS: usize = 10_000;
 
-/// A potential with its force, written out.
+/// A potential and its force in closed form.
 trait Problem<const D: usize> {
     fn force(q: [f64; D]) -> [f64; D];
     fn potential(q: [f64; D]) -> f64;
@@ -129,7 +131,7 @@ fn by_library<L: Lagrangian<D>, const D: usize, const ACTION: bool, const COMPEN
     Some(motion.state())
 }
 
-/// Both loops side by side, after a look that they compute the same.
+/// Measures both loops, after a check that they compute the same.
 fn pair<L: Lagrangian<D> + Problem<D>, const D: usize, const S: usize, const ACTION: bool>(
     c: &mut Criterion,
     name: &str,
@@ -166,7 +168,7 @@ fn pair<L: Lagrangian<D> + Problem<D>, const D: usize, const S: usize, const ACT
     group.finish();
 }
 
-/// One problem, with three schemes, with and without the action.
+/// Measures one problem with three schemes, with and without the action.
 fn problem<L: Lagrangian<D> + Problem<D>, const D: usize>(
     c: &mut Criterion,
     name: &str,

@@ -1,5 +1,5 @@
-//! One step by automatic differentiation against a hand-written Newton loop of the same arithmetic and stopping rule: the
-//! paper's midpoint rule, a thousand steps a sample.
+//! Time of steps of the paper's midpoint rule by automatic differentiation, compared with a hand-written Newton loop
+//! with the same arithmetic and stopping criterion. A sample has a thousand steps.
 
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::{Matrix2, Vector2};
@@ -11,20 +11,20 @@ use std::hint::black_box;
 const H: f64 = 0.1;
 const STEPS: usize = 1000;
 
-/// A run of the library, final state only.
+/// A run of the library that keeps only the final state.
 fn by_library<const N: usize>(ld: &impl DiscreteLagrangian<N>, start: PhasePoint<N>) -> Option<PhasePoint<N>> {
     let mut flow = Flow::new(ld, 0.0, start).ok()?;
     flow.advance(STEPS).ok()?;
     Some(*flow.state())
 }
 
-/// The library's stopping rule for a rule explicit in z.
+/// The stopping criterion of the library for a rule explicit in z.
 fn done(change: f64, before: f64, u: f64, residual: f64, terms: f64) -> bool {
     let next = change * (change / before) * (change / before);
     (before.is_finite() && next <= f64::EPSILON * u) || residual <= 8.0 * f64::EPSILON * terms
 }
 
-/// The pendulum, written out.
+/// The hand-written loop for the pendulum.
 fn pendulum_by_hand(gamma: f64, start: PhasePoint<1>) -> PhasePoint<1> {
     let (mut q, mut p, mut z) = (start.q[0], start.p[0], start.z);
     let (mut latest, mut before) = (p, p);
@@ -50,7 +50,7 @@ fn pendulum_by_hand(gamma: f64, start: PhasePoint<1>) -> PhasePoint<1> {
     PhasePoint::new([q], [p], z)
 }
 
-/// The double pendulum, written out.
+/// The hand-written loop for the double pendulum.
 fn double_pendulum_by_hand(l: &DoublePendulum, start: PhasePoint<2>) -> PhasePoint<2> {
     let ([m1, m2], [l1, l2]) = (l.masses, l.lengths);
     let (a, b, c) = ((m1 + m2) * l1 * l1, m2 * l2 * l2, m2 * l1 * l2);
@@ -104,7 +104,7 @@ fn double_pendulum_by_hand(l: &DoublePendulum, start: PhasePoint<2>) -> PhasePoi
     PhasePoint { q, p, z }
 }
 
-/// Both loops side by side, after a look that they compute the same.
+/// Measures both loops, after a check that they compute the same.
 fn pair<const N: usize>(
     c: &mut Criterion,
     name: &str,

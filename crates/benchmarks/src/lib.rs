@@ -1,1 +1,1 @@
-//! The benchmarks are in `benches/`: `cargo bench -p contact-benchmarks --bench skips`.
+//! The benchmarks are in `benches/`; one of them is run by `cargo bench -p contact-benchmarks --bench skips`.

@@ -1,9 +1,10 @@
-//! Which shard goes to whom.
+//! Distribution of shards to workers.
 
-/// The shards that a worker has at a time: one under way and one to go on with while a result is on its way.
+/// The number of shards that a worker has at a time: one that it computes, and one to continue with while a result is
+/// sent.
 const AHEAD: usize = 2;
 
-/// The shards of an ensemble that are open, and with whom: the bookkeeping of the rank that hands them out.
+/// The open shards of an ensemble and their workers: the bookkeeping of the rank that hands them out.
 ///
 /// ```
 /// let mut dispatch = ensemble_mpi::Dispatch::new(3, 2);
@@ -17,20 +18,21 @@ const AHEAD: usize = 2;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Dispatch {
-    /// The first shard that was never handed out nor skipped.
+    /// The first shard that has neither been handed out nor skipped.
     next: usize,
     count: usize,
-    /// The shards that each worker has, in the order in which it computes them.
+    /// The open shards of each worker, in the order in which it computes them.
     open: Vec<Vec<usize>>,
 }
 
 impl Dispatch {
-    /// Of so many shards to so many workers.
+    /// The distribution of `count` shards to `workers` workers.
     pub fn new(count: usize, workers: usize) -> Self {
         Dispatch { next: 0, count, open: vec![Vec::with_capacity(AHEAD); workers] }
     }
 
-    /// A shard for a worker, below a bound; `None` where it has enough, or there is none. Those that are done are skipped.
+    /// The next shard for a worker, below a bound; `None` where the worker has enough shards, or there is no shard.
+    /// Shards that are done are skipped.
     pub fn next(&mut self, worker: usize, bound: usize, done: impl Fn(usize) -> bool) -> Option<usize> {
         let open = self.open.get_mut(worker).filter(|open| open.len() < AHEAD)?;
         while self.next < self.count && done(self.next) {
@@ -45,19 +47,19 @@ impl Dispatch {
         Some(shard)
     }
 
-    /// Whether a worker could have another shard, of those that are left.
+    /// Whether a worker can be given another shard, and there are any left.
     pub fn wants(&self, worker: usize) -> bool {
         self.next < self.count && self.open(worker).len() < AHEAD
     }
 
-    /// A worker has sent a shard; whether it had it.
+    /// Records that a worker has sent a shard; returns whether the shard was open with this worker.
     pub fn received(&mut self, worker: usize, shard: usize) -> bool {
         let Some(open) = self.open.get_mut(worker) else { return false };
         let place = open.iter().position(|of| *of == shard);
         place.map(|place| open.remove(place)).is_some()
     }
 
-    /// The shards that a worker has.
+    /// The open shards of a worker.
     pub fn open(&self, worker: usize) -> &[usize] {
         self.open.get(worker).map_or(&[], Vec::as_slice)
     }
@@ -72,7 +74,7 @@ impl Dispatch {
 mod tests {
     use super::*;
 
-    /// All shards are handed out once but those that are done, whatever the speeds, and none at or beyond the bound.
+    /// Every shard that is not done is handed out once, for any speeds of the workers, and none at or beyond the bound.
     #[test]
     fn every_missing_shard_once() {
         for workers in 1..5 {

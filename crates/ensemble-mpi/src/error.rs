@@ -1,23 +1,23 @@
-//! Why an ensemble over ranks cannot begin, or go on.
+//! Errors of an ensemble on several ranks.
 
 use discrete_herglotz::EnsembleError;
 use thiserror::Error;
 
-/// Why an ensemble over ranks cannot begin, or go on.
+/// The reason why an ensemble on several ranks cannot start or continue.
 #[derive(Debug, Error)]
 pub enum MpiError {
-    /// This rank cannot make or merge the ensemble.
+    /// This rank cannot construct or merge the ensemble.
     #[error(transparent)]
     Ensemble(#[from] EnsembleError),
-    /// Another rank cannot.
+    /// Another rank cannot construct or merge the ensemble.
     #[error("rank {rank}: {message}")]
     Refused {
-        /// Which one.
+        /// The rank.
         rank: usize,
-        /// What it says.
+        /// Its error message.
         message: String,
     },
-    /// Two ranks have made different ensembles.
+    /// Two ranks have constructed different ensembles.
     #[error(
         "rank {rank} has another ensemble than rank 0; start all ranks with the same program, members, integrator, steps, end and requests"
     )]
@@ -25,18 +25,18 @@ pub enum MpiError {
         /// The first rank whose ensemble is not that of rank 0.
         rank: usize,
     },
-    /// Nothing was heard of a rank for longer than [`Options::patience`](crate::Options::patience). The ranks cannot come together any more: end the job with
-    /// [`abort`](mpi::topology::Communicator::abort).
+    /// No result of a rank has arrived for longer than [`Options::patience`](crate::Options::patience). Collective
+    /// calls are no longer possible: end the job with [`abort`](mpi::topology::Communicator::abort).
     #[error(
         "nothing was heard of rank {rank} for {seconds} s, and {open} of its shards are open; run again from the checkpoint, or with more patience than \
          a shard takes"
     )]
     RankLost {
-        /// Which one.
+        /// The rank.
         rank: usize,
-        /// The shards that it was to compute; they are lost.
+        /// The number of its open shards, which are lost.
         open: usize,
-        /// How long it was waited for.
+        /// How long rank 0 has waited for it.
         seconds: f64,
     },
 }

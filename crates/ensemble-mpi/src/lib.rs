@@ -1,9 +1,11 @@
-//! Ensembles over the ranks of an MPI job.
+//! Ensembles on the ranks of an MPI job.
 //!
-//! All ranks make the same [`Ensemble`](https://docs.rs/discrete-herglotz) and call `run`, behind the feature `mpi`. Rank 0 hands out numbers of shards, a few hundred members
-//! each, as the others ask for them by sending results, so that a rank with slow members gets fewer shards. It merges what comes in the order of the
-//! members: the fold on rank 0 sees the same bits as that of a single process. With a checkpoint, each shard is written as it comes, in
-//! any order; a job that is killed at any point loses the shards under way, and the next one goes on with those that are missing.
+//! All ranks construct the same [`Ensemble`](https://docs.rs/discrete-herglotz) and call `run`, which needs the feature
+//! `mpi`. Rank 0 hands out shards of a few hundred members each; a rank gets another shard when it has sent a result,
+//! so that a rank with slow members gets fewer. Rank 0 merges the results in the order of the members, so that its fold
+//! is bitwise that of a single process. With a checkpoint, each shard is written when it arrives, in any order. A job
+//! that is killed at any point loses only the shards that are being computed, and the next job computes those that are
+//! missing.
 //!
 #![cfg_attr(
     feature = "mpi",
@@ -33,7 +35,7 @@ if let Some(merged) = merged {
 "#
 )]
 //!
-//! Costs, limits and a plan to 1e4 cores: `docs/scaling.md`.
+//! Costs, limits and a plan for 1e4 cores: `docs/scaling.md`.
 
 mod dispatch;
 #[cfg(feature = "mpi")]

@@ -1,4 +1,4 @@
-//! The same ensemble over all ranks of a communicator.
+//! Runs one ensemble on all ranks of a communicator.
 
 use crate::{Dispatch, MpiError};
 use contact_geom::Lagrangian;
@@ -9,61 +9,63 @@ use mpi::{Rank, Tag};
 use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
 use std::time::{Duration, Instant};
 
-/// From rank 0: the number of a shard, or nothing where there are no more.
+/// Tag of messages from rank 0: the number of a shard, or an empty message where there are no more.
 const HANDED_OUT: Tag = 1;
 
-/// To rank 0: the words of a shard.
+/// Tag of messages to rank 0: the words of a shard.
 const COMPUTED: Tag = 2;
 
-/// The ranks up to which rank 0 computes too, on a thread beside the one that hands out. Its core is worth one part in so many, and from some
-/// hundred ranks on it is busy with messages (docs/scaling.md).
+/// The number of ranks up to which rank 0 also computes, on a thread in addition to the one that hands out shards. With
+/// more ranks its core adds little, and from a few hundred ranks on it is busy with messages (docs/scaling.md).
 const RANKS_WITH_WORKING_ROOT: usize = 64;
 
-/// How long a rank sleeps where it has nothing to do: short beside a shard, long beside the look whether something has come.
+/// The sleep of an idle rank: short compared with a shard, long compared with a probe for messages.
 const NAP: Duration = Duration::from_micros(50);
 
-/// How to run over ranks.
+/// Options of a run on several ranks.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
-    /// How long to wait for a sign of a rank that has work, or of rank 0: longer than a shard takes. For ever where nothing is said, as launchers
-    /// end a job themselves when one of its processes ends.
+    /// How long rank 0 waits for a result of a rank that has open shards, which must be longer than a shard takes.
+    /// There is no limit where it is `None`, since launchers end a job themselves when one of its processes ends.
     pub patience: Option<Duration>,
 }
 
-/// What became of an ensemble over ranks; on rank 0.
+/// The result of an ensemble on several ranks, on rank 0.
 #[derive(Clone, Debug)]
 pub struct Merged {
-    /// How the members have ended.
+    /// How the members ended.
     pub tally: Tally,
     /// The shards that were in the checkpoint.
     pub resumed: usize,
-    /// What rank 0 has handed out and received.
+    /// The traffic of rank 0.
     pub traffic: Traffic,
 }
 
-/// What rank 0 has handed out and received, and what that took of its time.
+/// The shards and bytes that rank 0 has received, and the time that it spent on them.
 #[derive(Clone, Debug, Default)]
 pub struct Traffic {
-    /// The shards that each rank has computed.
+    /// The number of shards that each rank has computed.
     pub shards: Vec<usize>,
-    /// The bytes of the shards that came from other ranks.
+    /// The bytes of the shards that were received from other ranks.
     pub bytes: usize,
-    /// The time of their receipt, and of handing out the next ones.
+    /// The time for receiving shards and for handing out the next ones.
     pub messages: Duration,
-    /// The time of merging all shards: the checkpoint and the fold.
+    /// The time for merging all shards: the checkpoint and the fold.
     pub merging: Duration,
 }
 
-/// Runs an ensemble over all ranks of a communicator, which have all made the same one and call this together. The fold is given the members
-/// on rank 0, in the order of their index, and has the same bits as with [`Ensemble::run`]; the result is `None` on all other ranks. Each
-/// rank computes on one thread; a single one as [`Ensemble::run`]. The checkpoint is that of rank 0.
+/// Runs an ensemble on all ranks of a communicator, which construct the same ensemble and call this function
+/// collectively. On rank 0 the fold is given the members in the order of their index, and its result is bitwise that of
+/// [`Ensemble::run`]; on all other ranks the result is `None`. Each rank computes on one thread; a single rank runs the
+/// ensemble as [`Ensemble::run`] does. The checkpoint is that of rank 0.
 ///
 /// # Errors
-/// [`MpiError`], on all ranks: one of them has no ensemble that could run, or another than rank 0, or rank 0 cannot read or write the checkpoint. What
-/// was computed before is in the checkpoint. A rank that is silent for too long is an error of those that wait for it.
+/// [`MpiError`], on all ranks, where the ensemble of a rank cannot run or differs from that of rank 0, or where rank 0
+/// cannot read or write the checkpoint. What was computed before is in the checkpoint. A rank that is silent for too
+/// long is an error on rank 0.
 ///
 /// # Panics
-/// A panic of a rank, in the fold or in a Lagrangian, ends all ranks.
+/// A panic on a rank, in the fold or in a Lagrangian, ends all ranks.
 pub fn run<'a, L: Lagrangian<N> + Sync, const N: usize>(
     world: &SimpleCommunicator,
     ensemble: &Ensemble<'a, L, N>,
@@ -94,7 +96,7 @@ pub fn run<'a, L: Lagrangian<N> + Sync, const N: usize>(
     agree(world, own, |_| 0)
 }
 
-/// Comes together with all ranks: what each has, where all have it with the same value.
+/// Collective agreement of all ranks: returns the own value where all ranks have one and their `value`s are equal.
 fn agree<T>(
     world: &SimpleCommunicator,
     own: Result<T, EnsembleError>,
@@ -121,11 +123,11 @@ fn agree<T>(
     Ok(own?)
 }
 
-/// Computes what rank 0 hands out, until there is no more.
+/// Computes the shards that rank 0 hands out, until there are no more.
 fn work<L: Lagrangian<N> + Sync, const N: usize>(world: &SimpleCommunicator, sharded: &ShardedEnsemble<'_, '_, L, N>) {
     let root = world.process_at_rank(0);
     loop {
-        // Not a blocking receive: that of Open MPI keeps a core busy.
+        // A blocking receive of Open MPI would keep a core busy.
         while root.immediate_probe_with_tag(HANDED_OUT).is_none() {
             std::thread::sleep(NAP);
         }
@@ -135,21 +137,21 @@ fn work<L: Lagrangian<N> + Sync, const N: usize>(world: &SimpleCommunicator, sha
     }
 }
 
-/// The thread of rank 0 that computes: where it gets numbers of shards, and where their words come from.
+/// The computing thread of rank 0: the channels for numbers of shards and for their words.
 struct OwnThread {
     hand_out: Sender<usize>,
     computed: Receiver<Vec<u64>>,
 }
 
-/// Rank 0: hands out shards and merges them.
+/// The state of rank 0, which hands out shards and merges them.
 struct Distributor<'w> {
     world: &'w SimpleCommunicator,
     patience: Option<Duration>,
-    /// Worker 0 is the thread of this rank.
+    /// Worker 0 is the computing thread of rank 0.
     dispatch: Dispatch,
-    /// When each rank has last sent something, or was given work after it had none.
+    /// When each rank last sent a result, or was given work while it was idle.
     heard: Vec<Instant>,
-    /// Those that could have had another shard, if results did not wait for a slow one.
+    /// Workers that can be given another shard, once the bound on waiting results permits it.
     starved: Vec<usize>,
     traffic: Traffic,
 }
@@ -167,7 +169,7 @@ impl<'w> Distributor<'w> {
         }
     }
 
-    /// Until all shards are merged.
+    /// Hands out and merges shards until all are merged.
     fn merge_all<L: Lagrangian<N> + Sync, const N: usize>(
         &mut self,
         sharded: &ShardedEnsemble<'_, '_, L, N>,
@@ -201,7 +203,7 @@ impl<'w> Distributor<'w> {
                         self.feed(merge, &own);
                     }
                     Err(TryRecvError::Empty) => {}
-                    // The thread has panicked, and so does the scope.
+                    // The thread has panicked, and the end of the scope propagates the panic.
                     Err(TryRecvError::Disconnected) => return Ok(()),
                 }
                 let clock = Instant::now();
@@ -226,7 +228,7 @@ impl<'w> Distributor<'w> {
         })
     }
 
-    /// Merges what a worker has computed.
+    /// Merges a shard that a worker has computed.
     fn take<L: Lagrangian<N> + Sync, const N: usize>(
         &mut self,
         worker: usize,
@@ -249,12 +251,12 @@ impl<'w> Distributor<'w> {
         Ok(())
     }
 
-    /// Hands out what may be computed now to those that have had less than they could.
+    /// Hands out the shards that may be computed now to the starved workers.
     fn feed<L: Lagrangian<N> + Sync, const N: usize>(&mut self, merge: &Merge<'_, '_, '_, L, N>, own: &OwnThread) {
         let bound = merge.bound(self.heard.len());
         let mut starved = std::mem::take(&mut self.starved);
         let mut handed_out = true;
-        // One to each in turn, so that the first do not get all where there are few.
+        // One shard to each worker in turn, so that few shards are distributed evenly.
         while std::mem::take(&mut handed_out) {
             for worker in &starved {
                 let idle = self.dispatch.open(*worker).is_empty();
@@ -264,7 +266,7 @@ impl<'w> Distributor<'w> {
                     self.heard[*worker] = Instant::now();
                 }
                 if *worker == 0 {
-                    // It fails where the thread has panicked, which the loop over results sees.
+                    // Sending fails where the thread has panicked, which the loop over results detects.
                     let _ = own.hand_out.send(shard);
                 } else {
                     self.world.process_at_rank(*worker as Rank).send_with_tag(&[shard as u64][..], HANDED_OUT);
@@ -275,7 +277,7 @@ impl<'w> Distributor<'w> {
         self.starved = starved;
     }
 
-    /// Looks whether a rank with open shards has been silent for too long.
+    /// Checks whether a rank with open shards has been silent for too long.
     fn look_for_the_lost(&self) -> Result<(), MpiError> {
         let Some(patience) = self.patience else { return Ok(()) };
         for (rank, heard) in self.heard.iter().enumerate().skip(1) {
@@ -287,7 +289,7 @@ impl<'w> Distributor<'w> {
         Ok(())
     }
 
-    /// Says to all ranks that there is no more, and receives what they have begun.
+    /// Tells all ranks that there are no more shards, and receives the results that are under way.
     fn dismiss(&self) {
         for rank in 1..self.heard.len() {
             let worker = self.world.process_at_rank(rank as Rank);
@@ -299,7 +301,7 @@ impl<'w> Distributor<'w> {
     }
 }
 
-/// Ends all ranks when one of them panics: the others would wait for it for ever.
+/// Ends all ranks when one of them panics, since the others would wait for it forever.
 struct AbortOnPanic<'w>(&'w SimpleCommunicator);
 
 impl Drop for AbortOnPanic<'_> {

@@ -1,6 +1,7 @@
-//! `ensemble_mpi` by several ranks (`cargo test --release`): the bytes of one process, also after a rank was killed; what is refused ends all ranks.
+//! `ensemble_mpi` on several ranks (`cargo test --release`): the output has the bytes of one process, also after a rank
+//! was killed; invalid input ends all ranks.
 
-// What a test cannot go on without is a failure of it.
+// A failed precondition fails the test.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::fs;
@@ -11,20 +12,20 @@ use std::time::{Duration, Instant};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_ensemble_mpi");
 
-/// What a run takes at most, on a machine with other things to do; a hang is a failure.
+/// The time limit of a run, on a machine with other load; a hang is a failure.
 const DEADLINE: Duration = Duration::from_secs(180);
 
-/// One job at a time: each has work for two cores.
+/// One job at a time, since each has work for two cores.
 static JOB: Mutex<()> = Mutex::new(());
 
-/// A directory for one test, and the right to start jobs.
+/// A directory for one test, and the lock for starting jobs.
 struct Folder(PathBuf, #[expect(dead_code, reason = "held until the test ends")] MutexGuard<'static, ()>);
 
 impl Folder {
     fn new(name: &str) -> Self {
         let path = std::env::temp_dir().join(format!("ensemble-mpi-{name}-{}", std::process::id()));
         fs::create_dir_all(&path).unwrap();
-        // A test that has failed is no reason for others to fail.
+        // A failed test must not make others fail.
         Folder(path, JOB.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
@@ -39,7 +40,7 @@ impl Drop for Folder {
     }
 }
 
-/// Programs of a job with the ranks of each, their arguments divided by blanks.
+/// Starts a job: the number of ranks of each program, with its arguments separated by spaces.
 fn start(programs: &[(usize, &str)]) -> Child {
     let mut command = Command::new("mpirun");
     command.args(["--allow-run-as-root", "--oversubscribe", "--bind-to", "none"]);
@@ -70,7 +71,7 @@ fn completed(ranks: usize, arguments: &str) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The process of a rank.
+/// The process id of a rank.
 fn process_of(job: &Child, rank: usize) -> String {
     let children = fs::read_to_string(format!("/proc/{0}/task/{0}/children", job.id())).unwrap();
     let variable = format!("OMPI_COMM_WORLD_RANK={rank}");
@@ -81,7 +82,7 @@ fn process_of(job: &Child, rank: usize) -> String {
     children.split_whitespace().find(is_it).unwrap().into()
 }
 
-/// Waits until a checkpoint has some shards, and sends a signal to rank 1.
+/// Waits until a checkpoint has some shards, and then sends a signal to rank 1.
 fn signal_in_mid_run(job: &mut Child, checkpoint: &str, signal: &str) {
     let begin = Instant::now();
     while shards_of(Path::new(checkpoint)) < 5 {
@@ -92,7 +93,8 @@ fn signal_in_mid_run(job: &mut Child, checkpoint: &str, signal: &str) {
     assert!(sent.success());
 }
 
-/// The whole shards in a checkpoint: behind four words each is its length, as many words and their digest.
+/// The number of complete shards in a checkpoint. After a header of four words, each shard has its length, that many
+/// words, and their digest.
 fn shards_of(checkpoint: &Path) -> usize {
     let bytes = fs::read(checkpoint).unwrap_or_default();
     let (mut at, mut shards) = (32, 0);
@@ -142,7 +144,7 @@ fn a_rank_that_is_killed_costs_its_open_shards_only() {
     signal_in_mid_run(&mut job, &checkpoint, "-KILL");
     let output = finish(job);
     assert!(!output.status.success(), "{output:?}");
-    // The CSV file gets its name when it is whole.
+    // The CSV file gets its name only when it is complete.
     assert!(!Path::new(&again).exists());
     let kept = shards_of(Path::new(&checkpoint));
     assert!((5..79).contains(&kept), "{kept} shards are kept: not killed in mid-run");
@@ -150,7 +152,7 @@ fn a_rank_that_is_killed_costs_its_open_shards_only() {
     assert!(said.contains(&format!("{kept} shards from the checkpoint")), "{said}");
     assert!(fs::read(&again).unwrap() == fs::read(&plain).unwrap());
     assert_eq!(shards_of(Path::new(&checkpoint)), 79);
-    // One process reads the shards of two, whatever their order.
+    // One process reads the shards of two, in any order.
     let said = completed(1, &resumed);
     assert!(said.contains("79 shards from the checkpoint"), "{said}");
     assert!(fs::read(&again).unwrap() == fs::read(&plain).unwrap());
@@ -186,7 +188,7 @@ fn what_is_refused_ends_all_ranks() {
     refused(&[(1, "--members 0")], "the ensemble has no members");
     refused(&[(2, "--time NaN")], "member 0: ");
     refused(&[(2, "--patience=-1")], "--patience: ");
-    // Ranks that disagree; one of them, not rank 0, that has nothing to run.
+    // Ranks that disagree, and a rank other than 0 that has nothing to run.
     refused(&[(1, "--seed 1"), (1, "--seed 2")], "rank 1 has another ensemble than rank 0");
     refused(&[(2, "--seed 1"), (1, "--time 7")], "rank 2 has another ensemble than rank 0");
     refused(&[(1, ""), (1, "--members 0")], "rank 1: the ensemble has no members");

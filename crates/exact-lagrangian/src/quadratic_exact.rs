@@ -98,7 +98,7 @@ impl<const N: usize> QuadraticExact<N> {
         let stays = std::array::from_fn(|i| d[i].abs() < evolution::FAR);
         (0..N).filter(|i| stays[*i]).for_each(|i| displacement.q[(i, i)] = d[i]);
         let velocity = Affine { q: block(1, 0, 1.0 / unit), v: block(1, 1, 1.0), one: column(1, 1.0 / unit) };
-        let Regularity { smallest, max_abs_or_nan } = singular_values(&block(0, 1, 1.0));
+        let Regularity { smallest, largest } = singular_values(&block(0, 1, 1.0));
         // What the rounding of h and of the doublings does to dq1/dw0, whose change with h is dw1/dw0; and what that of K and
         // of the drag does, which is more near the critical drag: measured by a change of both, in opposite directions and so
         // large that some digits of the velocity are left where it is accepted.
@@ -108,7 +108,7 @@ impl<const N: usize> QuadraticExact<N> {
             _ => rate[(i, j)],
         });
         let moved = Evolution::over(&nearby, &form, gamma * h, size)?.e - &e;
-        let rounding = 8.0 * f64::EPSILON * (size * row_sum(&velocity.v)).max(N as f64 * max_abs_or_nan)
+        let rounding = 8.0 * f64::EPSILON * (size * row_sum(&velocity.v)).max(N as f64 * largest)
             + row_sum(&SMatrix::<f64, N, N>::from_fn(|i, j| moved[(i, N + j)]));
         let conjugate = InputError::FirstStep(StepError::ConjugatePoint { smallest: smallest * unit });
         if Fold::of(&displacement.v, &velocity.v, h).decayed {
@@ -291,9 +291,9 @@ fn over_mass<const N: usize, const M: usize>(
     let (what, remedy) = ("W = L_vv", "take a regular Lagrangian");
     let unit = SVector::<f64, N>::from_fn(|i, _| w.row(i).amax().sqrt());
     let scaled = SMatrix::<f64, N, N>::from_fn(|i, j| w[(i, j)] / (unit[i] * unit[j]));
-    let Regularity { smallest, max_abs_or_nan } = singular_values(&scaled);
-    if smallest <= 4.0 * N as f64 * f64::EPSILON * max_abs_or_nan {
-        let pivot = smallest / max_abs_or_nan;
+    let Regularity { smallest, largest } = singular_values(&scaled);
+    if smallest <= 4.0 * N as f64 * f64::EPSILON * largest {
+        let pivot = smallest / largest;
         return Err(GeometryError::Singular { what, pivot, remedy }.into());
     }
     inverse_times(w, b).map_err(|e| e.of(what, remedy).into())

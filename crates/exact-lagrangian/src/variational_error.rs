@@ -97,17 +97,17 @@ pub fn error_orders<D: DiscreteLagrangian<N>, const N: usize>(
     method: impl Fn(f64) -> Result<D, InputError>,
     t: f64,
     x: &VelocityPoint<N>,
-    max_abs_or_nan: f64,
+    largest: f64,
 ) -> Result<ErrorOrders, ExactError<N>> {
-    if !(max_abs_or_nan > 0.0 && max_abs_or_nan.is_finite()) {
-        return Err(InputError::Step { h: max_abs_or_nan }.into());
+    if !(largest > 0.0 && largest.is_finite()) {
+        return Err(InputError::Step { h: largest }.into());
     }
     let p0 = lagrangian.gradient(t, x).y;
     let start = PhasePoint { q: x.q, p: p0, z: x.z };
     let mut rows: [Vec<Row>; 4] = Default::default();
     let mut solver = Solver::default();
     for k in 0..STEPS {
-        let h = max_abs_or_nan * 0.5f64.powf(0.5 * k as f64);
+        let h = largest * 0.5f64.powf(0.5 * k as f64);
         let ld = method(h)?;
         let motion = match herglotz_flow(lagrangian, t, x, h) {
             Ok(motion) => motion,
@@ -219,8 +219,8 @@ mod tests {
     fn a_plateau_is_no_order() {
         let system = CoupledInZ::default();
         let x = VelocityPoint::new([0.8], [-0.6], 0.4);
-        let of = |max_abs_or_nan| {
-            error_orders(&system, |h| Midpoint::new(&system, h).map(WithoutClosedDerivatives), 0.0, &x, max_abs_or_nan)
+        let of = |largest| {
+            error_orders(&system, |h| Midpoint::new(&system, h).map(WithoutClosedDerivatives), 0.0, &x, largest)
                 .unwrap()
         };
         let orders = of(0.25);
@@ -232,11 +232,11 @@ mod tests {
         ] {
             assert!(found.order.is(expected, 0.15), "{what}: {:?} from {:?}", found.order, found.fitted);
         }
-        for max_abs_or_nan in [1e-3, 1e-6, 1e-9] {
-            let orders = of(max_abs_or_nan);
+        for largest in [1e-3, 1e-6, 1e-9] {
+            let orders = of(largest);
             for (found, expected) in [(&orders.value, 3.0), (&orders.legendre_minus, 2.0), (&orders.flow, 3.0)] {
                 let told = matches!(found.order, Order::Exact | Order::Unclear) || found.order.is(expected, 0.3);
-                assert!(told, "{max_abs_or_nan}: {:?} from {:?}", found.order, found.fitted);
+                assert!(told, "{largest}: {:?} from {:?}", found.order, found.fitted);
             }
         }
     }

@@ -7,13 +7,14 @@ use std::error::Error;
 
 /// The largest residual that a true statement of sections 2 and 3 may have.
 ///
-/// Residuals are relative to the size of their terms, so they are a few units of round-off (2e-16) times the conditions of
-/// the matrices that are inverted: W, the derivative of F-L_d, the Jacobian of a step. Those of the catalogue stay below
-/// 1e4; 1e-11 leaves a factor of ten. A false statement (a wrong sign, `1 + h gamma` for `e^(h gamma)`) has a residual of
-/// the size of `h gamma`, 1e-3 and more.
+/// Residuals are relative to the size of their terms, so they are a few units of round-off (2e-16) times the conditions
+/// of the matrices that are inverted: W, the derivative of F-L_d, the Jacobian of a step. Those of the catalogue stay
+/// below 1e4; 1e-11 leaves a factor of ten. A false statement (a wrong sign, `1 + h gamma` for `e^(h gamma)`) has a
+/// residual of the size of `h gamma`, 1e-3 and more.
 pub const TOLERANCE: f64 = 1e-11;
 
-/// What a residual belongs to. The order is that of the table: by statement, then by name, then by step.
+/// The statement, system, method and step that a residual belongs to. The order is that of the table: by statement,
+/// then by name, then by step.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Subject {
     /// The statement.
@@ -48,23 +49,23 @@ impl Subject {
     }
 }
 
-/// All residuals so far.
+/// All residuals recorded so far.
 #[derive(Clone, Debug, Default)]
 pub struct Checks {
     /// The worst residual, and its tolerance.
     worst: BTreeMap<Subject, (f64, f64)>,
-    /// What went wrong where a statement could not be evaluated at all.
+    /// The errors of statements that could not be evaluated.
     errors: BTreeMap<Subject, String>,
 }
 
 impl Checks {
-    /// Takes a residual into account that must be within [`TOLERANCE`]. What cannot be evaluated counts as infinite; `None` says
-    /// that the statement's hypotheses do not hold here.
+    /// Records a residual that must be within [`TOLERANCE`]. A statement that cannot be evaluated has an infinite
+    /// residual; `None` means that the hypotheses of the statement do not hold here.
     pub fn record<E: Error>(&mut self, subject: &Subject, residual: Result<Option<f64>, E>) {
         self.record_within(TOLERANCE, subject, residual);
     }
 
-    /// The same with a tolerance of its own.
+    /// Records a residual with a tolerance of its own.
     pub fn record_within<E: Error>(&mut self, tolerance: f64, subject: &Subject, residual: Result<Option<f64>, E>) {
         let residual = match residual {
             Ok(None) => return,
@@ -91,7 +92,7 @@ impl Checks {
         self.worst.iter().map(|(subject, (residual, _))| (subject, *residual))
     }
 
-    /// The worst residual of a statement and where it was met.
+    /// The worst residual of a statement, and the subject that has it.
     pub fn worst_of(&self, statement: Statement) -> Option<(&Subject, f64)> {
         let of = self.iter().filter(|(subject, _)| subject.statement == statement);
         of.reduce(|worst, other| if other.1 > worst.1 { other } else { worst })
@@ -132,8 +133,8 @@ impl Checks {
     }
 }
 
-/// `2N + 2` numbers of `[0, 1)` for the sample of index `i`: a Kronecker sequence, which fills the cube evenly and is the
-/// same in every run.
+/// `count` numbers in `[0, 1)` for the sample of index `i`: a Kronecker sequence, which fills the cube evenly and is
+/// the same in every run.
 pub fn fractions(i: usize, count: usize) -> Vec<f64> {
     const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
     let position = (i + 1) as f64;

@@ -1,4 +1,4 @@
-//! How a binary fails, and with which exit code.
+//! Errors of the binaries, and their exit codes.
 
 use contact_geom::GeometryError;
 use discrete_herglotz::{InputError, Status, StepError};
@@ -8,10 +8,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use thiserror::Error;
 
-/// Why a binary cannot deliver its results.
+/// An error that ends a binary.
 #[derive(Debug, Error)]
 pub enum Failure {
-    /// The output cannot be written. Bad input: exit code 2.
+    /// The output cannot be written. Invalid input: exit code 2.
     #[error(
         "cannot write to {}: {cause}; --out takes a directory that exists or can be created, and in which files can \
          be written", .path.display()
@@ -19,39 +19,39 @@ pub enum Failure {
     Output {
         /// The file or directory.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         cause: io::Error,
     },
-    /// A name is not among those that are known. Bad input: exit code 2.
+    /// A name is not among those that are known. Invalid input: exit code 2.
     #[error("there is no {what} {name:?}; known are all, {known}")]
     Unknown {
-        /// What it should name.
+        /// The kind of thing that has the name.
         what: &'static str,
         /// The name.
         name: String,
         /// The known names.
         known: String,
     },
-    /// A table that is to be read cannot be, or is not what it should be. Bad input: exit code 2.
+    /// A table cannot be read, or its content is invalid. Invalid input: exit code 2.
     #[error("cannot take the rows of {}: {cause}; {expected}", .path.display())]
     Table {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error in it.
         cause: String,
-        /// What would be accepted.
+        /// The content that is accepted.
         expected: String,
     },
     /// The text for the terminal cannot be written: exit code 2.
     #[error("cannot write to the standard output: {0}")]
     Terminal(io::Error),
-    /// A time step, a start or a count is not acceptable. Bad input: exit code 2.
+    /// A time step, an initial value or a count is invalid. Invalid input: exit code 2.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// A point or a matrix is not acceptable. Bad input: exit code 2.
+    /// A point or a matrix is invalid. Invalid input: exit code 2.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
-    /// A run ended early; what it recorded before is written. Exit code 1.
+    /// A run ended early; its results up to then are written. Exit code 1.
     #[error("the run of {what} {status}")]
     Run {
         /// The system.
@@ -62,28 +62,28 @@ pub enum Failure {
     /// A single step could not be taken: exit code 1.
     #[error("no step: {0}")]
     Step(#[from] StepError),
-    /// An exact motion, or the motion between two points, was not found; the text is that of the error, whose type depends on
-    /// the dimension. Exit code 1.
+    /// An exact motion, or the motion between two points, was not found. The text is that of the error, whose type
+    /// depends on the dimension. Exit code 1.
     #[error("no exact motion: {0}")]
     Exact(String),
-    /// Statements that are theorems were found violated: exit code 1.
+    /// Statements of the paper, which are theorems, are violated: exit code 1.
     #[error("{count} of {total} checks of the paper's statements fail:\n{list}")]
     Statements {
-        /// How many fail.
+        /// The number of failing checks.
         count: usize,
-        /// How many there are.
+        /// The number of all checks.
         total: usize,
-        /// One line for each that fails.
+        /// One line for each failing check.
         list: String,
     },
     /// Figures are above their bounds: exit code 1.
     #[error("{count} of {total} figures are above their bounds:\n{list}")]
     Bounds {
-        /// How many are.
+        /// The number of figures above their bounds.
         count: usize,
-        /// How many there are.
+        /// The number of all figures.
         total: usize,
-        /// One line for each of them.
+        /// One line for each figure above its bound.
         list: String,
     },
 }
@@ -98,7 +98,7 @@ impl<const N: usize> From<ExactError<N>> for Failure {
 }
 
 impl Failure {
-    /// 2 for bad input, 1 for a run or a check that went wrong.
+    /// The exit code: 2 for invalid input, 1 for a run or a check that failed.
     fn code(&self) -> u8 {
         match self {
             Failure::Output { .. }
@@ -116,7 +116,7 @@ impl Failure {
     }
 }
 
-/// Ends a binary: prints a failure on stderr and makes it an exit code.
+/// Ends a binary: prints a failure on stderr and converts it to an exit code.
 pub fn finish(result: Result<(), Failure>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,6 +1,7 @@
-//! What the binaries share: where results go, how figures look, which checks of statements passed, how a failure ends a program.
+//! Code that the binaries share: output of results, figures, the record of checked statements, and failures with their
+//! exit codes.
 //!
-//! No mechanics is computed here; that is what the library crates are for.
+//! It computes no mechanics; the library crates do.
 
 mod checks;
 mod failure;
@@ -13,7 +14,7 @@ pub use contact_figure::{Axis, Curve, Line, Panel, draw, draw_row};
 pub use failure::{Failure, finish};
 pub use output::{Directory, number, print};
 
-/// The tasks of the guide, compiled and run.
+/// The programs of the guide, compiled and run.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/guide.md")]
 pub struct Guide;

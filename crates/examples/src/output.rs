@@ -1,4 +1,4 @@
-//! Where results go: a directory of CSV and SVG files, and the terminal.
+//! Output of results: a directory of CSV and SVG files, and the terminal.
 
 use crate::Failure;
 use std::fs;
@@ -12,8 +12,8 @@ pub struct Directory {
 }
 
 impl Directory {
-    /// Creates the directory where it does not exist, and makes sure that files can be written into it: a program should
-    /// fail before it computes, not after.
+    /// Creates the directory where it does not exist, and checks that files can be written into it, so that a program
+    /// fails before it computes.
     ///
     /// # Errors
     /// [`Failure::Output`].
@@ -69,7 +69,7 @@ pub fn number(x: f64) -> String {
     format!("{x:.16e}")
 }
 
-/// Prints on the standard output. A reader that stops reading, as `head` does, is no failure.
+/// Prints on the standard output. A closed pipe, for example to `head`, is not an error.
 ///
 /// # Errors
 /// [`Failure::Terminal`].

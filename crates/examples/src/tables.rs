@@ -1,10 +1,10 @@
-//! The tables of the README are those that the code makes.
+//! Checks that the tables of the README agree with those that the code generates.
 
 use contact_geom::systems::{Pendulum, System, SystemVisitor, catalogue_size, visit_catalogue};
 use discrete_herglotz::{AnyIntegrator, Integrator, MethodInfo};
 
-/// The integrators by name, those of one kind in one line: order, what a step solves, its `sigma_d` for a linear drag, and how many of the
-/// catalogue's systems meet the hypotheses.
+/// The table of the integrators, with one line for each kind: names, orders, whether a step is explicit or implicit,
+/// `sigma_d` for a linear drag, and the number of systems of the catalogue that meet the hypotheses.
 fn integrators() -> String {
     let mut kinds: Vec<(MethodInfo, Vec<AnyIntegrator>)> = Vec::new();
     for integrator in AnyIntegrator::all() {
@@ -58,7 +58,7 @@ fn info(integrator: &AnyIntegrator) -> MethodInfo {
     Integrator::<'_, Pendulum, 1>::info(integrator)
 }
 
-/// How many systems of the catalogue meet the hypotheses of an integrator.
+/// The number of systems of the catalogue that meet the hypotheses of an integrator.
 fn taken(integrator: &AnyIntegrator) -> usize {
     struct Taken(AnyIntegrator, usize);
     impl SystemVisitor for Taken {
@@ -71,7 +71,7 @@ fn taken(integrator: &AnyIntegrator) -> usize {
     taken.1
 }
 
-/// What stands between `<!-- name -->` and `<!-- end name -->`.
+/// The text of the README between `<!-- name -->` and `<!-- end name -->`.
 fn part(name: &str) -> &'static str {
     let readme = include_str!("../../../README.md");
     let (_, rest) = readme.split_once(&format!("<!-- {name} -->\n")).unwrap_or_default();

@@ -1,17 +1,17 @@
-//! Angles on an axis of one turn: curves that leave it on one side come back on the other.
+//! Angles on an axis of one turn: curves that leave it on one side continue on the other.
 
 use std::f64::consts::{PI, TAU};
 
-/// The turns that a line between two points may make to be drawn from edge to edge; what makes more is not resolved by its points, and
-/// would fill the picture.
+/// The maximal number of turns between two points that are joined by a line; a curve with more turns is not resolved by
+/// its points, and its lines would fill the figure.
 const MOST_TURNS: f64 = 3.0;
 
-/// The number of the turn that an angle is in: 0 from -pi, excluded, to pi.
+/// The turn that contains an angle: 0 for the interval (-pi, pi].
 fn turn(angle: f64) -> f64 {
     ((angle - PI) / TAU).ceil()
 }
 
-/// An angle in (-pi, pi].
+/// The angle reduced to (-pi, pi].
 ///
 /// ```
 /// use contact_figure::fold;
@@ -20,12 +20,12 @@ fn turn(angle: f64) -> f64 {
 /// ```
 pub fn fold(angle: f64) -> f64 {
     let folded = angle - TAU * turn(angle);
-    // Beyond the edges by rounding alone.
+    // The reduced angle exceeds the edges by rounding only.
     folded.clamp(-PI, PI)
 }
 
-/// The pieces of a curve of which the coordinates that are angles are folded: it is cut where one of them leaves its turn, and each piece
-/// reaches the edge there, so that no line crosses the picture.
+/// The pieces of a curve after reduction of its angular coordinates. The curve is cut where one of them changes its
+/// turn, and each piece reaches the edge there, so that no line crosses the figure.
 pub fn folded(points: &[(f64, f64)], angles: (bool, bool)) -> Vec<Vec<(f64, f64)>> {
     let turns_of = |(x, y): (f64, f64)| (if angles.0 { turn(x) } else { 0.0 }, if angles.1 { turn(y) } else { 0.0 });
     let place = |(x, y): (f64, f64), turns: (f64, f64)| {
@@ -49,7 +49,7 @@ pub fn folded(points: &[(f64, f64)], angles: (bool, bool)) -> Vec<Vec<(f64, f64)
                 cuts.push(1.0);
                 let mut before = 0.0;
                 for part in cuts {
-                    // At an edge itself it is in two turns: between the edges in one.
+                    // A point at an edge belongs to two turns, so the turn is taken between the edges.
                     let between = turns_of(at(0.5 * (before + part)));
                     if between != turns {
                         pieces.push(vec![place(at(before), between)]);
@@ -70,7 +70,7 @@ pub fn folded(points: &[(f64, f64)], angles: (bool, bool)) -> Vec<Vec<(f64, f64)
     pieces
 }
 
-/// The parts of the way from an angle to another, in these turns, at which it passes from one turn to the next.
+/// The fractions of the way from one angle to another at which it passes from one turn to the next.
 fn cuts((from, to): (f64, f64), (first, last): (f64, f64)) -> Vec<f64> {
     let (low, high) = (first.min(last), first.max(last));
     let count = (high - low) as usize;
@@ -82,14 +82,14 @@ fn cuts((from, to): (f64, f64), (first, last): (f64, f64)) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Every angle is in its turn, those of one turn are as they were, and the edges belong to the one above.
+    /// Every angle is reduced, angles of the turn 0 are unchanged, and both edges are mapped to the upper one.
     #[test]
     fn angles_are_folded() {
         for k in -1000..=1000 {
             let angle = 0.1 * f64::from(k);
             let found = fold(angle);
             assert!(found > -PI && found <= PI, "{angle}: {found}");
-            // To the rounding of a hundred.
+            // The bound is the rounding of angles up to one hundred.
             assert!((found.sin() - angle.sin()).abs() + (found.cos() - angle.cos()).abs() < 1e-13, "{angle}: {found}");
             assert!(angle.abs() > PI || found == angle);
         }
@@ -97,7 +97,7 @@ mod tests {
         assert!(fold(f64::NAN).is_nan());
     }
 
-    /// No line of a piece is longer than the way between its two points, and the pieces meet the edges.
+    /// The lines of the pieces have the slope of the curve, and the pieces meet the edges.
     #[test]
     fn curves_are_cut_at_the_edges() {
         let curve =
@@ -106,7 +106,7 @@ mod tests {
             let points = curve(rate);
             let pieces = folded(&points, (false, true));
             let turns = (rate.abs() * 20.0 / TAU + 0.5).floor() as usize;
-            // One more where the curve ends, or a piece begins, at an edge.
+            // There is one more piece where the curve ends, or a piece begins, at an edge.
             assert!((turns..=turns + 2).contains(&pieces.len()), "{rate}: {} for {turns}", pieces.len());
             for piece in &pieces {
                 assert!(piece.iter().all(|(_, y)| y.abs() <= PI));
@@ -123,14 +123,14 @@ mod tests {
                 assert!((end.1 - edge).abs() < 1e-12 && (begin.1 + edge).abs() < 1e-12, "{rate}: {end:?} {begin:?}");
             }
         }
-        // Both coordinates are angles: the line has the slope of the curve everywhere.
+        // If both coordinates are angles, the lines have the slope of the curve everywhere.
         let torus: Vec<(f64, f64)> = curve(1.0).iter().map(|(t, _)| (3.0 * t, -1.7 * t)).collect();
         let pieces = folded(&torus, (true, true));
         assert!(pieces.len() > 10);
         for w in pieces.iter().flat_map(|piece| piece.windows(2)) {
             assert!((1.7 * (w[1].0 - w[0].0) + 3.0 * (w[1].1 - w[0].1)).abs() < 1e-12, "{w:?}");
         }
-        // Nothing is cut, or drawn, where nothing is an angle; what its points do not resolve is not joined.
+        // A curve without angles is not cut, and points that do not resolve the curve are not joined.
         assert_eq!(folded(&torus, (false, false)), std::slice::from_ref(&torus));
         assert_eq!(folded(&[(0.0, 0.0), (1.0, 1e300)], (false, true)).len(), 2);
         assert!(folded(&[], (true, true)).is_empty());

@@ -1,4 +1,5 @@
-//! One look for all figures: framed axes, ticks inside, few colours, lines that differ in pattern as well as in colour.
+//! A common style for all figures: framed axes, ticks inside, few colours, lines that differ in pattern as well as in
+//! colour.
 
 mod fold;
 
@@ -13,18 +14,18 @@ use kuva::render::plots::Plot;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
-/// How a curve is drawn. The four patterns can be told apart in black and white, and so can the three markers.
+/// The style of a curve. The four patterns can be distinguished in black and white, and so can the three markers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {
-    /// Solid, blue: what a discrete Lagrangian gives.
+    /// Solid, blue: the result of a discrete Lagrangian.
     Solid,
-    /// Dashed, red: what is true, or predicted.
+    /// Dashed, red: the exact result, or a prediction.
     Dashed,
     /// Dotted, grey: a reference.
     Dotted,
     /// Dash-dot, green: a second method.
     DashDot,
-    /// Blue discs without a line: single points on a curve.
+    /// Blue discs without a line: single points of a curve.
     Discs,
     /// Small blue discs without a line: thousands of points.
     Dots,
@@ -32,17 +33,17 @@ pub enum Line {
     Crosses,
     /// Green upright crosses without a line.
     Pluses,
-    /// One of many, where four patterns are too few: colour and pattern both change from one number to the next, and meet
-    /// again after 24.
+    /// One of many curves, where four patterns are too few: colour and pattern both change from one number to the next,
+    /// and repeat after 24.
     Coloured(usize),
-    /// One of many references, in grey: patterns and widths change, and meet again after 8.
+    /// One of many references, in grey: patterns and widths change, and repeat after 8.
     Grey(usize),
 }
 
-/// The colours of the many.
+/// The colours of `Line::Coloured`.
 const COLOURS: [&str; 6] = [SOLID, "#c1272d", GREEN, "#8e44ad", "#d98200", "#00838f"];
 
-/// The pattern of the many that has a number.
+/// The line pattern of a number.
 fn pattern(number: usize) -> LineStyle {
     match number % 4 {
         0 => LineStyle::Solid,
@@ -64,7 +65,8 @@ impl Line {
             Line::Crosses => marked(points, GREY, MarkerShape::Cross, MARKER, name),
             Line::Pluses => marked(points, GREEN, MarkerShape::Plus, MARKER, name),
             Line::Coloured(number) => {
-                // The colours go round once while the patterns do one and a half times; shifted, all pairs are met.
+                // In 12 numbers the colours repeat twice and the patterns three times; the shift then gives the other
+                // 12 pairs.
                 let colour = COLOURS[number % COLOURS.len()];
                 drawn(points, colour, 2.0, pattern(number + number / 12), name)
             }
@@ -82,7 +84,7 @@ fn drawn(points: Vec<(f64, f64)>, colour: &str, width: f64, pattern: LineStyle, 
     }
 }
 
-/// Points on their own.
+/// Points without a line.
 fn marked(points: Vec<(f64, f64)>, colour: &str, shape: MarkerShape, size: f64, name: Option<&str>) -> Plot {
     let plot = ScatterPlot::new().with_data(points).with_color(colour).with_size(size).with_marker(shape);
     match name {
@@ -96,9 +98,9 @@ fn marked(points: Vec<(f64, f64)>, colour: &str, shape: MarkerShape, size: f64, 
 pub struct Curve {
     /// The name; a curve without one is not in the legend.
     pub name: Option<String>,
-    /// How it is drawn.
+    /// The style.
     pub line: Line,
-    /// Its points.
+    /// The points.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -108,26 +110,26 @@ impl Curve {
         Curve { name: Some(name.into()), line, points: points.into_iter().collect() }
     }
 
-    /// A curve of the style of another one that the legend names.
+    /// A curve without an entry in the legend, for example in the style of another curve that the legend names.
     pub fn unnamed(line: Line, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Curve { name: None, line, points: points.into_iter().collect() }
     }
 }
 
-/// The range of an axis and the distance of its ticks, chosen by hand: a figure for print is composed.
+/// The range of an axis and the distance of its ticks, which are chosen by hand for figures in print.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Axis {
     /// A linear axis: from, to, distance of ticks.
     Linear(f64, f64, f64),
-    /// A logarithmic axis: the powers of ten between which it extends, and the number of them between ticks.
+    /// A logarithmic axis: the powers of ten between which it extends, and how many of them lie between ticks.
     Logarithmic(i32, i32, u32),
     /// A linear axis of one turn, from -pi to pi.
     Angle,
 }
 
 impl Axis {
-    /// The coordinate on the axis; none for what a logarithmic axis cannot show. Logarithms are taken here, as kuva's own
-    /// logarithmic axis ends at 1e-10.
+    /// The coordinate on the axis; `None` for values that a logarithmic axis cannot show. Logarithms are taken here,
+    /// since kuva's own logarithmic axis ends at 1e-10.
     fn place(self, value: f64) -> Option<f64> {
         let coordinate = match self {
             Axis::Linear(..) | Axis::Angle => value,
@@ -136,7 +138,7 @@ impl Axis {
         Some(coordinate).filter(|c| c.is_finite())
     }
 
-    /// The ends and the distance of the ticks, in coordinates on the axis.
+    /// The ends of the axis and the distance of the ticks, in coordinates on the axis.
     fn range(self) -> (f64, f64, f64) {
         match self {
             Axis::Linear(from, to, step) => (from, to, step),
@@ -165,10 +167,10 @@ pub struct Panel {
     pub x: Axis,
     /// The vertical axis.
     pub y: Axis,
-    /// The upper left corner of the legend, as fractions of the width and of the height from the lower left; to the right of
-    /// the axes, in a figure of one panel, if the first is 1.
+    /// The upper left corner of the legend, as fractions of the width and of the height from the lower left corner. If
+    /// the first is 1, the legend is to the right of the axes, in a figure of one panel.
     pub legend: (f64, f64),
-    /// The curves, the first one drawn first.
+    /// The curves, in the order in which they are drawn.
     pub curves: Vec<Curve>,
     /// Marked points of a solid curve: the states that it connects.
     pub marks: Vec<(f64, f64)>,
@@ -192,11 +194,11 @@ const DOT: f64 = 1.0;
 /// The width and the height of a panel, in pixels.
 const SIZE: (f64, f64) = (560.0, 400.0);
 
-/// What a legend to the right of the axes adds to the width, in pixels.
+/// The additional width for a legend to the right of the axes, in pixels.
 const BESIDE: f64 = 270.0;
 
-/// The factor by which all but the curves is enlarged. It makes the swatches of the legend long enough to show a pattern;
-/// the sizes of the fonts below are in units of it.
+/// The factor by which everything but the curves is enlarged. It makes the samples of the legend long enough to show a
+/// pattern; the font sizes below are in units of it.
 const SCALE: f64 = 1.6;
 
 impl Panel {
@@ -287,8 +289,8 @@ pub fn draw(panel: &Panel) -> String {
     numbered(&kuva::render_to_svg(plots, layout))
 }
 
-/// The same figure with its clips counted from 0: the library counts all those of a process, and a figure should not depend on which
-/// others are drawn.
+/// The same figure with its clip paths numbered from 0: kuva numbers those of the whole process, and a figure should
+/// not depend on which others are drawn.
 fn numbered(svg: &str) -> String {
     const CLIP: &str = "kuva-clip-";
     let (mut seen, mut parts) = (Vec::new(), svg.split(CLIP));
@@ -304,17 +306,17 @@ fn numbered(svg: &str) -> String {
     out
 }
 
-/// A figure of panels side by side, marked a, b and so on where there are several, as SVG.
+/// A figure of panels side by side, as SVG; several panels are labelled a, b and so on.
 pub fn draw_row(panels: &[Panel]) -> String {
     draw_grid(panels, panels.len())
 }
 
-/// A figure of panels in rows of so many, marked a, b and so on where there are several, as SVG.
+/// A figure of panels in rows of `in_a_row`, as SVG; several panels are labelled a, b and so on.
 pub fn draw_grid(panels: &[Panel], in_a_row: usize) -> String {
     let plots: Vec<Vec<Plot>> = panels.iter().map(Panel::plots).collect();
     let layouts = panels.iter().zip(&plots).map(|(panel, plots)| panel.layout(plots)).collect();
     let in_a_row = in_a_row.max(1);
-    // Of the panels alone: the last row may have places without one.
+    // Only panels have letters: the last row may have empty places.
     let count = if panels.len() > 1 { panels.len() } else { 0 };
     let letters: Vec<String> = ('a'..='z').take(count).map(String::from).collect();
     let scene = Figure::new(panels.len().div_ceil(in_a_row).max(1), in_a_row)
@@ -331,7 +333,7 @@ pub fn draw_grid(panels: &[Panel], in_a_row: usize) -> String {
 mod tests {
     use super::*;
 
-    /// Each of several panels has its letter; a place without a panel has none, nor has a panel by itself.
+    /// Each of several panels has its letter; empty places and a single panel have none.
     #[test]
     fn letters_are_those_of_panels() {
         let panel = Panel {

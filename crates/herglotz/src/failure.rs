@@ -1,19 +1,19 @@
-//! How the program ends where it does not succeed.
+//! Errors of the program and its exit codes.
 
 use herglotz::SceneError;
 use std::process::ExitCode;
 use thiserror::Error;
 
-/// Why a command did not succeed.
+/// The reason for which a command failed.
 #[derive(Debug, Error)]
 pub(crate) enum Failure {
-    /// Something is wrong with the scene.
+    /// The scene is invalid.
     #[error("{0}")]
     Scene(#[from] SceneError),
-    /// Something else is wrong with what the user gave.
+    /// Another input of the user is invalid.
     #[error("{0}")]
     Input(String),
-    /// The motion did not end well; what is wrong was told.
+    /// The motion failed or was interrupted; its output has been written.
     #[error("{0}")]
     Run(String),
     /// A file cannot be read or written.
@@ -21,7 +21,7 @@ pub(crate) enum Failure {
     File {
         /// The file.
         path: String,
-        /// Why.
+        /// The cause.
         cause: std::io::Error,
     },
     /// The output cannot be written.
@@ -30,15 +30,15 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// Of a file.
+    /// The error of a file.
     pub fn of_file(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Failure {
         let path = path.display().to_string();
         move |cause| Failure::File { path, cause }
     }
 
-    /// Tells it, and how the program ends: 1 of a run, 2 of input.
+    /// Prints the error, and returns the exit code: 1 for a run, 2 for input.
     pub fn tell(&self) -> ExitCode {
-        // Who reads the output has closed it: nothing is wrong.
+        // A reader that closes the output early is not an error.
         if matches!(self, Failure::Output(cause) if cause.kind() == std::io::ErrorKind::BrokenPipe) {
             return ExitCode::SUCCESS;
         }

@@ -1,6 +1,6 @@
-//! Scene files: a Lagrangian as text, a start, and what is asked of its motion. The program `herglotz` runs them.
+//! Scene files: a Lagrangian as text, an initial state, and the requested output. The program `herglotz` runs them.
 //!
-//! [`Scene::read`] reads one; what is wrong with it is a [`SceneError`] with the place in the file.
+//! [`Scene::read`] reads a scene; an error is a [`SceneError`] with the position in the file.
 
 mod scene;
 

@@ -1,4 +1,4 @@
-//! Motions of Lagrangians that depend on the action, from scene files.
+//! Motions of action-dependent Lagrangians, from scene files.
 
 mod commands;
 mod failure;
@@ -10,7 +10,8 @@ use clap::Parser;
 use commands::Command;
 use std::process::ExitCode;
 
-/// Contact mechanics from a scene file: runs, plans, checks, comparisons and sweeps of motions by Herglotz' equation.
+/// Contact mechanics from scene files: runs, plans, checks, comparisons and parameter sweeps of solutions of Herglotz'
+/// equation.
 ///
 /// Begin with `herglotz new pendulum > pendulum.toml` and `herglotz run pendulum.toml`.
 #[derive(Parser)]

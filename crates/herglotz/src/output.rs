@@ -1,4 +1,4 @@
-//! Where results go: numbers with 17 digits, tables, JSON.
+//! Output formats: numbers with 17 digits, tables, JSON.
 
 use crate::failure::Failure;
 use serde_json::Value;
@@ -6,12 +6,12 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// A number with the 17 digits from which it can be read back to the bit.
+/// A number with 17 significant digits, from which it can be read back exactly.
 pub(crate) fn exact(x: f64) -> String {
     format!("{x:.16e}")
 }
 
-/// A number for readers.
+/// A number in a short form.
 pub(crate) fn short(x: f64) -> String {
     let size = x.abs();
     if x == 0.0 || (1e-3..1e6).contains(&size) {
@@ -21,7 +21,7 @@ pub(crate) fn short(x: f64) -> String {
     }
 }
 
-/// A number as JSON: a text where it is not finite.
+/// A number as JSON; a string where it is not finite.
 pub(crate) fn json(x: f64) -> Value {
     if x.is_finite() { x.into() } else { x.to_string().into() }
 }
@@ -34,12 +34,12 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
     Ok(out.flush()?)
 }
 
-/// Writes a value to the standard output.
+/// Writes a JSON value to the standard output.
 pub(crate) fn print_json(value: &Value) -> Result<(), Failure> {
     print(&format!("{value:#}"))
 }
 
-/// A table with columns as wide as their widest entry.
+/// A table whose columns are as wide as their widest entry.
 pub(crate) fn table(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width =
@@ -57,12 +57,12 @@ pub(crate) fn table(rows: &[Vec<String>]) -> String {
 pub(crate) struct Directory(PathBuf);
 
 impl Directory {
-    /// The one that was asked for, or one in the present directory with the name of the scene.
+    /// The requested directory, or one in the current directory with the name of the scene.
     pub fn new(wanted: Option<PathBuf>, scene: &Path) -> Self {
         Directory(wanted.unwrap_or_else(|| scene.file_stem().map(PathBuf::from).unwrap_or_else(|| "scene".into())))
     }
 
-    /// Makes it, when there is something to write.
+    /// Creates the directory; called when there is output to write.
     pub fn create(&self) -> Result<(), Failure> {
         std::fs::create_dir_all(&self.0).map_err(Failure::of_file(&self.0))
     }
@@ -79,7 +79,7 @@ impl Directory {
         Ok(path)
     }
 
-    /// Writes a file that is there whole or as it was before: to another name, which then is made its own.
+    /// Replaces a file atomically: the text is written to another file, which is then renamed.
     pub fn replace(&self, name: &str, text: &str) -> Result<(), Failure> {
         let (path, part) = (self.file(name), self.file(&format!("{name}.part")));
         let write = || -> std::io::Result<()> {
@@ -91,7 +91,7 @@ impl Directory {
         write().map_err(Failure::of_file(&path))
     }
 
-    /// Removes a file, if it is there.
+    /// Removes a file if it exists.
     pub fn remove(&self, name: &str) -> Result<(), Failure> {
         let path = self.file(name);
         match std::fs::remove_file(&path) {
@@ -101,7 +101,7 @@ impl Directory {
     }
 }
 
-/// A table of numbers that is written as it comes.
+/// A CSV table that is written row by row.
 pub(crate) struct Table {
     out: csv::Writer<BufWriter<File>>,
     path: PathBuf,
@@ -116,7 +116,7 @@ impl Table {
         Ok(table)
     }
 
-    /// Goes on with a file after so many bytes; what follows them is dropped.
+    /// Continues a file after a number of bytes; anything after them is dropped.
     pub fn go_on(path: PathBuf, bytes: u64) -> Result<Self, Failure> {
         let open = || -> std::io::Result<File> {
             let file = OpenOptions::new().append(true).open(&path)?;
@@ -140,19 +140,19 @@ impl Table {
         self.record(numbers.iter().map(|x| exact(*x)))
     }
 
-    /// Writes all to the file, and tells its length.
+    /// Writes all buffered rows to the file and returns its length.
     pub fn finish(mut self) -> Result<u64, Failure> {
         self.flush()
     }
 
-    /// Writes all that there is so far to the file, and tells its length.
+    /// Writes all buffered rows so far to the file and returns its length.
     pub fn flush(&mut self) -> Result<u64, Failure> {
         let flushed = self.out.flush().and_then(|()| std::fs::metadata(&self.path));
         Ok(flushed.map_err(Failure::of_file(&self.path))?.len())
     }
 }
 
-/// The rows of a table that was written.
+/// The rows of a table in a file.
 pub(crate) fn read_rows(path: &Path) -> Result<Vec<Vec<String>>, Failure> {
     let broken = |error: csv::Error| Failure::of_file(path)(error.into());
     let mut reader = csv::Reader::from_path(path).map_err(broken)?;

@@ -1,17 +1,18 @@
-//! The peer of comparisons: Hairer's explicit method of order 8 with step control, as another library has it.
+//! The external integrator of comparisons: Hairer's explicit Runge-Kutta method DOP853 of order 8 with step size
+//! control.
 
 use differential_equations::methods::ExplicitRungeKutta;
 use differential_equations::prelude::{IVP, ODE};
 use differential_equations::traits::State;
 use runtime_herglotz::{FirstOrder, Peer, PeerEnd};
 
-/// The most steps of a run: of one that takes more, others are compared.
+/// The maximal number of steps of a run; runs that need more are left out of the comparison.
 const MOST_STEPS: usize = 100_000;
 
-/// The dop853 of differential-equations.
+/// `dop853` of the crate differential-equations.
 pub(crate) struct Dop853;
 
-/// The motion as that library takes it.
+/// The vector field of a motion, in the interface of that crate.
 struct Rates<'m>(&'m FirstOrder);
 
 impl<const D: usize> ODE<f64, [f64; D]> for Rates<'_> {
@@ -36,7 +37,7 @@ impl Peer for Dop853 {
     }
 
     fn run(&self, motion: &FirstOrder, tolerance: f64) -> Option<PeerEnd> {
-        // Without an allocation in each stage where there are few variables, of up to three coordinates.
+        // For few variables (up to three coordinates) arrays avoid an allocation in each stage.
         match motion.start.len() {
             2 => in_array::<2>(motion, tolerance),
             3 => in_array::<3>(motion, tolerance),

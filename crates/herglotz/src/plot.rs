@@ -5,26 +5,27 @@ use herglotz::{EndsScene, LatticeScene, Scene};
 use runtime_herglotz::{Column, Comparison, Work, velocity_name};
 use std::collections::BTreeSet;
 
-/// The most points of a curve: more are not seen.
+/// The maximal number of points of a curve; more points are not visible.
 const POINTS: usize = 2000;
 
-/// The points from which on they are drawn as dots.
+/// From this number on, single points are drawn as dots.
 const MANY: usize = 500;
 
-/// The panels beside each other.
+/// The number of panels in a row.
 const IN_A_ROW: usize = 3;
 
-/// The families of integrators, with the number of those that are drawn of each in a comparison.
+/// The families of integrators, with the number of integrators of each that are drawn in a comparison.
 const FAMILIES: [(&str, usize); 5] =
     [("gauss_", 3), ("transformed_gauss_", 2), ("midpoint_by_", 2), ("rules", 2), ("splittings", 3)];
 
-/// The discrete Lagrangians by a quadrature rule.
+/// The discrete Lagrangians given by a quadrature rule.
 const RULES: [&str; 4] = ["rectangle", "left_midpoint", "midpoint", "trapezoidal"];
 
-/// A run that takes so many times what twice its steps take, or so many times what half of them take, was held up.
+/// A run was delayed by other load on the machine if it takes this many times as long as a run with more steps, or as a
+/// run with fewer, but at least half as many, steps.
 const HELD_UP: (f64, f64) = (2.0, 8.0);
 
-/// The longest label of an axis, in characters.
+/// The maximal length of an axis label, in characters.
 const LABEL: usize = 30;
 
 /// A quantity on an axis: its name, and whether it is an angle.
@@ -40,19 +41,20 @@ impl<'q> Quantity<'q> {
         Quantity { name, is_angle: scene.is_angle(name) }
     }
 
-    /// One that is no angle.
+    /// A quantity that is not an angle.
     fn plain(name: &'q str) -> Self {
         Quantity { name, is_angle: false }
     }
 }
 
-/// The figures of rows with their names: each column against time, and each velocity against its coordinate.
+/// The figures of rows with their file names: each column against time, each velocity against its coordinate, and the
+/// path in the first two coordinates.
 pub(crate) fn of_rows(scene: &Scene, rows: &[Vec<f64>]) -> Vec<(String, String)> {
     let columns = scene.columns.iter().map(|(name, column)| (Quantity::of(scene, name), column)).collect();
     of_columns(columns, scene.system.dimension(), rows)
 }
 
-/// The same of the points of a path between ends.
+/// The same for the points of a path between ends.
 pub(crate) fn of_path(scene: &EndsScene, rows: &[Vec<f64>]) -> Vec<(String, String)> {
     let columns = scene.columns.iter().map(|(name, column)| (Quantity::plain(name), column)).collect();
     of_columns(columns, scene.system.dimension(), rows)
@@ -86,37 +88,37 @@ fn of_columns(columns: Vec<(Quantity<'_>, &Column)>, dimension: usize, rows: &[V
     figures
 }
 
-/// The figure of a section: velocities against coordinates where the first event changes its sign.
+/// The figure of a section: velocities against coordinates where the first event changes sign.
 pub(crate) fn of_section(scene: &Scene, crossings: &[(usize, Vec<f64>)]) -> Option<String> {
     let names = scene.system.formula().coordinates();
     let panels = names.iter().enumerate().filter_map(|(i, name)| {
         let velocity = velocity_name(name);
         let quantities = [Quantity::of(scene, name), Quantity::of(scene, &velocity)];
-        // A row has the time, the coordinates, and their velocities.
+        // A row has the time, the coordinates and their velocities, in this order.
         let of = |(_, row): &(usize, Vec<f64>)| Some((*row.get(1 + i)?, *row.get(1 + names.len() + i)?));
         let points: Vec<_> = crossings.iter().filter(|(event, _)| *event == 0).filter_map(of).collect();
         let panel = panel(quantities, single(points.len()), points)?;
         let all = || panel.curves.iter().flat_map(|curve| &curve.points);
         let size = |of: fn(&(f64, f64)) -> f64| all().map(|p| of(p).abs()).fold(0.0, f64::max);
-        // That the section is at one place needs no figure.
+        // A section in which the coordinate or the velocity vanishes is not drawn.
         (size(|p| p.0) > 1e-9 && size(|p| p.1) > 1e-9).then_some(panel)
     });
     let panels: Vec<Panel> = panels.collect();
     (!panels.is_empty()).then(|| grid(&panels))
 }
 
-/// The figure of one column of the members of a sweep against the swept value.
+/// The figure of one column against the swept value, over the members of a sweep.
 pub(crate) fn of_sweep(scene: &Scene, knob: &str, column: &str, points: Vec<(f64, f64)>) -> Option<String> {
     let quantities = [Quantity::plain(knob), Quantity::of(scene, column)];
     panel(quantities, single(points.len()), points).map(|panel| draw(&panel))
 }
 
-/// How so many single points are drawn.
+/// The style in which a number of single points is drawn.
 fn single(count: usize) -> Line {
     if count < MANY { Line::Discs } else { Line::Dots }
 }
 
-/// Panels in rows; one alone needs no letter.
+/// Panels in a grid; a single panel has no letter.
 fn grid(panels: &[Panel]) -> String {
     match panels {
         [one] => draw(one),
@@ -124,7 +126,7 @@ fn grid(panels: &[Panel]) -> String {
     }
 }
 
-/// One curve in axes that fit it; angles are folded.
+/// One curve with axes that fit it; angles are reduced to -pi to pi.
 fn panel([x, y]: [Quantity<'_>; 2], line: Line, points: Vec<(f64, f64)>) -> Option<Panel> {
     let label = |name: &str| match name.char_indices().nth(LABEL) {
         Some((end, _)) => format!("{}...", &name[..end]),
@@ -138,7 +140,7 @@ fn panel([x, y]: [Quantity<'_>; 2], line: Line, points: Vec<(f64, f64)>) -> Opti
     let (x, y) = (axis_of(angles.0, |p| p.0)?, axis_of(angles.1, |p| p.1)?);
     let curves = match line {
         _ if angles == (false, false) => vec![Curve::unnamed(line, points)],
-        // Single points have no line between them.
+        // Single points are not joined by lines.
         Line::Discs | Line::Dots => {
             let fold_if = |is_angle: bool, x: f64| if is_angle { fold(x) } else { x };
             vec![Curve::unnamed(line, points.iter().map(|p| (fold_if(angles.0, p.0), fold_if(angles.1, p.1))))]
@@ -148,13 +150,13 @@ fn panel([x, y]: [Quantity<'_>; 2], line: Line, points: Vec<(f64, f64)>) -> Opti
     Some(Panel { x_label, y_label, x, y, legend: (0.0, 1.0), curves, marks: Vec::new() })
 }
 
-/// A linear axis around numbers, from a tick to a tick; none where there are none.
+/// A linear axis that contains the numbers and extends from tick to tick; `None` without numbers.
 fn axis(numbers: impl Iterator<Item = f64>) -> Option<Axis> {
     let (low, high) = numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     if low > high {
         return None;
     }
-    // What does not vary beyond round-off is shown as a line.
+    // Variation of the size of round-off is shown as a constant.
     let least = f64::EPSILON * 1e4 * low.abs().max(high.abs());
     let span = if high - low > least { high - low } else { low.abs().max(1e-12) };
     let rough = span / 5.0;
@@ -173,7 +175,7 @@ fn family(name: &str) -> usize {
     FAMILIES.iter().position(of).unwrap_or(FAMILIES.len() - 1)
 }
 
-/// Of each family the integrators that are its fastest for most errors from 1 to 1e-15, by name.
+/// For each family, the names of the integrators that are its fastest for most errors from 1 to 1e-15.
 fn best_of_families(rows: &[&Work]) -> Vec<String> {
     let mut chosen = Vec::new();
     for (index, (_, most)) in FAMILIES.iter().enumerate() {
@@ -190,7 +192,7 @@ fn best_of_families(rows: &[&Work]) -> Vec<String> {
         counts.sort_by_key(|(name, count)| (std::cmp::Reverse(*count), *name));
         chosen.extend(counts.into_iter().take(*most).map(|(name, _)| name.to_owned()));
     }
-    // gauss_4 before gauss_12.
+    // Sorted by number, so that gauss_4 precedes gauss_12.
     chosen.sort_by_key(|name| {
         let digits = name.len() - name.trim_end_matches(|c: char| c.is_ascii_digit()).len();
         let (stem, number) = name.split_at(name.len() - digits);
@@ -199,7 +201,8 @@ fn best_of_families(rows: &[&Work]) -> Vec<String> {
     chosen
 }
 
-/// The runs that can be drawn, without those that were held up: they say nothing of their integrator, and would set the axis.
+/// The runs that can be drawn, without delayed ones: these say nothing about their integrator and would determine the
+/// range of the axis.
 fn to_draw(comparison: &Comparison) -> Vec<&Work> {
     let shown = |row: &&Work| row.error > 0.0 && row.error.is_finite() && row.seconds > 0.0;
     let rows: Vec<&Work> = comparison.rows.iter().chain(&comparison.peers).filter(shown).collect();
@@ -212,7 +215,7 @@ fn to_draw(comparison: &Comparison) -> Vec<&Work> {
     rows.iter().copied().filter(|row| !held_up(row)).collect()
 }
 
-/// Run time against error, both in powers of ten, of the best integrators of each family and of the peers.
+/// Run time against error, both on logarithmic axes, of the best integrators of each family and of the peers.
 pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
     let rows = to_draw(comparison);
     let is_peer = |name: &str| comparison.peers.iter().any(|row| row.integrator == name);
@@ -248,12 +251,13 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Option<String> {
     }))
 }
 
-/// The curves of a space-time picture, and the most points of each.
+/// The maximal number of curves of a space-time figure, and of points of each.
 const PROFILES: usize = 40;
 const PLACES: usize = 150;
 
-/// The figures of a lattice with their names: the first component of all sites, as a curve at each of some times above each other; and that of three
-/// sites against time. Of several directions the sites are those of the last one, in the middle of the others.
+/// The figures of a lattice with their file names: the first component at all sites, as curves at successive times
+/// above each other, and the same component at three sites against time. For lattices with several directions, the
+/// sites are those along the last direction, in the middle of the others.
 pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String, String)> {
     let (d, length) = (scene.coordinates.len(), scene.sizes.last().copied().unwrap_or(0));
     let strides = (0..scene.sizes.len()).map(|a| scene.sizes.iter().skip(a + 1).product::<usize>());
@@ -270,11 +274,11 @@ pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String
     let stride = rows.len().div_ceil(PROFILES).max(1);
     let chosen: Vec<&Vec<f64>> = rows.iter().step_by(stride).collect();
     let sizes = chosen.iter().flat_map(|row| (0..length).filter_map(|i| value(row, i))).map(|(_, x)| x.abs());
-    let max_abs_or_nan = sizes.fold(0.0, f64::max);
+    let largest = sizes.fold(0.0, f64::max);
     let times: Vec<f64> = chosen.iter().filter_map(|row| row.first().copied()).collect();
-    if let ([start, .., end], true) = (times.as_slice(), max_abs_or_nan > 0.0 && max_abs_or_nan.is_finite()) {
-        // The largest value has the height of two and a half of the distances of curves.
-        let height = 2.5 * (end - start) / (times.len() - 1) as f64 / max_abs_or_nan;
+    if let ([start, .., end], true) = (times.as_slice(), largest > 0.0 && largest.is_finite()) {
+        // The largest value is drawn 2.5 times as high as the distance of two curves.
+        let height = 2.5 * (end - start) / (times.len() - 1) as f64 / largest;
         let every = length.div_ceil(PLACES).max(1);
         let curves: Vec<Curve> = chosen
             .iter()
@@ -321,7 +325,8 @@ mod tests {
         Work { integrator: integrator.into(), order: 2, step_size: 0.1, steps, evaluations: 1, error, seconds }
     }
 
-    /// Of each family its best ones by name, however fast the others are; a run that was held up is not among them.
+    /// The best integrators of each family are chosen by name, even if those of other families are faster; a delayed
+    /// run is left out.
     #[test]
     fn families_and_outliers() {
         let mut rows = Vec::new();
@@ -337,7 +342,7 @@ mod tests {
         rows.push(work("midpoint_by_yoshida_4", 16, 1e-3, 1e-2));
         rows.push(work("strang", 256, 1e-5, 40.0));
         let left_out = Vec::new();
-        // A peer is drawn after all others, whatever its name.
+        // Peers are drawn after all others, whatever their names.
         let peers = (1..=3).map(|k| work("dop853", 8 << k, f64::powi(0.01, k), 1e-4 * f64::from(k))).collect();
         let comparison =
             Comparison { rows, peers, reference: String::new(), reference_error: 1e-15, left_out, ended: false };

@@ -1,4 +1,4 @@
-//! The program: what its commands write, and how they end.
+//! The program: output and exit codes of its commands.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
@@ -13,7 +13,7 @@ use std::path::Path;
 use std::process::Command;
 use support::{Directory, REPOSITORY, column, fail, refuses_each, scene, succeed};
 
-/// x'' = -x + gamma x' in closed form: what the tables say is checked against it.
+/// x'' = -x + gamma x', whose closed-form solution is compared with the tables.
 const OSCILLATOR: &str = r#"
 [system]
 coordinates = ["x"]
@@ -50,27 +50,27 @@ fn rows_and_events_are_those_of_the_motion() {
     for (t, x) in column(&rows, "t").iter().zip(column(&rows, "x")) {
         assert!((x - oscillation(-0.2, *t)).abs() < 1e-9, "{t}: {x}");
     }
-    // A period apart.
+    // Events are one period apart.
     let times = column(&at.read("out/events.csv"), "t");
     let period = std::f64::consts::TAU / f64::sqrt(0.99);
     assert!(times.len() == 4 && times.windows(2).all(|t| (t[1] - t[0] - period).abs() < 1e-9), "{times:?}");
     assert!(at.read("out/columns.svg").contains("<svg"));
-    // A column that is not always a number.
+    // A column that is not finite in some rows.
     let of_column = at.write("column.toml", &OSCILLATOR.replace("\"exp(-gamma*t/2)*x\"", "\"log(x)\""));
     let (code, told) = fail(&["run", &of_column, "--out", &at.path("column")]);
     assert!(code == Some(0) && told.contains("the column `log(x)` is not a finite number in"), "{told}");
-    // A sum of what JSON says.
+    // The summary as JSON.
     let said = succeed(&["run", &file, "--out", &at.path("out"), "--set", "run.time=30", "--json"]);
     let told: serde_json::Value = serde_json::from_str(&said).unwrap();
     assert_eq!((&told["status"], &told["rows"], &told["events"]), (&"completed".into(), &101.into(), &4.into()));
     assert!((told["end"]["x"].as_f64().unwrap() - oscillation(-0.2, 30.0)).abs() < 1e-9);
 }
 
-/// Interrupted runs go on to the last byte, whatever rows they have and wherever they stop.
+/// Interrupted runs that are resumed give the same bytes, for all kinds of rows and wherever they are interrupted.
 #[test]
 fn resumed_runs_are_those_that_were_not_interrupted() {
     let at = Directory::new("resume");
-    // Rows at all steps, too, at some of which the run is interrupted.
+    // Some rows are given by steps, and the run is interrupted at some of them.
     for (i, rows) in ["every = 0.3", "every_step = 7", "every_step = 256", "at = [0.5, 399.9]"].iter().enumerate() {
         let file = at.write(&format!("{i}.toml"), &OSCILLATOR.replace("every = 0.3", rows));
         let (whole, parts) = (format!("whole_{i}"), format!("parts_{i}"));
@@ -81,7 +81,7 @@ fn resumed_runs_are_those_that_were_not_interrupted() {
         assert!(told.contains("--resume"), "{told}");
         let rest = ["run", &file, "--out", &at.path(&parts), "--resume"];
         assert_eq!(fail(&[rest.as_slice(), &["--interrupt-at", "0.7"]].concat()).0, Some(1));
-        // What a program that was killed has written beyond its checkpoint.
+        // Output that a killed program has written after its last checkpoint.
         let written = at.read(&format!("{parts}/rows.csv"));
         at.write(&format!("{parts}/rows.csv"), &(written.clone() + "1.0e0,2.0e"));
         succeed(&rest);
@@ -89,18 +89,18 @@ fn resumed_runs_are_those_that_were_not_interrupted() {
             assert_eq!(at.read(&format!("{whole}/{table}")), at.read(&format!("{parts}/{table}")), "{rows}: {table}");
         }
         assert!(written.len() < at.read(&format!("{whole}/rows.csv")).len() || i == 3);
-        // It has ended: there is nothing to resume.
+        // The run has ended, so that there is nothing to resume.
         let (code, told) = fail(&rest);
         assert!(code == Some(2) && told.contains("there is no interrupted run"), "{told}");
     }
-    // Another scene does not go on with it.
+    // A different scene is not resumed.
     let file = at.path("0.toml");
     fail(&["run", &file, "--out", &at.path("parts_0"), "--interrupt-at", "0.3"]);
     let (code, told) = fail(&["run", &file, "--out", &at.path("parts_0"), "--resume", "--set", "gamma=-0.3"]);
     assert!(code == Some(2) && told.contains("the scene is not the one"), "{told}");
 }
 
-/// A run that was killed goes on from its last checkpoint, to the last byte.
+/// A killed run that is resumed from its last checkpoint gives the same bytes.
 #[test]
 fn killed_runs_go_on_from_their_checkpoint() {
     let at = Directory::new("killed");
@@ -110,7 +110,7 @@ fn killed_runs_go_on_from_their_checkpoint() {
         let (whole, parts) = (at.path(&format!("whole_{i}")), at.path(&format!("parts_{i}")));
         succeed(&["run", &file, "--out", &whole]);
         assert!(!Path::new(&whole).join("checkpoint.json").exists());
-        // One after every few steps takes longer than the steps do.
+        // A checkpoint at every poll takes longer than the steps between polls.
         let mut child = Command::new(env!("CARGO_BIN_EXE_herglotz"))
             .args(["run", &file, "--out", &parts, "--checkpoint-every", "0", "--json"])
             .spawn()
@@ -154,12 +154,12 @@ fn sweeps_do_not_depend_on_threads() {
     for i in 0..6 {
         let expected = start[i] * oscillation(gamma[i], 20.0);
         assert!((x[i] - expected).abs() < 1e-9, "member {i}: {} {expected}", x[i]);
-        // The column has the member's own parameter.
+        // The column is evaluated with the parameters of the member.
         assert!((scaled[i] - x[i] * f64::exp(-gamma[i] * 10.0)).abs() < 1e-12 * scaled[i].abs(), "member {i}");
     }
     assert!(at.read("one/sweep_0.svg").contains("<svg"));
 
-    // x rises through 0 at 3/4 of a period, and then once in each.
+    // x rises through 0 after 3/4 of a period, and then once in each period.
     let events = at.read("one/events.csv");
     assert_eq!(events, at.read("three/events.csv"));
     assert!(events.starts_with("index,gamma,start.x,event,t,x,x',p_x,z\n"), "{events}");
@@ -170,12 +170,12 @@ fn sweeps_do_not_depend_on_threads() {
     }
     assert!(at.read("one/sweep_events_0.svg").contains("<svg"));
 
-    // A terminal one ends its member.
+    // A terminal event ends its member.
     let terminal = OSCILLATOR.replace("\"rising\" }", "\"falling\", terminal = true }");
     let file = at.write("terminal.toml", &terminal);
     let said = succeed(&["sweep", &file, "--out", &at.path("terminal")]);
     assert!(said.starts_with("6 members: 0 completed (0 unresolved), 0 failed, 6 stopped by an event"), "{said}");
-    // The reason has a comma.
+    // The reason contains a comma.
     let table = at.read("terminal/sweep.csv").replace(", in step", " in step");
     for (gamma, t) in column(&table, "gamma").iter().zip(column(&table, "t")) {
         assert!(t < 2.0 && oscillation(*gamma, t).abs() < 1e-9, "{gamma}, {t}: {table}");
@@ -186,7 +186,7 @@ fn sweeps_do_not_depend_on_threads() {
     assert!(code == Some(2) && told.contains("the column `log_factor`"), "{told}");
 }
 
-/// A member that fails is a row with its status, and the others are there.
+/// A member that fails has a row with its status, and the others are complete.
 #[test]
 fn members_that_fail_are_rows() {
     let at = Directory::new("fail");
@@ -202,13 +202,13 @@ fn members_that_fail_are_rows() {
 #[test]
 fn endings_are_told_by_the_code() {
     let at = Directory::new("codes");
-    // The motion leaves the domain of its Lagrangian: 1.
+    // The motion leaves the domain of its Lagrangian: exit code 1.
     let file = at.write("fall.toml", &OSCILLATOR.replace("- x^2/2", "- sqrt(x)"));
     let (code, told) = fail(&["run", &file, "--out", &at.path("out")]);
     assert!(code == Some(1) && told.contains("failed in step"), "{told}");
-    // What was recorded before is there.
+    // The rows before the failure are in the file.
     assert!(at.read("out/rows.csv").lines().count() > 2);
-    // Input: 2, with file, line and column.
+    // Invalid input: exit code 2, with file, line and column.
     let file = at.write("bad.toml", &OSCILLATOR.replace("x^2/2", "y^2/2"));
     let (code, told) = fail(&["run", &file, "--out", &at.path("out")]);
     assert!(code == Some(2) && told.contains(&format!("{file}, line 4, column 24: unknown name `y`")), "{told}");
@@ -216,7 +216,7 @@ fn endings_are_told_by_the_code() {
         assert_eq!(fail(&arguments).0, Some(2), "{arguments:?}");
     }
     assert!(fail(&["new", "keplr"]).1.contains("did you mean \"kepler\"?"));
-    // A terminal event ends a run well.
+    // A run that a terminal event ends is successful.
     let said = succeed(&["run", &scene("landing"), "--out", &at.path("landing")]);
     assert!(said.starts_with("stopped by an event at t = 2.60"), "{said}");
 }
@@ -245,7 +245,7 @@ fn lists_templates_and_completions_are_complete() {
     let at = Directory::new("new");
     for system in systems.as_array().unwrap() {
         let name = system["name"].as_str().unwrap();
-        // A template is a scene that can run.
+        // A template is a scene that can be run.
         let file = at.write(&format!("{name}.toml"), &succeed(&["new", name]));
         assert!(succeed(&["plan", &file]).contains("steps"), "{name}");
     }
@@ -255,7 +255,7 @@ fn lists_templates_and_completions_are_complete() {
     assert!(succeed(&["schema"]).contains("every_step"));
 }
 
-/// All scenes of the repository run; each has its picture in the documents.
+/// All scenes of the repository run, and each has its figure in the documentation.
 #[test]
 fn scenes_run() {
     let at = Directory::new("scenes");
@@ -279,7 +279,8 @@ fn scenes_run() {
         names.push(name);
     }
     assert_eq!(names.len(), 13, "{names:?}");
-    // What two of them are about: a momentum that decays as the conformal factor, and a factor in closed form.
+    // The results of two scenes: a momentum that decays with the conformal factor, and a conformal factor in closed
+    // form.
     let kept = column(&at.read("kepler/rows.csv"), "exp(-gamma*t)*(x*y' - y*x')");
     assert!(kept.iter().all(|x| (x - 1.1).abs() < 1e-10));
     let field = at.read("field/rows.csv");
@@ -288,7 +289,7 @@ fn scenes_run() {
     }
 }
 
-/// Where the integrators are compared, each error has its best one, and shorter steps have smaller errors.
+/// A comparison names the best integrator for each error, and shorter steps have smaller errors.
 #[test]
 fn comparisons_name_the_best() {
     let at = Directory::new("compare");
@@ -303,10 +304,10 @@ fn comparisons_name_the_best() {
     };
     let errors = of("midpoint,");
     assert!(errors.len() > 2 && errors[0] > 10.0 * errors[errors.len() - 1], "{errors:?}");
-    // The figure has those near the best.
+    // The figure shows the best integrators.
     let picture = at.read("out/compare.svg");
     assert!(!of("gauss_8,").is_empty() && picture.contains("gauss_"));
-    // A peer is measured in the same way, and is not one of those that a scene can name.
+    // A peer is measured in the same way, but cannot be named in a scene.
     let errors = of("dop853,");
     assert!(
         picture.contains(">dop853<") && errors.len() > 5 && errors[0] > 1e3 * errors[errors.len() - 1],
@@ -336,7 +337,8 @@ step = 0.05
 every = 1.0
 "#;
 
-/// A lattice: its rows are those of a normal mode, it is drawn, and is told; what is not for lattices says so.
+/// A lattice: its rows are those of a normal mode, and its figures and its summary are written. Commands that do not
+/// apply to lattices are refused.
 #[test]
 fn a_lattice_runs() {
     let at = Directory::new("lattice");
@@ -348,7 +350,7 @@ fn a_lattice_runs() {
     );
     let rows = at.read("out/rows.csv");
     assert!(rows.starts_with("t,x[0][0],x[0][1],"), "{rows}");
-    // Of the frequency of a mode in each direction.
+    // From the frequencies of the mode along each direction.
     let half = |k: f64| 4.0 * (0.5 * k).sin().powi(2);
     let pi = std::f64::consts::PI;
     let omega = (half(pi / 3.0) + half(pi / 21.0) - 0.0025f64).sqrt();
@@ -357,7 +359,7 @@ fn a_lattice_runs() {
     assert_eq!(t, [0.0, 1.0, 2.0, 3.0]);
     for (t, x) in t.iter().zip(x) {
         let expected = shape * (-0.05 * t).exp() * ((omega * t).cos() + 0.05 / omega * (omega * t).sin());
-        // Steps of order 6 of a hundredth of the period.
+        // A method of order 6 with steps of a hundredth of the period.
         assert!((x - expected).abs() < 1e-10, "{x} for {expected} at {t}");
     }
     for figure in ["space-time.svg", "sites.svg"] {
@@ -372,7 +374,7 @@ fn a_lattice_runs() {
     assert!(code == Some(2) && said.contains("--set"), "{said}");
 }
 
-/// What is wrong with a scene of a lattice is said with its place.
+/// Errors of a lattice scene are reported with their position.
 #[test]
 fn wrong_lattices_are_refused() {
     let changes = [
@@ -402,12 +404,12 @@ fn wrong_lattices_are_refused() {
     ];
     refuses_each(LATTICE, &changes, |text| match herglotz::LatticeScene::read(text) {
         Err(error) => Some(error.to_string()),
-        // What is seen when it is run.
+        // Errors that are found when the lattice is run.
         Ok(scene) => scene.system.run(&scene.motion, &mut ()).err().map(|error| scene.explain(&error).to_string()),
     });
 }
 
-/// A coordinate that is small and becomes fast counts where the scene gives its size.
+/// A small coordinate that grows quickly is resolved where the scene gives its scale.
 #[test]
 fn coordinates_have_scales() {
     const SCENE: &str = r#"[system]

@@ -1,4 +1,4 @@
-//! Scene files as they are read: what is said of bad ones, and that none, however mangled, does harm.
+//! Reading scene files: messages for invalid ones, and robustness against random changes.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
@@ -53,7 +53,7 @@ start.x = [1, 2]
 "start.p_u[1]" = { from = 1, to = 100, count = 3, spacing = "log" }
 "#;
 
-/// What is changed in a good scene, from and to.
+/// Changes that make a valid scene invalid, from and to.
 const BAD: [(&str, &str); 57] = [
     // Names.
     ("cos(theta)", "cos(teta)"),
@@ -75,7 +75,7 @@ const BAD: [(&str, &str); 57] = [
     ("\"rising\"", "\"risng\""),
     ("accuracy = 1e-10", "integrator = \"gaus_12\"\nstep = 0.1"),
     ("accuracy = 1e-10", "integrator = \"runge_kutta\"\nstep = 0.1"),
-    // What is missing.
+    // Missing entries.
     ("theta = 1.0\n", ""),
     ("\"theta'\" = 0.0\n", ""),
     ("[start]\ntheta = 1.0\n\"theta'\" = 0.0\n", ""),
@@ -88,7 +88,7 @@ const BAD: [(&str, &str); 57] = [
     ("accuracy = 1e-10", "integrator = \"gauss_8\""),
     ("accuracy = 1e-10", "step = 0.1"),
     ("count = 101", "cont = 101"),
-    // Too much, or what does not fit.
+    // Superfluous or inconsistent entries.
     ("accuracy = 1e-10", "accuracy = 1e-10\nstep = 0.1"),
     ("accuracy = 1e-10", "integrator = \"gauss_8\"\nstep = 0.1\nsteps = 10"),
     ("\"theta'\" = 0.0", "\"theta'\" = 0.0\np_theta = 0.0"),
@@ -115,14 +115,14 @@ const BAD: [(&str, &str); 57] = [
     ("count = 101", "count = 10000000000"),
     ("count = 101", "count = 101, spacing = \"log\""),
     ("[system]", "version = 2\nnew = \"thing\"\n[system]"),
-    // What the system does not let be done.
+    // Integrators that do not apply to the system.
     ("accuracy = 1e-10", "integrator = \"transformed_gauss_8\"\nstep = 0.1"),
 ];
 
-/// What no splitting can run.
+/// A kinetic term that no splitting can integrate.
 const COUPLED: &str = "theta'^2*(2 + cos(theta))";
 
-/// The same, for what shows when the motion is planned.
+/// Changes whose errors are found when the motion is planned.
 const BAD_MOTIONS: [(&str, &str); 4] = [
     ("theta'^2/2 + cos(theta)", "theta' + cos(theta)"),
     ("cos(theta)", "1/(theta - 1)"),
@@ -135,7 +135,7 @@ fn changed((from, to): (&str, &str)) -> String {
     GOOD.replacen(from, to, 1)
 }
 
-/// The scene; an error with a name of a file.
+/// Reads a scene; errors have the name of a file.
 fn read(text: &str) -> Result<Scene, SceneError> {
     Scene::read(text).map_err(|error| error.in_file("scene.toml"))
 }
@@ -162,7 +162,7 @@ fn bad_input_is_told_with_its_place_and_a_remedy() {
         let error = Scene::read_with(GOOD, &[change.to_owned()]).err().unwrap();
         told += &format!("--set {change}\n{error}\n\n");
     }
-    // Round-off depends on the instructions of the processor.
+    // Round-off depends on the instruction set of the processor.
     if let Some((before, (_, after))) =
         told.split_once("trial runs agree to ").and_then(|(a, b)| Some((a, b.split_once(')')?)))
     {
@@ -175,7 +175,7 @@ fn bad_input_is_told_with_its_place_and_a_remedy() {
     }
 }
 
-/// A motion to the time at which it starts has the start as its one row, whatever the rows.
+/// A motion whose end is its start has the start as its only row, for all kinds of rows.
 #[test]
 fn a_motion_to_its_start_has_one_row() {
     let given = r#"every = 0.1, columns = ["t", "theta", "theta'", "z", "energy", "exp(-0.1*t)*theta"]"#;
@@ -204,7 +204,7 @@ fn a_scene_is_what_it_says() {
     assert_eq!(motion.start.rate, InitialVelocity::Momentum(vec![0.25, -1.0, 3.0]));
     let (members, close) = (scene.members(), |a: f64, b: f64| (a - b).abs() < 1e-12 * b.abs());
     assert_eq!(members.count(), 6);
-    // The last one changes first.
+    // The last swept quantity varies fastest.
     assert_eq!((members.values(0), members.values(2), members.values(3)[0]), (vec![1.0, 1.0], vec![1.0, 100.0], 2.0));
     assert!(close(members.values(4)[1], 10.0), "{:?}", members.values(4));
     let start = members.start(5);
@@ -221,7 +221,7 @@ fn changes_are_those_of_the_file() {
     assert_ne!(set.fingerprint(), read(GOOD).unwrap().fingerprint());
 }
 
-/// All values of the run can be changed; an accuracy and steps replace each other.
+/// All values of the run can be overridden; an accuracy and steps replace each other.
 #[test]
 fn changes_of_the_run() {
     let set = |changes: &[&str]| Scene::read_with(GOOD, &changes.iter().map(|c| (*c).to_owned()).collect::<Vec<_>>());
@@ -250,18 +250,18 @@ fn changes_of_the_run() {
     }
 }
 
-/// A number for an array is that of all its entries.
+/// One number for an array is the value of all its entries.
 #[test]
 fn one_number_for_all_entries() {
     let one = SEVERAL.replace("u = [1, 2.5]", "u = 2.5").replace("p_u = [0.25, -1]", "p_u = -1");
     let (one, all) = (read(&one).unwrap(), SEVERAL.replace("[1, 2.5]", "[2.5, 2.5]").replace("[0.25, -1]", "[-1, -1]"));
     assert_eq!(one.motion().start, read(&all).unwrap().motion().start);
-    // A list is as long as the array, and a coordinate by itself has none.
+    // A list must be as long as the array, and a single coordinate takes no list.
     assert!(read(&SEVERAL.replace("u = [1, 2.5]", "u = [1]")).is_err());
     assert!(read(&SEVERAL.replace("x = 0.5", "x = [0.5]")).is_err());
 }
 
-/// A parameter that is nowhere is misspelt; one that only a column or an event has is not.
+/// A parameter that is used nowhere is reported as misspelt; one that is used only in a column or an event is accepted.
 #[test]
 fn parameters_that_are_nowhere_are_refused() {
     let with = |parameters: &str| changed(("gamma = -0.1 }", parameters));
@@ -270,7 +270,7 @@ fn parameters_that_are_nowhere_are_refused() {
     assert!(told.contains("line 4") && told.contains("`gama`") && told.contains("did you mean `gamma`?"), "{told}");
     let told = read(&with("gamma = -0.1, level = 1.0 }")).err().unwrap().to_string();
     assert!(told.contains("there are gamma"), "{told}");
-    // In a longer name it is not.
+    // A parameter whose name is only part of a longer name is unused.
     let levels = with("gamma = -0.1, level = 1.0, levels = 2.0 }").replace("exp(-0.1*t)*theta", "levels*theta");
     assert!(read(&levels).err().unwrap().to_string().contains("`level`"));
     for (from, to) in [("exp(-0.1*t)*theta", "a = level; a*theta"), ("when = \"theta\"", "when = \"theta - level\"")] {
@@ -278,7 +278,7 @@ fn parameters_that_are_nowhere_are_refused() {
     }
 }
 
-/// Energy, momenta and conformal factor are names in columns and events.
+/// Energy, momenta and conformal factor can be used in columns and events.
 #[test]
 fn quantities_in_columns_and_events() {
     let quantities = changed(("exp(-0.1*t)*theta", "E = energy/sigma; E - p_theta^2"));
@@ -355,11 +355,13 @@ const VALUES: [&str; 12] = [
     "{ from = 1, to = 2, count = 1000000 }",
 ];
 
-/// Changes good scenes, and reads them: a scene or an error of readable length. How many are scenes.
+/// Changes valid scenes at random and reads them: each gives a scene or an error of moderate length. Returns the number
+/// of valid scenes.
 fn attack(seed: u64, count: usize) -> usize {
     let (mut random, mut good) = (Random(seed), 0);
     for k in 0..count {
-        // Half of them lose a line, or have one of the other or a value of their own elsewhere, so that most are read beyond the syntax.
+        // In half of the cases a line is removed, inserted from the other scene, or given another value, so that most
+        // of these pass the TOML reader.
         let mut lines: Vec<&str> = [GOOD, SEVERAL][k % 2].lines().collect();
         let others: Vec<&str> = [SEVERAL, GOOD][k % 2].lines().collect();
         let (line, other) = (random.below(lines.len()), random.below(others.len()));
@@ -401,11 +403,11 @@ fn attack(seed: u64, count: usize) -> usize {
 #[test]
 fn changes_of_good_scenes_do_no_harm() {
     let good = attack(0x9e37_79b9_7f4a_7c15, 10_000);
-    // Neither all nor none are refused.
+    // Some are accepted and some are refused.
     assert!((500..9_000).contains(&good), "{good}");
 }
 
-/// The same a million times: `cargo test --release -p herglotz --test scenes -- --ignored`.
+/// The same with a million changes: `cargo test --release -p herglotz --test scenes -- --ignored`.
 #[test]
 #[ignore = "takes a minute"]
 fn a_million_changes_of_good_scenes_do_no_harm() {

@@ -1,10 +1,11 @@
-//! The program `work_precision` as it is run: its tests of parts compile no integrator.
+//! Runs the program `work_precision` as a whole. Its unit tests use no integrator of the library.
 
-#![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
+#![allow(clippy::unwrap_used)] // Tests may unwrap, in helpers too.
 
 use std::process::Command;
 
-/// The midpoint rule on P6, with the action or without (P6 needs it): of second order, and as many steps as the step says.
+/// The midpoint rule on P6, which can be solved only with the action: the error is of second order, and the number of
+/// steps is the duration over the step.
 #[test]
 fn the_midpoint_rule_is_of_second_order() {
     let out = std::env::temp_dir().join(format!("work_precision_{}", std::process::id()));
@@ -23,7 +24,7 @@ fn the_midpoint_rule_is_of_second_order() {
     let rows: Vec<[f64; 4]> =
         lines.map(|line| [h, steps, evaluations, error].map(|i| line[i].parse().unwrap())).collect();
     for [h, steps, evaluations, _] in &rows {
-        // At least one iteration a step, and the jet after it; P6 ends at t = 100.
+        // Each step takes at least one iteration and one evaluation of the jet after it. P6 ends at t = 100.
         assert!(h * steps == 100.0 && *evaluations >= 2.0 * steps, "{h} {steps} {evaluations}");
     }
     let resolved: Vec<_> = rows.iter().filter(|row| (1e-8..1e-3).contains(&row[3])).collect();

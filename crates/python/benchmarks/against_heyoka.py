@@ -1,15 +1,16 @@
-"""Motions from Python beside heyoka's, in one run: warm, cold, the overhead of a call, the time to import, the size of the wheel.
+"""Motions from Python compared with heyoka: warm and cold run times, call overhead, import time, size of the wheel.
 
     python benchmarks/against_heyoka.py [WHEEL]
 
-OutputRequest heyoka beside herglotz. The motions are (T is the end, z is carried along):
+Needs heyoka in addition to herglotz. The motions are (T is the final time, z is integrated along):
 
     P2   v^2/2 - 1 + cos q - 0.01 z      q = 1, v = 1   T = 1000
     P6   v^2/2 - q^2/2 - 0.05 z^2        q = 1, v = 0, z = 1   T = 100
 
-Cold is the time from the definition to the end of the first run, once by an accuracy, which is found by trial_runs runs, and once by given
-steps that reach it. Warm is the cheapest way to an error of (q, v) at the end, relative to its size there: of both a list of settings is run. The reference
-is heyoka's with its smallest tolerance.
+Cold is the time from the definition to the end of the first run: once with a requested accuracy, for which trial runs
+find the step, and once with given steps that reach it. Warm is the fastest way to an error of (q, v) at the end,
+relative to its size there; both libraries run a list of settings. The reference is a run of heyoka with its smallest
+tolerance.
 """
 
 import os
@@ -83,7 +84,7 @@ def of_herglotz(name, integrator, steps):
 
 
 def cheapest(runs, reference, level):
-    """The fastest of some runs that are within an error: its median time, its settings, and the run."""
+    """The fastest of the runs whose error is within a bound: its median time, its settings, and the run."""
     best = None
     for settings, run in runs:
         found = run()
@@ -95,7 +96,7 @@ def cheapest(runs, reference, level):
 
 
 def beside(their, our, rounds=25):
-    """The median times of two runs that take turns, and that of their ratios: a processor that changes its pace does it to both."""
+    """The median times of two alternating runs, and of their ratio, insensitive to changes of clock frequency."""
     times = np.array([[median(run, least=0.02) for run in (their, our)] for _ in range(rounds)])
     return *np.median(times, axis=0), float(np.median(times[:, 1] / times[:, 0]))
 
@@ -152,7 +153,7 @@ print(time.perf_counter() - middle)
 
 
 def in_a_process(code, count=5):
-    """The median of the number that a program prints, each time in a process of its own."""
+    """The median of the numbers that a program prints, each in a process of its own."""
     found = [
         float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
         for _ in range(count)
@@ -174,7 +175,7 @@ def cold():
 
 
 def overhead():
-    """A call of `solve`, less the run itself: of one step, which both have."""
+    """The time of a call of `solve` with one step, minus that of the run itself."""
     import herglotz as hz
     from herglotz import _core
 

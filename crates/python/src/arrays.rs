@@ -1,4 +1,4 @@
-//! Numbers from Python and back, with the name of the argument in what is said of them.
+//! Conversion of numbers between Python and Rust; errors name the argument.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -21,7 +21,8 @@ pub fn number(name: &str, from: &Bound<'_, PyAny>) -> PyResult<f64> {
     if x.is_finite() { Ok(x) } else { Err(wrong()) }
 }
 
-/// The integer of an argument, at least so large: a whole number of floating point is none, and is told how it is written.
+/// The integer of an argument, at least `least`. A float is refused; where it is a whole number, the error says how to
+/// write it.
 pub fn whole(name: &str, from: &Bound<'_, PyAny>, least: usize) -> PyResult<usize> {
     let wrong = |instead: String| {
         value_error(format!("`{name}` is {}, where an integer of at least {least} is needed{instead}", shown(from)))
@@ -33,29 +34,29 @@ pub fn whole(name: &str, from: &Bound<'_, PyAny>, least: usize) -> PyResult<usiz
     if let Ok(found) = from.extract::<usize>() {
         return if found >= least { Ok(found) } else { Err(wrong(String::new())) };
     }
-    // Whatever is an integer, and too large or negative.
+    // Integers that are too large or negative, and everything that is not an integer.
     match from.extract::<f64>() {
         Ok(x) if x.fract() == 0.0 && x >= least as f64 && x <= 1e15 => Err(wrong(format!(": write {x}"))),
         _ => Err(wrong(String::new())),
     }
 }
 
-/// The text of an argument.
+/// The string of an argument.
 pub fn word(name: &str, from: &Bound<'_, PyAny>, example: &str) -> PyResult<String> {
     from.extract()
         .map_err(|_| value_error(format!("`{name}` is {}, where a text is needed, as {example}", shown(from))))
 }
 
-/// An object in an error, cut where it is long.
+/// The representation of an object for an error message, truncated where it is long.
 pub fn shown(from: &Bound<'_, PyAny>) -> String {
     const LONGEST: usize = 60;
     let text = from.repr().map_or_else(|_| "an object".to_owned(), |text| text.to_string());
     if text.chars().count() <= LONGEST { text } else { text.chars().take(LONGEST).chain("...".chars()).collect() }
 }
 
-/// The finite numbers of an argument of one dimension; a single number is one of length 1.
+/// The finite numbers of a one-dimensional argument; a single number gives a vector of length 1.
 pub fn numbers(name: &str, from: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    // What is written out is read at once; NumPy reads the rest.
+    // Floats, lists and tuples are read directly; NumPy converts everything else.
     if from.is_instance_of::<PyFloat>() {
         return Ok(vec![number(name, from)?]);
     }
@@ -99,7 +100,7 @@ fn finite(name: &str, numbers: &[f64]) -> PyResult<()> {
     }
 }
 
-/// The numbers of an array of any shape, in the order of C.
+/// The numbers of an array of any shape, in C order.
 fn array(name: &str, from: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)> {
     if let Ok(array) = from.extract::<PyReadonlyArrayDyn<'_, f64>>() {
         let shape = array.shape().to_vec();
@@ -119,7 +120,7 @@ fn array(name: &str, from: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)
     Ok((array.shape().to_vec(), array.as_array().iter().copied().collect()))
 }
 
-/// The finite numbers of an argument of two dimensions with so many columns, and the number of its rows.
+/// The finite numbers of a two-dimensional argument with this number of columns, and the number of its rows.
 pub fn table(name: &str, from: &Bound<'_, PyAny>, columns: usize) -> PyResult<(usize, Vec<f64>)> {
     let (shape, found) = array(name, from)?;
     match shape.as_slice() {
@@ -133,12 +134,12 @@ pub fn table(name: &str, from: &Bound<'_, PyAny>, columns: usize) -> PyResult<(u
     }
 }
 
-/// A vector as an array, without a copy.
+/// A vector as a NumPy array, without a copy.
 pub fn vector(py: Python<'_>, numbers: Vec<f64>) -> Py<PyArray1<f64>> {
     PyArray1::from_vec(py, numbers).unbind()
 }
 
-/// Rows one after the other as a matrix, without a copy.
+/// Consecutive rows as a NumPy matrix, without a copy.
 pub fn matrix(py: Python<'_>, numbers: Vec<f64>, columns: usize) -> PyResult<Py<PyArray2<f64>>> {
     let rows = numbers.len() / columns.max(1);
     Ok(PyArray1::from_vec(py, numbers).reshape([rows, columns])?.unbind())

@@ -10,8 +10,8 @@ use runtime_herglotz::{
     Start, Steps,
 };
 
-/// What is asked of a motion: q0, v0 or p0 without their shape and whether it is p0, z0; t; every; integrator, step, steps; and whether the
-/// conformal factor is asked for.
+/// The arguments of a motion: q0, v0 or p0 as flat arrays, whether it is p0, and z0; t; every; integrator, step, steps;
+/// and whether the conformal factor is requested.
 type Request<'py> = (
     (Bound<'py, PyAny>, Bound<'py, PyAny>, bool, Bound<'py, PyAny>),
     Bound<'py, PyAny>,
@@ -52,7 +52,7 @@ pub fn run_lattice(
     run(py, request, || lattice.system())
 }
 
-/// Runs a motion, with the interpreter left to other threads.
+/// Runs a motion with the interpreter lock released.
 fn run(
     py: Python<'_>,
     request: Request<'_>,

@@ -6,7 +6,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::pyclass::CompareOp;
 
-/// What is known of a condition.
+/// A condition, reduced to `<`, `not` and `and`.
 #[derive(Clone)]
 enum Kind {
     Less(Id, Id),
@@ -81,7 +81,7 @@ impl Condition {
         self.with(not(and(not(self.kind.clone()), not(other.kind.clone()))))
     }
 
-    /// `then` where it holds, else `otherwise`.
+    /// `then` where the condition holds, else `otherwise`.
     fn choose(&self, then: &Bound<'_, PyAny>, otherwise: &Bound<'_, PyAny>) -> PyResult<Symbol> {
         let node = |x: &Bound<'_, PyAny>| match self.of.operand(x)? {
             Operand::Node(id) => Ok(id),

@@ -1,4 +1,4 @@
-//! Whether a map of (q, p, z) is contact.
+//! The check whether a map of (q, p, z) is a contact transformation.
 
 use crate::arrays::{matrix, number, numbers, value_error, vector};
 use contact_geom::nalgebra::{DMatrix, SVector};
@@ -10,7 +10,8 @@ use runtime_herglotz::Formula;
 /// The conformal factor, the defect, the image and the Jacobian.
 type Found = (f64, f64, Py<PyArray1<f64>>, Py<PyArray2<f64>>);
 
-/// The pullback of `dz - p dq` by a map at a point, where the components of the map are formulas of q, p (as the velocities) and z.
+/// The pullback of `dz - p dq` by a map at a point, where the components of the map are formulas in q, p (in place of
+/// the velocities) and z.
 #[pyfunction]
 pub fn conformality(
     py: Python<'_>,

@@ -1,4 +1,4 @@
-//! States of a motion at any time.
+//! Dense output: states of a motion at any time.
 
 use crate::arrays::{matrix, numbers, value_error, vector};
 use crate::motion::{Motion, columns};
@@ -20,7 +20,7 @@ struct Nodes {
 
 struct Keeps {
     nodes: Nodes,
-    /// The time beyond which no node is needed, and whether one is there.
+    /// The time beyond which no node is needed, and whether it has been reached.
     until: f64,
     done: bool,
     signals: Signals,
@@ -45,13 +45,13 @@ impl RunMonitor for Keeps {
     }
 }
 
-/// A motion at any time: by the node before it, and the step from there.
+/// Dense output of a motion: a state is computed by a step from the node before it.
 #[pyclass(frozen, module = "herglotz._core")]
 pub struct Dense {
     system: runtime_herglotz::System,
     by: AnyIntegrator,
     nodes: Nodes,
-    /// The end of the motion, which may lie in a step that could not be taken as a whole.
+    /// The end of the motion, which may lie within a step that could not be completed.
     until: f64,
 }
 
@@ -59,7 +59,7 @@ pub struct Dense {
 type States =
     (Py<PyArray2<f64>>, Py<PyArray2<f64>>, Py<PyArray2<f64>>, Py<PyArray1<f64>>, Py<PyArray1<f64>>, Py<PyArray2<f64>>);
 
-/// Runs a motion up to a time again and keeps the ends of its steps.
+/// Runs a motion again up to a time, and keeps the ends of its steps.
 #[pyfunction]
 pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
     let signals = motion.signals.clone();
@@ -72,7 +72,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
         };
         let Ok(by) = by else { return Ok(None) };
         let again = runtime_herglotz::Motion {
-            // Of a motion that ends where it starts there is no step.
+            // A motion whose end is its start has no step.
             way: StepControl::Steps { by, steps: Steps::Count(plan.steps.max(1)) },
             rows: None,
             columns: Vec::new(),
@@ -93,7 +93,7 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
 }
 
 impl Dense {
-    /// The rows at some times within one step, in its direction.
+    /// The rows at times within one step, in the direction of the motion.
     fn within(&self, k: usize, times: Vec<f64>, all: &[Column]) -> PyResult<Vec<Vec<f64>>> {
         let (n, Nodes { t, q, v, p, z }) = (self.system.dimension(), &self.nodes);
         let part = |x: &[f64]| x.get(k * n..(k + 1) * n).unwrap_or_default().to_vec();
@@ -116,7 +116,7 @@ impl Dense {
 
 #[pymethods]
 impl Dense {
-    /// The states at some times, in any order, with the values of expressions there.
+    /// The states at given times, in any order, with the values of expressions there.
     fn at(&self, py: Python<'_>, t: &Bound<'_, PyAny>, expressions: Vec<String>) -> PyResult<States> {
         let (n, times) = (self.system.dimension(), numbers("t", t)?);
         let nodes = self.nodes.t.as_slice();
@@ -125,7 +125,7 @@ impl Dense {
         };
         let sign = if self.until < first { -1.0 } else { 1.0 };
         let last = if sign * last < sign * self.until { self.until } else { last };
-        // The time of the end is rounded by the sum of the steps, and by the caller's own arithmetic.
+        // The final time is rounded by the sum of the steps, and by the arithmetic of the caller.
         let rounding = 4.0 * f64::EPSILON * (first.abs() + last.abs());
         let nearest = |t: f64| match (first - t, t - last) {
             (before, _) if sign * before > 0.0 && before.abs() <= rounding => first,
@@ -148,7 +148,7 @@ impl Dense {
         let mut found = vec![f64::NAN; times.len() * width];
         let mut rest = order.as_slice();
         while let Some(&(t, _)) = rest.first() {
-            // The step that ends there, or has it inside.
+            // The step that contains the time, or ends at it.
             py.check_signals()?;
             let k = nodes.partition_point(|node| sign * node < sign * t).saturating_sub(1);
             let end = nodes.get(k + 1).copied().unwrap_or(last);

@@ -1,4 +1,4 @@
-//! Many motions of one formula.
+//! Ensembles: many motions of one formula.
 
 use crate::arrays::{matrix, number, numbers, table, value_error, vector, whole};
 use crate::motion::{self, GivenEvent, GivenWay};
@@ -14,10 +14,10 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Keeps the members' ends, or their rows.
+/// Stores the final states of the members, or their rows.
 struct Kept {
     n: usize,
-    /// The rows of each member, where they are more than the end.
+    /// The number of rows of each member, where rows are requested.
     rows: Option<usize>,
     extra: usize,
     parts: [Vec<f64>; 5],
@@ -26,7 +26,7 @@ struct Kept {
     success: Vec<bool>,
     troubles: Vec<(usize, String)>,
     crossings: Vec<(usize, Crossing)>,
-    /// Whether a signal's handler has raised something.
+    /// Whether a signal handler has raised an exception.
     ended: Arc<AtomicBool>,
 }
 
@@ -43,7 +43,7 @@ impl Kept {
 }
 
 impl Kept {
-    /// Adds the members that an interruption has left out.
+    /// Adds the members that were not started because of an interruption.
     fn fill(&mut self, count: usize) {
         while self.success.len() < count {
             let index = self.success.len();
@@ -66,7 +66,7 @@ impl EnsembleMonitor for Kept {
             Err(cause) => Some(in_words(cause)),
             Ok(end) => match (&end.status, &end.unresolved) {
                 (Status::Stopped { by: INTERRUPTION, t, .. }, _) => Some(format!("interrupted at t = {t}")),
-                // A terminal event is what was asked for.
+                // A terminal event is a regular end.
                 (Status::Completed | Status::Stopped { .. }, unresolved) => {
                     unresolved.map(|unresolved| unresolved.to_string())
                 }
@@ -92,7 +92,7 @@ impl EnsembleMonitor for Kept {
                 }
             }
         }
-        // Those that are done are handed on to the last.
+        // An interruption is polled elsewhere: all members that have ended are stored.
         ControlFlow::Continue(())
     }
 
@@ -106,10 +106,10 @@ impl EnsembleMonitor for Kept {
     }
 }
 
-/// The member, the index of the event, t, q, v, p and z.
+/// The index of the member, the index of the event, t, q, v, p and z.
 type Found = (usize, usize, f64, Vec<f64>, Vec<f64>, Vec<f64>, f64);
 
-/// Many motions at their ends, or by rows one after the other.
+/// The final states of many motions, or their rows one after the other.
 #[pyclass(frozen, get_all, module = "herglotz._core")]
 pub struct EnsembleRecord {
     t: Py<PyArray1<f64>>,
@@ -120,18 +120,18 @@ pub struct EnsembleRecord {
     columns: Option<Py<PyArray2<f64>>>,
     steps: Py<PyArray1<i64>>,
     success: Py<PyArray1<bool>>,
-    /// What went wrong, by the index of the member.
+    /// Errors and warnings, by the index of the member.
     troubles: Vec<(usize, String)>,
-    /// What the events have found: the member, the index of the event, t, q, v, p and z.
+    /// The sign changes of events: the member, the index of the event, t, q, v, p and z.
     crossings: Vec<Found>,
     /// The times of the rows.
     times: Option<Py<PyArray1<f64>>>,
     batch_kernel: usize,
-    /// What a signal's handler has raised.
+    /// The exception that a signal handler has raised.
     interrupted: Option<Py<PyAny>>,
 }
 
-/// Runs an ensemble, with the interpreter left to other threads.
+/// Runs an ensemble with the interpreter lock released.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are those of `ensemble`, which names them")]
 pub fn run_ensemble(
@@ -218,7 +218,7 @@ pub fn run_ensemble(
     };
     let (tally, raised) = heard(py, run)?;
     let tally = match tally {
-        // Nothing had begun.
+        // The ensemble was interrupted before it began.
         Err(_) if raised.is_some() => Tally::default(),
         tally => tally.map_err(value_error)?,
     };

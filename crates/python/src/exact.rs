@@ -10,7 +10,7 @@ use discrete_herglotz::DiscreteLagrangian;
 use formula_lagrangian::Formula;
 use pyo3::prelude::*;
 
-/// What is computed of points.
+/// The map or function to be evaluated.
 #[derive(Clone, Copy, PartialEq)]
 enum What {
     Exponential,
@@ -18,7 +18,7 @@ enum What {
     Lagrangian,
 }
 
-/// A time, two vectors and an action, checked.
+/// A time, two vectors and an action, validated.
 struct At {
     h: f64,
     t: f64,
@@ -31,7 +31,7 @@ struct At {
 type Found = (Vec<Vec<f64>>, Vec<f64>);
 
 fn found<const N: usize>(formula: &Formula, what: What, at: &At) -> PyResult<Found> {
-    // What is beyond the coordinates of the formula stays at rest, and is not seen.
+    // The additional coordinates of a larger dimension are at rest and not visible.
     let n = formula.dimension();
     let vector = |x: &[f64]| SVector::<f64, N>::from_fn(|i, _| x.get(i).copied().unwrap_or(0.0));
     let list = |x: &SVector<f64, N>| x.iter().take(n).copied().collect::<Vec<f64>>();
@@ -82,13 +82,14 @@ fn of_system(
     })?
 }
 
-/// The position after a time h, and the smallest singular value of its derivative by the velocity.
+/// The position after a time h, and the smallest singular value of its derivative with respect to the velocity.
 #[pyfunction]
 pub fn exponential(py: Python<'_>, system: &System, arguments: [Bound<'_, PyAny>; 5]) -> PyResult<Found> {
     of_system(py, system, What::Exponential, ["q0", "v0"], arguments)
 }
 
-/// The velocities of the motion between two points, its end's action, its own action and conformal factor.
+/// The velocities at both ends of the motion between two points, the action at its end, and the action and the
+/// conformal factor of the motion.
 #[pyfunction]
 pub fn retract(py: Python<'_>, system: &System, arguments: [Bound<'_, PyAny>; 5]) -> PyResult<Found> {
     of_system(py, system, What::Retraction, ["q0", "q1"], arguments)

@@ -1,5 +1,5 @@
-//! The extension module below the Python package `herglotz`: what is named with an underscore there, checked and documented by the
-//! package's own files.
+//! The extension module of the Python package `herglotz`, imported there as `_core`. The Python files of the package
+//! check and document its functions.
 
 mod arrays;
 mod assembled;
@@ -51,7 +51,7 @@ mod _core {
     use crate::{catalogue, integrators};
     use pyo3::prelude::*;
 
-    /// Looks up NumPy's functions, as each extension module does that makes arrays.
+    /// Initialises the NumPy C API, as every extension module that creates arrays must.
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         numpy::PyArray1::<f64>::zeros(module.py(), 0, false);
@@ -63,7 +63,7 @@ mod _core {
 type Entry =
     (&'static str, &'static str, Vec<&'static str>, &'static str, Vec<(&'static str, f64)>, Vec<f64>, Vec<f64>);
 
-/// The systems that are known by name.
+/// The systems of the catalogue.
 #[pyfunction]
 fn catalogue() -> Vec<Entry> {
     let entry = |e: &runtime_herglotz::CatalogueEntry| {
@@ -72,7 +72,8 @@ fn catalogue() -> Vec<Entry> {
     CATALOGUE.iter().map(entry).collect()
 }
 
-/// The names of all integrators that take formulas, which have no clock, with their orders.
+/// The names of all integrators that apply to formulas, with their orders; those that need a time transformation are
+/// excluded.
 #[pyfunction]
 fn integrators() -> Vec<(String, u32)> {
     let all = AnyIntegrator::all()

@@ -1,4 +1,4 @@
-//! What is looked at beside a motion: the geometry at a point, whether steps are contact, which integrator is the best.
+//! Checks: the geometry at a point, whether steps are contact transformations, and comparisons of integrators.
 
 use crate::arrays::{number, numbers, value_error, whole};
 use crate::motion::Motion;
@@ -32,17 +32,19 @@ pub fn geometry<'py>(
     Ok(all)
 }
 
-/// A place of a check: t, sigma, the logarithm of the factor, the two defects, and the momenta beside their predictions.
+/// A place of a check: t, sigma, the logarithm of the conformal factor, the two defects, and the momenta with their
+/// predictions.
 type Place = (f64, f64, f64, f64, f64, Vec<(f64, f64)>);
 
-/// A check: the integrator, the step, the places, the theorems, and whether every step is contact.
+/// A check: the integrator, the step, the places, the theorems, and whether every step is a contact transformation.
 type Checked = (String, f64, Vec<Place>, Vec<(String, String, f64)>, bool);
 
-/// Whether the steps of a motion are contact, and the theorems of the discrete theory on it.
+/// Whether the steps of a motion are contact transformations, and the residuals of the theorems of the discrete theory
+/// along it.
 #[pyfunction]
 pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyResult<Checked> {
     let places = whole("places", &places, 1)?;
-    // It works on threads of its own, which hear no signals.
+    // A check runs on threads of its own, on which Python does not handle signals.
     let (found, raised) = heard(py, |ended| {
         let ended = ended.clone();
         let interrupt = Some(Interrupt::when(move || ended.load(Ordering::Relaxed)));
@@ -67,7 +69,7 @@ pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyRes
 /// A run of a comparison: integrator, order, step, steps, evaluations, error and seconds.
 type Work = (String, u32, f64, usize, u64, f64, f64);
 
-/// A comparison: the runs, how the reference was computed, and what is left out and why.
+/// A comparison: the runs, how the reference was computed, and the integrators that do not apply with the reason.
 type Compared = (Vec<Work>, String, Vec<(String, String)>);
 
 /// Run time against error for all integrators that apply.

@@ -1,4 +1,4 @@
-//! What is asked of a motion.
+//! Requests for a motion.
 
 use crate::arrays::{number, numbers, shown, value_error, whole, word};
 use crate::signals::Signals;
@@ -8,26 +8,27 @@ use runtime_herglotz::{
     AnyIntegrator, Column, Direction, Event, Formula, InitialVelocity, OutputTimes, Start, StepControl, Steps,
 };
 
-/// A motion that is asked for, read from the arguments of `solve`.
+/// A request for a motion, from the arguments of `solve`.
 #[pyclass(frozen, module = "herglotz._core")]
 pub struct Motion {
     pub system: runtime_herglotz::System,
     pub motion: runtime_herglotz::Motion,
     /// Whether the rows have the conformal factor.
     pub conformal_factor: bool,
-    /// What ends its plan and its runs.
+    /// The signals that interrupt its plan and its runs.
     pub signals: Signals,
 }
 
-/// The position, the velocity or the momentum, whether it is the latter, the action, and for a momentum a velocity near its own.
+/// The position, the velocity or the momentum, whether it is the momentum, the action, and for a momentum a nearby
+/// velocity.
 type GivenStart<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, bool, Bound<'py, PyAny>, Option<Vec<f64>>);
 
 /// The arguments accuracy, integrator, step and steps.
 pub type GivenWay<'py> = [Option<Bound<'py, PyAny>>; 4];
 
-/// The way that arguments say.
+/// The step control that these arguments specify.
 pub fn way([accuracy, integrator, step, steps]: &GivenWay<'_>) -> PyResult<StepControl> {
-    /// What is computed to where nothing is said.
+    /// The default accuracy.
     const ACCURACY: f64 = 1e-9;
     let named = |name: &Bound<'_, PyAny>| -> PyResult<AnyIntegrator> {
         word("integrator", name, "\"gauss_8\"")?.parse().map_err(value_error)
@@ -50,7 +51,7 @@ pub fn way([accuracy, integrator, step, steps]: &GivenWay<'_>) -> PyResult<StepC
     }
 }
 
-/// What every row has: t, q, v, p, z, the energy, and the conformal factor where it is asked for.
+/// The columns of every row: t, q, v, p, z, the energy, and the conformal factor where it is requested.
 pub fn columns(n: usize, conformal_factor: bool) -> Vec<Column> {
     let mut columns = vec![Column::Time];
     columns.extend((0..n).map(Column::Position));
@@ -61,7 +62,8 @@ pub fn columns(n: usize, conformal_factor: bool) -> Vec<Column> {
     columns
 }
 
-/// The times of an argument: those of the rows, of which the first is that of the start; a single number is the end, from 0.
+/// The times of an argument: those of the rows, the first of which is the initial time. A single number is the final
+/// time of a motion from 0.
 pub fn times(t: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let mut times = numbers("t", t)?;
     if let [end] = times.as_slice() {
@@ -79,7 +81,7 @@ fn no_times() -> PyErr {
     )
 }
 
-/// A column or an event by its text, with its name in what is wrong with it.
+/// The error of a column or an event, with its text.
 fn named<T>(what: &str, text: &str, read: Result<T, runtime_herglotz::RuntimeError>) -> PyResult<T> {
     read.map_err(|error| value_error(format!("{what} {text:?}: {error}")))
 }
@@ -87,7 +89,7 @@ fn named<T>(what: &str, text: &str, read: Result<T, runtime_herglotz::RuntimeErr
 /// The text of an event, its direction, and whether it ends the motion.
 pub type GivenEvent<'py> = (String, Bound<'py, PyAny>, bool);
 
-/// The events that were asked for.
+/// The requested events.
 pub fn events(given: Vec<GivenEvent<'_>>, formula: &Formula) -> PyResult<Vec<Event>> {
     let read = |(text, direction, terminal): GivenEvent<'_>| {
         let function = named("the event", &text, formula.expression(&text).map_err(Into::into))?;
@@ -97,7 +99,7 @@ pub fn events(given: Vec<GivenEvent<'_>>, formula: &Formula) -> PyResult<Vec<Eve
             Ok("both") => Direction::Both,
             _ => {
                 let shown = direction.extract().map_or_else(|_| shown(&direction), |text: String| format!("{text:?}"));
-                // As SciPy has them.
+                // SciPy gives directions as numbers.
                 let instead = match direction.extract::<f64>() {
                     Ok(x) if x > 0.0 => ": write \"rising\"",
                     Ok(x) if x < 0.0 => ": write \"falling\"",
@@ -138,7 +140,7 @@ impl Motion {
         } else {
             InitialVelocity::Velocity(numbers("v0", &rate)?)
         };
-        // The velocity of a motion that goes on.
+        // The velocity of a motion that is continued.
         let rate = match (rate, near) {
             (InitialVelocity::Momentum(p), Some(v)) if v.len() == p.len() && v.iter().all(|v| v.is_finite()) => {
                 InitialVelocity::MomentumNear { p, v }
@@ -160,7 +162,7 @@ impl Motion {
         let times = times(&t)?;
         let (Some(&first), Some(&end)) = (times.first(), times.last()) else { return Err(no_times()) };
         let every = every.map(|every| whole("every", &every, 1)).transpose()?;
-        // To where it starts there is the start alone.
+        // A motion whose end is its start has a single row.
         let times = if let [start, end] = times[..]
             && start == end
         {
@@ -191,7 +193,7 @@ impl Motion {
         Ok(Motion { system: system.inner.clone(), motion, conformal_factor, signals })
     }
 
-    /// The plan in words, with the name of the integrator, the step, the number of steps and the predicted error.
+    /// The plan as text, with the name of the integrator, the step, the number of steps and the predicted error.
     fn plan(&self, py: Python<'_>) -> PyResult<(String, String, f64, usize, Option<f64>)> {
         let plan = py.detach(|| self.system.plan(&self.motion));
         if let Some(raised) = self.signals.take() {

@@ -1,4 +1,4 @@
-//! Runs of motions, and what is kept of them.
+//! Runs of motions, and their records.
 
 use crate::arrays::{matrix, value_error, vector};
 use crate::motion::Motion;
@@ -11,10 +11,10 @@ use runtime_herglotz::{
 };
 use std::ops::ControlFlow;
 
-/// Keeps the rows of a motion by their parts.
+/// Stores the parts of the rows of a motion.
 pub struct Kept {
     n: usize,
-    /// The columns beside the state's.
+    /// The number of columns in addition to the state.
     extra: usize,
     conformal_factor: bool,
     t: Vec<f64>,
@@ -27,9 +27,9 @@ pub struct Kept {
     columns: Vec<f64>,
     crossings: Vec<Crossing>,
     signals: Signals,
-    /// What a signal's handler has raised.
+    /// The exception that a signal handler has raised.
     raised: Option<PyErr>,
-    /// Where a signal has ended it.
+    /// The state at which a signal has interrupted the motion.
     halted: Option<ResumeState>,
 }
 
@@ -75,7 +75,7 @@ type End = (f64, Vec<f64>, Vec<f64>, Option<f64>, Option<Vec<f64>>);
 /// A crossing: the index of the event, t, q, v, p and z.
 type Crossed = (usize, f64, Vec<f64>, Vec<f64>, Vec<f64>, f64);
 
-/// What a motion has led to, by rows.
+/// The record of a motion by rows.
 #[pyclass(frozen, get_all, module = "herglotz._core")]
 pub struct Record {
     t: Py<PyArray1<f64>>,
@@ -85,10 +85,10 @@ pub struct Record {
     z: Py<PyArray1<f64>>,
     energy: Py<PyArray1<f64>>,
     log_factor: Option<Py<PyArray1<f64>>>,
-    /// A column for each that was asked for.
+    /// The requested columns.
     columns: Option<Py<PyArray2<f64>>>,
     crossings: Vec<Crossed>,
-    /// The end, whether it is a row or not.
+    /// The final state, whether it is a row or not.
     end: End,
     status: String,
     success: bool,
@@ -97,11 +97,11 @@ pub struct Record {
     steps: usize,
     evaluations: u64,
     interrupted: Option<Py<PyAny>>,
-    /// From where it goes on to the last bit.
+    /// The state from which the motion can be resumed, bitwise.
     halted: Option<Vec<u8>>,
 }
 
-/// Runs a motion, with the interpreter left to other threads.
+/// Runs a motion with the interpreter lock released.
 #[pyfunction]
 pub fn run(py: Python<'_>, motion: &Motion) -> PyResult<Record> {
     let (mut kept, request) = (Kept::of(motion), &motion.motion);
@@ -109,7 +109,7 @@ pub fn run(py: Python<'_>, motion: &Motion) -> PyResult<Record> {
     record(py, kept, whole(motion, outcome)?)
 }
 
-/// Goes on with a motion that was interrupted at a time; the rows that are left are kept.
+/// Resumes a motion that was interrupted at a time, and keeps the remaining rows.
 #[pyfunction]
 pub fn resume(py: Python<'_>, motion: &Motion, halted: &[u8], at: f64) -> PyResult<Record> {
     let (mut kept, mut request) = (Kept::of(motion), motion.motion.clone());
@@ -130,7 +130,7 @@ fn whole(motion: &Motion, outcome: Result<Outcome, RuntimeError>) -> PyResult<Ou
     }
 }
 
-/// What is known of a motion whose plan was interrupted: its start, without rows.
+/// The outcome of a motion whose plan was interrupted: its start, without rows.
 fn nothing_yet(motion: &Motion) -> Outcome {
     let start = &motion.motion.start;
     let p = match &start.rate {
@@ -144,7 +144,7 @@ fn nothing_yet(motion: &Motion) -> Outcome {
         t: start.t,
         q: start.q.clone(),
         p: p.unwrap_or_else(|| vec![f64::NAN; start.q.len()]),
-        // Where the momentum has several velocities, the one that the motion begins with.
+        // Where several velocities correspond to the momentum, the initial one.
         v: match &start.rate {
             InitialVelocity::Velocity(v) | InitialVelocity::MomentumNear { v, .. } => Some(v.clone()),
             InitialVelocity::Momentum(_) => None,
@@ -166,7 +166,7 @@ impl Kept {
         }
     }
 
-    /// Of so many coordinates, with no columns beside the state's.
+    /// An empty record for n coordinates, without columns in addition to the state.
     pub fn new(n: usize, conformal_factor: bool, signals: Signals) -> Self {
         Kept {
             n,
@@ -188,7 +188,7 @@ impl Kept {
     }
 }
 
-/// What is given to Python of a run.
+/// Converts the result of a run for Python.
 pub fn record(py: Python<'_>, mut kept: Kept, outcome: Outcome) -> PyResult<Record> {
     kept.raised = kept.signals.take();
     let Kept { n, extra, .. } = kept;
@@ -206,7 +206,7 @@ pub fn record(py: Python<'_>, mut kept: Kept, outcome: Outcome) -> PyResult<Reco
         crossings,
         end: (outcome.t, outcome.q, outcome.p, outcome.z, outcome.v),
         status: outcome.status.to_string(),
-        // A terminal event is what was asked for.
+        // A terminal event is a regular end.
         success: matches!(outcome.status, Status::Completed | Status::Stopped { .. }) && kept.raised.is_none(),
         unresolved: outcome.unresolved.map(|unresolved| unresolved.to_string()),
         error_estimate: outcome.error_estimate,

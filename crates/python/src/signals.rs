@@ -1,4 +1,4 @@
-//! Whether the user has asked to end a run.
+//! Signals of the user (Ctrl-C) during a run.
 
 use pyo3::prelude::*;
 use runtime_herglotz::Interrupt;
@@ -8,13 +8,13 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The time between two looks: short for a hand, long for a run.
+/// The time between two checks for signals: short for a user, long for a run.
 const BETWEEN: Duration = Duration::from_millis(50);
 
-/// The time of the last look, and what a signal's handler has raised.
+/// The time of the last check, and the exception that a signal handler has raised.
 struct Looked(Instant, Option<PyErr>);
 
-/// Looks for signals from time to time, while the interpreter is left to others. Clones are of one and the same.
+/// Checks for signals at intervals, while the interpreter lock is released. Clones share their state.
 #[derive(Clone)]
 pub struct Signals(Arc<Mutex<Looked>>);
 
@@ -27,7 +27,7 @@ impl Signals {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether to go on.
+    /// Checks whether to continue.
     pub fn look(&self) -> ControlFlow<()> {
         let mut looked = self.looked();
         if looked.1.is_some() {
@@ -46,20 +46,20 @@ impl Signals {
         }
     }
 
-    /// The same as a question that plans ask.
+    /// The same check as an interrupt of plans.
     pub fn interrupt(&self) -> Interrupt {
         let signals = self.clone();
         Interrupt::when(move || signals.look().is_break())
     }
 
-    /// What a signal's handler has raised, which is forgotten.
+    /// The exception that a signal handler has raised; it is cleared.
     pub fn take(&self) -> Option<PyErr> {
         self.looked().1.take()
     }
 }
 
-/// Computes something on a thread of its own, while this one, which alone hears signals in Python, looks for them: what a handler raises is told
-/// to the work, and comes back beside its result.
+/// Runs `work` on a thread of its own, while this thread, the only one on which Python handles signals, checks for
+/// them. An exception of a handler is signalled to the work by the flag, and is returned together with its result.
 pub fn heard<T: Send>(py: Python<'_>, work: impl FnOnce(&Arc<AtomicBool>) -> T + Send) -> PyResult<(T, Option<PyErr>)> {
     let ended = Arc::new(AtomicBool::new(false));
     let (done, waits) = channel();
@@ -68,7 +68,7 @@ pub fn heard<T: Send>(py: Python<'_>, work: impl FnOnce(&Arc<AtomicBool>) -> T +
             let (flag, mut raised) = (&ended, None);
             let worker = std::thread::Builder::new().spawn_scoped(scope, move || {
                 let found = work(flag);
-                // Who waits hears that it is over.
+                // Dropping the sender wakes the waiting thread.
                 drop(done);
                 found
             })?;
@@ -89,8 +89,8 @@ pub fn heard<T: Send>(py: Python<'_>, work: impl FnOnce(&Arc<AtomicBool>) -> T +
     }
 }
 
-/// Computes something that ends by itself after a second or so and asks no one, on a thread of its own: what a signal's handler raises is raised at once,
-/// and the thread is left to its end.
+/// Runs `work` on a thread of its own: a computation that cannot be interrupted but ends after about a second. An
+/// exception of a signal handler is raised at once, and the thread is left to finish.
 pub fn heard_at_once<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
     let (done, waits) = channel();
     std::thread::Builder::new().spawn(move || done.send(work()))?;

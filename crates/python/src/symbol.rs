@@ -1,4 +1,4 @@
-//! Values of a function that is traced: nodes of a graph in place of numbers.
+//! Values of a traced function: nodes of a graph in place of numbers.
 
 use crate::condition::Condition;
 use crate::text;
@@ -10,7 +10,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyFloat, PyInt, PyTuple};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The most nodes of a traced function: more than a formula may have.
+/// The maximal number of nodes of a traced function, above the limit of a formula.
 const MOST: usize = 100_000;
 
 /// The graph of one trace.
@@ -31,7 +31,7 @@ pub struct Symbol {
     pub id: Id,
 }
 
-/// An operand: a node, or something that operators leave to others.
+/// An operand: a node, or an object whose operators Python tries next.
 pub enum Operand {
     Node(Id),
     Other,
@@ -94,7 +94,7 @@ impl Symbol {
         }
     }
 
-    /// A product with a number.
+    /// A function of the value, multiplied by a number.
     fn scaled(&self, function: Function, by: f64) -> PyResult<Symbol> {
         self.with(|graph| {
             let (value, by) = (graph.unary(function, self.id), graph.number(by));
@@ -102,7 +102,7 @@ impl Symbol {
         })
     }
 
-    /// A function of one number by the name that NumPy has for it; `None` where it is not known.
+    /// A function of one number by its NumPy name; `None` where it is not known.
     fn named(&self, name: &str) -> Option<PyResult<Symbol>> {
         use std::f64::consts::{LOG2_E, LOG10_E};
         let function = match name {
@@ -137,7 +137,8 @@ impl Symbol {
         Some(self.unary(function))
     }
 
-    /// The inverse of the sine or the cosine, as the angle of the point `(sqrt((1 - x)(1 + x)), x)`, or of that turned.
+    /// The inverse of the sine or the cosine: the angle of the point `(sqrt((1 - x)(1 + x)), x)`, or of the point with
+    /// these coordinates exchanged.
     fn inverse(&self, sine: bool) -> PyResult<Symbol> {
         self.with(|graph| {
             let (x, one) = (self.id, graph.number(1.0));
@@ -150,7 +151,7 @@ impl Symbol {
     }
 }
 
-/// Whether it is a number of NumPy, not an array.
+/// Whether the object is a NumPy scalar, not an array.
 fn is_scalar(other: &Bound<'_, PyAny>) -> bool {
     let py = other.py();
     let Ok(dtype) = other.getattr(pyo3::intern!(py, "dtype")) else { return false };
@@ -159,7 +160,7 @@ fn is_scalar(other: &Bound<'_, PyAny>) -> bool {
     dimensions.is_ok_and(|n| n == 0) && kind.is_ok_and(|kind| "fiu".contains(kind))
 }
 
-/// A function of the package's own tracer.
+/// A function of the Python module `herglotz._trace`.
 pub(crate) fn tracer<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     static TRACE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let module = TRACE.get_or_try_init(py, || py.import("herglotz._trace").map(|module| module.into_any().unbind()))?;
@@ -238,7 +239,7 @@ impl Symbol {
         Ok(Bound::new(py, condition)?.into_any())
     }
 
-    /// What NumPy's functions of numbers do with it.
+    /// Applies a NumPy ufunc.
     #[pyo3(signature = (ufunc, method, *inputs, **kwargs))]
     fn __array_ufunc__<'py>(
         &self,
@@ -257,7 +258,7 @@ impl Symbol {
         tracer(py, "apply")?.call1((ufunc, method, inputs, kwargs))
     }
 
-    /// What the other functions of NumPy do with it.
+    /// Applies a NumPy function that is not a ufunc.
     fn __array_function__<'py>(
         &self,
         function: &Bound<'py, PyAny>,
@@ -269,13 +270,13 @@ impl Symbol {
         tracer(function.py(), "call")?.call1((function, arguments, kwargs))
     }
 
-    /// The value as an expression over names of coordinates, velocities and parameters.
+    /// The value as an expression in the names of coordinates, velocities and parameters.
     fn text(&self, coordinates: Vec<String>, velocities: Vec<String>, parameters: Vec<String>) -> PyResult<String> {
         let names = text::Names { coordinates, velocities, parameters };
         Ok(text::text(&self.shared.graph(), self.id, &names))
     }
 
-    /// NumPy calls a function as a method of the elements of arrays of objects that are not of the tracer's own class.
+    /// For object arrays other than those of the tracer, NumPy calls a function as a method of the elements.
     fn __getattr__<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let is_two = matches!(name, "arctan2" | "hypot");
         if !is_two && (name.starts_with('_') || slf.get().named(name).is_none()) {
@@ -289,7 +290,7 @@ impl Symbol {
         "<traced value>"
     }
 
-    /// A function of one number by the name that NumPy has for it.
+    /// A function of one number by its NumPy name.
     #[pyo3(name = "apply")]
     fn apply_named(&self, name: &str) -> PyResult<Symbol> {
         self.named(name).unwrap_or_else(|| {
@@ -297,7 +298,7 @@ impl Symbol {
         })
     }
 
-    /// A function of two numbers by the name that NumPy has for it.
+    /// A function of two numbers by its NumPy name.
     #[pyo3(signature = (name, other, turned = false))]
     fn apply_two<'py>(&self, name: &str, other: &Bound<'py, PyAny>, turned: bool) -> PyResult<Bound<'py, PyAny>> {
         let operation = match name {
@@ -311,7 +312,7 @@ impl Symbol {
     }
 }
 
-/// The symbols of a trace: t, the coordinates, the velocities, z, and so many parameters.
+/// The symbols of a trace: t, the coordinates, the velocities, z and the parameters.
 #[pyfunction]
 pub fn symbols(n: u32, parameters: u32) -> (Symbol, Vec<Symbol>, Vec<Symbol>, Symbol, Vec<Symbol>) {
     let shared = Shared::default();

@@ -1,4 +1,4 @@
-//! Systems.
+//! Systems given by a formula.
 
 use crate::arrays::value_error;
 use pyo3::prelude::*;
@@ -17,10 +17,10 @@ pub struct System {
     given_coordinates: Vec<String>,
 }
 
-/// What an object is made anew of: its class, and the arguments.
+/// The class and the arguments from which pickle restores an object.
 type Reduced<'py> = (Bound<'py, PyType>, (String, Vec<String>, Bound<'py, PyDict>));
 
-/// Slices of texts.
+/// String slices of strings.
 fn texts(of: &[String]) -> Vec<&str> {
     of.iter().map(String::as_str).collect()
 }
@@ -79,7 +79,7 @@ impl System {
         format!("System({l:?}, {coordinates:?}, {{{}}})", parameters.join(", "))
     }
 
-    /// The same with other values of some parameters.
+    /// The same system with other values of some parameters.
     fn with_parameters(&self, parameters: &Bound<'_, PyDict>) -> PyResult<Self> {
         let parameters = values(Some(parameters))?;
         let values: Vec<(&str, f64)> = parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
@@ -93,7 +93,7 @@ impl System {
         self.inner.dimension()
     }
 
-    /// What is proved of the formula, by name.
+    /// The properties that are proved from the formula, by name.
     #[getter]
     fn structure(&self) -> Vec<&'static str> {
         let s = self.inner.structure();
@@ -110,7 +110,8 @@ impl System {
         all.into_iter().filter(|(_, holds)| *holds).map(|(name, _)| name).collect()
     }
 
-    /// The symmetries that are seen: the coordinates that a translation moves, each alone, or the pairs that a rotation turns.
+    /// The recognised symmetries: for a translation the indices of its coordinates, one in each list; for a rotation
+    /// the pairs of its coordinates.
     #[getter]
     fn symmetries(&self) -> Vec<Vec<Vec<usize>>> {
         let of = |symmetry: SeenSymmetry| match symmetry {
@@ -120,16 +121,16 @@ impl System {
         self.inner.symmetries().into_iter().map(of).collect()
     }
 
-    /// The Lagrangian as a source file in Rust.
+    /// The Lagrangian as a Rust source file.
     fn to_rust(&self, name: &str) -> PyResult<String> {
         self.inner.to_rust(name).map_err(value_error)
     }
 }
 
-/// The names of all coordinates and of their velocities, of names with arrays.
+/// The names of all coordinates and of their velocities; arrays are expanded.
 #[pyfunction]
 pub fn velocity_names(coordinates: Vec<String>) -> PyResult<(Vec<String>, Vec<String>)> {
-    // A formula knows how names are read.
+    // The names are expanded by parsing a formula.
     let formula = runtime_herglotz::Formula::parse("0", &texts(&coordinates), &[]).map_err(value_error)?;
     let names = formula.coordinates();
     let velocities = names.iter().map(|name| runtime_herglotz::velocity_name(name)).collect();

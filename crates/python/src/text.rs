@@ -1,22 +1,22 @@
-//! Graphs as texts of the language.
+//! Graphs as texts in the formula language.
 
 use formula_lagrangian::{Function, Graph, Id, Node, Operation};
 use std::collections::HashMap;
 use std::fmt::Write;
 
-/// The names of what a graph knows by index.
+/// The names of the variables that a graph refers to by index.
 pub struct Names {
     pub coordinates: Vec<String>,
     pub velocities: Vec<String>,
     pub parameters: Vec<String>,
 }
 
-/// The deepest nesting of brackets before a part gets a name: a quarter of what the language reads.
+/// The nesting depth of brackets above which a subexpression gets a name: a quarter of what the parser accepts.
 const DEEPEST: usize = 50;
 
-/// The text of a node: parts that are used more than once, or are nested deep, are definitions before it.
+/// The text of a node. Subexpressions that are used more than once or are deeply nested become definitions before it.
 pub fn text(graph: &Graph, root: Id, names: &Names) -> String {
-    // In the order of their making, operands come first.
+    // Operands have smaller indices than the nodes that use them, so sorting puts them first.
     let mut uses: HashMap<Id, usize> = HashMap::new();
     let mut order = Vec::new();
     let mut open = vec![root];
@@ -53,12 +53,12 @@ pub fn text(graph: &Graph, root: Id, names: &Names) -> String {
     definitions + &last
 }
 
-/// A number, to the last digit.
+/// A number with all its digits.
 fn number(x: f64) -> String {
     if x.is_sign_negative() { format!("({x:?})") } else { format!("{x:?}") }
 }
 
-/// A node, in brackets where it is not one word or a call.
+/// A node, in brackets unless it is a single word or a call.
 fn expression(node: &Node, of: &mut dyn FnMut(Id) -> String, names: &Names) -> String {
     let name = |from: &[String], i: u32| from.get(i as usize).cloned().unwrap_or_else(|| "?".to_owned());
     match *node {

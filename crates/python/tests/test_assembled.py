@@ -1,4 +1,4 @@
-"""Lattices and bodies, of more coordinates than a formula of one system has."""
+"""Lattices and bodies with more coordinates than the formula of a system can have."""
 
 import os
 import pickle
@@ -14,7 +14,7 @@ SITE, BOND = "x'^2/2 - (1 - cos(x)) + gamma*z", "-(xr - xl)^2/2"
 
 @pytest.fixture(autouse=True)
 def signals_are_heard():
-    """A process that a script has started in the background ignores Ctrl-C, and its Python with it."""
+    """A background process of a script inherits an ignored SIGINT; this restores Python's handler."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -34,7 +34,7 @@ def test_a_short_lattice_is_the_small_system():
         conformal_factor=True,
     )
     for name in ("t", "q", "v", "p", "z", "energy", "log_factor"):
-        # Round-off of twenty steps.
+        # The bound is the round-off of twenty steps.
         assert np.abs(getattr(sol, name) - getattr(small, name)).max() < 1e-13, name
     assert (sol.status, sol.success, sol.steps, sol.t_end) == ("completed", True, 20, 2.0)
 
@@ -58,7 +58,8 @@ def test_a_plane_of_three_hundred_sites_with_two_components():
     kinetic = (sol.p**2).sum(axis=(1, 2, 3)) / 2
     stretched = sum(((sol.q - np.roll(sol.q, 1, axis)) ** 2).sum(axis=(1, 2, 3)) for axis in (1, 2)) / 2
     energy = kinetic + stretched + ((sol.q**2).sum(axis=3) ** 2).sum(axis=(1, 2)) / 4 + 0.2 * sol.z
-    # The energy is that of the formulas, to the round-off of 600 terms, and decays as e^(gamma t) to the error of order 6.
+    # The energy is that of the formulas, up to the round-off of 600 terms, and decays as e^(gamma t), up to the error
+    # of order 6.
     assert np.abs(energy / sol.energy - 1).max() < 1e-12
     assert np.abs(sol.energy * np.exp(0.2 * sol.t) / sol.energy[0] - 1).max() < 1e-7
 
@@ -74,7 +75,7 @@ def test_momenta_of_bodies_decay_with_the_rate():
     sol = bodies(conformal_factor=True)
     assert sol.q.shape == (5, 10, 3) and len(sol.momenta) == 6
     for name, momentum in sol.momenta.items():
-        # Round-off of 200 steps.
+        # The bound is the round-off of 200 steps.
         assert np.abs(momentum - momentum[0] * np.exp(-0.05 * sol.t)).max() < 1e-12, name
     assert np.abs(sol.log_factor + 0.05 * sol.t).max() < 1e-14
 
@@ -85,7 +86,7 @@ def test_a_motion_goes_on_and_back():
     whole = bodies(step=0.02)
     assert on.t[0] == 4.0 and on.t_end == 8.0 and np.array_equal(on.q[0], whole.q[-1])
     back = on.resume(0.0)
-    # There and back by a symmetric method: round-off, which grows by the motion.
+    # Forward and backward with a symmetric method: the bound is round-off, amplified by the motion.
     assert back.t_end == 0.0 and np.abs(back.q[-1] - sol.q[0]).max() < 1e-9
 
 
@@ -125,8 +126,8 @@ def test_what_is_wrong_is_said_with_the_argument():
 
 def test_ctrl_c_ends_a_run_and_keeps_what_was_computed():
     threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT)).start()
-    with pytest.raises(hz.ResumeState) as caught:
-        # Some minutes.
+    with pytest.raises(hz.Interrupted) as caught:
+        # The run would take some minutes.
         hz.lattice(SITE, BOND, np.zeros(10000), 1.0, 1e6, step=0.1, every=1000, parameters={"gamma": -1e-9})
     sol = pickle.loads(pickle.dumps(caught.value)).solution
     assert not sol.success and 0 < sol.t_end < 1e6

@@ -1,4 +1,4 @@
-"""Many motions: against single ones, threads, processes, failures."""
+"""Ensembles: compared with single motions; threads, processes, failures."""
 
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
@@ -77,7 +77,7 @@ def test_events_of_members_are_those_of_single_motions():
         assert many.success.all() and not many.troubles
         for i in range(3):
             one = hz.solve(PENDULUM, q[i], v[i], 20.0, parameters={"gamma": gamma[i]}, events=events, **wanted)
-            # What ends at an event has no row there.
+            # A motion that ends at an event has no row there.
             end = one.q[-1] if isinstance(events, dict) else one.events[0].q[-1]
             assert many.t[i] == one.t_end and np.array_equal(many.q[i], end)
             for name in events if isinstance(events, dict) else (0,):

@@ -1,4 +1,4 @@
-"""The exact discrete Lagrangian: its theorems, and motions of `solve`."""
+"""The exact discrete Lagrangian: its theorems, and comparison with motions of `solve`."""
 
 import herglotz as hz
 import numpy as np
@@ -26,7 +26,7 @@ def test_the_derivatives_are_momenta():
     q1 = hz.exponential(L, H, Q0, V0, Z0).q1
     exact, motion = hz.exact_lagrangian(L, H, Q0, q1, Z0), hz.retract(L, H, Q0, q1, Z0)
     assert exact.value == pytest.approx(motion.action, rel=1e-13)
-    # W is 1: momenta are velocities.
+    # W is the identity: momenta equal velocities.
     assert np.allclose(exact.d2, motion.v1, rtol=1e-12) and np.allclose(-exact.d1 / exact.sigma, V0, rtol=1e-12)
     assert exact.sigma == pytest.approx(1 + exact.dz, rel=1e-14) and exact.sigma == pytest.approx(
         motion.sigma, rel=1e-13
@@ -39,7 +39,7 @@ def test_the_derivatives_are_momenta():
 
 
 def test_five_coordinates():
-    """They are computed among eight; nothing is seen of the others."""
+    """Five coordinates are computed with the code for eight; the additional ones are not visible."""
 
     def chain(t, q, v, z):
         bonds = sum((q[i + 1] - q[i]) ** 4 for i in range(4))
@@ -52,7 +52,7 @@ def test_five_coordinates():
     assert np.allclose(back.v0, v0, rtol=1e-12) and back.v1.shape == (5,)
     exact = hz.exact_lagrangian(chain, H, q0, there.q1, Z0)
     assert exact.value == pytest.approx(back.action, rel=1e-13)
-    # W is 4.
+    # W is 4 times the identity.
     assert np.allclose(exact.d2, 4 * back.v1, rtol=1e-11) and np.allclose(-exact.d1 / exact.sigma, 4 * v0, rtol=1e-11)
 
 

@@ -1,4 +1,4 @@
-"""What is loaded with the package, and what when it is asked for."""
+"""Modules that are loaded with the package, and those that are loaded at first use."""
 
 import subprocess
 import sys

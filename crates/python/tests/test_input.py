@@ -1,4 +1,4 @@
-"""What is wrong with an argument is a ValueError that names it."""
+"""An invalid argument raises a ValueError that names it."""
 
 import herglotz as hz
 import numpy as np
@@ -83,7 +83,7 @@ def test_parameters_that_do_not_exist_are_refused():
             hz.solve(L, t=1.0, parameters=parameters, **start)
     with pytest.raises(ValueError, match="'gama'"):
         hz.ensemble(drag, np.ones((3, 1)), np.zeros((3, 1)), 1.0, parameters={"gama": [-1.0, -2.0, -3.0]})
-    # One that an event or a column alone has is no mistake.
+    # A parameter that is used only in an event or a column is accepted.
     sol = hz.solve(FORMULA, [1.0], [0.0], 9.0, coordinates=["x"], parameters={"gamma": -0.1, "level": 0.5}, events="x - level")
     assert len(sol.events[0].t) > 1
 

@@ -1,4 +1,4 @@
-"""Ctrl-C ends a long run; other threads go on meanwhile."""
+"""Ctrl-C ends a long run, and other threads continue during a run."""
 
 import os
 import pickle
@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 PENDULUM = "theta'^2/2 + cos(theta) + gamma*z"
-# Some minutes.
+# The run would take some minutes.
 LONG = dict(integrator="gauss_2", steps=400_000_000, coordinates=["theta"], parameters={"gamma": -1e-9})
 
 
 @pytest.fixture(autouse=True)
 def signals_are_heard():
-    """A process that a script has started in the background ignores Ctrl-C, and its Python with it."""
+    """A background process of a script inherits an ignored SIGINT; this restores Python's handler."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -30,7 +30,7 @@ def press(after):
 def test_ctrl_c_ends_a_run_and_keeps_what_was_computed():
     press(0.4)
     begin = time.monotonic()
-    with pytest.raises(hz.ResumeState) as caught:
+    with pytest.raises(hz.Interrupted) as caught:
         hz.solve(PENDULUM, [1.0], [0.0], 1e7, every=1_000_000, **LONG)
     assert time.monotonic() - begin < 5
     assert isinstance(caught.value, KeyboardInterrupt)
@@ -42,7 +42,7 @@ def test_ctrl_c_ends_a_run_and_keeps_what_was_computed():
 
 def test_an_interrupted_run_goes_on_to_the_last_bit():
     def asked():
-        # Some ten seconds.
+        # About ten seconds.
         return hz.solve(
             PENDULUM,
             [1.0],
@@ -59,7 +59,7 @@ def test_an_interrupted_run_goes_on_to_the_last_bit():
 
     whole = asked()
     press(0.5)
-    with pytest.raises(hz.ResumeState) as caught:
+    with pytest.raises(hz.Interrupted) as caught:
         asked()
     first = pickle.loads(pickle.dumps(caught.value)).solution
     rest = first.resume()
@@ -110,7 +110,7 @@ def test_other_threads_run_meanwhile():
 
 
 def heard_within(seconds, asked, error=KeyboardInterrupt, after=0.4):
-    """What is raised by a computation of minutes when Ctrl-C is pressed: within so many seconds."""
+    """The exception that Ctrl-C raises in a long computation; it must come within this number of seconds."""
     press(after)
     begin = time.monotonic()
     with pytest.raises(error) as caught:
@@ -119,7 +119,7 @@ def heard_within(seconds, asked, error=KeyboardInterrupt, after=0.4):
     return caught.value
 
 
-# Its trial runs take some twenty seconds, and find nothing.
+# The trial runs take about twenty seconds and do not reach the accuracy.
 COSTLY = dict(
     L="sum(i, 0, 4, q'[i]^2*(1/2 - q[i]^2/10) - q[i]^2/2 - q[i]^4/10)",
     q0=np.linspace(0.5, 1.0, 5),
@@ -132,11 +132,11 @@ WEAK = dict(coordinates=["theta"], parameters={"gamma": -1e-9})
 
 
 def test_ctrl_c_is_heard_in_trial_runs():
-    caught = heard_within(2.0, lambda: hz.solve(**COSTLY), hz.ResumeState)
+    caught = heard_within(2.0, lambda: hz.solve(**COSTLY), hz.Interrupted)
     sol = caught.solution
     assert not sol.success and sol.t_end == 0.0 and sol.steps == 0 and len(sol.t) == 0
-    # What was asked for begins anew.
-    rest = heard_within(2.0, sol.resume, hz.ResumeState)
+    # The requested motion starts again from the beginning.
+    rest = heard_within(2.0, sol.resume, hz.Interrupted)
     assert rest.solution.t_end == 0.0
 
 
@@ -153,20 +153,20 @@ def test_ctrl_c_is_heard_in_a_check():
 
 
 def test_ctrl_c_is_heard_in_the_trial_runs_of_a_comparison():
-    # Some eight seconds.
+    # About eight seconds.
     asked = {name: x for name, x in COSTLY.items() if name != "accuracy"} | dict(t=2000.0)
     heard_within(2.0, lambda: hz.compare(**asked))
 
 
 def test_ctrl_c_is_heard_in_an_estimate():
-    """The run with half of the steps takes twice as long as that which comes before it."""
+    """The run with steps of half the length takes twice as long as the run before it."""
     asked = dict(integrator="gauss_2", steps=5_000_000, **WEAK)
     begin = time.monotonic()
     hz.solve(PENDULUM, [1.0], [0.0], 5e4, **asked)
     first = time.monotonic() - begin
     after = 1.3 * first
     caught = heard_within(
-        after + 0.5 * first, lambda: hz.solve(PENDULUM, [1.0], [0.0], 5e4, estimate=True, **asked), hz.ResumeState, after
+        after + 0.5 * first, lambda: hz.solve(PENDULUM, [1.0], [0.0], 5e4, estimate=True, **asked), hz.Interrupted, after
     )
     assert caught.solution.t_end == 5e4 and caught.solution.error_estimate == np.inf
 
@@ -174,13 +174,13 @@ def test_ctrl_c_is_heard_in_an_estimate():
 def test_ctrl_c_is_heard_in_dense_output():
     sol = hz.solve(PENDULUM, [1.0], [0.0], 1e3, integrator="gauss_2", steps=20_000, **WEAK)
     sol(1.0)
-    # Some ten seconds.
+    # About ten seconds.
     many = np.linspace(0.0, 1e3, 2_000_000)
     heard_within(2.0, lambda: sol(many))
 
 
 def test_ctrl_c_is_heard_in_the_exponential():
-    # Some ten seconds: eight coordinates, each with the derivatives by all others.
+    # About ten seconds: eight coordinates, each with the derivatives with respect to all others.
     pendula = "sum(i, 0, 7, q'[i]^2/2 + cos(q[i])) + gamma*z"
     asked = dict(coordinates=["q[8]"], parameters={"gamma": -1e-9})
     heard_within(1.5, lambda: hz.exponential(pendula, 1e5, np.ones(8), np.zeros(8), **asked))
@@ -189,10 +189,10 @@ def test_ctrl_c_is_heard_in_the_exponential():
 @pytest.mark.parametrize("events", [(), "theta"], ids=["plain", "events"])
 @pytest.mark.parametrize("integrator", ["gauss_2", "strang", "midpoint"])
 def test_ctrl_c_is_heard_in_an_ensemble_of_long_members(integrator, events):
-    """The members that were done before are kept."""
+    """The members that ended before the interruption are kept."""
     count = 40
     ends = np.full((count, 1), 1.0)
-    # Those of no steps to speak of come first: a terminal event.
+    # The first members end at a terminal event after very few steps.
     stop = [hz.Event("theta - 3", terminal=True)]
     q = ends.copy()
     v = ends.copy()
@@ -200,7 +200,7 @@ def test_ctrl_c_is_heard_in_an_ensemble_of_long_members(integrator, events):
     asked = dict(integrator=integrator, step=1e-3, coordinates=["theta"], parameters={"gamma": -1e-9}, threads=2)
     if events:
         asked["events"] = stop
-    caught = heard_within(4.0, lambda: hz.ensemble(PENDULUM, q, v, 1e6, **asked), hz.ResumeState)
+    caught = heard_within(4.0, lambda: hz.ensemble(PENDULUM, q, v, 1e6, **asked), hz.Interrupted)
     found = caught.solution
     assert len(found) == count and not found.success[-1] and np.isnan(found.t[-1]) | (found.t[-1] < 1e6)
     assert all("interrupted" in found.troubles[i] for i in range(count) if not found.success[i])
@@ -212,10 +212,10 @@ def test_the_finished_members_are_kept():
     count = 30_000
     many = np.linspace(0.5, 1.5, count).reshape(-1, 1)
     asked = dict(integrator="gauss_2", step=1e-2, coordinates=["theta"], parameters={"gamma": -1e-3 * np.ones(count)})
-    caught = heard_within(5.0, lambda: hz.ensemble(PENDULUM, many, many, 1e2, **asked), hz.ResumeState, after=3.0)
+    caught = heard_within(5.0, lambda: hz.ensemble(PENDULUM, many, many, 1e2, **asked), hz.Interrupted, after=3.0)
     found = pickle.loads(pickle.dumps(caught)).solution
     done = int(np.sum(found.success))
     assert 0 < done < count and found.success[0]
-    # To the last bit what they are by themselves.
+    # Finished members are bitwise those of an ensemble of their own.
     first = hz.ensemble(PENDULUM, many[:1], many[:1], 1e2, **asked | dict(parameters={"gamma": [-1e-3]}))
     assert found.q[0] == first.q[0] and np.isnan(found.q[~found.success & np.isnan(found.t)]).all()

@@ -12,7 +12,7 @@ def L(t, q, v, z):
 
 
 def rates(q, p, z):
-    """Herglotz' equation of L in (q, p, z)."""
+    """The right-hand side of Herglotz' equation of L in (q, p, z)."""
     return p, -np.sin(q) + GAMMA * p, p @ p / 2 + np.cos(q[0]) + GAMMA * z
 
 
@@ -33,7 +33,7 @@ def test_a_step_of_runge_and_kutta_is_not_contact():
     at = [1.0], [0.3], 0.2
     found = hz.is_contact(runge_kutta, at)
     assert not found and 1e-6 < found.defect < 1e-2 and str(found).startswith("not contact")
-    # It is nearly so for short steps: its local error is of the fifth order.
+    # The defect decreases with the step, as the local error does, which is of fifth order.
     finer = hz.is_contact(lambda q, p, z: runge_kutta(q, p, z, 0.25), at)
     assert 4.5 < np.log2(found.defect / finer.defect) < 5.5
     assert found.sigma == pytest.approx(np.exp(GAMMA * 0.5), abs=1e-3)
@@ -52,7 +52,8 @@ def test_contact_maps_are_contact():
 
 
 def test_a_factor_of_nothing_is_not_contact():
-    # All of these pull dz - p dq back to 0: to a point, to a Legendrian curve, onto the momenta at one place.
+    # The pullback of dz - p dq by each of these maps is 0: onto a point, a Legendrian curve, the momenta at one
+    # position.
     for map in (
         lambda q, p, z: (0 * q, 0 * p, 0 * z),
         lambda q, p, z: (q, np.cos(q), np.sum(np.sin(q))),
@@ -60,7 +61,7 @@ def test_a_factor_of_nothing_is_not_contact():
     ):
         found = hz.is_contact(map, ([1.0], [0.3], 0.2))
         assert not found and found.sigma == 0.0 and "sigma is 0" in str(found)
-    # A factor may be small.
+    # The conformal factor may be small.
     assert hz.is_contact(lambda q, p, z: (q, 1e-200 * p, 1e-200 * z), ([1.0], [0.3], 0.2))
 
 

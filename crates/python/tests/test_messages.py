@@ -1,4 +1,4 @@
-"""What is refused is said in the reader's language, with what to write instead."""
+"""Error messages use the terms of the user and say what to write instead."""
 
 import herglotz as hz
 import numpy as np
@@ -18,14 +18,14 @@ def function(L, **change):
 
 
 def spline(t, q, v, z):
-    # What SciPy's CubicSpline does with its argument first.
+    # SciPy's CubicSpline begins with this conversion of its argument.
     return v @ v / 2 - np.interp(0.5, [0.0, 1.0], [0.0, 1.0]) * np.asarray(q[0], dtype=float)
 
 
 X, XDOT, Z, GAMMA, T = sympy.symbols("x xdot z gamma t")
 XT, F = sympy.Function("x")(T), sympy.Function("f")(T)
 
-# What is asked for, and what is said of it.
+# Requests, and the expected messages.
 SAID = {
     "all velocities": (formula("v^2/2"), "the velocities are `x'` and so on"),
     "a velocity by its name elsewhere": (formula("xdot^2/2 - x^2"), "did you mean `x'`?"),
@@ -69,7 +69,7 @@ SAID = {
     "observers in a list": (GOOD | dict(observe=["x^2"]), r"`observe` is \['x\^2'\].*observe=\{"),
     "an observer alone": (GOOD | dict(observe="x^2"), r"`observe` is 'x\^2'.*observe=\{"),
     "parameters in a list": (GOOD | dict(parameters=[("gamma", -0.1)]), r"`parameters` is \[.*parameters=\{"),
-    "a clock": (GOOD | dict(integrator="transformed_gauss_8", step=0.1), "functions? do not have"),
+    "a time transformation": (GOOD | dict(integrator="transformed_gauss_8", step=0.1), "functions? do not have"),
     "a claim": (formula("x'^2/2 + x^2*x'^2", integrator="strang", step=0.1), "not separable"),
     "too exact": (GOOD | dict(accuracy=1e-40), "is not reached.*round-off"),
     "something too fast": (
@@ -78,8 +78,8 @@ SAID = {
     ),
 }
 
-# Words of another language, or of the inside.
-FOREIGN = ["`structure`", "take a clock", "HAS_", "Stepper", "argument '", "OverflowError", "`by`", "FormulaLagrangian", "dt_dtau"]
+# Names of the Rust libraries, or of their internals.
+FOREIGN = ["`structure`", "take a time transformation", "HAS_", "Stepper", "argument '", "OverflowError", "`by`", "FormulaLagrangian", "dt_dtau"]
 
 
 @pytest.mark.parametrize("asked, said", SAID.values(), ids=SAID)
@@ -110,7 +110,7 @@ def test_a_check_says_the_same():
 
 
 def test_a_comparison_leaves_out_what_could_be_taken():
-    """What needs a clock can be taken by no formula, and is no integrator of Python's."""
+    """Integrators that need a time transformation apply to no formula, and are not among those of Python."""
     found = hz.compare("x'^2/2 + x'^2*x^2/2", [0.1], [0.0], 0.1, coordinates=["x"])
     assert found.left_out
     for name, why in found.left_out.items():
@@ -133,7 +133,7 @@ def test_tables_and_polynomials_of_numpy_are_traced():
         assert abs(hz.geometry(table, 0.0, [x], [0.0]).lagrangian - wanted) < 1e-14
         found = hz.geometry(polynomial, 0.0, [x], [0.0]).lagrangian
         assert abs(found - np.polyval([1.0, -2.0, 3.0], x)) <= 1e-14 * abs(found)
-    # A mass on a piecewise linear slope falls as its pieces say: x = t^2/2 up to 1/2, then at twice the force.
+    # On a piecewise linear slope the motion is known: x = t^2/2 up to 1/2, and then with twice the force.
     slope = lambda t, q, v, z: v @ v / 2 + np.interp(q[0], [0.0, 0.5, 4.0], [0.0, 0.5, 7.5])
     sol = hz.solve(slope, [0.0], [0.0], 2.0, accuracy=1e-9)
     assert abs(sol.q[-1, 0] - (0.5 + 1.0 + 1.0)) < 1e-8

@@ -16,7 +16,7 @@ def test_there_are_notebooks():
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs(path):
     notebook = nbformat.read(path, as_version=4)
-    # An error of a cell, a failed assertion among them, is raised.
+    # An error in a cell, including a failed assertion, is raised.
     NotebookClient(notebook, timeout=300, kernel_name="python3").execute()
     drawn = [
         output for cell in notebook.cells for output in cell.get("outputs", []) if "image/png" in output.get("data", {})

@@ -1,4 +1,4 @@
-"""Solutions: states at any time, going on, pickling, tables."""
+"""Solutions: dense output, continuation, pickling, tables."""
 
 import pickle
 
@@ -24,7 +24,7 @@ def test_states_at_any_time_are_those_of_rows(way):
     shuffled = np.random.default_rng(2).permutation(len(times))
     found = sol(times[shuffled])
     for name in ("q", "v", "p", "z", "energy"):
-        # The same steps from the same nodes: the iteration's start alone differs.
+        # The steps from the same nodes are the same, except for the initial guess of the iteration.
         assert np.allclose(getattr(found, name), getattr(rows, name)[shuffled], rtol=1e-12, atol=1e-13), name
     one = sol(times[7])
     assert one.q.shape == (1,) and np.isclose(one.q[0], rows.q[7, 0], rtol=1e-12)
@@ -63,7 +63,7 @@ def test_a_motion_to_its_start_is_the_start():
 
 
 def test_the_velocity_is_that_of_the_motion():
-    # p = sin(4) - t/10 and x' = pi - arcsin(p): of each p there are many x'.
+    # p = sin(4) - t/10 and x' = pi - arcsin(p): many velocities x' correspond to each p.
     def p(t):
         return np.sin(4.0) - 0.1 * t
 
@@ -96,7 +96,7 @@ def test_what_was_not_reached_is_gone_on_with():
     part = pendulum(times, events=[hz.Event("theta", terminal=True)])
     assert 1.0 < part.t_end < 5.0
     rest = part.resume()
-    # The event that has ended the first part is at the start of the rest, and ends it at the next crossing.
+    # The event that ended the first part is at the start of the continuation, which ends at the next crossing.
     assert rest.t[0] == part.t_end and rest.t_end > part.t_end + 1
     with pytest.raises(ValueError, match="reached its end"):
         pendulum(times).resume()

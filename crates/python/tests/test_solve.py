@@ -1,4 +1,4 @@
-"""Motions against closed forms and against themselves."""
+"""Motions compared with closed forms and with each other."""
 
 import herglotz as hz
 import numpy as np
@@ -20,7 +20,7 @@ def test_a_formula_follows_the_closed_form():
     t = np.linspace(0, 50, 501)
     sol = hz.solve(FORMULA, [1.0], [0.0], t, accuracy=1e-11, **OSCILLATOR)
     x, v = oscillator(t)
-    # The size of the motion falls by e^-2.5; 1e-11 of it was asked for.
+    # The size of the motion decays by e^-2.5; the requested error is 1e-11 of it.
     assert np.max(np.abs(sol.q[:, 0] - x)) < 1e-11
     assert np.max(np.abs(sol.v[:, 0] - v)) < 1e-11
     assert sol.status == "completed" and sol.success and sol.unresolved is None
@@ -65,7 +65,7 @@ def test_events_are_where_the_closed_form_has_them():
     sol = hz.solve(FORMULA, [1.0], [0.0], 20.0, accuracy=1e-11, events=events, **OSCILLATOR)
     w = np.sqrt(1 - 0.05**2)
     zeros = (np.arctan2(w, -0.05) + np.arange(6) * np.pi) / w
-    # The first sine with its sign: cos(wt) + 0.05/w sin(wt) = 0.
+    # The zeros of x in closed form: cos(wt) + 0.05/w sin(wt) = 0.
     zeros = np.array([t for t in zeros if t < 20.0])
     assert np.allclose(sol.events["zero"].t, zeros, atol=1e-9)
     # x' = -e^(at) sin(wt)/w rises through 0 at odd multiples of pi/w.
@@ -101,7 +101,7 @@ def test_the_momenta_of_bodies_in_a_formula():
     )
     assert list(sol.momenta) == ["translation of a, c", "translation of b, d", "rotation of (a, b), (c, d)"]
     for name, momentum in sol.momenta.items():
-        # To the accuracy, in units of a momentum of the two.
+        # Accurate relative to the momentum of a single body.
         assert np.allclose(momentum, momentum[0] * np.exp(-0.05 * sol.t), rtol=0, atol=1e-9), name
     assert np.array_equal(sol.momenta["translation of a, c"], sol.p[:, 0] + sol.p[:, 2])
 
@@ -148,7 +148,7 @@ def test_arrays_are_not_copies():
 
 
 def test_every_name_of_the_catalogue_runs():
-    # From t = 1: one of them is singular at t = 0.
+    # From t = 1, since one system is singular at t = 0.
     for name in hz.catalogue():
         system = hz.solve(name, t=[1.0, 1.5]).system
         assert hz.solve(name, t=[1.0, 1.5]).success, system
@@ -159,15 +159,16 @@ def test_the_error_of_given_steps_is_estimated():
     for integrator, step in [("strang", 0.1), ("gauss_2", 0.5), ("midpoint", 0.05)]:
         sol = hz.solve(FORMULA, [1.0], [0.0], [0, end], integrator=integrator, step=step, estimate=True, **OSCILLATOR)
         x, v = oscillator(end)
-        # The conjugate momentum is the velocity.
+        # The conjugate momentum equals the velocity.
         error = np.hypot(sol.q[-1, 0] - x, sol.p[-1, 0] - v) / np.hypot(x, v)
-        # Of an order p the distance from half steps is the part 1 - 2^-p of the error: three quarters at the least.
+        # For a method of order p, the distance from the run with half steps is 1 - 2^-p of the error: at least three
+        # quarters.
         assert 0.7 * error < sol.error_estimate < 1.3 * error
     assert hz.solve(FORMULA, [1.0], [0.0], [0, end], integrator="strang", step=0.1, **OSCILLATOR).error_estimate is None
 
 
 def test_the_velocity_is_as_accurate_as_the_state():
-    # A charge in a field: v turns by B t, and p = v + A(q) is 1e5 times as large.
+    # A charge in a magnetic field: v rotates by the angle B t, and p = v + A(q) is 1e5 times as large.
     B, t = 1e5, 40e-5
     formula, plane = "(x'^2 + y'^2)/2 + B*(x*y' - y*x')/2", dict(coordinates=["x", "y"], parameters={"B": B})
     sol = hz.solve(formula, [1.0, 0.0], [0.6, 0.8], t, accuracy=1e-6, **plane)

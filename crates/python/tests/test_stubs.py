@@ -1,4 +1,4 @@
-"""The stubs say what the package has."""
+"""The stubs agree with the package."""
 
 import ast
 import inspect
@@ -12,7 +12,7 @@ STUBS = ast.parse(Path(hz.__file__).with_name("__init__.pyi").read_text())
 def test_every_public_name_has_a_stub_and_a_docstring():
     named = {node.name for node in STUBS.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
     assert set(hz.__all__) <= named
-    # Named tuples that others hold are known by their holders.
+    # Named tuples that are only parts of others need not be public.
     assert named - set(hz.__all__) <= {"Place", "Work"}
     for name in hz.__all__:
         assert inspect.getdoc(getattr(hz, name)), name

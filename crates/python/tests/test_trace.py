@@ -1,4 +1,4 @@
-"""Functions that are traced: against formulas, and what cannot be traced."""
+"""Traced functions: compared with formulas, and functions that cannot be traced."""
 
 import math
 
@@ -11,14 +11,14 @@ STATE = dict(t=0.3, q=[0.7, -0.4], v=[0.2, 0.5], z=0.1)
 
 
 def value(L):
-    """L at a state, by the trace; a kinetic term keeps it regular."""
+    """The value of L at a state by tracing; a kinetic term makes the Lagrangian regular."""
     traced = hz.system(lambda t, q, v, z: v @ v / 2 + L(t, q, v, z), n=2)
     found = hz.geometry(traced, *STATE.values()).lagrangian
     v = np.array(STATE["v"])
     return found - v @ v / 2
 
 
-# Each is evaluated with numbers too: the trace must do what NumPy does.
+# Each is also evaluated with numbers: the trace must agree with NumPy.
 FUNCTIONS = [
     lambda t, q, v, z: np.sin(q[0]) * np.cos(q[1]) + np.tan(q[0]),
     lambda t, q, v, z: np.exp(-q @ q) + np.expm1(q[0]) + np.log(q[0]) + np.log1p(q[0]),
@@ -53,7 +53,7 @@ def test_a_trace_is_what_numpy_computes(L):
     with np.errstate(all="raise"):
         t, q, v, z = STATE.values()
         wanted = float(L(t, np.array(q), np.array(v), z))
-    # A dozen operations, each to a rounding or two.
+    # About a dozen operations, each with a rounding error or two.
     assert value(L) == pytest.approx(wanted, rel=2e-14)
 
 

@@ -117,8 +117,8 @@ pub fn in_words(error: &InputError) -> String {
             };
             format!("the Lagrangian is not {claim}, as this integrator needs; take another integrator")
         }
-        InputError::Hypothesis { hypothesis } if hypothesis.contains("clock") => {
-            "the integrator needs a clock, which Lagrangians by a formula or a function do not have; take another integrator".to_owned()
+        InputError::Hypothesis { hypothesis } if hypothesis.contains("time transformation") => {
+            "the integrator needs a time transformation, which Lagrangians by a formula or a function do not have; take another integrator".to_owned()
         }
         InputError::Hypothesis { hypothesis } => format!("the integrator needs {hypothesis}; take another integrator"),
         InputError::Unsaved => "this integrator's motion cannot be saved on the way; take another integrator".to_owned(),

@@ -1,7 +1,7 @@
 //! The contact geometry at a point.
 
-/// The contact geometry of a Lagrangian at a time and a point `(q, v, z)` of TQ x R. Vectors and covectors on TQ x R have the order
-/// q, v, z; matrices are given by rows.
+/// The contact geometry of a Lagrangian at a time and a point `(q, v, z)` of TQ x R. Vectors and covectors on TQ x R
+/// have the order q, v, z; matrices are given by rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Geometry {
     /// The value of L.
@@ -14,14 +14,14 @@ pub struct Geometry {
     pub rate: f64,
     /// `W = L_vv`.
     pub mass: Vec<Vec<f64>>,
-    /// The condition of W: infinite where L is not regular.
+    /// The condition number of W: infinite where L is not regular.
     pub condition: f64,
     /// The contact form `eta_L = dz - L_v dq`.
     pub eta: Vec<f64>,
     /// Its Reeb field `d/dz - W^-1 L_vz d/dv`.
     pub reeb: Vec<f64>,
-    /// `eta ^ (d eta)^n` of the coordinate vectors.
+    /// The value of `eta ^ (d eta)^n` on the coordinate vectors.
     pub volume: f64,
-    /// The Herglotz field `(v, a, L)`, the motion's velocity in TQ x R.
+    /// The Herglotz field `(v, a, L)`, the velocity of the motion in TQ x R.
     pub herglotz_field: Vec<f64>,
 }

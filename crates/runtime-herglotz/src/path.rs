@@ -1,4 +1,4 @@
-//! Paths between given ends.
+//! Discrete boundary value problems: paths between given ends.
 
 use crate::kernel::path;
 use crate::{RuntimeError, System};

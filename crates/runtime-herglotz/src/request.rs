@@ -63,7 +63,7 @@ pub enum StepControl {
 /// Which states are recorded.
 #[derive(Clone, Debug, PartialEq)]
 pub enum OutputTimes {
-    /// The start, every so many steps, and the end.
+    /// The start, the steps whose number is a multiple of this one, and the end.
     Every(usize),
     /// These times, in the order of the motion.
     At(Vec<f64>),

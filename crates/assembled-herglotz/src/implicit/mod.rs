@@ -20,11 +20,11 @@ pub(crate) use pattern::{FullPattern, Pattern};
 
 /// The largest absolute component; infinite where one is not a number.
 fn max_abs_or_nan(x: &[f64]) -> f64 {
-    let mut max_abs_or_nan = 0.0f64;
+    let mut largest = 0.0f64;
     let mut sum = 0.0;
     for x in x {
-        max_abs_or_nan = max_abs_or_nan.max(x.abs());
+        largest = largest.max(x.abs());
         sum += x;
     }
-    if sum.is_nan() { f64::INFINITY } else { max_abs_or_nan }
+    if sum.is_nan() { f64::INFINITY } else { largest }
 }

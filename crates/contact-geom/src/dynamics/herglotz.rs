@@ -16,26 +16,26 @@ pub struct Regularity {
     /// The smallest singular value; 0 where the Lagrangian is singular.
     pub smallest: f64,
     /// The largest singular value.
-    pub max_abs_or_nan: f64,
+    pub largest: f64,
 }
 
 impl Regularity {
     /// The singular values of a matrix that decides regularity. A matrix that is not finite counts as singular.
     pub fn of(matrix: DMatrix<f64>) -> Self {
         if !matrix.iter().all(|e| e.is_finite()) {
-            return Regularity { smallest: 0.0, max_abs_or_nan: f64::INFINITY };
+            return Regularity { smallest: 0.0, largest: f64::INFINITY };
         }
         if matrix.is_empty() {
             // Of dimension 0 there is one matrix, the identity.
-            return Regularity { smallest: 1.0, max_abs_or_nan: 1.0 };
+            return Regularity { smallest: 1.0, largest: 1.0 };
         }
         let values = matrix.singular_values();
-        Regularity { smallest: values.min(), max_abs_or_nan: values.max() }
+        Regularity { smallest: values.min(), largest: values.max() }
     }
 
     /// The condition number; infinite for a singular matrix. Digits beyond `16 - log10(condition)` are noise.
     pub fn condition(&self) -> f64 {
-        if self.smallest > 0.0 { self.max_abs_or_nan / self.smallest } else { f64::INFINITY }
+        if self.smallest > 0.0 { self.largest / self.smallest } else { f64::INFINITY }
     }
 }
 

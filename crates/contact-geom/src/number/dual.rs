@@ -201,12 +201,12 @@ macro_rules! arithmetic {
             }
             #[$inline]
             fn extent(self) -> f64 {
-                let mut max_abs_or_nan = self.re.extent();
+                let mut largest = self.re.extent();
                 self.d.each(|a| {
-                    max_abs_or_nan = max_abs_or_nan.max(a.extent());
+                    largest = largest.max(a.extent());
                     a
                 });
-                max_abs_or_nan
+                largest
             }
             #[$inline]
             fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {

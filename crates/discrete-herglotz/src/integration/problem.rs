@@ -181,9 +181,9 @@ fn check_regular<const N: usize>(
     // In units of the coordinates in which its rows are of size one: masses may differ by any factor.
     let unit = SVector::<f64, N>::from_fn(|i, _| max_abs_or_nan(w.row(i).iter().copied()).sqrt());
     let scaled = DMatrix::from_fn(N, N, |i, j| w[(i, j)] / (unit[i] * unit[j]));
-    let Regularity { smallest, max_abs_or_nan } = Regularity::of(scaled);
+    let Regularity { smallest, largest } = Regularity::of(scaled);
     // A matrix of zeros has no such units, and counts as singular.
-    if smallest > 4.0 * N as f64 * f64::EPSILON * max_abs_or_nan {
+    if smallest > 4.0 * N as f64 * f64::EPSILON * largest {
         return Ok(());
     }
     Err(InputError::FirstStep(StepError::Singular { pivot: smallest }))

@@ -45,13 +45,13 @@ pub(crate) struct Root<const N: usize> {
 /// a small step.
 #[inline(always)]
 pub(crate) fn max_abs_or_nan<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> f64 {
-    let mut max_abs_or_nan = 0.0;
+    let mut largest = 0.0;
     for column in &m.data.0 {
         for &c in column {
-            max_abs_or_nan = f64::max(max_abs_or_nan, c.abs());
+            largest = f64::max(largest, c.abs());
         }
     }
-    max_abs_or_nan
+    largest
 }
 
 /// Whether the correction of a Newton iteration after this one is within a tolerance: convergence is quadratic, so from two

@@ -262,8 +262,8 @@ fn principle<const N: usize>(
     let size = ld.jet(t, x)?.d1.max_abs_or_nan().max_or_nan(ld.jet(t, x)?.d2.max_abs_or_nan());
     // A rounded point of the path changes its neighbours' residuals by D12 times the rounding.
     let second = ld.second_jet(t, x)?;
-    let max_abs_or_nan = solution.points().iter().map(MaxAbsOrNan::max_abs_or_nan).fold(0.0, max_or_nan);
-    let size_of_solution = size.max_or_nan(second.d12.max_abs_or_nan() * max_abs_or_nan);
+    let largest = solution.points().iter().map(MaxAbsOrNan::max_abs_or_nan).fold(0.0, max_or_nan);
+    let size_of_solution = size.max_or_nan(second.d12.max_abs_or_nan() * largest);
     let differential = differentiated(ld, t, &solution, x.z0)?;
     let mut worst = differential[1..3].iter().map(|d| d.max_abs_or_nan() / size_of_solution).fold(0.0, max_or_nan);
 

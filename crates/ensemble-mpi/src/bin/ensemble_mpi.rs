@@ -1,13 +1,14 @@
-//! An ensemble of damped pendula over MPI ranks.
+//! An ensemble of damped pendula on MPI ranks.
 //!
 //! ```text
 //! mpirun -np 2 ensemble_mpi [--members N --time T --steps K --method NAME --seed I --checkpoint FILE --out FILE --means
 //!     --patience S --rates]
 //! ```
 //!
-//! `L = v^2/2 - (1 - cos q) - z/100`; angle and velocity of each member are random numbers seeded with its index. Writes a CSV file with the
-//! members' ends or their means, 17 digits each: the same bytes for any number of ranks, and for runs that were killed and went on from the checkpoint. Ends
-//! with 2 where the input is refused, a checkpoint cannot be used or a rank is lost, with 1 where the CSV file cannot be written.
+//! `L = v^2/2 - (1 - cos q) - z/100`; angle and velocity of each member are random numbers seeded with its index.
+//! Writes a CSV file with the final states of the members or their means, with 17 digits each: the same bytes for any
+//! number of ranks, and for runs that were killed and resumed from the checkpoint. The exit code is 2 where the input
+//! is refused, a checkpoint cannot be used or a rank is lost, and 1 where the CSV file cannot be written.
 
 use clap::Parser;
 use contact_geom::{VelocityPoint, systems::Pendulum};
@@ -21,42 +22,42 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Runs an ensemble of damped pendula over MPI ranks.
+/// Runs an ensemble of damped pendula on MPI ranks.
 #[derive(Parser)]
 struct Arguments {
-    /// How many pendula.
+    /// The number of pendula.
     #[arg(long, default_value_t = 100_000)]
     members: usize,
-    /// The time at their end.
+    /// The final time.
     #[arg(long, default_value_t = 100.0)]
     time: f64,
-    /// The steps of each.
+    /// The number of steps of each.
     #[arg(long, default_value_t = 400)]
     steps: usize,
     /// The integrator.
     #[arg(long, default_value = "blanes_moan_6")]
     method: AnyIntegrator,
-    /// What the starts are drawn from, beside the index.
+    /// The seed of the random initial states, in addition to the index.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// A file of the shards that are done, to go on from.
+    /// A file with the shards that are done, from which the run is resumed.
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
-    /// The members' ends.
+    /// The file for the final states.
     #[arg(long, value_name = "FILE", default_value = "ensemble_mpi.csv")]
     out: PathBuf,
-    /// Only the means of the ends.
+    /// Write only the means of the final states.
     #[arg(long)]
     means: bool,
-    /// How many seconds to wait for a rank's next shard; for ever where nothing is said.
+    /// How many seconds to wait for the next shard of a rank; by default without limit.
     #[arg(long, value_name = "SECONDS")]
     patience: Option<f64>,
-    /// Print what rank 0 has handed out and received.
+    /// Print statistics of what rank 0 has handed out and received.
     #[arg(long)]
     rates: bool,
 }
 
-/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014) at a place: a number of `[-1, 1)`.
+/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014) at an index: a number in `[-1, 1)`.
 fn random(seed: u64, place: u64) -> f64 {
     let mixed = |x: u64| {
         let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -67,11 +68,11 @@ fn random(seed: u64, place: u64) -> f64 {
     (word >> 11) as f64 * f64::EPSILON - 1.0
 }
 
-/// The ends of members, or their means, as lines of a file that gets its name when it is whole.
+/// The final states of members, or their means, as lines of a file that gets its name when it is complete.
 struct Table {
     path: PathBuf,
     file: BufWriter<File>,
-    /// The members that completed and the sums of their q, p and z, where only the means are wanted.
+    /// The number of members that completed and the sums of their q, p and z, where only the means are requested.
     sums: Option<(usize, [f64; 3])>,
 }
 
@@ -160,7 +161,7 @@ fn main() -> ExitCode {
     if let Some(path) = &arguments.checkpoint {
         ensemble = ensemble.checkpoint(path);
     }
-    // Made at the first member: where the ensemble is refused no file is left.
+    // Created with the first member, so that no file is left where the ensemble is refused.
     let mut table: Option<std::io::Result<Table>> = None;
     let clock = Instant::now();
     let merged = run(&world, &ensemble, Until::Time(arguments.time), Options { patience }, |member| {

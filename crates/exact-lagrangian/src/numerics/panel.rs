@@ -249,8 +249,8 @@ pub(crate) fn collocate<const N: usize, T: Scalar>(
     let mut contraction = 0.0;
     let sizes = if problem.narrow.is_some() { 2 } else { collocations().len() };
     for (k, g) in collocations()[..sizes].iter().enumerate() {
-        let max_abs_or_nan = k + 1 == sizes;
-        let (mut panel, seen) = sweeps(rates, problem, g, &mut nodes[..g.s], v0, max_abs_or_nan, evaluations)?;
+        let largest = k + 1 == sizes;
+        let (mut panel, seen) = sweeps(rates, problem, g, &mut nodes[..g.s], v0, largest, evaluations)?;
         contraction = max_or_nan(panel.contraction, contraction);
         panel.contraction = contraction;
         if panel.error <= problem.accuracy {
@@ -258,7 +258,7 @@ pub(crate) fn collocate<const N: usize, T: Scalar>(
             panel.last = between_nodes(rates, problem, g, &nodes[..g.s], &panel, &seen, start, evaluations)?;
             return Ok(panel);
         }
-        if max_abs_or_nan {
+        if largest {
             return Ok(panel);
         }
         let coarse = nodes;
@@ -292,13 +292,13 @@ fn between_nodes<const N: usize, T: Scalar>(
     let most = |rates: &[Rate<N, T>]| {
         rates.iter().map(sizes).fold([0.0; 3], |m: [f64; 3], e| std::array::from_fn(|i| max_or_nan(m[i], e[i])))
     };
-    let (max_abs_or_nan, tails) = (most(nodes), most(&g.tail.map(|row| Rate::sum(nodes, &row))));
+    let (largest, tails) = (most(nodes), most(&g.tail.map(|row| Rate::sum(nodes, &row))));
     let floor = problem.floor.over(h, 64.0);
     let position = from.q.iter().map(|q| q.pivot_size()).fold(0.0, max_or_nan);
     // What a change of a rate must exceed to matter: the polynomial's own error, and what changes the state by roundings.
     let state = [seen.scales[0].0[0], from.z.pivot_size(), 1.0];
     let allowed: [f64; 3] = std::array::from_fn(|i| {
-        let rounding = max_or_nan(1e4 * accuracy * max_abs_or_nan[i], 32.0 * accuracy * state[i] / h.abs());
+        let rounding = max_or_nan(1e4 * accuracy * largest[i], 32.0 * accuracy * state[i] / h.abs());
         max_or_nan(16.0 * tails[i], rounding) + floor[i].0[0]
     });
     let defect = |found: &Rate<N, T>, row: &[f64; MOST]| {
@@ -312,9 +312,9 @@ fn between_nodes<const N: usize, T: Scalar>(
         return Err(Refused::Hidden(0.0));
     }
     let moved = panel.displacement.iter().map(|d| d.pivot_size()).fold(0.0, max_or_nan);
-    let still = max_abs_or_nan[0] == 0.0;
+    let still = largest[0] == 0.0;
     // Of a motion of many panels also the change of the velocity tells: it may have come to rest.
-    let faster = if problem.part.abs() < 0.5 { max_abs_or_nan[0] * h.abs() / state[0] } else { 0.0 };
+    let faster = if problem.part.abs() < 0.5 { largest[0] * h.abs() / state[0] } else { 0.0 };
     let share = if still { 1.0 } else { max_or_nan(moved / max_or_nan(position, moved), faster).min(1.0) };
     let places = if still { g.probes.len() } else { PROBES };
     let wanted = (places as f64 * problem.part.abs() * share * share) as usize;
@@ -345,7 +345,7 @@ fn between_nodes<const N: usize, T: Scalar>(
     // In the mean the polynomial's own error vanishes, up to an order beyond the panel's, and so does its first moment. Not so those
     // of a force which is too small to be seen beside it, and too fast for the nodes; that both do by chance is unlikely.
     let mean =
-        std::array::from_fn(|i| 16.0 * accuracy * max_or_nan(max_abs_or_nan[i], state[i] / h.abs()) + floor[i].0[0]);
+        std::array::from_fn(|i| 16.0 * accuracy * max_or_nan(largest[i], state[i] / h.abs()) + floor[i].0[0]);
     if !missed.iter().all(|missed| within(missed, &mean)) {
         return Err(Refused::Hidden(0.0));
     }

@@ -46,9 +46,9 @@ impl Units {
         let (p0, p1) = (lagrangian.gradient(0.0, start).y, lagrangian.gradient(0.0, end).y);
         // A rounding of q0 moves the momenta by about p/|q1 - q0| times it, and the action by p times it.
         let ill = start.q.max_abs_or_nan() / (end.q - start.q).max_abs_or_nan();
-        let max_abs_or_nan = p0.max_abs_or_nan().max_or_nan(p1.max_abs_or_nan());
+        let largest = p0.max_abs_or_nan().max_or_nan(p1.max_abs_or_nan());
         let of_momenta = (jet.d1 / jet.sigma() + p0).max_abs_or_nan().max_or_nan((jet.d2 - p1).max_abs_or_nan())
-            / ((1.0 + ill) * max_abs_or_nan);
+            / ((1.0 + ill) * largest);
         let of_value = (jet.value - action).abs() / (action.abs() + ill * p1.dot(&(end.q - start.q)).abs());
         self.motion = self.motion.max_or_nan(of_motion / EPS);
         self.value = self.value.max_or_nan(of_value / EPS);

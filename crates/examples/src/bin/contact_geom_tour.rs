@@ -1,8 +1,13 @@
-//! A tour of the geometry: contact forms and Reeb fields on the three spaces, and a test for "is this map contact?".
+//! A tour of the geometry: contact forms and Reeb fields on the three spaces, and a test of whether a map is a contact
+//! map.
 //!
 //! ```text
 //! cargo run --release --bin contact_geom_tour
 //! ```
+//!
+//! Prints, for one system, the components, the Reeb field and the volume of four contact forms at corresponding points.
+//! For a step of the damped pendulum by several methods and four step sizes, it prints the conformal factor and the
+//! defect of the pullback. It writes no files.
 
 use clap::Parser;
 use contact_examples::{Failure, finish, print};
@@ -34,13 +39,13 @@ fn describe(name: &str, form: &impl ContactForm<1>, x: &ChartVector<1>) -> Resul
 
 /// The contact forms of one system at corresponding points of T\*Q x R, TQ x R and Q x Q x R.
 ///
-/// The system's L_v depends on z, so the Reeb field of eta_L has a component along v: it is `d/dz` in Darboux coordinates
-/// only.
+/// `L_v` of the system depends on z, so the Reeb field of eta_L has a component along v; it is `d/dz` only in Darboux
+/// coordinates.
 fn forms_and_reeb_fields() -> Result<(), Failure> {
     let (system, t, h) = (CoupledInZ::default(), 0.0, 0.1);
     let velocity = system.initial();
     let phase = legendre(&system, t, &velocity);
-    // The step of a discrete Lagrangian that starts with this momentum.
+    // The step of the discrete Lagrangian whose initial momentum is that of `phase`.
     let ld = Midpoint::new::<1>(system, h)?;
     let points: DiscretePoint<1> = legendre_minus_inverse(&ld, t, &phase, &velocity.v)?;
     let jets = |x: &DiscretePoint<1>| Ok(ld.second_jet(t, x)?);
@@ -65,7 +70,7 @@ impl SmoothFunction<1> for Hamiltonian {
     }
 }
 
-/// One step of the classical Runge-Kutta method with X_H: a good integrator, not a contact one.
+/// One step of the classical Runge-Kutta method for X_H, which is accurate but not a contact map.
 struct RungeKutta<F> {
     field: F,
     h: f64,
@@ -82,8 +87,8 @@ impl<F: Smooth<1>> Smooth<1> for RungeKutta<F> {
     }
 }
 
-/// One step of Strang's splitting of the pendulum: the flows of `-gamma z`, of the potential and of `p^2/2`, each an exact
-/// contact map.
+/// One step of Strang's splitting of the pendulum: the flows of `-gamma z`, of the potential and of `p^2/2`, each an
+/// exact contact map.
 struct Strang {
     gamma: f64,
     h: f64,
@@ -104,8 +109,8 @@ impl Smooth<1> for Strang {
     }
 }
 
-/// The conformal factor and the defect `|F* eta - sigma eta|` of one step, for methods that are contact and one that is
-/// not.
+/// The conformal factor and the defect `|F* eta - sigma eta|` of one step, for methods that are contact maps and for
+/// one that is not.
 fn which_maps_are_contact() -> Result<(), Failure> {
     let system = Pendulum { gamma: -0.1 };
     let hamiltonian = Hamiltonian(system);
@@ -120,11 +125,11 @@ fn which_maps_are_contact() -> Result<(), Failure> {
     text += &format!("   {:>12} {:>9}", "sigma", "defect").repeat(4);
     text += "\n";
     for h in [0.8, 0.4, 0.2, 0.1] {
-        // As generic functions, differentiated automatically.
+        // Generic functions, differentiated automatically.
         let strang = conformality(&Darboux, &Darboux, &Strang { gamma: system.gamma, h }, &start.into())?;
         let field = DarbouxField { hamiltonian: &hamiltonian, t: 0.0 };
         let runge_kutta = conformality(&Darboux, &Darboux, &RungeKutta { field, h }, &start.into())?;
-        // By the Jacobian at the point: a step that solves an equation.
+        // Steps that solve an equation: by the Jacobian at the point.
         let midpoint = step(&Midpoint::new::<1>(system, h)?, &start)?;
         let left = step(&LeftMidpoint::new::<1>(system, h)?, &start)?;
         text += &format!("  {h:>6} {:>12.9}", (system.gamma * h).exp());

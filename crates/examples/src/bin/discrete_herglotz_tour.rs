@@ -1,8 +1,12 @@
-//! A tour of runs: a Lagrangian of one's own, run, observed and plotted.
+//! A tour of runs: a user-defined Lagrangian is integrated and observed, and its motion is plotted.
 //!
 //! ```text
 //! cargo run --release --bin discrete_herglotz_tour [-- --out DIR]
 //! ```
+//!
+//! Integrates a star in a pulsating galaxy by the midpoint rule. Writes every fifth state (`star.csv`), and the orbit
+//! beside the decay of the angular momentum (`star.svg`), into `--out`. Prints the final state, the smallest conformal
+//! factor of a step, and the largest relative difference of the angular momentum from the product of the factors.
 
 use clap::Parser;
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, finish, number, print};
@@ -16,8 +20,9 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// A star in a galaxy whose core pulsates, with a drag that grows with the action: nonlinear in z, driven in time, and still
-/// symmetric under rotations. Dimensionless: velocities in units of the circular velocity far out.
+/// A star in a galaxy whose core pulsates, with a drag that grows with the action: the Lagrangian is nonlinear in z,
+/// depends on time, and is symmetric under rotations. Dimensionless: velocities are in units of the circular velocity
+/// at large radii.
 struct Star;
 
 impl Lagrangian<2> for Star {
@@ -28,7 +33,7 @@ impl Lagrangian<2> for Star {
     }
 }
 
-/// Runs a Lagrangian of one's own, and writes its orbit and the decay of its angular momentum.
+/// Integrates a user-defined Lagrangian, and writes its orbit and the decay of its angular momentum.
 #[derive(Parser)]
 struct Arguments {
     /// The directory for the table and the figure; created where it does not exist.
@@ -48,7 +53,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (h, steps) = RUN;
     let problem = Problem::new(&Star, 0.0, PhasePoint::new([1.0, 0.0], [0.0, 0.7], 0.0))?;
 
-    // What the run is observed by: every fifth state, a momentum with its prediction, the smallest conformal factor, a bar.
+    // The observers: every fifth state, a momentum with its prediction, the smallest conformal factor, and a progress
+    // bar.
     let mut states = Rows::every(5)?;
     let mut momentum = MomentumDecay::new(Symmetry::rotation(0, 1)?);
     let mut smallest = f64::INFINITY;
@@ -98,7 +104,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// The orbit as a table, and as a figure beside the angular momentum.
+/// Writes the orbit as a table, and as a figure beside the angular momentum.
 fn write(out: &Directory, rows: &[Row<2>], momentum: &[MomentumRow]) -> Result<(), Failure> {
     let entries = rows.iter().map(|x| [x.t, x.q[0], x.q[1], x.p[0], x.p[1]].into_iter().chain(x.z).map(number));
     out.table("star.csv", &["t", "q1", "q2", "p1", "p2", "z"], entries)?;

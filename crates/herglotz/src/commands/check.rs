@@ -14,7 +14,7 @@ pub(crate) struct Check {
     /// The number of places along the motion.
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     places: u16,
-    /// Write it as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }

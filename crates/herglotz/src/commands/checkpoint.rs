@@ -1,4 +1,4 @@
-//! The checkpoints of `herglotz run`: a file from which a run that was interrupted or killed goes on.
+//! The checkpoints of `herglotz run`: a file from which a run that was interrupted or killed is resumed.
 
 use crate::failure::Failure;
 use crate::output::Directory;
@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 
 const FILE: &str = "checkpoint.json";
 
-/// What is saved of a run: its state, and how much of its files belongs to what is before it. One file holds both, so that they never
-/// belong to different steps.
+/// The content of a checkpoint: the state of a run, and the lengths of its output files at that state. Both are in one
+/// file, so that they always belong to the same step.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct Checkpoint {
-    /// The scene, in words.
+    /// The fingerprint of the scene.
     scene: String,
     pub integrator: String,
     pub count: usize,
@@ -24,7 +24,7 @@ pub(crate) struct Checkpoint {
     state: Vec<u8>,
 }
 
-/// What is in the files.
+/// The lengths of the output files.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Written {
     pub rows: usize,
@@ -34,7 +34,7 @@ pub(crate) struct Written {
 }
 
 impl Checkpoint {
-    /// That of a directory, for a scene.
+    /// Reads the checkpoint of a directory, for a scene.
     pub fn read(directory: &Directory, scene: &Scene) -> Result<Self, Failure> {
         let path = directory.file(FILE);
         let refuse = |why: &str| Failure::Input(format!("{}: {why}", path.display()));
@@ -48,19 +48,19 @@ impl Checkpoint {
         Ok(read)
     }
 
-    /// The state from which the run goes on.
+    /// The state from which the run is resumed.
     pub fn state(&self, directory: &Directory) -> Result<ResumeState, Failure> {
         let read = ResumeState::from_bytes(&self.state);
         read.map_err(|error| Failure::Input(format!("{}: {error}", directory.file(FILE).display())))
     }
 
-    /// Removes that of a directory.
+    /// Removes the checkpoint of a directory.
     pub fn remove(directory: &Directory) -> Result<(), Failure> {
         directory.remove(FILE)
     }
 }
 
-/// Saves a run.
+/// Writes the checkpoints of a run.
 pub(crate) struct Saves {
     directory: Directory,
     scene: String,
@@ -72,7 +72,7 @@ pub(crate) struct Saves {
 }
 
 impl Saves {
-    /// In a directory, each so much time.
+    /// Checkpoints in a directory at an interval of time.
     pub fn new(directory: &Directory, scene: &Scene, plan: &Plan, every: Duration) -> Self {
         Saves {
             directory: directory.clone(),
@@ -85,12 +85,12 @@ impl Saves {
         }
     }
 
-    /// Whether it is time for the next one.
+    /// Whether the next checkpoint is due.
     pub fn is_due(&self) -> bool {
         self.last.elapsed() >= self.every
     }
 
-    /// Saves the state after so many steps.
+    /// Saves the state after a number of steps.
     pub fn save(&mut self, taken: usize, written: Written, state: &ResumeState) -> Result<(), Failure> {
         let Saves { scene, integrator, count, in_transformed_time, .. } = &*self;
         let checkpoint = Checkpoint {

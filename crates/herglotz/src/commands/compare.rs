@@ -10,17 +10,17 @@ use clap::Args;
 use runtime_herglotz::{Comparison, Work};
 use std::path::PathBuf;
 
-/// The errors for which the best integrator is named.
+/// The errors for which the best integrator is reported.
 const ERRORS: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
 
 #[derive(Args)]
 pub(crate) struct Compare {
     #[command(flatten)]
     scene: SceneArguments,
-    /// The directory of compare.csv and compare.svg; that with the name of the scene otherwise.
+    /// The directory of compare.csv and compare.svg; by default one with the name of the scene.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Tell the best ones as JSON.
+    /// Print the best integrators as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -80,14 +80,14 @@ fn in_words(comparison: &Comparison) -> String {
         None => format!("{error:.0e}: none"),
     };
     let mut lines = vec![format!("the reference: {}", comparison.reference)];
-    // Those with one reason in one line.
+    // Integrators with the same reason share a line.
     for same in comparison.left_out.chunk_by(|a, b| a.1 == b.1) {
         let names: Vec<&str> = same.iter().map(|(name, _)| name.as_str()).collect();
         let why = same.first().map_or("", |(_, why)| why);
         lines.push(format!("left out: {}: {why}", names.join(", ")));
     }
     lines.push(format!("the best for {}", ERRORS.map(best).join("; ")));
-    // Its steps have no one length.
+    // Peers have variable steps, so only their number is given.
     let of_peer = |error: f64| match comparison.best_of_peers(error) {
         Some(work) => format!("{error:.0e}: {} by {} steps in {:.2e} s", work.integrator, work.steps, work.seconds),
         None => format!("{error:.0e}: none"),

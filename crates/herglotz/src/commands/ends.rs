@@ -1,4 +1,4 @@
-//! `herglotz run` of a path between ends.
+//! `herglotz run` for a path between ends.
 
 use super::run::{ROWS, Run};
 use crate::failure::Failure;
@@ -32,7 +32,7 @@ impl Run {
         self.tell_path(&scene, &found)
     }
 
-    /// Tells how the search has ended, and what the path is worth.
+    /// Prints how the search ended, and the quality of the path.
     fn tell_path(&self, scene: &EndsScene, found: &FoundPath) -> Result<(), Failure> {
         let FoundPath { residual, log_factor, regularity, iterations, .. } = found;
         let (by, steps) = (scene.problem.by, scene.problem.steps);
@@ -40,7 +40,7 @@ impl Run {
         let step_size = (t1 - t0) / steps as f64;
         let n = scene.system.dimension();
         let at_start = |of: &[f64]| of.get(..n).unwrap_or_default().to_vec();
-        // The motion starts with it.
+        // The velocity and the momentum with which the motion starts.
         let start = [at_start(&found.v), at_start(&found.p)].concat();
         let columns = scene.columns.iter().map(|(name, _)| name.as_str());
         let start: Vec<(&str, f64)> = columns.skip(1 + n).zip(start).collect();

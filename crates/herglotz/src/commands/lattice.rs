@@ -1,4 +1,4 @@
-//! `herglotz run` of a lattice.
+//! `herglotz run` for a lattice.
 
 use super::run::{ROWS, Run, progress_bar, stop_flag};
 use crate::failure::Failure;
@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Writes the rows of a motion, and keeps what is drawn.
+/// Writes the rows of a motion, and keeps those that are drawn.
 struct Writer {
     rows: Table,
     count: usize,
@@ -76,12 +76,12 @@ impl Run {
         self.tell_lattice(&scene, &outcome, count)
     }
 
-    /// Tells where the motion has led.
+    /// Prints the final state.
     fn tell_lattice(&self, scene: &LatticeScene, outcome: &Outcome, rows: usize) -> Result<(), Failure> {
         let interrupted = matches!(outcome.status, Status::Stopped { .. });
         let status = match outcome.status {
             _ if interrupted => "interrupted".to_owned(),
-            // Why is told as an error.
+            // The cause is printed as an error.
             Status::Failed { .. } if !self.json => "failed".to_owned(),
             status => status.to_string(),
         };

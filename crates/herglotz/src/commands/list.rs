@@ -7,10 +7,10 @@ use runtime_herglotz::{AnyIntegrator, CATALOGUE, CatalogueEntry};
 
 #[derive(Args)]
 pub(crate) struct List {
-    /// What is listed.
+    /// The kind of entries to list.
     #[arg(value_enum)]
     what: What,
-    /// Write it as JSON.
+    /// Print the list as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -23,7 +23,7 @@ enum What {
     Integrators,
 }
 
-/// What an integrator is, in a few words.
+/// A short description of an integrator.
 fn kind(integrator: AnyIntegrator) -> &'static str {
     match integrator {
         AnyIntegrator::Discrete(_) => "a discrete Lagrangian, each step by Newton's method",

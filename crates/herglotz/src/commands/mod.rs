@@ -19,31 +19,33 @@ use clap_complete::Shell;
 use herglotz::Scene;
 use std::path::PathBuf;
 
-/// What is to be done.
+/// The subcommands.
 #[derive(Subcommand)]
 pub(crate) enum Command {
-    /// Run the motion of a scene, or find its path between two ends: rows.csv, events.csv, and where it leads.
+    /// Run the motion of a scene, or find its path between two ends: writes rows.csv and events.csv, and prints the
+    /// final state.
     Run(run::Run),
-    /// Say what will be computed and what is skipped, and what is proved of the formula.
+    /// Print what will be computed and what is skipped, and what is proved of the formula.
     Plan(plan::Plan),
-    /// Say whether the motion is contact: sigma_d, momenta, Herglotz' equation, and the discrete theory's theorems; ends with 1 if not.
+    /// Check whether the motion is contact: conformal factors, momenta, Herglotz' equation, and the theorems of the
+    /// discrete theory; the exit code is 1 if not.
     Check(check::Check),
-    /// Measure run time against error for all integrators that apply, and for dop853 of another library: compare.csv, and the best dozen with it in
-    /// compare.svg.
+    /// Measure run time against error for all integrators that apply, and for dop853 of another library: writes
+    /// compare.csv, and draws the best dozen with dop853 in compare.svg.
     Compare(compare::Compare),
-    /// Run all members of a sweep over threads: sweep.csv.
+    /// Run all members of a sweep on several threads: writes sweep.csv.
     Sweep(sweep::Sweep),
     /// List the systems of the catalogue, or the integrators.
     List(list::List),
-    /// Write a commented scene to begin with.
+    /// Print a commented scene as a starting point.
     New(new::New),
-    /// Write the completions of a shell.
+    /// Print the completions for a shell.
     Completions {
         /// The shell.
         #[arg(value_enum)]
         shell: Shell,
     },
-    /// Write the JSON schema of scene files, for editors.
+    /// Print the JSON schema of scene files, for editors.
     Schema,
 }
 
@@ -67,12 +69,13 @@ impl Command {
     }
 }
 
-/// A scene file, with changes.
+/// A scene file, with overrides.
 #[derive(Args)]
 pub(crate) struct SceneArguments {
     /// The scene file.
     pub(crate) file: PathBuf,
-    /// Change a value of the scene: a parameter, start.NAME, run.time, run.accuracy or run.step.
+    /// Override a value of the scene: a parameter, start.NAME, run.time, run.accuracy, run.step, run.steps or
+    /// run.integrator.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub(crate) changes: Vec<String>,
 }

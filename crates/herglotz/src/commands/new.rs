@@ -7,7 +7,7 @@ use runtime_herglotz::{CatalogueEntry, velocity_name};
 
 #[derive(Args)]
 pub(crate) struct New {
-    /// A system of the catalogue, to begin with.
+    /// The system of the catalogue to start from.
     #[arg(default_value = "pendulum")]
     name: String,
 }
@@ -19,12 +19,12 @@ impl New {
     }
 }
 
-/// A number as TOML writes it.
+/// A number in TOML.
 fn number(x: f64) -> String {
     format!("{x:?}")
 }
 
-/// A key: in quotes, unless it has only letters, digits and `_`.
+/// A key in TOML: in quotes, unless it consists of letters, digits and `_`.
 fn key(name: &str) -> String {
     let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     if bare { name.to_owned() } else { format!("\"{name}\"") }
@@ -46,7 +46,7 @@ fn template(entry: &CatalogueEntry) -> Result<String, Failure> {
             names.iter().zip(numbers).map(|(coordinate, x)| format!("{} = {}", key(&name(coordinate)), number(*x)));
         lines.collect::<Vec<_>>().join("\n")
     };
-    // Entries of an array are given one by one: a list would do, too.
+    // The entries of an array are given one by one; a list is also accepted.
     let (q, v) = (start(&|name| name.to_owned(), entry.q), start(&velocity_name, entry.v));
     let first = names.first().map(String::as_str).unwrap_or("x");
     let swept = entry.parameters.last().map_or_else(

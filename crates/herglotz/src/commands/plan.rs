@@ -11,7 +11,7 @@ use runtime_herglotz::SeenSymmetry;
 pub(crate) struct Plan {
     #[command(flatten)]
     scene: SceneArguments,
-    /// Write it as JSON.
+    /// Print the plan as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -29,7 +29,7 @@ pub(crate) fn momentum(scene: &Scene, symmetry: &SeenSymmetry) -> String {
     all.join(" + ")
 }
 
-/// What is proved of a system, in words.
+/// The properties of a system that can be proved, whether they are, and their meaning.
 fn proved(scene: &Scene) -> Vec<(&'static str, bool, &'static str)> {
     let structure = scene.system.structure();
     vec![

@@ -26,37 +26,38 @@ pub(crate) const EVENTS: &str = "events.csv";
 pub(crate) struct Run {
     #[command(flatten)]
     pub(super) scene: SceneArguments,
-    /// The directory of the results; that with the name of the scene otherwise.
+    /// The directory of the results; by default one with the name of the scene.
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
-    /// Go on from the last checkpoint of a run that Ctrl-C has interrupted, or that was killed.
+    /// Resume from the last checkpoint of a run that was interrupted by Ctrl-C or killed.
     #[arg(long)]
     pub(super) resume: bool,
     /// The time between two checkpoints, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 60)]
     checkpoint_every: u32,
-    /// Draw the columns against time, and phase portraits: columns.svg, phase.svg, path.svg, section.svg; of a lattice space-time.svg and sites.svg.
+    /// Draw the columns against time, and phase portraits: columns.svg, phase.svg, path.svg, section.svg; for a lattice
+    /// space-time.svg and sites.svg.
     #[arg(long)]
     pub(super) plot: bool,
-    /// Tell the end as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     pub(super) json: bool,
-    /// Interrupt the run as Ctrl-C does, once this part of it is done: for tests.
+    /// Interrupt the run as Ctrl-C does, once this fraction of it is done: for tests.
     #[arg(long, hide = true)]
     interrupt_at: Option<f64>,
 }
 
-/// Sees a motion, and writes what it sees.
+/// Observes a motion and writes its output.
 struct Writer {
     scene: Scene,
     rows: Table,
-    /// Where the scene has events.
+    /// The table of events, where the scene has events.
     events: Option<Table>,
     row_count: usize,
     event_count: usize,
-    /// The rows in which each column is not finite.
+    /// For each column the number of rows in which it is not finite.
     not_finite: Vec<usize>,
-    /// Whether the next row is written already.
+    /// Whether the next row is already in the file.
     skip: bool,
     bar: ProgressBar,
     stop: Arc<AtomicBool>,
@@ -67,7 +68,7 @@ struct Writer {
 }
 
 impl Writer {
-    /// What is in the files, once all is there that was written to them.
+    /// Flushes the files and returns their lengths.
     fn written(&mut self) -> Result<Written, Failure> {
         let rows_bytes = self.rows.flush()?;
         let events_bytes = self.events.as_mut().map(Table::flush).transpose()?.unwrap_or(0);
@@ -109,7 +110,7 @@ impl RunMonitor for Writer {
 
     fn poll(&mut self, part: f64) -> ControlFlow<()> {
         self.bar.set_position((part * 1000.0) as u64);
-        // At the end nothing is left to be interrupted.
+        // At the end of the motion an interruption has no effect.
         let wanted = self.stop.load(Ordering::Relaxed) || self.interrupt_at.is_some_and(|at| part >= at);
         if wanted && part < 1.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
@@ -128,9 +129,9 @@ impl RunMonitor for Writer {
     }
 }
 
-/// What follows the name of the event in a row of events.csv.
+/// The entries of a row of events.csv after the name of the event.
 pub(crate) fn numbers_of_event(scene: &Scene, crossing: &Crossing) -> impl Iterator<Item = String> {
-    // Another event's column is empty.
+    // The columns of other events are empty.
     scene.numbers_of_event(crossing).into_iter().map(|number| number.map(exact).unwrap_or_default())
 }
 
@@ -150,7 +151,7 @@ pub(crate) fn stop_flag() -> Arc<AtomicBool> {
     flag
 }
 
-/// A bar of thousandths on a terminal.
+/// A progress bar in thousandths, on a terminal.
 pub(crate) fn progress_bar(shown: bool) -> ProgressBar {
     if !(shown && std::io::stderr().is_terminal()) {
         return ProgressBar::hidden();
@@ -181,14 +182,14 @@ impl Run {
         let directory = Directory::new(self.out.clone(), &self.scene.file);
         let saved = if self.resume { Some(Checkpoint::read(&directory, &scene)?) } else { None };
         let plan = match &saved {
-            // The steps are known: they are not looked for once more.
+            // The steps are known, and are not determined again.
             Some(saved) if !saved.in_transformed_time => {
                 motion.way = steps(&saved.integrator, saved.count).unwrap_or(motion.way);
                 scene.system.plan(&motion).map_err(explain)?
             }
             _ => scene.system.plan(&motion).map_err(explain)?,
         };
-        // The same steps, found once.
+        // The run takes the steps of the plan, which are determined once.
         if !plan.integrator.in_transformed_time {
             motion.way = steps(&plan.integrator.name, plan.steps).unwrap_or(motion.way);
         }
@@ -230,7 +231,7 @@ impl Run {
         self.tell(&scene, &plan, &outcome, (written.rows, written.events), interrupted.is_some())
     }
 
-    /// The files, from their beginning or where they are to go on.
+    /// The output files: new ones, or those of the run that is resumed.
     fn writer(
         &self,
         directory: &Directory,
@@ -254,7 +255,7 @@ impl Run {
                 (Table::new(rows_at, scene.columns.iter().map(|(name, _)| name.as_str()))?, events)
             }
         };
-        // Rows at steps begin with that at which the motion goes on.
+        // With rows given by steps, the first row after a resume is that of the step at which the motion continues.
         let stride = scene.rows_every_step();
         let skip = saved.zip(stride).is_some_and(|(saved, stride)| saved.taken.is_multiple_of(stride));
         let before = before.unwrap_or_default();
@@ -275,7 +276,7 @@ impl Run {
         })
     }
 
-    /// Tells where the motion has led.
+    /// Prints the final state.
     fn tell(
         &self,
         scene: &Scene,
@@ -287,7 +288,7 @@ impl Run {
         let end = end_of(scene, outcome);
         let status = match outcome.status {
             _ if interrupted => "interrupted".to_owned(),
-            // Why is told as an error.
+            // The cause is printed as an error.
             Status::Failed { .. } if !self.json => "failed".to_owned(),
             Status::FalseClaim { .. } if !self.json => "unreliable".to_owned(),
             status => status.to_string(),
@@ -338,7 +339,7 @@ impl Run {
     }
 }
 
-/// So many steps by the integrator of a name.
+/// A number of steps with the integrator of this name.
 fn steps(integrator: &str, count: usize) -> Option<StepControl> {
     let by: AnyIntegrator = integrator.parse().ok()?;
     Some(StepControl::Steps { by, steps: Steps::Count(count) })
@@ -358,7 +359,7 @@ pub(crate) fn end_of(scene: &Scene, outcome: &Outcome) -> Vec<(String, f64)> {
     end
 }
 
-/// The events that were written: which one, and its numbers.
+/// The events in the file: the index of each, and its numbers.
 fn read_crossings(scene: &Scene, path: &std::path::Path) -> Result<Vec<(usize, Vec<f64>)>, Failure> {
     let index = |name: &str| scene.events.iter().position(|(known, _)| known == name).unwrap_or(usize::MAX);
     let rows = read_rows(path)?;
@@ -369,7 +370,7 @@ fn read_crossings(scene: &Scene, path: &std::path::Path) -> Result<Vec<(usize, V
     Ok(rows.into_iter().filter_map(of).collect())
 }
 
-/// The rows that were written.
+/// The rows in the file.
 fn read_numbers(path: &std::path::Path) -> Result<Vec<Vec<f64>>, Failure> {
     let number = |x: &String| x.parse().unwrap_or(f64::NAN);
     Ok(read_rows(path)?.iter().map(|row| row.iter().map(number).collect()).collect())

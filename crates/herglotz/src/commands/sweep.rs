@@ -18,33 +18,35 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) struct Sweep {
     #[command(flatten)]
     scene: SceneArguments,
-    /// The directory of sweep.csv, and of events.csv where the scene has events; that with the name of the scene otherwise.
+    /// The directory of sweep.csv, and of events.csv where the scene has events; by default one with the name of the
+    /// scene.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// The number of threads; the results do not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Draw the columns at the end, and the coordinates and columns of the first event, against the first swept value.
+    /// Draw the columns at the end, and the coordinates and columns of the first event, against the first swept
+    /// quantity.
     #[arg(long)]
     plot: bool,
-    /// Tell how it ended as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// A swept value with what is drawn against it.
+/// A swept value with the numbers that are drawn against it.
 type Drawn = (f64, Vec<f64>);
 
-/// Writes the members as they come.
+/// Writes the members in the order of their index.
 struct Writer<'s> {
     scene: &'s Scene,
     csv: Table,
-    /// Where the scene has events.
+    /// The table of events, where the scene has events.
     events: Option<Table>,
     /// The number of columns at the end.
     columns: usize,
-    /// The swept values of those that began with their columns, and those with the coordinates and the columns of the first event there,
-    /// where they are drawn.
+    /// The data of the figures: the columns at the end of each member that started, and the coordinates and columns at
+    /// each sign change of the first event, both with the swept value.
     drawn: Option<[Vec<Drawn>; 2]>,
     bar: ProgressBar,
     stop: Arc<AtomicBool>,
@@ -52,7 +54,7 @@ struct Writer<'s> {
     failure: Option<Failure>,
 }
 
-/// How a member ended: a word, and why.
+/// The status of a member in one word, and its reason.
 fn words(ending: &Ending) -> (&'static str, String) {
     let why = ending.unresolved.map(|unresolved| unresolved.to_string()).unwrap_or_default();
     match ending.status {
@@ -127,7 +129,7 @@ impl Sweep {
                 "the column `{column}` of a sweep is known at the ends of steps, where the terminal event `{event}` is not; leave one of them out"
             )));
         }
-        // The time has a column of its own.
+        // The time is a column of its own.
         let shown = scene.columns.iter().filter(|(_, column)| !matches!(column, Column::Time));
         let (names, columns): (Vec<&str>, Vec<Column>) =
             shown.map(|(name, column)| (name.as_str(), column.clone())).unzip();

@@ -1,4 +1,4 @@
-//! Scenes of paths between given ends.
+//! Scenes of boundary value problems: paths between given ends.
 
 use super::file::{SystemTable, place_of_table};
 use super::location::{Location, Named, Numbers, Span};
@@ -10,7 +10,7 @@ use runtime_herglotz::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// A path between two positions over a time: critical for the discrete action of Herglotz' principle.
+/// A path between two positions over a time span that is critical for the discrete action of Herglotz' principle.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a scene of a path between ends")]
 #[schemars(title = "Scene of a path between ends")]
@@ -18,35 +18,38 @@ pub(crate) struct EndsFile {
     /// The version of the format: 1.
     #[expect(dead_code, reason = "it is looked at before all else is read")]
     pub version: Option<Location<i64>>,
-    /// The Lagrangian: a formula of one to eight coordinates, or one of the catalogue.
+    /// The Lagrangian: a formula in one to eight coordinates, or a system of the catalogue.
     pub system: Location<SystemTable>,
-    /// Where the path starts: a number for each coordinate `x`; of the action `z` and the time `t`, which are 0 otherwise. An array of
-    /// coordinates has a list, or one number for all its entries. A system of the catalogue has a start of its own.
+    /// The start of the path: a number for each coordinate `x`, and for the action `z` and the time `t`, which default
+    /// to 0. An array of coordinates has a list, or one number for all its entries. A system of the catalogue has a
+    /// default start.
     #[serde(default)]
     pub start: Option<Location<Named<Numbers>>>,
-    /// Where it ends: a number for each coordinate `x`, and the time `t`.
+    /// The end of the path: a number for each coordinate `x`, and the time `t`.
     pub ends: Location<Named<Numbers>>,
-    /// By what steps.
+    /// The discretization of the path.
     pub run: Location<EndsRun>,
 }
 
-/// By what steps a path is found.
+/// The discretization of a path.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `steps` and `integrator`")]
 pub(crate) struct EndsRun {
-    /// The number of steps, of one length.
+    /// The number of steps, all of the same length.
     pub steps: Location<usize>,
-    /// The integrator whose discrete Lagrangian it is: `gauss_4` without it; any of Gauss', or a rule as `midpoint`.
+    /// The integrator whose discrete Lagrangian is used: a Gauss method, or a quadrature rule such as `midpoint`. The
+    /// default is `gauss_4`.
     pub integrator: Option<Location<String>>,
 }
 
-/// A scene of a path between ends that has been read and checked.
+/// A scene of a boundary value problem that has been read and validated.
 pub struct EndsScene {
     /// The system.
     pub system: System,
-    /// The path that is searched for.
+    /// The boundary value problem.
     pub problem: BoundaryProblem,
-    /// The columns of its points with their names: the time, coordinates, velocities, momenta and the action.
+    /// The columns of the points of the path with their names: the time, coordinates, velocities, momenta and the
+    /// action.
     pub columns: Vec<(String, Column)>,
     text: String,
     system_at: Span,
@@ -82,7 +85,7 @@ impl EndsScene {
     /// ```
     ///
     /// # Errors
-    /// [`SceneError`] with the place in the text.
+    /// [`SceneError`] with the position in the text.
     pub fn read(text: &str) -> Result<Self, SceneError> {
         check_version(text)?;
         let file: EndsFile = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
@@ -133,7 +136,7 @@ impl EndsScene {
         })
     }
 
-    /// The place in the file that an error is about.
+    /// The error with the position in the file that it concerns.
     pub fn explain(&self, error: &RuntimeError) -> SceneError {
         use InputError as E;
         let span = match error {

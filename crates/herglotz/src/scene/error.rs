@@ -1,30 +1,31 @@
-//! What is wrong with a scene, and where.
+//! Errors of a scene, with their position.
 
 use super::location::Span;
 use runtime_herglotz::{ParseError, nearest_name};
 use std::fmt::{Display, Formatter};
 
-/// Something that is wrong with a scene. Printed, it shows file, line and column, what would be accepted, and the line with a mark below.
+/// An error of a scene. Its text has file, line and column, the accepted input, and the line with the position marked
+/// below it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneError {
-    /// The file, or where else the text is from.
+    /// The file, or another source of the text.
     pub file: Option<String>,
-    /// What is wrong, and where.
+    /// The error and its position.
     pub error: Box<ParseError>,
 }
 
 impl SceneError {
-    /// The same with the name of the file.
+    /// The same error with the name of the file.
     pub fn in_file(self, file: impl Into<String>) -> Self {
         SceneError { file: self.file.or_else(|| Some(file.into())), ..self }
     }
 
-    /// At the bytes of a text.
+    /// An error at a range of bytes of a text.
     pub(crate) fn at(text: &str, span: Span, message: impl Into<String>) -> Self {
         SceneError { file: None, error: Box::new(ParseError::at(text, first_line(text, span), message)) }
     }
 
-    /// A name that is unknown, with the nearest of those that are known.
+    /// An unknown name, with the nearest known one.
     pub(crate) fn unknown<'k>(
         text: &str,
         span: Span,
@@ -37,17 +38,17 @@ impl SceneError {
         error
     }
 
-    /// An error in a text that is the value of a string of the file.
+    /// An error in a formula that is the value of a string in the file.
     pub(crate) fn in_string(text: &str, span: Span, error: &ParseError) -> Self {
         let raw = text.get(span.0..span.1).unwrap_or_default();
         let quotes =
             ["\"\"\"", "'''", "\"", "'"].into_iter().find(|quotes| raw.starts_with(quotes)).unwrap_or_default();
-        // A line end after the quotes does not belong to the string.
+        // A line end directly after the opening quotes does not belong to the string.
         let after = &raw[quotes.len()..];
         let dropped =
             ["\r\n", "\n"].into_iter().find(|end| quotes.len() == 3 && after.starts_with(end)).map_or(0, str::len);
         if quotes.is_empty() || quotes.starts_with('"') && raw.contains('\\') {
-            // The places in the string are not those in the file.
+            // Positions in the string differ from those in the file.
             return Self::at(text, span, format!("in this formula: {}", error.message));
         }
         let first = span.0 + quotes.len() + dropped;
@@ -62,11 +63,11 @@ impl SceneError {
         moved
     }
 
-    /// What the reader of the format says.
+    /// An error of the TOML reader.
     pub(crate) fn of_format(text: &str, error: &toml::de::Error) -> Self {
         let span = error.span().map_or((0, 0), |span| (span.start, span.end));
         let message = plain(error.message());
-        // `unknown field `a`, expected one of `b`, `c``: the first one is not known.
+        // In a message such as `unknown field `a`, expected one of `b`, `c``, the first quoted name is the unknown one.
         let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         match quoted.as_slice() {
             [name, known @ ..] if message.starts_with("unknown") => {
@@ -77,7 +78,7 @@ impl SceneError {
     }
 }
 
-/// What to do about what the reader of the format has found.
+/// Advice for an error of the TOML reader.
 fn remedy(text: &str, (start, _): Span, message: &str) -> &'static str {
     let before = text.get(..start).and_then(|before| before.rsplit('\n').next()).unwrap_or_default();
     let after = text.get(start..).and_then(|after| after.lines().next()).unwrap_or_default();
@@ -93,13 +94,13 @@ fn remedy(text: &str, (start, _): Span, message: &str) -> &'static str {
     }
 }
 
-/// A place within one line: of a table that is its first.
+/// A range within one line; a table is represented by its first line.
 fn first_line(text: &str, (start, end): Span) -> Span {
     let length = text.get(start..end).map_or(0, |part| part.lines().next().unwrap_or_default().trim_end().len());
     (start, start + length)
 }
 
-/// A message of the format's reader without the names of types.
+/// A message of the TOML reader without the names of types.
 fn plain(message: &str) -> String {
     const PLAIN: [(&str, &str); 9] = [
         ("expected f64", "expected a number"),

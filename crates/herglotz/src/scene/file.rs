@@ -1,4 +1,4 @@
-//! The scene file as it is written. The documentation of these types is that of the schema, which editors show.
+//! The scene file format. The documentation of these types is that of the JSON schema, which editors show.
 
 use super::location::{Location, Named, Numbers, Span};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -12,12 +12,13 @@ use std::fmt::Formatter;
 /// The version of scene files that this program reads.
 pub(crate) const VERSION: i64 = 1;
 
-/// Where a text has a table of this name, which tells the kind of a scene; what is wrong with the scene is said by its reader.
+/// The position of a table of this name, which determines the kind of a scene. Errors of the scene itself are left to
+/// its reader.
 pub(crate) fn place_of_table(text: &str, name: &str) -> Option<Span> {
     toml::from_str::<BTreeMap<String, Location<IgnoredAny>>>(text).ok()?.get(name).map(Location::span)
 }
 
-/// A motion of a Lagrangian, and what is to be recorded of it.
+/// A motion of a Lagrangian, and the requested output.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a scene")]
 #[schemars(title = "Scene")]
@@ -25,20 +26,20 @@ pub(crate) struct File {
     /// The version of the format: 1.
     #[expect(dead_code, reason = "it is looked at before all else is read")]
     pub version: Option<Location<i64>>,
-    /// The Lagrangian: a formula, or one of the catalogue.
+    /// The Lagrangian: a formula, or a system of the catalogue.
     pub system: Location<SystemTable>,
-    /// Where the motion starts: a number for each coordinate `x`, and for its velocity `x'` or its momentum `p_x`; of the action `z` and
-    /// the time `t`, which are 0 otherwise. An array of coordinates has a list, or one number for all its
-    /// entries. A system of the catalogue has a start of its own.
+    /// The initial state: a number for each coordinate `x`, and for its velocity `x'` or its momentum `p_x`; the action
+    /// `z` and the time `t` default to 0. An array of coordinates has a list, or one number for all its entries. A
+    /// system of the catalogue has a default initial state.
     #[serde(default)]
     pub start: Option<Location<Named<Numbers>>>,
-    /// How long, and how.
+    /// The final time, and the accuracy or the steps.
     pub run: Location<RunTable>,
-    /// What is recorded.
+    /// The output.
     #[serde(default)]
     pub want: WantTable,
-    /// Parameters, or values of the start such as `start.theta`, that `herglotz sweep` takes through their values. Of several, all pairs
-    /// are taken, the last one fastest.
+    /// Parameters, or values of the initial state such as `start.theta`, over whose values `herglotz sweep` runs. With
+    /// several of them all combinations are run; the last one varies fastest.
     #[serde(default)]
     pub sweep: Swept,
 }
@@ -51,20 +52,20 @@ pub(crate) struct SystemTable {
     pub catalogue: Option<Location<String>>,
     /// The names of the coordinates; `"q[3]"` is an array of three.
     pub coordinates: Option<Location<Vec<Location<String>>>>,
-    /// L over the coordinates `x`, the velocities `x'`, `z`, `t` and the parameters.
+    /// L as a formula in the coordinates `x`, the velocities `x'`, `z`, `t` and the parameters.
     pub lagrangian: Option<Location<String>>,
     /// The parameters with their values.
     #[serde(default)]
     pub parameters: Named<f64>,
 }
 
-/// How long, and how.
+/// The final time, and the accuracy or the steps.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `time` and `accuracy`, or `time`, `integrator` and `step`")]
 pub(crate) struct RunTable {
-    /// The time at which the motion ends; before that of the start it goes back.
+    /// The final time; the motion runs backward where it is before the initial time.
     pub time: Location<f64>,
-    /// The relative error of (q, p) and v; the step is chosen for it, and the integrator unless one is named.
+    /// The relative error of (q, p) and of v. The step is chosen for it, and also the integrator unless one is named.
     pub accuracy: Option<Location<f64>>,
     /// The integrator; see `herglotz list integrators`.
     pub integrator: Option<Location<String>>,
@@ -72,32 +73,32 @@ pub(crate) struct RunTable {
     pub step: Option<Location<f64>>,
     /// The number of steps, instead of their length.
     pub steps: Option<Location<usize>>,
-    /// The size of each coordinate, in the order of the coordinates, where they differ much: errors are those of each coordinate and velocity in
-    /// units of its own.
+    /// The size of each coordinate, in the order of the coordinates, where they differ much: the errors of each
+    /// coordinate and its velocity are measured in units of its size.
     pub scales: Option<Location<Vec<f64>>>,
 }
 
-/// What is recorded.
+/// The output.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `rows` and `events`")]
 pub(crate) struct WantTable {
-    /// The rows of rows.csv; without it, 1000 of the whole state.
+    /// The rows of rows.csv; by default, the whole state at the ends of 1000 equal intervals.
     pub rows: Option<Location<RowsTable>>,
-    /// Functions of the state whose changes of sign are written to events.csv.
+    /// Functions of time and state whose sign changes are written to events.csv.
     #[serde(default)]
     pub events: Vec<EventTable>,
-    /// Columns that are angles, of rows or of events, by name: pictures show them from -pi to pi, tables as they are.
+    /// The names of columns of rows or events that are angles: figures show them from -pi to pi, tables are unchanged.
     #[serde(default)]
     pub wrap: Vec<Location<String>>,
-    /// Whether the conformal factor of the whole motion is in the summary.
+    /// Whether the summary has the conformal factor of the whole motion.
     #[serde(default)]
     pub conformal_factor: bool,
-    /// Whether the error of given steps is estimated, by a second run with steps of half their length.
+    /// Whether the error of given steps is estimated, by a second run with steps of half the length.
     #[serde(default)]
     pub estimate: bool,
 }
 
-/// When there is a row, by one of `every`, `at` and `every_step`, and what is in it.
+/// The times of the rows, by one of `every`, `at` and `every_step`, and their columns.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `every`, `at` or `every_step`, and `columns`")]
 pub(crate) struct RowsTable {
@@ -107,33 +108,36 @@ pub(crate) struct RowsTable {
     pub at: Option<Location<Vec<Location<f64>>>>,
     /// The number of steps between two rows.
     pub every_step: Option<Location<usize>>,
-    /// `t`, coordinates, velocities, `z`, momenta `p_x`, `energy`, `sigma`, `log_factor`, and any expressions of these, with a name
-    /// (`E = ...`) or without; without it, the whole state. `energy` is `v L_v - L`, which holds all of L, its terms in z too (`-gamma*z` for
-    /// a drag `gamma*z`); `log_factor` is the integral of `L_z`, `sigma` its exponential: the conformal factor.
+    /// `t`, coordinates, velocities, `z`, momenta `p_x`, `energy`, `sigma`, `log_factor`, and any expressions in these,
+    /// with a name (`E = ...`) or without; by default, the whole state. `energy` is `v L_v - L`, including the terms of
+    /// L in z (`-gamma*z` for a drag `gamma*z`); `log_factor` is the integral of `L_z`, and `sigma`, its exponential,
+    /// is the conformal factor.
     pub columns: Option<Location<Vec<Location<String>>>>,
 }
 
-/// A function of the state whose changes of sign are found.
+/// A function of time and state whose sign changes are located.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `when`")]
 pub(crate) struct EventTable {
-    /// The function, an expression as those of columns: with `energy` and `p_x`, and with `sigma` and `log_factor` where `L_z` is constant.
+    /// The function, an expression as in columns: also with `energy` and `p_x`, and with `sigma` and `log_factor` where
+    /// `L_z` is constant.
     pub when: Location<String>,
-    /// Which changes count.
+    /// Which sign changes count.
     #[serde(default)]
     pub direction: DirectionName,
-    /// Whether the first one ends the motion.
+    /// Whether the first sign change ends the motion.
     #[serde(default)]
     pub terminal: bool,
-    /// The time from which they count, in the sense of the motion, so that transients are left out; from the start without it.
+    /// The time from which sign changes count, in the direction of the motion, so that transients are left out; by
+    /// default, from the start.
     pub from: Option<Location<f64>>,
-    /// What events.csv has beside the state there: expressions as those of the columns of rows, with a name (`E = ...`) or without. They are
-    /// empty for other events.
+    /// The columns of events.csv in addition to the state: expressions as in the columns of rows, with a name (`E =
+    /// ...`) or without. They are empty for other events.
     #[serde(default)]
     pub columns: Vec<Location<String>>,
 }
 
-/// Which changes of sign count, in the sense of the motion.
+/// Which sign changes count, in the direction of the motion.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum DirectionName {
@@ -150,21 +154,21 @@ pub(crate) enum DirectionName {
 #[derive(Clone, Debug, JsonSchema)]
 #[schemars(untagged, inline)]
 pub(crate) enum Values {
-    /// These.
+    /// The values.
     List(Vec<Location<f64>>),
-    /// Between two.
+    /// Values between two numbers.
     Range(RangeTable),
 }
 
-/// So many values from one to another.
+/// A number of values from one number to another.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `from`, `to` and `count`")]
 pub(crate) struct RangeTable {
-    /// The first.
+    /// The first value.
     pub from: Location<f64>,
-    /// The last.
+    /// The last value.
     pub to: Location<f64>,
-    /// How many.
+    /// The number of values.
     pub count: Location<usize>,
     /// How they are spaced.
     #[serde(default)]
@@ -178,7 +182,7 @@ pub(crate) enum Spacing {
     /// Equal differences.
     #[default]
     Linear,
-    /// Equal quotients.
+    /// Equal ratios.
     Log,
 }
 
@@ -208,11 +212,11 @@ impl<'de> Deserialize<'de> for Values {
     }
 }
 
-/// Parameters and values of the start, with the values that they take.
+/// Parameters and values of the initial state, with the values that a sweep gives them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Swept(pub Vec<(Location<String>, Location<Values>)>);
 
-/// The key of a table in it of values of the start.
+/// The key of the nested table with values of the initial state.
 const START: &str = "start";
 
 impl<'de> Deserialize<'de> for Swept {
@@ -238,7 +242,7 @@ impl<'de> Deserialize<'de> for Swept {
                         all.push((key, map.next_value()?));
                     }
                 }
-                // The reader of the file sorts tables by name.
+                // The TOML reader sorts tables by name; this restores the order of the file.
                 all.sort_by_key(|(key, _)| key.span());
                 Ok(Swept(all))
             }

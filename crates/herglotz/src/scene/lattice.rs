@@ -21,13 +21,13 @@ pub(crate) struct LatticeFile {
     pub version: Option<Location<i64>>,
     /// The lattice.
     pub lattice: Location<LatticeTable>,
-    /// Where the motion starts: a number for all sites, a list with one for each, or a formula in the index `i` of a site (`i`, `j`, `k` in several
-    /// directions), counted from 0, and the number `n` of sites; for each coordinate `x`, and for its velocity `x'` or its momentum `p_x`. A
-    /// velocity is 0 otherwise, as the action `z` and the time `t`.
+    /// The initial state: a number for all sites, a list with one for each, or a formula in the index `i` of a site
+    /// (`i`, `j`, `k` in several directions), counted from 0, and the number `n` of sites; for each coordinate `x`, and
+    /// for its velocity `x'` or its momentum `p_x`. Velocities, the action `z` and the time `t` default to 0.
     pub start: Location<Named<Profile>>,
-    /// How long, and how.
+    /// The final time, the integrator and its steps.
     pub run: Location<RunTable>,
-    /// What is recorded.
+    /// The output.
     #[serde(default)]
     pub want: LatticeWant,
 }
@@ -36,16 +36,17 @@ pub(crate) struct LatticeFile {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `sites`, `site` and `bond`")]
 pub(crate) struct LatticeTable {
-    /// The number of sites, or their numbers along each direction.
+    /// The number of sites, or a list with the number along each direction.
     pub sites: Location<Sizes>,
-    /// What the first and the last site along each direction are bound to: each other, walls at 0, or nothing.
+    /// The boundary condition along each direction: periodic, fixed walls at 0, or free ends.
     #[serde(default)]
     pub boundary: BoundaryName,
-    /// The names of the components at a site, 1 to 3 of them; `x` without it.
+    /// The names of the components at a site, 1 to 3 of them; by default `x`.
     pub coordinates: Option<Location<Vec<Location<String>>>>,
-    /// The Lagrangian of a site, `m*x'^2/2 - V(t, x) + gamma*z`. The drag is that of the whole lattice, and counts once.
+    /// The Lagrangian of a site, `m*x'^2/2 - V(t, x) + gamma*z`. The drag is that of the whole lattice, and counts
+    /// once.
     pub site: Location<String>,
-    /// That of a bond, of the coordinates `xl` before it and `xr` after it.
+    /// The Lagrangian of a bond, in the coordinates `xl` of the site before it and `xr` of the site after it.
     pub bond: Option<Location<String>>,
     /// The parameters with their values.
     #[serde(default)]
@@ -57,49 +58,49 @@ pub(crate) struct LatticeTable {
 #[serde(untagged, expecting = "a whole number, or a list of them")]
 #[schemars(inline)]
 pub(crate) enum Sizes {
-    /// In a row.
+    /// In a chain.
     One(usize),
     /// Along each direction.
     Many(Vec<usize>),
 }
 
-/// What is beyond the ends of a lattice.
+/// The boundary condition of a lattice.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum BoundaryName {
-    /// The other end.
+    /// The ends are joined.
     #[default]
     Periodic,
-    /// Walls.
+    /// Walls at 0.
     Fixed,
-    /// Nothing.
+    /// No bonds beyond the ends.
     Free,
 }
 
-/// The values of all sites.
+/// The values at all sites.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "a number, a list of numbers, or a formula in the index of a site")]
 #[schemars(inline)]
 pub(crate) enum Profile {
-    /// The same at all.
+    /// The same value at all sites.
     One(f64),
-    /// One at each.
+    /// One value for each site.
     Many(Vec<f64>),
-    /// By the index.
+    /// A formula in the index.
     Formula(String),
 }
 
-/// What is recorded of a lattice.
+/// The output of a lattice.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `rows`")]
 pub(crate) struct LatticeWant {
-    /// The rows of rows.csv, of the whole state; without it, 1000.
+    /// The rows of rows.csv, of the whole state; by default at the ends of 1000 equal intervals.
     pub rows: Option<Location<RowsTable>>,
 }
 
-/// A scene of a lattice that has been read and checked.
+/// A scene of a lattice that has been read and validated.
 pub struct LatticeScene {
-    /// The lattice, ready to be run.
+    /// The assembled system.
     pub system: Assembled,
     /// The motion, with its rows.
     pub motion: AssembledMotion,
@@ -112,7 +113,7 @@ pub struct LatticeScene {
     run: Span,
 }
 
-/// The most sites of a scene.
+/// The maximal number of sites of a scene.
 const MOST_SITES: usize = 1_000_000;
 
 impl LatticeScene {
@@ -142,7 +143,7 @@ impl LatticeScene {
     /// ```
     ///
     /// # Errors
-    /// [`SceneError`] with the place in the text.
+    /// [`SceneError`] with the position in the text.
     pub fn read(text: &str) -> Result<Self, SceneError> {
         check_version(text)?;
         let file: LatticeFile = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
@@ -206,12 +207,13 @@ impl LatticeScene {
         Ok(LatticeScene { system, motion, coordinates, sizes, text: text.into(), places, run: run.span() })
     }
 
-    /// The place in the file that an error is about.
+    /// The error with the position in the file that it concerns.
     pub fn explain(&self, error: &RuntimeError) -> SceneError {
         explain(&self.text, &self.places, self.run, error)
     }
 
-    /// The names of the columns of a row: `t`, `x[0]`, ..., `x'[0]`, ..., `p_x[0]`, ..., `z`, `energy`; of several directions `x[0][0]`.
+    /// The names of the columns of a row: `t`, `x[0]`, ..., `x'[0]`, ..., `p_x[0]`, ..., `z`, `energy`; with two
+    /// directions `x[0][0]`.
     pub fn columns(&self) -> Vec<String> {
         let sites: usize = self.sizes.iter().product();
         let index = |site: usize| {
@@ -234,7 +236,7 @@ impl LatticeScene {
     }
 }
 
-/// An error with the place of the argument that it names.
+/// The error with the position of the argument that it names.
 fn explain(text: &str, places: &[(&'static str, Span)], otherwise: Span, error: &RuntimeError) -> SceneError {
     let place = |name: &str| places.iter().find(|(known, _)| *known == name).map_or(otherwise, |(_, span)| *span);
     match error {
@@ -275,7 +277,7 @@ fn steps(text: &str, run: &Location<RunTable>) -> Result<(AnyIntegrator, Steps),
     }
 }
 
-/// The start of all sites.
+/// The initial state of all sites.
 fn read_start(
     text: &str,
     table: &Location<Named<Profile>>,
@@ -329,7 +331,7 @@ fn read_start(
             format!("the coordinate `{name}` has no start; add `{name} = 0.0` to [start], or a formula in `i`");
         return Err(SceneError::at(text, table.span(), message));
     }
-    // The components of one site follow each other.
+    // The components of one site are contiguous.
     let of = |all: &[Option<Vec<f64>>]| -> Vec<f64> {
         (0..sites * d).map(|k| all[k % d].as_ref().and_then(|x| x.get(k / d)).copied().unwrap_or(0.0)).collect()
     };
@@ -337,7 +339,7 @@ fn read_start(
     Ok(Start { t, q: of(&q), rate, z })
 }
 
-/// The value of each site.
+/// The values at all sites.
 fn values(
     text: &str,
     profile: &Location<Profile>,

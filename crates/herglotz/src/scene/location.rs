@@ -1,4 +1,4 @@
-//! Values that know where in the file they are.
+//! Values with their position in the file.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
@@ -9,10 +9,10 @@ use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut, Range};
 use toml::Spanned;
 
-/// The bytes of a text from the first to the one after the last.
+/// A range of bytes of a text: the first byte, and the one after the last.
 pub(crate) type Span = (usize, usize);
 
-/// A value with its place in the file.
+/// A value with its position in the file.
 #[derive(Clone, Debug)]
 pub(crate) struct Location<T> {
     value: T,
@@ -20,12 +20,12 @@ pub(crate) struct Location<T> {
 }
 
 impl<T> Location<T> {
-    /// A value that is at these bytes.
+    /// A value at a range of bytes.
     pub fn new(value: T, span: Span) -> Self {
         Location { value, span }
     }
 
-    /// Where it is.
+    /// The position of the value.
     pub fn span(&self) -> Span {
         self.span
     }
@@ -67,7 +67,7 @@ impl<T: JsonSchema> JsonSchema for Location<T> {
     }
 }
 
-/// A table whose keys are names of the user's, in the order of the file.
+/// A table whose keys are chosen by the user, in the order of the file.
 #[derive(Clone, Debug)]
 pub(crate) struct Named<T>(pub Vec<(Location<String>, Location<T>)>);
 
@@ -83,7 +83,7 @@ impl<T> Named<T> {
         self.0.iter().find(|(key, _)| **key == name).map(|(_, value)| value)
     }
 
-    /// Gives a name a value, instead of the one that it has.
+    /// Sets the value of a name, replacing an existing one.
     pub fn set(&mut self, name: &str, value: Location<T>) {
         match self.0.iter_mut().find(|(key, _)| **key == name) {
             Some((_, old)) => *old = value,
@@ -107,7 +107,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Named<T> {
                 while let Some(entry) = map.next_entry()? {
                     all.push(entry);
                 }
-                // The reader of the file sorts tables by name.
+                // The TOML reader sorts tables by name; this restores the order of the file.
                 all.sort_by_key(|(key, _): &(Location<String>, Location<T>)| key.span());
                 Ok(Named(all))
             }
@@ -134,9 +134,9 @@ impl<T: JsonSchema> JsonSchema for Named<T> {
 #[derive(Clone, Debug, JsonSchema)]
 #[schemars(untagged, inline)]
 pub(crate) enum Numbers {
-    /// A number; of an array, for all its entries.
+    /// One number; for an array, the value of all its entries.
     One(f64),
-    /// As many as an array has entries.
+    /// One number for each entry of an array.
     Many(Vec<Location<f64>>),
 }
 

@@ -1,10 +1,10 @@
-//! The members of a sweep: all combinations of the values of its knobs.
+//! The members of a sweep: all combinations of the values of the swept quantities.
 
 use super::Knob;
 use super::sweep::{Slot, put};
 use runtime_herglotz::Start;
 
-/// The members of a sweep by their index; the last knob changes from one to the next.
+/// The members of a sweep by their index; the last swept quantity varies fastest.
 #[derive(Clone, Copy, Debug)]
 pub struct Members<'s> {
     knobs: &'s [Knob],
@@ -16,12 +16,12 @@ impl<'s> Members<'s> {
         Members { knobs, start }
     }
 
-    /// How many there are: 1 where nothing is swept.
+    /// The number of members: 1 where nothing is swept.
     pub fn count(&self) -> usize {
         self.knobs.iter().map(|knob| knob.values.len()).product()
     }
 
-    /// The knobs with their values for a member.
+    /// The swept quantities with their values for a member.
     fn knobs_of(&self, index: usize) -> impl Iterator<Item = (&'s Knob, f64)> {
         let mut after = self.count();
         self.knobs.iter().filter_map(move |knob| {
@@ -30,7 +30,7 @@ impl<'s> Members<'s> {
         })
     }
 
-    /// The values of all knobs for a member, in their order.
+    /// The values of all swept quantities for a member, in their order.
     pub fn values(&self, index: usize) -> Vec<f64> {
         self.knobs_of(index).map(|(_, value)| value).collect()
     }
@@ -46,7 +46,7 @@ impl<'s> Members<'s> {
         self.knobs_of(index).filter(|(knob, _)| knob.slot == Slot::Parameter).map(|(_, value)| value).collect()
     }
 
-    /// The start of a member.
+    /// The initial state of a member.
     pub fn start(&self, index: usize) -> Start {
         let mut start = self.start.clone();
         for (knob, value) in self.knobs_of(index) {
@@ -57,7 +57,7 @@ impl<'s> Members<'s> {
         start
     }
 
-    /// The time of all starts.
+    /// The initial time, which all members share.
     pub fn t0(&self) -> f64 {
         self.start.t
     }

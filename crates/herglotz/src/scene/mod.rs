@@ -1,4 +1,4 @@
-//! A scene: a system, a start, and what is asked of the motion.
+//! A scene: a system, an initial state, and the requested output.
 
 mod ends;
 mod error;
@@ -26,7 +26,7 @@ use runtime_herglotz::{
 };
 use serde::Deserialize;
 
-/// A scene that has been read and checked.
+/// A scene that has been read and validated.
 #[derive(Clone)]
 pub struct Scene {
     /// The system.
@@ -39,9 +39,9 @@ pub struct Scene {
     angles: Vec<String>,
     /// The texts of all columns and events.
     expressions: Vec<String>,
-    /// What a sweep takes through its values.
+    /// The swept quantities with their values.
     pub knobs: Vec<Knob>,
-    /// The formula's text.
+    /// The text of the formula.
     lagrangian: String,
     start: Start,
     end: f64,
@@ -54,7 +54,7 @@ pub struct Scene {
     places: Places,
 }
 
-/// Where in the file that is of which something may turn out to be wrong later.
+/// Positions in the file, for errors that are found after it has been read.
 #[derive(Clone, Copy, Debug)]
 struct Places {
     lagrangian: Span,
@@ -89,16 +89,17 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// [`SceneError`] with the place in the text.
+    /// [`SceneError`] with the position in the text.
     pub fn read(text: &str) -> Result<Self, SceneError> {
         Self::read_with(text, &[])
     }
 
-    /// Reads a scene file and changes some of its values: `gamma=-0.2` for a parameter, `start.x=1`, `run.time=10`, `run.accuracy=1e-6`,
-    /// `run.step=0.1`, `run.steps=100`, `run.integrator=gauss_8`. Of the accuracy and the steps the last one that is set counts.
+    /// Reads a scene file and overrides some of its values: `gamma=-0.2` for a parameter, `start.x=1`, `run.time=10`,
+    /// `run.accuracy=1e-6`, `run.step=0.1`, `run.steps=100`, `run.integrator=gauss_8`. Of the accuracy and the steps,
+    /// the one that is set last counts.
     ///
     /// # Errors
-    /// [`SceneError`] with the place in the text, or in the change.
+    /// [`SceneError`] with the position in the text, or in the override.
     pub fn read_with(text: &str, changes: &[String]) -> Result<Self, SceneError> {
         check_version(text)?;
         if let Some(lattice) = file::place_of_table(text, "lattice") {
@@ -180,7 +181,7 @@ impl Scene {
         })
     }
 
-    /// The motion, with all that is to be recorded.
+    /// The motion with the requested output.
     pub fn motion(&self) -> Motion {
         Motion {
             rows: Some(self.rows.when(self.start.t, self.end)),
@@ -192,12 +193,12 @@ impl Scene {
         }
     }
 
-    /// The motion with nothing recorded but its end.
+    /// The motion with no output but its end.
     pub fn bare_motion(&self) -> Motion {
         Motion { scales: self.scales.clone(), ..Motion::new(self.start.clone(), self.end, self.way) }
     }
 
-    /// The columns of events.csv after the name of the event: the state there, and what the events have beside it.
+    /// The columns of events.csv after the name of the event: the state there, and the columns of the events.
     pub fn columns_of_events(&self) -> Vec<String> {
         output::state_of_event(self.system.formula())
             .into_iter()
@@ -212,7 +213,7 @@ impl Scene {
         self.system.formula().coordinates().into_iter().chain(own.cloned()).collect()
     }
 
-    /// The numbers of a crossing in these columns; `None` in those of other events.
+    /// The numbers of a sign change in these columns; `None` in columns of other events.
     pub fn numbers_of_event(&self, crossing: &Crossing) -> Vec<Option<f64>> {
         let Crossing { t, event, q, v, p, z, columns } = crossing;
         let of_state = [*t].into_iter().chain(q.iter().chain(v).chain(p).copied()).chain([*z]).map(Some);
@@ -222,12 +223,12 @@ impl Scene {
         of_state.chain((0..names.len()).map(|column| columns.get(place(column)?).copied())).collect()
     }
 
-    /// Whether a column, of rows or of events, is an angle, which pictures show from -pi to pi.
+    /// Whether a column of rows or events is an angle, which figures show from -pi to pi.
     pub fn is_angle(&self, column: &str) -> bool {
         self.angles.iter().any(|angle| angle == column)
     }
 
-    /// The number of steps between two rows, where rows are counted in steps.
+    /// The number of steps between two rows, where rows are given by steps.
     pub fn rows_every_step(&self) -> Option<usize> {
         match self.rows {
             RowTimes::EveryStep(steps) => Some(steps),
@@ -240,7 +241,7 @@ impl Scene {
         Members::new(&self.knobs, &self.start)
     }
 
-    /// All that determines what is recorded, in words, for telling one scene from another.
+    /// A text of everything that determines the output, used to distinguish scenes.
     pub fn fingerprint(&self) -> String {
         let events = self.events.iter().map(|(name, e)| (name, e.direction, e.terminal, e.from)).collect::<Vec<_>>();
         let Scene { start, end, way, rows, conformal_factor, expressions, event_columns, .. } = self;
@@ -252,7 +253,7 @@ impl Scene {
         )
     }
 
-    /// The place in the file that an error is about.
+    /// The error with the position in the file that it concerns.
     pub fn explain(&self, error: &RuntimeError) -> SceneError {
         use InputError as E;
         let places = &self.places;
@@ -279,13 +280,13 @@ impl Scene {
     }
 }
 
-/// Refuses a file of a later version before what is new in it is called unknown.
+/// Rejects a file of another version, before its new names are reported as unknown.
 fn check_version(text: &str) -> Result<(), SceneError> {
     #[derive(Deserialize)]
     struct Versioned {
         version: Option<Location<i64>>,
     }
-    // What else is wrong is said by the whole file's reader.
+    // All other errors are left to the reader of the whole file.
     let Ok(Versioned { version: Some(version) }) = toml::from_str(text) else { return Ok(()) };
     if *version == VERSION {
         return Ok(());
@@ -366,7 +367,7 @@ fn expressions(file: &File) -> impl Iterator<Item = &String> {
     columns.chain(events).map(|text| &**text)
 }
 
-/// Refuses parameters that are neither in the formula nor in the texts of columns and events.
+/// Rejects parameters that occur neither in the formula nor in the texts of columns and events.
 fn check_used(text: &str, formula: &Formula, system: &Location<SystemTable>, texts: &[&str]) -> Result<(), SceneError> {
     check_parameters(formula, texts).map_err(|error| {
         let named = |name: &str| system.parameters.0.iter().find(|(known, _)| **known == *name);
@@ -423,7 +424,7 @@ fn integrator(text: &str, name: &Location<String>) -> Result<AnyIntegrator, Scen
     })
 }
 
-/// A number that is finite.
+/// Checks that a number is finite.
 fn finite(text: &str, x: &Location<f64>, name: &str) -> Result<f64, SceneError> {
     if x.is_finite() {
         return Ok(**x);
@@ -431,7 +432,7 @@ fn finite(text: &str, x: &Location<f64>, name: &str) -> Result<f64, SceneError> 
     Err(SceneError::at(text, x.span(), format!("`{name}` is {:?}, where a finite number is needed", **x)))
 }
 
-/// A number that is positive and finite.
+/// Checks that a number is positive and finite.
 fn positive(text: &str, x: &Location<f64>, name: &str) -> Result<f64, SceneError> {
     if **x > 0.0 {
         return finite(text, x, name);
@@ -441,7 +442,7 @@ fn positive(text: &str, x: &Location<f64>, name: &str) -> Result<f64, SceneError
 
 /// The JSON schema of scene files.
 pub fn schema() -> serde_json::Value {
-    /// A motion of a Lagrangian, or of a lattice, and what is to be recorded of it; or a path between two ends.
+    /// A motion of a Lagrangian or of a lattice with the requested output, or a path between two ends.
     #[derive(schemars::JsonSchema)]
     #[schemars(title = "Scene", untagged)]
     #[expect(dead_code, reason = "it stands for its variants, which are read one by one")]

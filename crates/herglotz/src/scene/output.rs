@@ -1,4 +1,4 @@
-//! What is recorded of a motion.
+//! The requested output of a motion.
 
 use super::SceneError;
 use super::file::{DirectionName, EventTable, RowsTable};
@@ -7,30 +7,30 @@ use runtime_herglotz::{
     Column, Direction, Event, Expression, Formula, FormulaError, OutputTimes, RuntimeError, nearest_name, velocity_name,
 };
 
-/// The rows of a scene that asks for none.
+/// The number of intervals between rows of a scene without `rows`.
 const DEFAULT_ROWS: usize = 1000;
 
-/// The largest number of rows at times.
+/// The maximal number of rows at given times.
 const MOST_ROWS: f64 = 1e7;
 
-/// When there is a row.
+/// The times of the rows.
 #[derive(Clone, Debug)]
 pub(crate) enum RowTimes {
-    /// Every so much time.
+    /// At equal intervals of time.
     Every(f64),
-    /// So many equal parts of the span.
+    /// At the ends of a number of equal parts of the span.
     Parts(usize),
-    /// At these times.
+    /// At given times.
     At(Vec<f64>),
-    /// Every so many steps.
+    /// At every n-th step.
     EveryStep(usize),
 }
 
 impl RowTimes {
-    /// The times of a motion from one to another.
+    /// The output times of a motion from `t0` to `end`.
     pub fn when(&self, t0: f64, end: f64) -> OutputTimes {
         match self {
-            // The start alone.
+            // The only row is at the start.
             RowTimes::Parts(_) | RowTimes::Every(_) if t0 == end => OutputTimes::At(vec![t0]),
             RowTimes::EveryStep(steps) => OutputTimes::Every(*steps),
             RowTimes::At(times) => OutputTimes::At(times.clone()),
@@ -39,7 +39,7 @@ impl RowTimes {
                 OutputTimes::At((0..=*parts).map(of).collect())
             }
             RowTimes::Every(every) => {
-                // A whole number of them fills the span but for its rounding.
+                // The tolerance is for a span that is a multiple of the interval up to rounding.
                 let count = ((end - t0).abs() / every * (1.0 + 4.0 * f64::EPSILON)).floor();
                 let stride = every.copysign(end - t0);
                 let at = |k: usize| t0 + k as f64 * stride;
@@ -85,7 +85,7 @@ impl RowTimes {
     }
 }
 
-/// A time of a motion from one to another.
+/// Checks that a time is between the start and the end of a motion.
 fn within(text: &str, time: &Location<f64>, name: &str, (t0, end): (f64, f64)) -> Result<f64, SceneError> {
     let t = super::finite(text, time, name)?;
     if !(t0.min(end)..=t0.max(end)).contains(&t) {
@@ -116,14 +116,14 @@ pub(crate) fn columns(
     columns.iter().map(of).collect()
 }
 
-/// A column is called by the name that its last value is given, as in `E1 = x'^2/2 + x^2/2`, or by its text.
+/// The name of a column: that given to its last value, as in `E1 = x'^2/2 + x^2/2`, or its text.
 fn name_of(column: &str) -> &str {
     let is_name = |text: &&str| !text.is_empty() && text.chars().all(|c| c.is_alphanumeric() || c == '_');
     let last = column.trim().rsplit(['\n', ';']).next().and_then(|last| last.split_once('='));
     last.map(|(name, _)| name.trim()).filter(is_name).unwrap_or(column)
 }
 
-/// An unknown name of a column or an event may be that of something else than a formula is made of.
+/// For an unknown name in a column or an event, also suggests names that are not part of the formula.
 fn with_nearest(mut error: SceneError, formula: &Formula) -> SceneError {
     let unknown = error.error.message.strip_prefix("unknown name `").and_then(|rest| rest.split('`').next());
     if let (Some(name), None) = (unknown, &error.error.nearest) {
@@ -139,7 +139,8 @@ fn with_nearest(mut error: SceneError, formula: &Formula) -> SceneError {
     error
 }
 
-/// The columns that every row of events.csv has after the name of the event: the time, coordinates, velocities, momenta and the action.
+/// The columns that every row of events.csv has after the name of the event: the time, coordinates, velocities, momenta
+/// and the action.
 pub(crate) fn state_of_event(formula: &Formula) -> Vec<String> {
     let names = formula.coordinates();
     let velocities = names.iter().map(|name| velocity_name(name));
@@ -148,22 +149,22 @@ pub(crate) fn state_of_event(formula: &Formula) -> Vec<String> {
     t.chain(names.iter().cloned()).chain(velocities).chain(momenta).chain(["z".to_owned()]).collect()
 }
 
-/// The events, with their names, and those of their columns.
+/// The events with their names, and their columns.
 pub(crate) struct Events {
     pub events: Vec<(String, Event)>,
     pub columns: EventColumns,
 }
 
-/// The columns of all events beside the state: those of one name are one.
+/// The columns of all events in addition to the state; events share columns of the same name.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct EventColumns {
     pub names: Vec<String>,
-    /// For each event which of them its own ones are.
+    /// For each event the indices of its columns.
     pub of_event: Vec<Vec<usize>>,
 }
 
 impl Events {
-    /// Those of a motion from one time to another. `constant_rate` is whether `L_z` is one number.
+    /// The events of a motion over a time span. `constant_rate` is whether `L_z` is constant.
     pub fn read(
         text: &str,
         (formula, constant_rate): (&Formula, bool),
@@ -209,7 +210,7 @@ impl Events {
 }
 
 impl EventColumns {
-    /// Adds those of one more event.
+    /// Adds the columns of one more event.
     fn add(&mut self, text: &str, formula: &Formula, columns: &[Location<String>]) -> Result<(), SceneError> {
         let of_state = state_of_event(formula);
         let mut own = Vec::with_capacity(columns.len());
@@ -233,7 +234,7 @@ impl EventColumns {
     }
 }
 
-/// The names of columns that are angles, of those that there are.
+/// The names of the columns that are angles, validated against the known names.
 pub(crate) fn angles(text: &str, wrapped: &[Location<String>], known: &[&str]) -> Result<Vec<String>, SceneError> {
     let of = |name: &Location<String>| {
         if known.contains(&name.as_str()) {
@@ -251,7 +252,7 @@ pub(crate) fn angles(text: &str, wrapped: &[Location<String>], known: &[&str]) -
     wrapped.iter().map(of).collect()
 }
 
-/// An error in a text of the file that is a formula.
+/// An error of a formula in the file.
 pub(crate) fn of_formula(text: &str, span: Span, error: &RuntimeError) -> SceneError {
     match error {
         RuntimeError::Formula(FormulaError::Parse(error)) => SceneError::in_string(text, span, error),

@@ -1,18 +1,19 @@
-//! Changes of single values of a scene from outside.
+//! Overrides of single values of a scene.
 
 use super::SceneError;
 use super::file::File;
 use super::location::{Location, Named, Numbers};
 use runtime_herglotz::CatalogueEntry;
 
-/// Where errors of changes are.
+/// The source that errors of overrides name.
 const SOURCE: &str = "--set";
 
-/// The names of the run's own values.
+/// The names of the values of the run.
 const OF_RUN: [&str; 5] = ["run.time", "run.accuracy", "run.step", "run.steps", "run.integrator"];
 
-/// Changes a value: `gamma=-0.2` of a parameter, `start.x=1`, `run.time=10`, `run.accuracy=1e-6`, `run.step=0.1`, `run.steps=100`,
-/// `run.integrator=gauss_8`. An accuracy and steps replace each other, as they exclude each other.
+/// Overrides a value: `gamma=-0.2` for a parameter, `start.x=1`, `run.time=10`, `run.accuracy=1e-6`, `run.step=0.1`,
+/// `run.steps=100`, `run.integrator=gauss_8`. An accuracy and steps exclude each other, so setting one removes the
+/// other.
 pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str) -> Result<(), SceneError> {
     let refuse = |message: &str| Err(SceneError::at(text, (0, text.len()), message).in_file(SOURCE));
     let at_run = file.run.span();
@@ -26,7 +27,7 @@ pub(crate) fn apply(file: &mut File, entry: Option<&CatalogueEntry>, text: &str)
     let Some((name, value)) = parsed.filter(|(_, value)| value.is_finite()) else {
         return refuse("a change is a name, `=` and a finite number, as in gamma=-0.2");
     };
-    // What is wrong with the value later is shown where that of the file is.
+    // Later errors of the value are reported at the position of the value in the file.
     let put = |place: &mut Option<Location<f64>>, at| {
         *place = Some(Location::new(value, place.as_ref().map_or(at, Location::span)));
     };

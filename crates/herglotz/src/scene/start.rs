@@ -1,11 +1,11 @@
-//! Where a motion starts.
+//! The initial state of a motion.
 
 use super::SceneError;
 use super::location::{Location, Named, Numbers, Span};
 use runtime_herglotz::{CatalogueEntry, Formula, InitialVelocity, Start, velocity_name};
 use std::ops::Range;
 
-/// A part of a start.
+/// A part of the initial state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
     Position,
@@ -15,7 +15,7 @@ pub(crate) enum Part {
     Time,
 }
 
-/// A name that may be in a start, and what it is: the entries of a part from one to another.
+/// A name that may occur in an initial state, with its meaning: a range of entries of a part.
 struct Key {
     name: String,
     part: Part,
@@ -23,7 +23,7 @@ struct Key {
     is_list: bool,
 }
 
-/// All names that may be in a start.
+/// All names that may occur in an initial state.
 fn keys(formula: &Formula) -> Vec<Key> {
     let names = formula.coordinates();
     let mut arrays: Vec<(&str, Range<usize>)> = Vec::new();
@@ -49,7 +49,7 @@ fn keys(formula: &Formula) -> Vec<Key> {
     keys
 }
 
-/// The part and the entry that a name of one number stands for.
+/// The part and the entry that a name of a single number refers to.
 pub(crate) fn entry_of(formula: &Formula, name: &str) -> Option<(Part, usize)> {
     let key = keys(formula).into_iter().find(|key| key.name == name && !key.is_list)?;
     Some((key.part, key.entries.start))
@@ -60,7 +60,7 @@ pub(crate) fn single_names(formula: &Formula) -> Vec<String> {
     keys(formula).into_iter().filter(|key| !key.is_list).map(|key| key.name).collect()
 }
 
-/// What a file says of a start.
+/// The initial state as far as a file gives it.
 #[derive(Default)]
 struct Given {
     q: Vec<Option<f64>>,
@@ -85,7 +85,7 @@ impl Given {
     }
 }
 
-/// The start of a table, completed by that of the catalogue.
+/// The initial state of a table, completed by that of the catalogue entry.
 pub(crate) fn read(
     text: &str,
     formula: &Formula,
@@ -104,7 +104,7 @@ pub(crate) struct Ends {
 }
 
 impl Ends {
-    /// Those of two tables; the start is completed by that of the catalogue.
+    /// The ends from two tables; the start is completed by that of the catalogue entry.
     pub fn read(
         text: &str,
         formula: &Formula,
@@ -132,7 +132,7 @@ impl Ends {
     }
 }
 
-/// What a table says, of these names.
+/// The values that a table gives for these names.
 fn given(text: &str, keys: Vec<Key>, place: &str, table: Option<&Named<Numbers>>) -> Result<Given, SceneError> {
     let count = keys.iter().map(|key| key.entries.end).max().unwrap_or(0);
     let none = || vec![None; count];
@@ -152,7 +152,7 @@ fn given(text: &str, keys: Vec<Key>, place: &str, table: Option<&Named<Numbers>>
             SceneError::at(text, numbers.span(), format!("`{}` is {found}, where {wanted} is needed", **name))
         };
         let values: Vec<Location<f64>> = match &**numbers {
-            // Of an array, for all its entries.
+            // For an array, the number is the value of all its entries.
             Numbers::One(x) => vec![Location::new(*x, numbers.span()); key.entries.len()],
             Numbers::Many(list) if key.is_list && list.len() == key.entries.len() => list.clone(),
             Numbers::Many(list) => return Err(wrong_count(&format!("a list of {}", list.len()))),
@@ -164,7 +164,7 @@ fn given(text: &str, keys: Vec<Key>, place: &str, table: Option<&Named<Numbers>>
     Ok(given)
 }
 
-/// The numbers of all coordinates: those that are given, or else of a system of the catalogue.
+/// The numbers of all coordinates: those that are given, and otherwise those of the catalogue entry.
 fn all(
     text: &str,
     names: &[String],
@@ -179,7 +179,7 @@ fn all(
         let known = given.get(i).copied().flatten().or_else(|| of_entry?.get(i).copied());
         all.push(known.ok_or_else(|| {
             let name = name(coordinate);
-            // A key of a table may have letters, digits and _ without quotes.
+            // TOML keys of letters, digits and _ need no quotes.
             let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
             let key = if bare { name.clone() } else { format!("\"{name}\"") };
             let table = if place == "end" { "ends" } else { "start" };
@@ -191,7 +191,7 @@ fn all(
     Ok(all)
 }
 
-/// All numbers that a motion needs.
+/// The complete initial state of a motion.
 fn complete(
     text: &str,
     given: Given,

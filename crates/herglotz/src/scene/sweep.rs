@@ -1,4 +1,4 @@
-//! What a sweep takes through its values.
+//! The swept quantities of a scene.
 
 use super::SceneError;
 use super::file::{RangeTable, Spacing, Swept, Values};
@@ -6,32 +6,32 @@ use super::location::Location;
 use super::start::{Part, entry_of, single_names};
 use runtime_herglotz::{Formula, InitialVelocity, Start};
 
-/// The largest number of members.
+/// The maximal number of members.
 const MOST: usize = 100_000_000;
 
-/// The largest number of values of one knob, which are kept.
+/// The maximal number of values of one swept quantity, all of which are stored.
 const MOST_VALUES: usize = 10_000_000;
 
-/// What is swept.
+/// The kind of a swept quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Slot {
     /// A parameter.
     Parameter,
-    /// A number of the start.
+    /// A number of the initial state.
     Start(Part, usize),
 }
 
-/// A parameter or a number of the start, with its values.
+/// A swept quantity, a parameter or a number of the initial state, with its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Knob {
-    /// Its name: that of the parameter, or `start.x`.
+    /// The name: that of the parameter, or `start.x`.
     pub name: String,
-    /// Its values.
+    /// The values.
     pub values: Vec<f64>,
     pub(crate) slot: Slot,
 }
 
-/// Puts a number into a start.
+/// Sets a number of an initial state.
 pub(crate) fn put(start: &mut Start, part: Part, entry: usize, value: f64) {
     let vector = match (part, &mut start.rate) {
         (Part::Position, _) => &mut start.q,
@@ -46,7 +46,7 @@ pub(crate) fn put(start: &mut Start, part: Part, entry: usize, value: f64) {
     }
 }
 
-/// The knobs of a table, over a formula and its start.
+/// The swept quantities of a table, validated against a formula and its initial state.
 pub(crate) fn read(text: &str, formula: &Formula, start: &Start, table: &Swept) -> Result<Vec<Knob>, SceneError> {
     let mut knobs = Vec::new();
     let mut members: usize = 1;
@@ -117,7 +117,7 @@ fn values_of(text: &str, values: &Location<Values>) -> Result<Vec<f64>, SceneErr
     let between = |k: usize| {
         let part = k as f64 / last;
         match spacing {
-            // The ends are met to the bit.
+            // The ends are exact.
             _ if k == 0 => a,
             _ if k + 1 == count => b,
             Spacing::Linear => a * (1.0 - part) + b * part,

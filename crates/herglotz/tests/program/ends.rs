@@ -1,4 +1,4 @@
-//! Paths between given ends from a scene.
+//! Scenes of paths between given ends.
 
 use crate::support::{Directory, column, fail, refuses_each, succeed};
 use herglotz::EndsScene;
@@ -28,7 +28,7 @@ fn exact(t: f64) -> (f64, f64) {
     (decay * f64::sin(w * s), decay * (0.5 * gamma * f64::sin(w * s) + w * f64::cos(w * s)))
 }
 
-/// The rows are those of the motion, the pictures are there, and it is told what the path is worth.
+/// The rows are those of the motion, the figures are written, and the quality of the path is reported.
 #[test]
 fn a_path_between_ends_runs() {
     let at = Directory::new("ends");
@@ -42,38 +42,38 @@ fn a_path_between_ends_runs() {
     assert_eq!((t.len(), t[40], x[40], column(&rows, "z")[0]), (41, 3.0, 1.0, 0.25));
     for k in 0..=40 {
         let (position, velocity) = exact(t[k]);
-        // Of order 8 with steps of 0.05.
+        // A method of order 8 with steps of 0.05.
         assert!((x[k] - position).abs() < 1e-11 && (v[k] - velocity).abs() < 1e-10 && (p[k] - v[k]).abs() < 1e-14);
     }
     for picture in ["columns.svg", "phase.svg"] {
         assert!(at.read(&format!("out/{picture}")).contains("<svg"), "{picture}");
     }
-    // A rule of order two knows by how much its steps move the path.
+    // A rule of order two estimates by how much its truncation error displaces the path.
     let by_rule = at.write("rule.toml", &OSCILLATOR.replace("steps = 40", "steps = 40\nintegrator = \"midpoint\""));
     let told = succeed(&["run", &by_rule, "--out", &at.path("rule"), "--json"]);
     let told: serde_json::Value = serde_json::from_str(&told).unwrap();
     let rows = at.read("rule/rows.csv");
     let error = column(&rows, "t").into_iter().zip(column(&rows, "x")).map(|(t, x)| (x - exact(t).0).abs());
     let (error, estimate) = (error.fold(0.0, f64::max), told["estimated_error"].as_f64().unwrap());
-    // The range of x is a little above one.
+    // The estimate is in units of the range of x, which is slightly above one.
     assert!(0.5 * error < estimate && estimate < 2.0 * error, "{estimate} for {error}");
     assert_eq!((&told["status"], &told["unresolved"]), (&"found".into(), &serde_json::Value::Null));
     assert!(told["regularity"].as_f64().unwrap() > 1e-3 && told["rows"] == 41 && told["steps"] == 40, "{told}");
     assert!((told["start"]["x'"].as_f64().unwrap() - exact(1.0).1).abs() < 1e-2, "{told}");
-    // The rate is one number.
+    // The rate is constant.
     assert!((told["log_factor"].as_f64().unwrap() + 0.4).abs() < 1e-3, "{told}");
 }
 
-/// Where there is no path the program ends with 1; one that may be far from every motion is flagged.
+/// Where there is no path, the exit code is 1; a path that may be far from every motion is flagged as unresolved.
 #[test]
 fn what_a_path_is_worth_is_told() {
     let at = Directory::new("ends_flagged");
     let free = OSCILLATOR.replace("gamma = -0.2", "gamma = 0.0");
-    // Half a period apart the ends are conjugate; the steps move that time.
+    // With ends half a period apart the ends are conjugate; the truncation error shifts that time.
     let half = free.replace("t = 3.0", "t = 4.14159265358979").replace("= 40", "= 40\nintegrator = \"midpoint\"");
     let (code, told) = fail(&["run", &at.write("half.toml", &half), "--out", &at.path("half"), "--json"]);
     assert!(code == Some(0) && told.starts_with("warning: ") && told.contains("does not resolve"), "{code:?} {told}");
-    // Exactly the time of 40 midpoint steps for half a turn.
+    // The exact time that 40 midpoint steps take for half a period.
     let h = 2.0 * (std::f64::consts::PI / 80.0).tan();
     let conjugate = half.replace("4.14159265358979", &format!("{:?}", 1.0 + 40.0 * h));
     let (code, told) = fail(&["run", &at.write("none.toml", &conjugate), "--out", &at.path("none")]);
@@ -81,7 +81,7 @@ fn what_a_path_is_worth_is_told() {
     assert!(at.read("none/rows.csv").lines().count() == 42);
 }
 
-/// What is wrong is said with its place.
+/// Errors are reported with their position.
 #[test]
 fn wrong_scenes_of_paths_are_refused() {
     let at = Directory::new("ends_wrong");
@@ -130,7 +130,7 @@ fn wrong_scenes_of_paths_are_refused() {
     }
     let (code, told) = fail(&["run", &file, "--set", "gamma=-0.1"]);
     assert!(code == Some(2) && told.contains("--set"), "{told}");
-    // A system of the catalogue has its own start, and arrays one number for all.
+    // A system of the catalogue has a default start, and arrays accept one number for all entries.
     let scene =
         EndsScene::read("[system]\ncatalogue = \"pendulum\"\n[ends]\ntheta = 0.5\nt = 2\n[run]\nsteps = 20\n").unwrap();
     assert_eq!(scene.problem.ends[1], [0.5]);

@@ -1,9 +1,9 @@
-//! Events in scenes: their own columns, the time from which they count, and angles that are folded in pictures.
+//! Events in scenes: columns of their own, the time from which they count, and angles that are wrapped in figures.
 
 use crate::support::{Directory, column, refuses_each, succeed};
 use herglotz::Scene;
 
-/// A pendulum that turns over and over, in closed form where it is looked at: the energy `theta'^2/2 - a cos theta` is kept.
+/// A rotating pendulum. It is compared with closed forms: the energy `theta'^2/2 - a cos theta` is conserved.
 const TURNING: &str = r#"[system]
 coordinates = ["theta"]
 lagrangian = "theta'^2/2 + a*cos(theta)"
@@ -30,14 +30,15 @@ columns = ["phase = 0.3*t", "turns = 7*a"]
 a = [1.0, 0.5]
 "#;
 
-/// The lines of a table whose entry in a column is this text, with the table's header.
+/// The lines of a table with this entry in a column, with the header of the table.
 fn lines_with(csv: &str, name: &str, entry: &str) -> String {
     let i = csv.lines().next().unwrap().split(',').position(|column| column == name).unwrap();
     let chosen = csv.lines().enumerate().filter(|(k, line)| *k == 0 || line.split(',').nth(i) == Some(entry));
     chosen.map(|(_, line)| format!("{line}\n")).collect()
 }
 
-/// Each event has its columns, which are empty for the others, from its time on, in runs and in sweeps.
+/// Each event has its own columns, which are empty for other events, and counts from its time on, in runs and in
+/// sweeps.
 #[test]
 fn events_have_columns_and_a_time_from_which_they_count() {
     let at = Directory::new("events");
@@ -49,20 +50,21 @@ fn events_have_columns_and_a_time_from_which_they_count() {
     let first = lines_with(&all, "event", "sin(theta - 1)").replace(",\n", "\n").replace(",phase\n", "\n");
     let [t, theta, energy, turns, none] =
         ["t", "theta", "energy", "turns", "p_theta - theta'"].map(|name| column(&first, name));
-    // A turn takes between 2 pi/3 and 2 pi/sqrt(5), so that some 25 to 34 are in what is left of the time.
+    // A turn takes between 2 pi/3 and 2 pi/sqrt(5), so that about 25 to 34 turns fit into the remaining time.
     assert!((25..=34).contains(&t.len()) && t.iter().all(|t| *t >= 30.0), "{t:?}");
     for i in 0..t.len() {
-        // 3^2/2 - cos 0, to the rounding of a hundred steps of order 16 that resolve the motion.
+        // The initial energy 3^2/2 - cos 0; a hundred steps of a method of order 16 that resolve the motion conserve it
+        // up to rounding.
         assert!((energy[i] - 3.5).abs() < 1e-12 && none[i] == 0.0, "{first}");
         assert!((turns[i] * std::f64::consts::TAU - theta[i]).abs() < 1e-13 * theta[i], "{first}");
-        // At one place of the circle.
+        // All events are at one point of the circle.
         assert!((theta[i] - 1.0).sin().abs() < 1e-12, "{first}");
     }
     let second = lines_with(&all, "event", "sin(0.3*t)");
     assert_eq!(second.lines().count() - 1, (30.0 / std::f64::consts::PI) as usize);
     assert!(second.lines().nth(1).unwrap().contains(",,7.0000000000000000e0,,3.14159265358979"), "{second}");
 
-    // The same of a member, with its own parameters.
+    // The events of a member, with its own parameters.
     let told = succeed(&["sweep", &file, "--out", &at.path("sweep"), "--plot"]);
     assert!(told.starts_with("2 members: 2 completed"), "{told}");
     let all = at.read("sweep/events.csv");
@@ -78,18 +80,18 @@ fn events_have_columns_and_a_time_from_which_they_count() {
     for (theta, turns) in column(&of_other, "theta").iter().zip(column(&of_other, "turns")) {
         assert!((turns - 0.5 * theta / std::f64::consts::TAU).abs() < 1e-13 * turns, "{of_other}");
     }
-    // The columns of the first event are drawn as the coordinates are.
+    // The columns of the first event are drawn like the coordinates.
     for i in 0..4 {
         assert!(at.read(&format!("sweep/sweep_events_{i}.svg")).contains("<svg"), "{i}");
     }
     assert!(at.read("sweep/sweep_events_2.svg").contains(">turns<"));
 }
 
-/// A run that goes on from a checkpoint writes the same events; one whose events have other columns does not go on.
+/// A run that is resumed from a checkpoint writes the same events. It is not resumed with other columns of its events.
 #[test]
 fn columns_of_events_after_an_interruption() {
     let at = Directory::new("events_resumed");
-    // sigma is that of the whole motion, also in what follows an interruption.
+    // sigma is the conformal factor of the whole motion, also after an interruption.
     let damped = TURNING.replace("cos(theta)\"", "cos(theta) - 1e-3*z\"").replace("\"energy\"", "\"sigma\"");
     let file = at.write("scene.toml", &damped);
     succeed(&["run", &file, "--out", &at.path("whole")]);
@@ -107,7 +109,7 @@ fn columns_of_events_after_an_interruption() {
     }
 }
 
-/// Backward in time those before the time count.
+/// In a backward motion, events count at times before `from`.
 #[test]
 fn events_of_a_motion_that_runs_backward() {
     let at = Directory::new("events_backward");
@@ -152,14 +154,14 @@ fn wrong_columns_and_times_of_events_are_refused() {
         ("a = 1.0 }", "a = 1.0, b = 2.0 }", "line 4, column 25: the parameter `b` is not in the Lagrangian"),
     ];
     refuses_each(TURNING, &changes, |text| Scene::read(text).err().map(|error| error.to_string()));
-    // A parameter of a column alone is used.
+    // A parameter that occurs only in a column counts as used.
     assert!(Scene::read(&TURNING.replace("a = 1.0 }", "a = 1.0, b = 2.0 }").replace("7*a", "7*b")).is_ok());
 }
 
-/// What an axis of angles is drawn with.
+/// The tick label of an axis of angles.
 const HALF_TURN: &str = ">\u{2212}\u{3c0}<";
 
-/// Angles are folded in all pictures of them, and in no table.
+/// Angles are wrapped in all figures, and in no table.
 #[test]
 fn wrapped_columns_are_folded_in_pictures() {
     let at = Directory::new("wrap");
@@ -171,7 +173,7 @@ fn wrapped_columns_are_folded_in_pictures() {
         assert!(at.read(picture).contains(HALF_TURN), "{picture}");
     }
     assert!(column(&at.read("out/rows.csv"), "theta").last().unwrap() > &100.0);
-    // Without it they are as wide as the motion is.
+    // Without `wrap`, axes are as wide as the motion.
     let free = at.write("free.toml", &TURNING.replace("wrap = [\"theta\", \"phase\"]\n", ""));
     succeed(&["run", &free, "--out", &at.path("free"), "--plot"]);
     succeed(&["sweep", &free, "--out", &at.path("free"), "--plot"]);

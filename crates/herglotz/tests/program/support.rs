@@ -1,11 +1,11 @@
-//! What tests of the program share: a directory, and its runs.
+//! Common parts of the tests of the program: a directory, and runs of the program.
 
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
 pub const REPOSITORY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
-/// A directory of a test, empty at its beginning and removed at its end.
+/// A temporary directory of a test, removed when it is dropped.
 pub struct Directory(PathBuf);
 
 impl Directory {
@@ -40,7 +40,7 @@ fn herglotz(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_herglotz")).args(arguments).output().unwrap()
 }
 
-/// Runs it, and gives what it has written to the standard output.
+/// Runs the program successfully, and returns its standard output.
 pub fn succeed(arguments: &[&str]) -> String {
     let output = herglotz(arguments);
     let told = String::from_utf8(output.stderr).unwrap();
@@ -48,7 +48,7 @@ pub fn succeed(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Runs it, and gives how it ends with what it has written to the standard error.
+/// Runs the program, and returns its exit code and its standard error.
 pub fn fail(arguments: &[&str]) -> (Option<i32>, String) {
     let output = herglotz(arguments);
     (output.status.code(), String::from_utf8(output.stderr).unwrap())
@@ -64,8 +64,8 @@ pub fn scene(name: &str) -> String {
     format!("{REPOSITORY}/scenes/{name}.toml")
 }
 
-/// Each change of a scene, one or several as `from|to` pairs after the first, is refused with a message that begins so. `told` is what is said of a
-/// text.
+/// Each change of a scene, given by one or several `from|to` pairs, is refused with a message that begins with the
+/// expected text. `told` returns the message for a text.
 pub fn refuses_each(scene: &str, changes: &[(&str, &str, &str)], told: impl Fn(&str) -> Option<String>) {
     for (from, to, expected) in changes {
         let mut to = to.split('|');

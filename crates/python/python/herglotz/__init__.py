@@ -1,10 +1,11 @@
 """Motions of contact Lagrangian systems.
 
-A Lagrangian L(t, q, v, z) that depends on its own action z has friction in it: Herglotz' equation,
+A Lagrangian L(t, q, v, z) that depends on its own action z describes dissipation. Its motions satisfy Herglotz'
+equation,
 
     d/dt L_v = L_q + L_z L_v,   dz/dt = L.
 
-`solve` integrates it by contact integrators:
+`solve` integrates it with contact integrators:
 
 >>> import numpy as np, herglotz as hz
 >>> def L(t, q, v, z):
@@ -19,14 +20,14 @@ from importlib import import_module as _import_module
 from ._core import System
 from ._core import catalogue as _catalogue
 from ._core import integrators as _integrators
-from ._solution import Crossings, ResumeState, Plan, Solution, States
+from ._solution import Crossings, Interrupted, Plan, Solution, States
 from ._solve import Event, solve
 from ._system import system
 from ._trace import array, where
 
 __version__ = "0.1.0"
 
-# What a single motion does not need is loaded when it is first asked for: that is half of what there is to load.
+# Modules that a single motion does not need are loaded at first use: they are half of the import time.
 _LATER = {
     "_assembled": "AssembledSolution bodies lattice",
     "_ensemble": "Ensemble MemberCrossings ensemble",
@@ -50,12 +51,12 @@ def __dir__():
 
 
 def integrators():
-    """The names of all integrators with their orders: a dict."""
+    """The names of all integrators with their orders, as a dict."""
     return dict(_integrators())
 
 
 def catalogue():
-    """The systems that are known by name, with what they are: a dict."""
+    """The names of all systems of the catalogue with a short description, as a dict."""
     return {name: about for name, about, *_ in _catalogue()}
 
 
@@ -70,7 +71,7 @@ __all__ = [
     "Event",
     "Exponential",
     "Geometry",
-    "ResumeState",
+    "Interrupted",
     "MemberCrossings",
     "Path",
     "Plan",

@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Vector: TypeAlias = NDArray[np.float64]
-# A function (t, q, v, z, **parameters), a formula or the name of a system, an expression of SymPy, or a system.
+# A function (t, q, v, z, **parameters), a formula, the name of a system, a SymPy expression, or a system.
 Lagrangian: TypeAlias = Callable[..., Any] | str | System | Any
 Expression: TypeAlias = str | Callable[..., Any]
 Direction: TypeAlias = Literal["both", "rising", "falling"]
@@ -138,7 +138,7 @@ class AssembledSolution:
     def resume(self, t: ArrayLike | None = None) -> AssembledSolution: ...
     def to_xarray(self) -> Any: ...
 
-class ResumeState(KeyboardInterrupt):
+class Interrupted(KeyboardInterrupt):
     solution: Solution | AssembledSolution | Ensemble
     def __init__(self, solution: Solution | AssembledSolution | Ensemble) -> None: ...
 

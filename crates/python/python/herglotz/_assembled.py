@@ -1,11 +1,11 @@
-"""Systems of many coordinates: lattices by the formulas of a site and of a bond, and bodies that attract each other."""
+"""Systems of many coordinates: lattices given by the formulas of a site and of a bond, and gravitating bodies."""
 
 import functools
 
 import numpy as np
 
 from . import _core
-from ._solution import ResumeState
+from ._solution import Interrupted
 from ._system import copied
 
 
@@ -16,19 +16,19 @@ class AssembledSolution:
     ----------
     t : array of shape (k,)
     q, v, p : arrays of shape (k, *sites), (k, *sites, components) or (k, bodies, dimensions)
-        Position, velocity and momentum; after the first axis as the start had them.
+        Position, velocity and momentum; the axes after the first are those of the initial position.
     z, energy : arrays of shape (k,)
         The action, and the energy v.p - L.
     log_factor : array of shape (k,) or None
-        The logarithm of the conformal factor since the start, where it was asked for.
+        The logarithm of the conformal factor since the start, where it was requested.
     status : str
-        How the run ended; ``success`` says whether as it was asked to.
+        How the run ended; ``success`` is whether it ended as requested.
     unresolved : str or None
-        The first step that was seen not to resolve the motion.
+        The first step that was found not to resolve the motion.
     steps, evaluations : int
-        The steps taken, and the evaluations of all forces.
+        The number of steps taken, and of evaluations of all forces.
     t_end : float
-        The time reached.
+        The time that was reached.
     """
 
     def __init__(self, run, request, shape, record, bodies):
@@ -45,10 +45,10 @@ class AssembledSolution:
 
     @property
     def momenta(self):
-        """The total momenta of bodies, by name: arrays of shape (k,); of a lattice there are none.
+        """The total momenta of bodies, by name: arrays of shape (k,); empty for a lattice.
 
-        "translation of x" and so on is the total momentum, "rotation of x, y" and so on the total angular momentum. They
-        decay as the conformal factor, e^(gamma t).
+        "translation of x" and so on are the components of the total momentum, "rotation of x, y" and so on those of the
+        total angular momentum. They decay as the conformal factor e^(gamma t).
         """
         if not self._bodies:
             return {}
@@ -61,18 +61,18 @@ class AssembledSolution:
         return found
 
     def resume(self, t=None):
-        """Goes on from the end of the motion, by the same integrator with steps of the same length.
+        """Continues from the end of the motion, with the same integrator and steps of the same length.
 
         Parameters
         ----------
         t : float or array, optional
-            The new end; or the times of the rows, beyond the end of this motion, of which the first may be that end. What
-            was asked for and not reached, if nothing is said.
+            The new final time; or the times of the rows, beyond the end of this motion, the first of which may be that
+            end. By default the requested times that were not reached.
 
         Returns
         -------
         AssembledSolution
-            From the end of this motion on.
+            The motion from the end of this one.
         """
         at, q, p, z, _ = self._end
         _, asked, every, (integrator, step, steps), conformal_factor = self._request
@@ -86,13 +86,13 @@ class AssembledSolution:
         if len(times) == 0 or times[0] != at:
             times = np.concatenate([[at], times])
         if steps is not None:
-            # So many steps were of another span.
+            # The number of steps was for another span.
             step, steps = abs(asked[-1] - start) / steps, None
         request = (q, p, True, z), times, every, (integrator, step, steps), conformal_factor
         return _solution(self._run, request, self._shape, self._bodies)
 
     def to_xarray(self):
-        """The rows as an `xarray.Dataset` over time and the axes of the sites or bodies."""
+        """The rows as an `xarray.Dataset` with axes for time and for the sites or bodies."""
         import xarray
 
         names = ["body", "component"] if self._bodies else [f"site_{i}" for i in range(len(self._shape))]
@@ -124,43 +124,43 @@ def lattice(
     coordinates=("x",),
     parameters=None,
 ):
-    """The motion of a lattice of equal sites with bonds between neighbours, of any number of them.
+    """The motion of a lattice of equal sites with bonds between neighbours, with any number of sites.
 
-    Its Lagrangian is the sum of `site` over the sites, of `bond` over the pairs of neighbours along each axis, and of the
-    drag gamma(t) z. The drag stands in `site`, so that each site has Herglotz' equation of its own; z is the action of the
-    whole lattice, and the term counts once.
+    Its Lagrangian is the sum of `site` over the sites, of `bond` over the pairs of neighbours along each axis, and of
+    the drag gamma(t) z. The drag is written in `site`, so that each site satisfies its own Herglotz equation; z is the
+    action of the whole lattice, and the term counts once.
 
     Parameters
     ----------
     site : str
         The Lagrangian of a site, of the form m*x'^2/2 - V(t, x) + gamma*z: ``"x'^2/2 - (1 - cos(x)) + gamma*z"``.
     bond : str, optional
-        That of a bond, of the coordinates before and after it, without velocities: ``"-k*(xr - xl)^2/2"``.
+        The Lagrangian of a bond, in the coordinates before and after it, without velocities: ``"-k*(xr - xl)^2/2"``.
     q0, v0 : array of shape (sites,), (sites, sites) and so on
-        Position and velocity of the start, with an axis for each direction of the lattice; of several coordinates at a
-        site, these are the last axis. One number of `v0` is that of all.
+        Initial position and velocity, with an axis for each direction of the lattice; several coordinates of a site are
+        the last axis. A single number `v0` is the velocity of all coordinates.
     t : float or array of shape (k,)
-        The times of the rows: the first is that of the start, the last the end, in either direction. One number is the
-        end, of a motion from 0.
+        The times of the rows: the first is the initial time, the last the final time, in either direction. A single
+        number is the final time of a motion from 0.
     p0 : array, optional
-        The momentum of the start, in place of `v0`.
+        The initial momentum, in place of `v0`.
     z0 : float
-        The action of the start.
+        The initial action.
     boundary : {"periodic", "fixed", "free"}
-        What the first and the last site along each axis are bound to: each other, walls at 0, or nothing.
+        The boundary condition along each axis: periodic, walls at 0, or free ends.
     integrator : str
-        A splitting such as "strang" or "blanes_moan_6", which is explicit; or "midpoint", "gauss_1" or "gauss_2", which
-        are for stiff bonds.
+        A splitting such as "strang" or "blanes_moan_6", which is explicit; or "midpoint", "gauss_1" or "gauss_2", for
+        stiff bonds.
     step, steps : float, int
-        The length or the number of its steps: one of them.
+        The length or the number of the steps; give one of them.
     every : int, optional
-        Rows at the ends of so many steps, in place of those at `t`.
+        Record a row every `every` steps, in place of the rows at `t`.
     conformal_factor : bool
         Whether `AssembledSolution.log_factor` is computed.
     coordinates : list of str
         The names of the components at a site, 1 to 3 of them; ``xl`` and ``xr`` are those of ``x`` in a bond.
     parameters : dict of float, optional
-        Their values by name.
+        The values of the parameters by name.
 
     Returns
     -------
@@ -169,13 +169,13 @@ def lattice(
     Raises
     ------
     ValueError
-        For all that is wrong with an argument.
-    ResumeState
-        A `KeyboardInterrupt` with the solution up to there.
+        For an invalid argument.
+    Interrupted
+        A `KeyboardInterrupt` with the solution up to the interruption.
 
     Examples
     --------
-    A wave in a thousand pendulums with springs:
+    A wave in a thousand pendulums coupled by springs:
 
     >>> import numpy as np, herglotz as hz
     >>> x = np.arange(1000)
@@ -212,33 +212,34 @@ def bodies(
     every=None,
     conformal_factor=False,
 ):
-    """The motion of bodies with Newton's gravitation of each pair and drag, of any number of them.
+    """The motion of any number of bodies with Newtonian gravitation of each pair and linear drag.
 
-    L = sum m_i |v_i|^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z. Steps are of one length: choose it for the closest
-    encounter. Few bodies, 5 in space or 8 in the plane, are a system for `solve` too, which chooses its steps.
+    L = sum m_i |v_i|^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z. All steps have the same length, which must
+    resolve the closest encounter. A few bodies (up to 5 in space or 8 in the plane) can also be given to `solve`, which
+    chooses its steps.
 
     Parameters
     ----------
     masses : array of shape (bodies,)
     q0, v0 : array of shape (bodies, 2) or (bodies, 3)
-        Position and velocity of the start. One number of `v0` is that of all.
+        Initial position and velocity. A single number `v0` is the velocity of all coordinates.
     t : float or array of shape (k,)
-        The times of the rows: the first is that of the start, the last the end, in either direction. One number is the
-        end, of a motion from 0.
+        The times of the rows: the first is the initial time, the last the final time, in either direction. A single
+        number is the final time of a motion from 0.
     p0 : array, optional
-        The momentum of the start, in place of `v0`.
+        The initial momentum, in place of `v0`.
     G : float
-        The constant of gravitation.
+        The gravitational constant.
     gamma : float
         The rate of the drag, negative for dissipation: momentum and angular momentum decay as e^(gamma t).
     z0 : float
-        The action of the start.
+        The initial action.
     integrator : str
         A splitting such as "blanes_moan_6" or "strang", or "midpoint".
     step, steps : float, int
-        The length or the number of its steps: one of them.
+        The length or the number of the steps; give one of them.
     every : int, optional
-        Rows at the ends of so many steps, in place of those at `t`.
+        Record a row every `every` steps, in place of the rows at `t`.
     conformal_factor : bool
         Whether `AssembledSolution.log_factor` is computed.
 
@@ -249,9 +250,9 @@ def bodies(
     Raises
     ------
     ValueError
-        For all that is wrong with an argument.
-    ResumeState
-        A `KeyboardInterrupt` with the solution up to there.
+        For an invalid argument.
+    Interrupted
+        A `KeyboardInterrupt` with the solution up to the interruption.
     """
     q0, request = _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor)
     masses = _array("masses", masses)
@@ -261,7 +262,7 @@ def bodies(
     return _solution(run, request, q0.shape, True)
 
 
-# Functions of the module, so that a solution can be pickled.
+# These functions are defined in the module so that a solution can be pickled.
 def _run_lattice(*arguments):
     return _core.run_lattice(*arguments)
 
@@ -271,7 +272,7 @@ def _run_bodies(*arguments):
 
 
 def _array(name, x):
-    """The numbers of an argument, a copy."""
+    """The numbers of an argument, copied."""
     try:
         return np.array(x, dtype=float, ndmin=1)
     except (TypeError, ValueError) as error:
@@ -279,7 +280,7 @@ def _array(name, x):
 
 
 def _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor):
-    """The position of the start with its shape, and what is asked for as the core reads it."""
+    """The initial position with its shape, and the request in the form of the core."""
     if q0 is None:
         raise ValueError("`q0` is not given: the position of the start")
     if t is None:
@@ -301,6 +302,6 @@ def _solution(run, request, shape, bodies):
     sol = AssembledSolution(run, request, shape, record, bodies)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
-            raise ResumeState(sol)
+            raise Interrupted(sol)
         raise record.interrupted
     return sol

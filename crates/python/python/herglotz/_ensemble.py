@@ -1,11 +1,11 @@
-"""Many motions of one Lagrangian."""
+"""Ensembles: many motions of one Lagrangian."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from . import _core
-from ._solution import ResumeState, crossings
+from ._solution import Interrupted, crossings
 from ._solve import columns_of, events_of, system_and_start
 from ._system import check_parameters
 
@@ -28,28 +28,28 @@ def ensemble(
     parameters=None,
     threads=None,
 ):
-    """M motions of one Lagrangian over threads; the result does not depend on their number.
+    """M motions of one Lagrangian on several threads; the result does not depend on the number of threads.
 
     Parameters
     ----------
     L : function, str, SymPy expression or System
-        As of `solve`.
+        As in `solve`.
     q0, v0 : arrays of shape (M, n)
-        Positions and velocities of the starts.
+        Initial positions and velocities.
     t : float or array of shape (k,)
-        The end, of motions from 0, or start and end: then the ends of the motions are told. With more than two times,
-        the states at all of them.
+        The final time of motions from 0, or initial and final time: then the final states are returned. With more than
+        two times, the states at all of them.
     p0 : array of shape (M, n), optional
-        The momenta of the starts, in place of `v0`.
+        The initial momenta, in place of `v0`.
     z0 : float or array of shape (M,)
     parameters : dict of float or arrays of shape (M,), optional
-        Those that are arrays differ among members.
+        Parameters given as arrays differ among the members.
     events : str, Event, or a list or dict of them
-        As of `solve`; what they find has the member too. A terminal one ends its member alone.
+        As in `solve`; their results also have the member. A terminal event ends the motion of its member only.
     threads : int, optional
-        As many as there are processors, if nothing is said.
+        By default the number of processors.
     accuracy, integrator, step, steps, observe, coordinates
-        As of `solve`.
+        As in `solve`.
 
     Returns
     -------
@@ -58,15 +58,15 @@ def ensemble(
     Raises
     ------
     ValueError
-        For all that is wrong with an argument.
-    ResumeState
-        A `KeyboardInterrupt` with the ensemble: the members that were done, and the others without success.
+        For an invalid argument.
+    Interrupted
+        A `KeyboardInterrupt` with the ensemble: the members that had ended, and the others without success.
     """
     if parameters is not None and not hasattr(parameters, "items"):
         raise ValueError(f"`parameters` is {parameters!r}, where values by name are needed: parameters={{\"gamma\": -0.1}}")
     parameters = dict(parameters or {})
     varied = {name: value for name, value in parameters.items() if np.ndim(value)}
-    # Any value of these will do for the formula.
+    # The formula needs some value of each parameter; any of the member's values will do.
     fixed = {
         name: float(np.ravel(value)[0]) if name in varied and np.size(value) else value
         for name, value in parameters.items()
@@ -97,13 +97,13 @@ def ensemble(
     found = Ensemble(system, record, event_names, tuple(observe or ()))
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
-            raise ResumeState(found)
+            raise Interrupted(found)
         raise record.interrupted
     return found
 
 
 class MemberCrossings(NamedTuple):
-    """The changes of sign of an event in an ensemble: m of them."""
+    """The sign changes of an event in an ensemble, m of them."""
 
     member: np.ndarray  # (m,)
     t: np.ndarray  # (m,)
@@ -124,13 +124,14 @@ class Ensemble:
         The times that were reached.
     times : array of shape (k,) or None
     events : list or dict of MemberCrossings
-        The changes of sign of the events, in their order or by their names: of all members, one after the other.
+        The sign changes of the events, in the order of the events or by name: those of all members, one after the
+        other.
     steps : array of int of shape (M,)
     success : array of bool of shape (M,)
     troubles : dict of str
-        What went wrong or is in doubt, by the index of the member; what was not computed is not a number.
+        Errors and warnings, by the index of the member; values that were not computed are NaN.
     batch_kernel : int
-        How many members were advanced together in vector registers.
+        The number of members that were advanced together in SIMD lanes.
     """
 
     def __init__(self, system, record, event_names, observed):
@@ -148,7 +149,7 @@ class Ensemble:
         return len(self.t)
 
     def __getitem__(self, name):
-        """An observed column: of shape (M,) or (M, k)."""
+        """A column of `observe`, of shape (M,) or (M, k)."""
         return self._observed[name]
 
     def __repr__(self):

@@ -1,4 +1,4 @@
-"""The exact discrete Lagrangian and the contact exponential map, of one to eight coordinates."""
+"""The exact discrete Lagrangian and the contact exponential map, in one to eight coordinates."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from ._system import system
 
 
 class Exponential(NamedTuple):
-    """Where motions lead to in a time h."""
+    """The position after a time h, and the regularity of the contact exponential map."""
 
     q1: np.ndarray  # (n,)
     regularity: float  # the smallest singular value of dq1/dv0
@@ -26,7 +26,7 @@ class Retraction(NamedTuple):
 
 
 class DiscreteLagrangian(NamedTuple):
-    """The exact discrete Lagrangian at two points, with its derivatives by q0, q1 and z0."""
+    """The exact discrete Lagrangian at two points, with its derivatives with respect to q0, q1 and z0."""
 
     value: float
     d1: np.ndarray  # (n,)
@@ -41,7 +41,7 @@ def exponential(L, h, q0, v0, z0=0.0, t=0.0, *, coordinates=None, parameters=Non
     Parameters
     ----------
     L, coordinates, parameters
-        As of `solve`; of one to eight coordinates.
+        As in `solve`, with one to eight coordinates.
     h, z0, t : float
     q0, v0 : arrays of shape (n,)
 
@@ -60,7 +60,7 @@ def retract(L, h, q0, q1, z0=0.0, t=0.0, *, coordinates=None, parameters=None):
     Parameters
     ----------
     L, coordinates, parameters
-        As of `solve`; of one to eight coordinates.
+        As in `solve`, with one to eight coordinates.
     h, z0, t : float
     q0, q1 : arrays of shape (n,)
 
@@ -79,7 +79,7 @@ def exact_lagrangian(L, h, q0, q1, z0=0.0, t=0.0, *, coordinates=None, parameter
     Parameters
     ----------
     L, coordinates, parameters
-        As of `solve`; of one to eight coordinates.
+        As in `solve`, with one to eight coordinates.
     h, z0, t : float
     q0, q1 : arrays of shape (n,)
 

@@ -1,4 +1,4 @@
-"""What is looked at beside a motion: geometry, contact maps, checks and comparisons."""
+"""Checks: geometry at a point, contact maps, contact steps, and comparisons of integrators."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from ._system import system
 
 
 class Geometry(NamedTuple):
-    """The contact geometry of L at a time and a point of TQ x R, of n coordinates; vectors there in the order q, v, z."""
+    """The contact geometry of L at a time and a point of TQ x R, in n coordinates; vectors have the order q, v, z."""
 
     lagrangian: float
     momentum: np.ndarray  # (n,)
@@ -30,7 +30,7 @@ def geometry(L, t, q, v, z=0.0, *, coordinates=None, parameters=None):
     Parameters
     ----------
     L, coordinates, parameters
-        As of `solve`.
+        As in `solve`.
     t, z : float
     q, v : arrays of shape (n,)
 
@@ -47,7 +47,7 @@ def geometry(L, t, q, v, z=0.0, *, coordinates=None, parameters=None):
 
 
 class Contact(NamedTuple):
-    """How a map (q, p, z) -> (q, p, z) pulls back dz - p dq."""
+    """The pullback of dz - p dq by a map (q, p, z) -> (q, p, z)."""
 
     is_contact: bool
     sigma: float
@@ -67,10 +67,10 @@ class Contact(NamedTuple):
 
 
 def is_contact(map, at, *, tolerance=1e-9):
-    """Whether a map (q, p, z) -> (q, p, z) is contact at a point.
+    """Whether a map (q, p, z) -> (q, p, z) is a contact transformation at a point.
 
     The map is called once with tracers, and its derivatives are exact: the defect of a contact map is round-off, that
-    of a step of a method of Runge and Kutta the size of its error.
+    of a Runge-Kutta step is of the size of its error.
 
     Parameters
     ----------
@@ -79,12 +79,12 @@ def is_contact(map, at, *, tolerance=1e-9):
     at : tuple (q, p, z)
         The point.
     tolerance : float
-        The max_abs_or_nan defect of a map that is called contact.
+        The largest defect of a map that counts as contact.
 
     Returns
     -------
     Contact
-        True or false, the conformal factor sigma, and the max_abs_or_nan component of F*eta - sigma eta, relative to F*eta.
+        True or false, the conformal factor sigma, and the largest component of F*eta - sigma eta, relative to F*eta.
         A map with sigma = 0 is not contact.
     """
     try:
@@ -96,24 +96,24 @@ def is_contact(map, at, *, tolerance=1e-9):
         raise ValueError("`at` has a q without coordinates")
     components = _trace.components_of(map, n)
     sigma, defect, image, jacobian = _core.conformality(components, (q, p, z))
-    # Not a number is no contact map, and neither is a factor 0: what it pulls back is no contact form.
+    # NaN does not count as contact, and neither does the factor 0, with which the pullback is not a contact form.
     is_so = defect <= tolerance and sigma != 0.0 and np.isfinite(sigma)
     return Contact(bool(is_so), sigma, defect, image, jacobian)
 
 
 class Place(NamedTuple):
-    """A step of a motion that was looked at."""
+    """A step of a motion that was checked."""
 
     t: float
     sigma: float
     log_factor: float
     contact_defect: float
     herglotz_defect: float
-    momenta: list  # (momentum, what the theorem of Noether predicts) of each symmetry
+    momenta: list  # (momentum, prediction of Noether's theorem) of each symmetry
 
 
 class Check(NamedTuple):
-    """Whether the steps of a motion are contact, and the theorems of the discrete theory on it."""
+    """Whether the steps of a motion are contact, and the residuals of the theorems of the discrete theory along it."""
 
     is_contact: bool
     integrator: str
@@ -153,7 +153,7 @@ def check(
 ):
     """Whether the steps of a motion are contact: sigma, defects and momenta at some places, and the discrete theorems.
 
-    The arguments are those of `solve`; `places` is the number of steps that are looked at.
+    The arguments are those of `solve`; `places` is the number of steps that are checked.
 
     Returns
     -------
@@ -195,7 +195,7 @@ class Comparison:
         return pandas.DataFrame(self.rows, columns=Work._fields)
 
     def plot(self, ax=None):
-        """Draws seconds against error with matplotlib."""
+        """Plots run time in seconds against error with matplotlib."""
         import matplotlib.pyplot
 
         ax = matplotlib.pyplot.gca() if ax is None else ax
@@ -209,7 +209,7 @@ class Comparison:
 
 
 def compare(L, q0=None, v0=None, t=None, *, p0=None, z0=0.0, coordinates=None, parameters=None):
-    """Run time against error of all integrators that apply to a motion; the arguments are those of `solve`.
+    """Run time against error for all integrators that apply to a motion; the arguments are those of `solve`.
 
     Returns
     -------

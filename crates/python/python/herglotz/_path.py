@@ -1,4 +1,4 @@
-"""Motions between two given positions."""
+"""Motions between two given positions: boundary value problems."""
 
 import numpy as np
 
@@ -13,28 +13,30 @@ class Path:
     Attributes
     ----------
     t, z : arrays of shape (k + 1,)
-        The times and the actions of its points.
+        The times and the actions of the points of the path.
     q, p : arrays of shape (k + 1, n)
         The positions and the momenta.
     found : bool
-        Whether it is critical for the discrete action; what it is of the search otherwise, is its last path.
+        Whether the path is critical for the discrete action; otherwise it is the last path of the search.
     status : str
-        How the search ended, with what to do where none was found.
+        How the search ended, with advice where no path was found.
     action : float
         The action of the whole path.
     residual : float
-        The max_abs_or_nan residual of a discrete Herglotz equation, a momentum.
+        The largest residual of a discrete Herglotz equation, in units of momentum.
     log_factor : float
         The logarithm of the conformal factor of the whole path.
     unresolved : str or None
-        Why a path that was found may be far from every motion: its steps do not resolve it, as where it jumps a centre of force, or its
-        ends are conjugate to within their error.
+        The reason why a path that was found may be far from every motion: its steps do not resolve the motion, as where
+        it jumps over a centre of force, or its ends are conjugate to within the truncation error.
     error_estimate : float or None
-        By how much the steps move the path, in units of its range; by a rule of order one or two.
+        The estimated displacement of the path by the truncation error, in units of its range; for rules of order one or
+        two.
     regularity : float
-        The smallest pivot of the last linearised equations, relative to its size; small where the ends are nearly conjugate.
+        The smallest pivot of the last linearised equations, relative to its size before the elimination; small where
+        the ends are nearly conjugate.
     iterations : int
-        The corrections that were made.
+        The number of corrections that were made.
     """
 
     def __init__(self, system, t, record):
@@ -59,24 +61,26 @@ class Path:
 def path(L, q0, q1, t, *, steps, integrator="gauss_4", z0=0.0, guess=None, coordinates=None, parameters=None):
     """The motion between two positions: the path that is critical for the discrete action of Herglotz' principle.
 
-    Newton's method searches for it from the straight line, or from a guess; there may be several such paths, or none.
+    Newton's method searches for it, starting from the straight line or from a guess; there may be several paths, or
+    none.
 
     Parameters
     ----------
     L, coordinates, parameters
-        As of `solve`; of one to eight coordinates.
+        As in `solve`, with one to eight coordinates.
     q0, q1 : arrays of shape (n,)
         The positions at the start and at the end.
     t : float or tuple (t0, t1)
-        The times of start and end; one number is the end, of a path from 0.
+        The times of start and end; a single number is the final time of a path from 0.
     steps : int
-        The number of steps, of one length.
+        The number of steps, all of the same length.
     integrator : str
-        One of Gauss', ``"gauss_1"`` to ``"gauss_16"``, or a rule as ``"midpoint"``, whose discrete action it is.
+        The integrator whose discrete action is used: a Gauss method, ``"gauss_1"`` to ``"gauss_16"``, or a quadrature
+        rule such as ``"midpoint"``.
     z0 : float
-        The action of the start.
+        The initial action.
     guess : array of shape (steps + 1, n), optional
-        The points from which the search starts, as those of a path with another time.
+        The points of the initial guess, for example those of a path over another time span.
 
     Returns
     -------
@@ -85,7 +89,7 @@ def path(L, q0, q1, t, *, steps, integrator="gauss_4", z0=0.0, guess=None, coord
     Raises
     ------
     ValueError
-        For all that is wrong with an argument; that no path was found is told by the path.
+        For an invalid argument; whether a path was found is an attribute of the path.
     """
     L, q0, _ = system_and_start(L, q0, np.zeros(np.shape(q0)), None, coordinates, parameters)
     if np.ndim(t) > 1 or np.size(t) != 2 and np.ndim(t) == 1:

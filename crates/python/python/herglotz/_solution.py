@@ -1,4 +1,4 @@
-"""What a motion has led to."""
+"""Results of a motion."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from . import _core
 
 
 class Crossings(NamedTuple):
-    """The changes of sign of an event: m of them."""
+    """The sign changes of an event, m of them."""
 
     t: np.ndarray  # (m,)
     q: np.ndarray  # (m, n)
@@ -29,7 +29,7 @@ class States(NamedTuple):
 
 
 class Plan:
-    """What a run computes and skips; printed, in words."""
+    """The plan of a run: what is computed and what is skipped; ``print`` shows it as text."""
 
     __slots__ = ("text", "integrator", "step", "steps", "error")
 
@@ -43,9 +43,11 @@ class Plan:
         return f"<Plan: {self.steps} steps of {self.step} by {self.integrator}>"
 
 
-class ResumeState(KeyboardInterrupt):
-    """A run that Ctrl-C has ended: ``solution`` has what was computed, and `Solution.resume` goes on with it; of an ensemble the members
-    that were done."""
+class Interrupted(KeyboardInterrupt):
+    """A run that Ctrl-C has interrupted: ``solution`` has what was computed, and `Solution.resume` continues it.
+
+    For an ensemble, ``solution`` has the members that had ended.
+    """
 
     def __init__(self, solution):
         done = f"t = {solution.t_end}" if hasattr(solution, "t_end") else f"{sum(solution.success)} of {len(solution)} members"
@@ -53,7 +55,7 @@ class ResumeState(KeyboardInterrupt):
         self.solution = solution
 
     def __reduce__(self):
-        return ResumeState, (self.solution,)
+        return Interrupted, (self.solution,)
 
 
 class Solution:
@@ -67,20 +69,20 @@ class Solution:
     z, energy : arrays of shape (k,)
         The action, and the energy v.p - L.
     log_factor : array of shape (k,) or None
-        The logarithm of the conformal factor since the start, where it was asked for.
+        The logarithm of the conformal factor since the start, where it was requested.
     events : list or dict of Crossings
-        The changes of sign of the events, in their order or by their names.
+        The sign changes of the events, in the order of the events or by name.
     status : str
-        How the run ended; ``success`` says whether as it was asked to.
+        How the run ended; ``success`` is whether it ended as requested.
     unresolved : str or None
-        The first step that was seen not to resolve the motion.
+        The first step that was found not to resolve the motion.
     error_estimate : float or None
-        The error at the end, where `estimate` was asked for: of (q, p) relative to its size, or of v relative to the max_abs_or_nan
-        speed, whichever is max_or_nan; infinite where half steps fail.
+        The error at the end, where `estimate` was requested: that of (q, p) relative to its size, or that of v relative
+        to the largest speed, whichever is larger; infinite where the run with half steps fails.
     steps, evaluations : int
-        The steps taken, and the evaluations of forces or gradients.
+        The number of steps taken, and of evaluations of forces or gradients.
     t_end : float
-        The time reached.
+        The time that was reached.
     """
 
     def __init__(self, system, request, record, event_names, observed):
@@ -104,13 +106,13 @@ class Solution:
 
     @property
     def plan(self):
-        """What was computed and what was skipped; ``print(sol.plan)``."""
+        """The plan: what was computed and what was skipped; ``print(sol.plan)``."""
         if self._plan is None:
             self._plan = Plan(*_core.Motion(self.system, *self._request).plan())
         return self._plan
 
     def __getitem__(self, name):
-        """A column: one that was observed, by its name, or the state's: a coordinate, its velocity ``x'``, ``t``, ``z``."""
+        """A column by name: observed, a coordinate, a velocity ``x'``, ``t``, ``z``, ``energy`` or ``log_factor``."""
         if name in self._observed:
             return self._columns[:, self._observed.index(name)]
         names = self.system.coordinates
@@ -125,10 +127,10 @@ class Solution:
         return [*self.system.coordinates, *_core.velocity_names(self.system.given_coordinates)[1], *self._observed]
 
     def __call__(self, t):
-        """The states at any times of the motion, as exact as its steps.
+        """Dense output: the states at any times of the motion, as accurate as its steps.
 
-        The first call runs the motion again and keeps the ends of its steps; a state inside of a step is by a step of
-        the same integrator.
+        The first call runs the motion again and keeps the ends of its steps; a state within a step is computed by a
+        shorter step of the same integrator.
 
         Parameters
         ----------
@@ -148,19 +150,19 @@ class Solution:
         return States(times.astype(float), q, v, p, z, energy)
 
     def resume(self, t=None):
-        """Goes on from the end of the motion, as it was asked for, with its own events and columns.
+        """Continues from the end of the motion, with the same arguments, events and columns.
 
         Parameters
         ----------
         t : float or array, optional
-            The new end; or the times of the rows, beyond the end of this motion, of which the first may be that end. What
-            was asked for and not reached, if nothing is said: a motion that Ctrl-C has interrupted then goes on to the
-            last bit as if it had not been, with the rows and crossings that are left.
+            The new final time; or the times of the rows, beyond the end of this motion, the first of which may be that
+            end. By default the requested times that were not reached: a motion that Ctrl-C has interrupted then
+            continues bitwise as if it had not been interrupted, with the remaining rows and crossings.
 
         Returns
         -------
         Solution
-            From the end of this motion on.
+            The motion from the end of this one.
         """
         from ._solve import run
 
@@ -168,7 +170,7 @@ class Solution:
             return run(self.system, self._request, self._event_names, self._observed, (self._halted, self.t_end))
 
         if t is None and len(self.t) == 0 and not self.success:
-            # Its plan was interrupted.
+            # The plan was interrupted.
             return run(self.system, self._request, self._event_names, self._observed)
 
         at, q, p, z, v = self._end
@@ -185,18 +187,18 @@ class Solution:
             times = np.concatenate([[at], times])
         _, _, every, way, events, columns, conformal_factor, estimate, scales = self._request
         if way[3] is not None:
-            # So many steps were of another span.
+            # The number of steps was for another span.
             way = (None, way[1], self.plan.step, None)
         request = (q, p, True, z, v), times, every, way, events, columns, conformal_factor, estimate, scales
         return run(self.system, request, self._event_names, self._observed)
 
     @property
     def momenta(self):
-        """The momenta of the symmetries that are seen, by name: arrays of shape (k,).
+        """The momenta of the recognised symmetries, by name: arrays of shape (k,).
 
-        Those of bodies are seen where L has the differences of their coordinates: ``translation of x1, x2`` and
-        ``rotation of (x1, y1), (x2, y2)``. They decay as the conformal factor: a momentum over exp(log_factor) stays
-        what it was.
+        Those of bodies are recognised where L depends on the differences of their coordinates: ``translation of x1,
+        x2`` and ``rotation of (x1, y1), (x2, y2)``. They decay as the conformal factor: a momentum divided by
+        exp(log_factor) is constant.
         """
         coordinates, found = self.system.coordinates, {}
         for which in self.system.symmetries:
@@ -209,7 +211,7 @@ class Solution:
         return found
 
     def to_xarray(self):
-        """The rows as an `xarray.Dataset` over time and coordinate."""
+        """The rows as an `xarray.Dataset` with axes for time and coordinate."""
         import xarray
 
         names = self.system.coordinates
@@ -222,7 +224,7 @@ class Solution:
         return xarray.Dataset(data, {"t": self.t, "coordinate": names}, attributes)
 
     def to_pandas(self):
-        """The rows as a `pandas.DataFrame` with t for its index."""
+        """The rows as a `pandas.DataFrame` with index t."""
         import pandas
 
         columns = {name: self[name] for name in self._names()}
@@ -232,7 +234,7 @@ class Solution:
         return pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
 
     def plot(self, *names, ax=None):
-        """Draws columns over time with matplotlib: those named, or the coordinates.
+        """Plots columns against time with matplotlib: those named, or the coordinates.
 
         Returns
         -------
@@ -248,7 +250,7 @@ class Solution:
         return ax
 
     def __getstate__(self):
-        # The ends of steps are found again.
+        # The ends of the steps are recomputed when they are needed.
         return self.__dict__ | {"_dense": None, "_plan": None}
 
     def __repr__(self):
@@ -256,7 +258,7 @@ class Solution:
 
 
 def crossings(kind, found, names, n):
-    """The crossings of each event: by names, or as many as a number says. The index of the event stands before t in what was found."""
+    """The crossings of each event: by name, or a list where `names` is a count. In `found` the event precedes t."""
     before = kind._fields.index("t")
 
     def of(index):

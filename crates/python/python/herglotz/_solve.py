@@ -1,7 +1,7 @@
-"""One motion: what is asked of it, and its run."""
+"""One motion: its request and its run."""
 
 from . import _core
-from ._solution import ResumeState, Solution
+from ._solution import Interrupted, Solution
 from ._system import check_parameters, copied, expression, system
 
 
@@ -26,45 +26,45 @@ def solve(
     coordinates=None,
     parameters=None,
 ):
-    """The motion of a Lagrangian by Herglotz' equation, d/dt L_v = L_q + L_z L_v with dz/dt = L.
+    """The motion of a Lagrangian system: Herglotz' equation, d/dt L_v = L_q + L_z L_v with dz/dt = L.
 
     Parameters
     ----------
     L : function, str, SymPy expression or System
         ``L(t, q, v, z)``, which is called once with tracers; a formula; the name of a system of the catalogue, with its
-        start; or what `system` has made of one of these.
+        default start; or the result of `system`.
     q0, v0 : array of shape (n,)
-        Position and velocity of the start.
+        Initial position and velocity.
     t : float or array of shape (k,)
-        The times of the rows: the first is that of the start, the last the end, in either direction. One number is the
-        end, of a motion from 0.
+        The times of the rows: the first is the initial time, the last the final time, in either direction. A single
+        number is the final time of a motion from 0.
     p0 : array of shape (n,), optional
-        The momentum of the start, in place of `v0`.
+        The initial momentum, in place of `v0`.
     z0 : float
-        The action of the start.
+        The initial action.
     accuracy : float, optional
-        The error that is wanted, 1e-9 if nothing is said: of (q, p) relative to its size, and of v relative to the max_abs_or_nan
-        speed. The step is chosen for it, and the integrator where none is named.
+        The requested error, by default 1e-9: that of (q, p) relative to its size, and that of v relative to the largest
+        speed. The step is chosen for it, and also the integrator where none is named.
     integrator : str, optional
-        One of `integrators`.
+        One of the names that `integrators` returns.
     step, steps : float, int, optional
         The length or the number of steps of `integrator`, in place of an accuracy.
     every : int, optional
-        Rows at the ends of so many steps, in place of those at `t`.
+        Record a row every `every` steps, in place of the rows at `t`.
     events : str, Event, or a list or dict of them
-        Functions of the state whose changes of sign are found.
+        Functions of time and state whose sign changes are located.
     observe : dict of str or functions, optional
-        Expressions by name: columns beside the state, ``sol["name"]``.
+        Expressions by name: additional columns, ``sol["name"]``.
     conformal_factor : bool
         Whether `Solution.log_factor` is computed.
     estimate : bool
-        Whether `Solution.error_estimate` is computed: of given steps by a second run with steps of half their length,
-        which costs twice as much as the first.
+        Whether `Solution.error_estimate` is computed. For given steps it takes a second run with steps of half the
+        length, which costs twice as much as the first.
     scales : array of shape (n,), optional
-        The size of each coordinate, where they differ much or have different units: `accuracy` and `estimate` are then
-        about each coordinate, and its velocity, in units of its own.
+        The size of each coordinate, where they differ much or have different units: `accuracy` and `estimate` then
+        apply to each coordinate and its velocity in units of its size.
     coordinates, parameters
-        As of `system`.
+        As in `system`.
 
     Returns
     -------
@@ -73,9 +73,9 @@ def solve(
     Raises
     ------
     ValueError
-        For all that is wrong with an argument.
-    ResumeState
-        A `KeyboardInterrupt` with the solution up to there.
+        For an invalid argument.
+    Interrupted
+        A `KeyboardInterrupt` with the solution up to the interruption.
     """
     given = L
     if type(L) is not _core.System or parameters is not None or q0 is None:
@@ -102,19 +102,19 @@ def solve(
 
 
 def run(L, request, event_names, observed, halted=None):
-    """The solution of a request, or the rest of it from where it was interrupted."""
+    """The solution of a request, or the remaining part of an interrupted one."""
     motion = _core.Motion(L, *request)
     record = _core.run(motion) if halted is None else _core.resume(motion, *halted)
     sol = Solution(L, request, record, event_names, observed)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
-            raise ResumeState(sol)
+            raise Interrupted(sol)
         raise record.interrupted
     return sol
 
 
 def system_and_start(L, q0, v0, p0, coordinates, parameters):
-    """The system of an argument, and the start, where the catalogue has it."""
+    """The system of an argument, and the start, which the catalogue may provide."""
     if isinstance(L, str) and L in CATALOGUE:
         entry = CATALOGUE[L]
         if q0 is None and v0 is None and p0 is None:
@@ -129,17 +129,17 @@ CATALOGUE = {entry[0]: entry for entry in _core.catalogue()}
 
 
 class Event:
-    """A function of the state whose changes of sign are found.
+    """A function of time and state whose sign changes are located.
 
     Parameters
     ----------
     when : str or function
-        An expression, written as the formula of a Lagrangian: ``"theta"``, ``"x'*y - 1"``; or a function of
-        (t, q, v, z), which is traced.
+        An expression, in the syntax of formulas: ``"theta"``, ``"x'*y - 1"``; or a function of (t, q, v, z), which is
+        traced.
     direction : {"both", "rising", "falling"}
-        Which changes count, in the sense of the motion.
+        Which sign changes count, in the direction of the motion.
     terminal : bool
-        Whether the first one ends the motion.
+        Whether the first sign change ends the motion.
     """
 
     __slots__ = ("when", "direction", "terminal")
@@ -152,7 +152,7 @@ class Event:
 
 
 def columns_of(observe, L):
-    """The texts of the expressions that are observed."""
+    """The texts of the observed expressions."""
     if not observe:
         return []
     if not hasattr(observe, "values"):
@@ -161,7 +161,7 @@ def columns_of(observe, L):
 
 
 def events_of(events, L):
-    """Events as the core reads them."""
+    """The events in the form of the core."""
     if isinstance(events, (str, Event)) or callable(events):
         events = [events]
     elif isinstance(events, dict):

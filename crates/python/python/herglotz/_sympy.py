@@ -1,4 +1,4 @@
-"""Expressions of SymPy as Lagrangians."""
+"""SymPy expressions as Lagrangians."""
 
 import functools
 
@@ -10,7 +10,8 @@ from . import _trace
 def formula_of_expression(L, coordinates, parameters):
     """The formula of an expression, and the names of its coordinates.
 
-    The coordinates are symbols, with velocities named as `xdot`, `x_dot`, `vx`, `v_x` or `Derivative(x(t), t)` of functions of t.
+    The coordinates are symbols, whose velocities are `xdot`, `x_dot`, `vx` or `v_x`, or functions of t, with
+    `Derivative(x(t), t)`.
     """
     L = sympy.sympify(L)
     functions = _functions(L)
@@ -35,7 +36,7 @@ def _name(coordinate):
 
 
 def _functions(L):
-    """The functions of t in an expression, by name."""
+    """The functions of t in an expression, sorted by name."""
     return sorted(L.atoms(sympy.core.function.AppliedUndef), key=str)
 
 
@@ -44,7 +45,7 @@ def _shown(expressions):
 
 
 def _check(L, coordinates, functions):
-    """Refuses derivatives and functions that are none of the coordinates', with what to give instead."""
+    """Rejects second derivatives and functions that are not coordinates; the error says what to give instead."""
     named = [f for f in functions if any(not isinstance(c, sympy.core.function.AppliedUndef) and _name(c) == _name(f) for c in coordinates)]
     if named:
         raise ValueError(

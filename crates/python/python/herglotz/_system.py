@@ -1,4 +1,4 @@
-"""Systems of what a user may call a Lagrangian."""
+"""Systems from the objects that a user may give as a Lagrangian."""
 
 import difflib
 import functools
@@ -10,7 +10,7 @@ import numpy as np
 from . import _core, _trace
 
 _SYSTEMS = {}
-# Systems of texts that are kept, so that a text is read once.
+# The number of systems of texts that are cached, so that a text is parsed once.
 _MOST = 256
 
 
@@ -23,9 +23,10 @@ def system(L, coordinates=None, parameters=None, *, n=None):
         ``L(t, q, v, z)``, or ``L(t, q, v, z, gamma)`` with a parameter gamma; a formula; the name of a system of the
         catalogue.
     coordinates : list of str, optional
-        Their names; ``"q[3]"`` stands for three. That of a function and the default of a formula is ``"q[n]"``.
+        The names of the coordinates; ``"q[3]"`` stands for three. The default, and the name for functions, is
+        ``"q[n]"``.
     parameters : dict of float, optional
-        Their values by name.
+        The values of the parameters by name.
     n : int, optional
         The number of coordinates, where they have no names.
 
@@ -58,7 +59,7 @@ _velocity_names = functools.lru_cache(256)(
 
 
 def expression(of, system):
-    """The text of an expression beside a Lagrangian: itself, or that of a function (t, q, v, z, **parameters)."""
+    """The text of an additional expression: itself, or that of a function (t, q, v, z, **parameters)."""
     if isinstance(of, str):
         return of
     if callable(of):
@@ -70,7 +71,7 @@ def expression(of, system):
 
 
 def check_parameters(system, given, L, expressions):
-    """Refuses parameters that neither the Lagrangian nor an expression beside it has: most are misspelt."""
+    """Rejects parameters that neither the Lagrangian nor an additional expression uses: most are misspelt."""
     known = system.used_parameters
     for name in given:
         if name in known or any(re.search(rf"\b{re.escape(str(name))}\b", text) for text in expressions):
@@ -86,14 +87,14 @@ def check_parameters(system, given, L, expressions):
 
 
 def copied(x):
-    """An array or a list of the caller's as it is now: what they change later changes no solution."""
+    """A copy of an array or list of the caller, so that later changes of it do not affect the solution."""
     if isinstance(x, np.ndarray):
         return x.copy()
     return [copied(part) for part in x] if isinstance(x, list) else x
 
 
 def names(coordinates, n):
-    """The names of coordinates, with those that they have by default."""
+    """The names of the coordinates, or the default names."""
     if coordinates is not None:
         return list(coordinates)
     if n is None:
@@ -111,7 +112,7 @@ def _of_text(text, coordinates, parameters, n):
         key = (text, tuple(coordinates), tuple(parameters.items()) if parameters else ())
         found = _SYSTEMS.get(key)
     except TypeError:
-        # What cannot be hashed is no number, and refused below.
+        # A value that cannot be hashed is not a number, and is refused below.
         key = found = None
     if found is None:
         found = _core.System(text, coordinates, parameters)

@@ -1,7 +1,7 @@
-"""Functions of the user's, called once with symbols in place of numbers.
+"""Tracing: functions of the user are called once, with symbols in place of numbers.
 
-`Traced` is an array of symbols. It is an array of NumPy's, so that slices, sums, products, stacking and the like are
-NumPy's own; functions of numbers, and the few others that look at values, are replaced here.
+`Traced` is an array of symbols. It is a subclass of `numpy.ndarray`, so that slices, sums, products, stacking and the
+like are those of NumPy; ufuncs, and the few other functions that depend on values, are replaced here.
 """
 
 import inspect
@@ -16,7 +16,7 @@ class Traced(np.ndarray):
 
     def __array_ufunc__(self, ufunc, method, *inputs, **kwargs):
         if ufunc is np.matmul and not kwargs and type(inputs[0]) is type(inputs[1]) is Traced:
-            # The most frequent one, at once.
+            # The most frequent operation has a shortcut.
             found = ufunc(inputs[0].view(np.ndarray), inputs[1].view(np.ndarray))
             return found.view(Traced) if isinstance(found, np.ndarray) else found
         return apply(ufunc, method, inputs, kwargs)
@@ -26,7 +26,7 @@ class Traced(np.ndarray):
 
 
 def array(values):
-    """An array of traced values and numbers: as `np.array`, for functions of NumPy that `np.array` hides the trace from.
+    """An array of traced values and numbers: like `np.array`, which hides the trace from some NumPy functions.
 
     Parameters
     ----------
@@ -92,13 +92,13 @@ _UFUNCS |= {ufunc: np.frompyfunc(function, 2, 1) for ufunc, function in _OPERATO
 _NOT = np.frompyfunc(lambda x: ~x if isinstance(x, Condition) else not x, 1, 1)
 _UFUNCS |= {np.logical_not: _NOT, np.invert: _NOT}
 _JUMPING = "floor_divide remainder fmod divmod modf floor ceil rint trunc isnan isinf isfinite heaviside".split()
-# These do with objects what they do with numbers.
+# Their implementation for object arrays is the right one.
 _OWN = {np.add, np.subtract, np.multiply, np.divide, np.matmul}
 _OWN |= {getattr(np, name) for name in ("vecdot", "matvec", "vecmat") if hasattr(np, name)}
 
 
 def _plain(x):
-    """Without the class, as an array of objects."""
+    """The value as a plain array of objects."""
     if isinstance(x, (Symbol, Condition)):
         found = np.empty((), dtype=object)
         found[()] = x
@@ -115,7 +115,7 @@ def _wrapped(found):
 
 
 def apply(ufunc, method, inputs, kwargs):
-    """A function of numbers of NumPy, on arrays with symbols in them."""
+    """A NumPy ufunc, applied to arrays with symbols."""
     kwargs = dict(kwargs or {})
     out = kwargs.pop("out", None)
     known = _UFUNCS.get(ufunc) or (ufunc if ufunc in _OWN else None)
@@ -130,7 +130,7 @@ def apply(ufunc, method, inputs, kwargs):
 
 
 def _where(condition, x, y):
-    """As `np.where`: x where a condition on traced values holds, else y."""
+    """Like `np.where`: x where a condition on traced values holds, else y."""
     return _wrapped(_CHOOSE(_plain(condition), _plain(x), _plain(y)))
 
 
@@ -138,7 +138,7 @@ _CHOOSE = np.frompyfunc(_choose, 3, 1)
 
 
 def where(condition, x, y):
-    """x where a condition holds, else y, elementwise: `np.where`, for traced values as for numbers."""
+    """x where a condition holds, else y, elementwise: `np.where`, for traced values and for numbers."""
     return np.where(condition, x, y)
 
 
@@ -197,7 +197,7 @@ _FUNCTIONS |= {np.interp: _interp, np.polyval: _polyval}
 
 
 def call(func, args, kwargs):
-    """Another function of NumPy's, on arrays with symbols in them."""
+    """A NumPy function that is not a ufunc, applied to arrays with symbols."""
     own = _FUNCTIONS.get(func)
     if own is not None:
         return own(*args, **kwargs)
@@ -210,7 +210,7 @@ def call(func, args, kwargs):
         return x
 
     args = [traced(x) for x in args]
-    # NumPy's own, which calls functions of numbers.
+    # NumPy's own implementation, which calls ufuncs.
     implementation = getattr(func, "_implementation", func)
     try:
         return _wrapped(implementation(*args, **kwargs))
@@ -232,7 +232,7 @@ def _vector(values):
 
 
 def formula_of(function, names):
-    """The formula of a function (t, q, v, z, **parameters) over the names of coordinates, velocities and parameters."""
+    """The formula of a function (t, q, v, z, **parameters), in the names of coordinates, velocities and parameters."""
     coordinates, _, parameters = names
     t, q, v, z, values = symbols(len(coordinates), len(parameters))
     wanted = _parameters_of(function)
@@ -250,7 +250,7 @@ def formula_of(function, names):
 
 
 def components_of(function, n):
-    """The formulas of the components of a map (q, p, z) -> (q, p, z), with v for p."""
+    """The formulas of the components of a map (q, p, z) -> (q, p, z), with v in place of p."""
     names = velocity_names([f"q[{n}]"])
     _, q, p, z, _ = symbols(n, 0)
     found = function(_vector(q), _vector(p), z)

@@ -81,14 +81,14 @@ impl<'r, const N: usize> Recorder<'r, N> {
             && let Some(RunInfo { t0, t_end, .. }) = self.course
             && self.watch.poll(if t_end == t0 { 1.0 } else { (at.t - t0) / (t_end - t0) }).is_break()
         {
-            if let Some(interrupted) = at.interrupted() {
+            if let Some(interrupted) = at.resume_state() {
                 self.watch.interrupted(interrupted);
             }
             return ControlFlow::Break(Stop::here("its watch"));
         }
         if at.k.is_multiple_of(POLL)
             && self.watch.wants_checkpoint()
-            && let Some(saved) = at.interrupted()
+            && let Some(saved) = at.resume_state()
             && self.watch.checkpoint(at.k, saved).is_break()
         {
             return ControlFlow::Break(Stop::here("its watch"));

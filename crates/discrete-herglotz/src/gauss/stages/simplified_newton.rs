@@ -99,17 +99,17 @@ impl<const N: usize> WithSimd for CorrectSlope<'_, N> {
                 far = far.max(moved.block::<S>(r).abs());
             }
         }
-        let mut max_abs_or_nan = Lanes::<S>::splat(0.0);
+        let mut largest = Lanes::<S>::splat(0.0);
         for (found, a) in found.iter_mut().zip(a) {
             modes.leave::<S>(found);
             for r in 0..blocks::<S>(*s) {
                 let change = found.block::<S>(r);
-                max_abs_or_nan = max_abs_or_nan.max(change.abs());
+                largest = largest.max(change.abs());
                 found.set(r, a.block::<S>(r) + change);
             }
             *a = *found;
         }
-        (max_abs_or_nan.max_abs_or_nan(), far.max_abs_or_nan())
+        (largest.max_abs_or_nan(), far.max_abs_or_nan())
     }
 }
 
@@ -270,10 +270,10 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
             drho.set(r, -drho.block::<S>(r));
         }
         // Factors are compared with 1.
-        let mut max_abs_or_nan = [[zero, zero], [zero, zero], [zero, one]];
+        let mut largest = [[zero, zero], [zero, zero], [zero, one]];
         let velocities = v.iter_mut().zip(&dv).map(|(v, dv)| (v, dv, 0));
         for (to, change, kind) in velocities.chain([(z, &dz, 1), (one_minus_rho_stages, &drho, 2)]) {
-            let [of_change, size] = &mut max_abs_or_nan[kind];
+            let [of_change, size] = &mut largest[kind];
             for r in 0..m {
                 let change = change.block::<S>(r);
                 let sum = to.block::<S>(r) + change;
@@ -296,7 +296,7 @@ impl<const N: usize> WithSimd for CorrectStages<'_, N> {
             }
         }
         let mut change = 0.0;
-        for [of_change, size] in &max_abs_or_nan {
+        for [of_change, size] in &largest {
             let (of_change, size) = (of_change.max_abs_or_nan(), size.max_abs_or_nan());
             change = max_or_nan(change, if of_change > 0.0 { of_change / size } else { of_change });
         }

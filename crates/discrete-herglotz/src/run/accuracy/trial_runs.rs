@@ -172,7 +172,7 @@ struct Uneven {
     steps: f64,
     /// The sum of the reciprocal rates, which is the span of the transformed time in units of the step, and the largest of them.
     sum: f64,
-    max_abs_or_nan: f64,
+    largest: f64,
 }
 
 impl Uneven {
@@ -181,8 +181,8 @@ impl Uneven {
     fn profit(&mut self, rate: f64) -> f64 {
         let speed = 1.0 / rate;
         (self.steps, self.sum) = (self.steps + 1.0, self.sum + speed);
-        self.max_abs_or_nan = max_or_nan(self.max_abs_or_nan, speed);
-        self.max_abs_or_nan * self.steps / self.sum
+        self.largest = max_or_nan(self.largest, speed);
+        self.largest * self.steps / self.sum
     }
 }
 

@@ -6,20 +6,20 @@ use contact_geom::systems::Pendulum;
 use exact_lagrangian::{ContactExponential, herglotz_flow};
 use std::f64::consts::PI;
 
-/// The pendulum whose motions fan out.
+/// The pendulum of the fan.
 const PENDULUM: Pendulum = Pendulum { gamma: -0.1 };
 
-/// How long the motions are followed, and the samples of each.
+/// The duration of the motions, and the number of samples of each.
 const RUN: (f64, usize) = (8.0, 320);
 
-/// The initial velocities of the fan, in hundredths: their spacing and their number on each side. The fastest motion still
-/// swings back; from about 2.2 on the pendulum turns over.
+/// The initial velocities of the fan, in hundredths: their spacing and their number on each side. The fastest motion
+/// still oscillates; from a velocity of about 2.2 on, the pendulum rotates.
 const FAN: (i32, i32) = (30, 7);
 
 /// The same for the envelope of all motions, on which the conjugate points lie.
 const ENVELOPE: (i32, i32) = (4, 53);
 
-/// The motions whose derivative is drawn: their places in the fan, counted from the middle, and their lines.
+/// The motions whose derivative is drawn: their indices in the fan, counted from the middle, and their line styles.
 const DRAWN: [(usize, Line); 3] = [(0, Line::Solid), (4, Line::DashDot), (6, Line::Dotted)];
 
 /// The initial velocities of a fan.
@@ -27,7 +27,7 @@ fn velocities((spacing, side): (i32, i32)) -> impl Iterator<Item = f64> {
     (-side..=side).map(move |k| f64::from(spacing * k) / 100.0)
 }
 
-/// The state of a motion at one time, with its derivative in the initial velocity.
+/// The position of a motion at one time, and its derivative with respect to the initial velocity.
 struct Sample {
     t: f64,
     q: f64,
@@ -40,16 +40,16 @@ struct Motion {
     /// Its initial velocity.
     v0: f64,
     samples: Vec<Sample>,
-    /// Its conjugate points, in their order.
+    /// Its conjugate points, in order of time.
     conjugate: Vec<Meeting>,
 }
 
-/// A conjugate point with the position there.
+/// A conjugate point, with the position there.
 struct Meeting {
     /// The time since the start.
     after: f64,
     q: f64,
-    /// How nearly the derivative vanishes there, in units of its largest value until then.
+    /// The size of the derivative `dq/dv0` there, relative to that of the variation in position and velocity.
     smallest: f64,
 }
 
@@ -91,7 +91,7 @@ fn envelope() -> Result<[Vec<(f64, f64)>; 2], Failure> {
     Ok(arms)
 }
 
-/// Writes tables and figure; what they show, in words.
+/// Writes tables and figure; returns a summary as text.
 pub fn write(out: &Directory) -> Result<String, Failure> {
     let fan: Vec<Motion> = velocities(FAN).map(motion).collect::<Result<_, _>>()?;
     let points = fan.iter().flat_map(|m| m.conjugate.iter().map(|c| [m.v0, c.after, c.smallest].map(number)));
@@ -100,7 +100,7 @@ pub fn write(out: &Directory) -> Result<String, Failure> {
     out.table("conjugate_fan.csv", &["v0", "t", "q", "slope"], samples)?;
     out.text("conjugate_points.svg", &draw_row(&[motions(&fan, envelope()?), slopes(&fan)]))?;
 
-    // The small motions are those of the oscillator with drag, whose conjugate points are half periods apart.
+    // Small motions are those of the damped oscillator, whose conjugate points are half periods apart.
     let half_period = PI / (1.0 - 0.25 * PENDULUM.gamma * PENDULUM.gamma).sqrt();
     let first = |m: &Motion| m.conjugate.first().map_or(f64::NAN, |c| c.after);
     let rest = fan.get(fan.len() / 2).map_or(f64::NAN, first);
@@ -134,7 +134,7 @@ fn motions(fan: &[Motion], envelope: [Vec<(f64, f64)>; 2]) -> Panel {
     }
 }
 
-/// The derivative of the position in the initial velocity, for three of the motions.
+/// The derivative of the position with respect to the initial velocity, for three of the motions.
 fn slopes(fan: &[Motion]) -> Panel {
     let mut curves = vec![Curve::unnamed(Line::Dotted, [(0.0, 0.0), (RUN.0, 0.0)])];
     let mut zeros = Vec::new();

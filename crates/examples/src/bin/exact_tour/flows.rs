@@ -1,4 +1,4 @@
-//! Three discrete flows with one long step, beside the motion.
+//! Three discrete flows with the same long step, compared with the motion.
 
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number};
 use contact_geom::systems::{CoupledInZ, System};
@@ -9,7 +9,8 @@ use exact_lagrangian::{ExactLagrangian, herglotz_flow};
 /// A pendulum whose inertia depends on position, velocity and action: nonlinear in z.
 const SYSTEM: CoupledInZ = CoupledInZ { a: 0.5, b: 0.1, gamma: -0.1 };
 
-/// The step, long enough to tell the rules apart by eye, the number of steps, and the points of the exact curve on each.
+/// The step, long enough for visible differences between the rules; the number of steps; and the points of the exact
+/// curve per step.
 const RUN: (f64, usize, usize) = (1.0, 15, 40);
 
 /// Times and states.
@@ -26,7 +27,8 @@ fn run(ld: &impl DiscreteLagrangian<1>) -> Result<States, Failure> {
     Ok(states)
 }
 
-/// The motion: each state in one go from the start, so that it owes nothing to the steps of the exact discrete flow.
+/// The motion. Each state is computed from the initial state in one call, independently of the steps of the exact
+/// discrete flow.
 fn curve() -> Result<States, Failure> {
     let (h, steps, fine) = RUN;
     let state = |k: usize| -> Result<(f64, PhasePoint<1>), Failure> {
@@ -43,7 +45,7 @@ fn distance(run: &States, curve: &States) -> f64 {
     run.iter().zip(at_steps).map(|(a, b)| (a.1.q[0] - b.1.q[0]).abs()).fold(0.0, f64::max)
 }
 
-/// Writes table and figure; what they show, in words.
+/// Writes table and figure; returns a summary as text.
 pub fn write(out: &Directory) -> Result<String, Failure> {
     let (h, steps, _) = RUN;
     let exact = run(&ExactLagrangian::<_, 1>::new(SYSTEM, h)?)?;
@@ -81,7 +83,7 @@ pub fn write(out: &Directory) -> Result<String, Failure> {
     ))
 }
 
-/// What both panels show.
+/// The curves of both panels.
 struct Runs<'a> {
     /// The motion.
     curve: &'a States,
@@ -94,7 +96,7 @@ struct Runs<'a> {
 }
 
 impl Runs<'_> {
-    /// An entry of all runs over time.
+    /// A panel with one coordinate of all runs over time.
     fn panel(&self, label: &str, y: Axis, legend: (f64, f64), entry: fn(&PhasePoint<1>) -> f64) -> Panel {
         let points = |states: &States| -> Vec<(f64, f64)> { states.iter().map(|(t, x)| (*t, entry(x))).collect() };
         Panel {

@@ -1,14 +1,17 @@
-//! A tour of exact discrete Lagrangians: what they look like, where they end, and how their flow meets the motion.
+//! A tour of exact discrete Lagrangians: their graphs, the conjugate points that bound their domain, and their flow
+//! compared with the motion.
 //!
 //! ```text
 //! cargo run --release --bin exact_tour [-- --out DIR]
 //! ```
 //!
-//! Writes the sections of `L_h^e` beside those of two discretisations (`exact_lagrangian_sections`), a fan of motions with
-//! its conjugate points (`conjugate_points`, `conjugate_fan`) and three discrete flows on one exact curve
-//! (`exact_and_discrete_flows`), the orders of all methods (`orders`), each as CSV and SVG; and `statements.csv`, the statements of
-//! section 4 on every system over six decades of the time step. Ends with 1 if one fails its check, with 2 if the output cannot be
-//! written.
+//! Writes tables and figures into `--out`: sections of `L_h^e` beside those of two discretisations
+//! (`exact_lagrangian_sections`), a fan of motions with its conjugate points (`conjugate_points`, and the table
+//! `conjugate_fan.csv`), three discrete flows on one exact curve (`exact_and_discrete_flows`), and the orders of all
+//! methods (`orders`), as CSV and SVG. Also writes `velocity_loss.csv`, the accuracy of a velocity recovered from two
+//! positions, and `statements.csv`, the residuals of the statements of section 4 on every system over six decades of
+//! the time step, and the deviations of the orders. The exit code is 1 if a statement fails its check, and 2 if the
+//! output cannot be written.
 
 mod conjugate;
 mod flows;

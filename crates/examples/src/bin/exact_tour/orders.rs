@@ -1,4 +1,4 @@
-//! Variational error analysis of every method on every system, and its figure.
+//! Variational error analysis of every method on every system, with a figure for one system.
 
 use contact_examples::{Axis, Checks, Curve, Directory, Failure, Line, Panel, Subject, draw_row, fractions};
 use contact_geom::systems::{CoupledInZ, System, SystemVisitor, visit_catalogue};
@@ -6,10 +6,10 @@ use contact_geom::{Statement, VelocityPoint, legendre};
 use discrete_herglotz::Method;
 use exact_lagrangian::{ErrorOrders, ExactError, MeasuredOrder, Order, error_orders};
 
-/// The band around the documented order.
+/// The accepted deviation from the documented order.
 const BAND: f64 = 0.15;
 
-/// The largest step tried.
+/// The largest step size.
 const LARGEST: f64 = 0.25;
 
 /// One measured order.
@@ -21,7 +21,7 @@ struct Row {
     measured: MeasuredOrder,
 }
 
-/// The four quantities with the order that a method of order r has in each.
+/// The four quantities, each with its order for a method of order r.
 fn quantities(orders: ErrorOrders, r: u32) -> [(&'static str, u32, MeasuredOrder); 4] {
     [
         ("value", r + 1, orders.value),
@@ -36,7 +36,8 @@ struct Walk<'a> {
     rows: Vec<Row>,
 }
 
-/// How far a measured order is from the documented one. A method may be exact, as the Strang splitting is for a free particle.
+/// The deviation of a measured order from the documented one. A method may be exact, as the Strang splitting is for a
+/// free particle.
 fn off(measured: &MeasuredOrder, documented: u32) -> f64 {
     match measured.order {
         Order::Measured(order) => (order - f64::from(documented)).abs(),
@@ -45,7 +46,8 @@ fn off(measured: &MeasuredOrder, documented: u32) -> f64 {
     }
 }
 
-/// The orders at a point without symmetry; where a leading error all but vanishes there, which hides the order, at another.
+/// The orders at a generic point; if one of them deviates from the documented order there, as where a leading error
+/// coefficient almost vanishes, the orders at a second point.
 fn measure<const N: usize, S: System<N>>(
     system: &S,
     method: Method,
@@ -85,7 +87,7 @@ impl SystemVisitor for Walk<'_> {
     }
 }
 
-/// Measures all orders into the checks, writes table and figure; what they show, in words.
+/// Measures all orders, records them in `checks`, and writes table and figure; returns a summary as text.
 pub fn write(out: &Directory, checks: &mut Checks) -> Result<String, Failure> {
     let mut walk = Walk { checks, rows: Vec::new() };
     visit_catalogue(&mut walk);
@@ -130,7 +132,7 @@ pub fn write(out: &Directory, checks: &mut Checks) -> Result<String, Failure> {
     Ok(text)
 }
 
-/// The errors of the quadrature rules over the step, for a system nonlinear in z.
+/// The errors of the quadrature rules against the step, for a system nonlinear in z.
 fn figure(out: &Directory) -> Result<(), Failure> {
     let system = CoupledInZ { gamma: -1.0, ..CoupledInZ::default() };
     let x = VelocityPoint::new([0.8], [-0.6], 0.4);

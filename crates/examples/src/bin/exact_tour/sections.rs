@@ -6,17 +6,17 @@ use contact_geom::systems::Pendulum;
 use discrete_herglotz::{DiscreteLagrangian, LeftMidpoint, Midpoint};
 use exact_lagrangian::ExactLagrangian;
 
-/// A pendulum with strong drag: the rules differ most in how they treat z.
+/// A pendulum with strong drag, since the rules differ mainly in how they treat z.
 const PENDULUM: Pendulum = Pendulum { gamma: -0.5 };
 
-/// Where the sections are taken: q0 and z0.
+/// The values of q0 and z0 of the sections.
 const AT: (f64, f64) = (0.5, 1.0);
 
-/// The long step of the values, and the short one that the differences are compared with.
+/// The long step, for which the values are drawn, and a short step for comparison of the differences.
 const STEPS: [f64; 2] = [1.0, 0.1];
 
-/// The largest mean velocity `(q1 - q0)/h`, and the samples on each side. Sections of different h are compared at the same
-/// mean velocities, as only then do they shrink with a power of h.
+/// The largest mean velocity `(q1 - q0)/h`, and the number of samples on each side. Sections of different h are
+/// compared at equal mean velocities, since only then the differences scale with a power of h.
 const SAMPLES: (f64, i32) = (3.0, 150);
 
 /// A point of a section and the three values there.
@@ -26,9 +26,9 @@ struct Row {
     q1: f64,
     /// `L_h^e`, the action along the motion.
     exact: f64,
-    /// The paper's midpoint rule, z at the left end.
+    /// The paper's midpoint rule, with z at the left end.
     left: f64,
-    /// The same made symmetric in z.
+    /// The midpoint rule made symmetric in z.
     middle: f64,
 }
 
@@ -61,7 +61,7 @@ fn worst(rows: &[Row]) -> (f64, f64) {
     rows.iter().map(Row::errors).fold((0.0, 0.0), |worst, error| (worst.0.max(error.0), worst.1.max(error.1)))
 }
 
-/// Writes table and figure; what they show, in words.
+/// Writes table and figure; returns a summary as text.
 pub fn write(out: &Directory) -> Result<String, Failure> {
     let [long, short] = STEPS;
     let (slow, fast) = (section(long)?, section(short)?);

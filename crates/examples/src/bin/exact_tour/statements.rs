@@ -8,10 +8,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// The time steps.
 const STEPS: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0];
 
-/// The largest residual, in units of the condition of the motion: round-off is 1e-15, a wrong formula is off by h at least.
+/// The largest residual, in units of the condition of the motion: round-off gives 1e-15, a wrong formula at least h.
 const TOLERANCE: f64 = 1e-12;
 
-/// What a velocity loses that is recovered from two positions, at one step.
+/// The loss of accuracy of a velocity that is recovered from two positions, for one step.
 pub struct Loss {
     system: &'static str,
     pub h: f64,
@@ -21,7 +21,7 @@ pub struct Loss {
     pub predicted: f64,
 }
 
-/// Checks all statements; the residuals, and the losses at steps down to 1e-8.
+/// Checks all statements; returns the residuals, and the losses for steps down to 1e-8.
 pub fn check() -> (Checks, Vec<Loss>) {
     let style = ProgressStyle::with_template("checking statements {bar:30} {pos}/{len}  {msg}");
     let bar =
@@ -41,14 +41,14 @@ struct Walk<'a> {
 impl SystemVisitor for Walk<'_> {
     fn visit<const N: usize, S: System<N>>(&mut self, system: &S) {
         self.bar.set_message(system.name());
-        // The second duals of many coordinates are long.
+        // Second-order dual numbers are expensive for many coordinates, so fewer samples are taken.
         let samples = if N > 2 { 2 } else { 4 };
         for (h, statement) in STEPS.into_iter().flat_map(|h| statements::STATEMENTS.map(|s| (h, s))) {
             let subject = Subject::discrete(statement, system.name(), "exact", h);
             for i in 0..samples {
                 let (t, x) = system.sample(&fractions(i, 2 * N + 2));
                 match statements::residual(statement, system, t, &x, h) {
-                    // Outside U_h the statements say nothing.
+                    // Outside U_h the statements do not apply.
                     Err(ExactError::OutsideDomain { .. }) => {}
                     residual => self.checks.record_within(TOLERANCE, &subject, residual),
                 }
@@ -78,7 +78,7 @@ pub fn write_losses(out: &Directory, losses: &[Loss]) -> Result<(), Failure> {
     out.table("velocity_loss.csv", &["system", "h", "relative_error", "predicted_by_condition"], rows)
 }
 
-/// The worst residual of each statement at each step, and for each system at each step.
+/// The worst residual of each statement at each step, and of each system at each step.
 pub fn tables(checks: &Checks) -> String {
     let header = |first: &str| {
         let steps: String = STEPS.iter().map(|h| format!("{h:>9e}")).collect();
@@ -111,7 +111,7 @@ pub fn tables(checks: &Checks) -> String {
     text
 }
 
-/// How the velocity's loss compares with its prediction, worst over the catalogue.
+/// The loss of the velocity and its prediction, worst over the catalogue, as text.
 pub fn loss(losses: &[Loss]) -> String {
     let mut text = String::from(
         "\nA velocity from two rounded positions, R_h^(e-) o exp_h: relative error, and what the condition of exp_h predicts\n\n",

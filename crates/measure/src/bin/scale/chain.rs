@@ -1,5 +1,5 @@
-//! Chains of Fermi, Pasta, Ulam and Tsingou: explicit steps against a loop written by hand and a copy of memory, implicit ones against
-//! one factorisation by faer.
+//! Fermi-Pasta-Ulam-Tsingou (FPUT) chains: time of explicit steps relative to a hand-written loop and to a copy of
+//! memory, and of implicit steps relative to one factorisation by faer.
 
 use crate::memory::peak;
 use crate::report::Report;
@@ -20,10 +20,11 @@ const CASE: &str = "chain";
 const GAMMA: f64 = -0.01;
 const BOND: FputBond = FputBond { alpha: 0.0, beta: 1.0 };
 
-/// Boost.odeint on P4 without z at the errors 1e-4, 1e-8, 1e-12, of the table of peers: another program, on a machine of this kind.
+/// Run times of Boost.odeint in seconds on problem P4, without z, at the errors 1e-4, 1e-8 and 1e-12, from the table of
+/// peers: measured with another program on a machine of this kind.
 const BOOST: [(f64, f64); 3] = [(1e-4, 574e-6), (1e-8, 585e-6), (1e-12, 585e-6)];
 
-/// How a refusal ends the program.
+/// Converts an error of the crate assembled-herglotz: invalid input to `Failure::Input`, any other to `Failure::Exact`.
 pub fn refused(error: AssemblyError) -> Failure {
     match error {
         AssemblyError::Input(cause) => Failure::Input(cause),
@@ -38,7 +39,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     factorisation(report, if report.quick { 100_000 } else { 1_000_000 })
 }
 
-/// The first mode at rest, of amplitude one.
+/// The first normal mode with amplitude one, at rest.
 fn start(n: usize) -> (Vec<f64>, Vec<f64>) {
     let of = |i: usize| (std::f64::consts::PI * (i + 1) as f64 / (n + 1) as f64).sin();
     ((0..n).map(of).collect(), vec![0.0; n])
@@ -48,12 +49,13 @@ fn chain(n: usize) -> Result<AssembledSystem, Failure> {
     fput_chain(n, BOND, GAMMA).map_err(refused)
 }
 
-/// FPUT-beta with 1000 sites until t = 100: the shortest time to an error, over the schemes and steps of a sweep.
+/// Problem P4, the FPUT-beta chain with 1000 sites until t = 100: the shortest run time that reaches an error, over
+/// several schemes and step sizes.
 fn p4(report: &mut Report) -> Result<(), Failure> {
     let n = 1000;
     let system = chain(n)?;
     let (q, v) = start(n);
-    // Without the action, whose energies are a part of the time.
+    // The action is not computed: the potential energies for it would be part of the measured time.
     let from = State { t: 0.0, q: &q, v: &v, z: None };
     let reference = {
         let scheme = SplittingScheme::SOFRONIOU_SPALETTA_10;
@@ -66,7 +68,7 @@ fn p4(report: &mut Report) -> Result<(), Failure> {
     let error =
         |y: &mut dyn Iterator<Item = f64>| y.zip(&reference).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt() / norm;
     let rounds = if report.quick { 50 } else { 400 };
-    // Errors, the library's times and those of the loop.
+    // Error, run time of the library, and run time of the hand-written loop.
     let mut found: Vec<[f64; 3]> = Vec::new();
     let schemes = [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_4, SplittingScheme::BLANES_MOAN_6];
     for (scheme, counts) in schemes.iter().zip([[100, 200, 400], [20, 50, 100], [13, 16, 20]]) {
@@ -102,7 +104,7 @@ fn p4(report: &mut Report) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The same steps by loops for this chain alone.
+/// The same steps by loops that are written for this chain only.
 fn by_hand(scheme: &SplittingScheme, h: f64, steps: usize, q0: &[f64], v0: &[f64]) -> Vec<f64> {
     let n = q0.len();
     let (drifts, kicks) = scheme.coefficients();
@@ -135,12 +137,12 @@ fn kick(q: &[f64], v: &mut [f64], h: f64) {
     }
 }
 
-/// Time and memory against size, for the time 1.
+/// Time per step and peak memory against the number of sites.
 fn sizes(report: &mut Report) -> Result<(), Failure> {
     let sizes: &[usize] = if report.quick { &[1000, 10_000, 100_000] } else { &[1000, 10_000, 100_000, 1_000_000] };
     for &n in sizes {
         let (q, v) = start(n);
-        // Without the action, whose energies are a part of the time.
+        // The action is not computed: the potential energies for it would be part of the measured time.
         let from = State { t: 0.0, q: &q, v: &v, z: None };
         for scheme in [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_4, SplittingScheme::BLANES_MOAN_6] {
             let (seconds, bytes) = peak(|| {
@@ -150,7 +152,7 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
             });
             report.row(CASE, &format!("a step by {}", scheme.name()), n, seconds?, Some(bytes));
             if n == sizes[sizes.len() - 1] && scheme == SplittingScheme::STRANG {
-                // The start is the user's.
+                // The initial vectors belong to the caller and are not counted.
                 let vectors = bytes as f64 / (8 * n) as f64;
                 report.verdict(CASE, "vectors of n held by an explicit chain and its motion", vectors, 6.0);
             }
@@ -171,11 +173,11 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A stage of a long chain against a copy of the positions and velocities.
+/// The time of one stage on a long chain, relative to a copy of its positions and velocities.
 fn copy(report: &mut Report, n: usize) -> Result<(), Failure> {
     let system = chain(n)?;
     let (q, v) = start(n);
-    // Without the action, whose energies are a part of the time.
+    // The action is not computed: the potential energies for it would be part of the measured time.
     let from = State { t: 0.0, q: &q, v: &v, z: None };
     let mut motion = AssembledSplitting::new(&system, &SplittingScheme::STRANG, 0.1, from).map_err(refused)?;
     let (mut a, mut b) = (q.clone(), v.clone());
@@ -195,15 +197,15 @@ fn copy(report: &mut Report, n: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Steps of the midpoint rule against a factorisation and a solve of their matrix.
+/// The time of a step of the midpoint rule, relative to one factorisation and solve of its matrix.
 fn factorisation(report: &mut Report, n: usize) -> Result<(), Failure> {
     let system = chain(n)?;
     let (q, v) = start(n);
     let h = 0.1;
-    // Without the action, whose energies are a part of the time.
+    // The action is not computed: the potential energies for it would be part of the measured time.
     let from = State { t: 0.0, q: &q, v: &v, z: None };
     let mut motion = AssembledMidpoint::new(&system, h, from, None).map_err(refused)?;
-    // M + (h^2/4) V_qq at the start.
+    // M + (h^2/4) V_qq at the initial state.
     let place = |i: usize| if i == 0 || i > n { 0.0 } else { q[i - 1] };
     let slope = |i: usize| 0.25 * h * h * (1.0 + 3.0 * BOND.beta * (place(i + 1) - place(i)).powi(2));
     let mut entries = Vec::with_capacity(2 * n);

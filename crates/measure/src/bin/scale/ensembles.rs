@@ -1,4 +1,5 @@
-//! Ensembles: 1e5 pendula to given errors, neighbours of one pendulum for a long time, time and memory against the count, two threads.
+//! Ensembles: 1e5 pendula to given errors, neighbours of one pendulum over a long time, time and memory against the
+//! number of members, and the speed-up by two threads.
 
 use crate::peer::python;
 use crate::report::Report;
@@ -10,16 +11,17 @@ use std::time::Instant;
 
 const CASE: &str = "ensembles";
 
-/// The errors that the pendula of problem P5 are run to; the best of heyoka 7's batch mode there by its table, in seconds, for a machine without
-/// heyoka; and how much of heyoka's time is the target.
+/// For the pendula of problem P5: the error to reach; the best time of the batch mode of heyoka 7 from its table, in
+/// seconds, used where heyoka is not installed; and the target for the ratio to the time of heyoka.
 const PENDULA: [(f64, f64, f64); 3] = [(1e-4, 0.124, 0.1), (1e-8, 0.127, 0.15), (1e-12, 0.145, 0.3)];
 
-/// How many neighbours of the pendulum of problem P2, until when, to which relative error, heyoka's best for each by that table, and the target.
+/// For the neighbours of the pendulum of problem P2: their number, the final time, the relative error to reach, the
+/// best time of heyoka per member from that table, in seconds, and the target ratio.
 const NEIGHBOURS: (usize, f64, f64, f64, f64) = (10_000, 1000.0, 1e-9, 355e-6, 0.5);
 
 const PENDULUM: Pendulum = Pendulum { gamma: -0.01 };
 
-/// Positions and momenta at the end, and the seconds that they took.
+/// Final positions and momenta, and the run time in seconds.
 type Timed = (Vec<[f64; 2]>, f64);
 
 fn failure(error: EnsembleError) -> Failure {
@@ -30,7 +32,7 @@ fn failure(error: EnsembleError) -> Failure {
     cause.into()
 }
 
-/// An ensemble of pendula, timed.
+/// Runs an ensemble of pendula and measures the run time.
 fn timed(
     count: usize,
     start: impl Fn(usize) -> VelocityPoint<1> + Sync,
@@ -57,7 +59,7 @@ fn timed(
     Ok((ends, seconds))
 }
 
-/// The shortest of so many times.
+/// The run with the shortest time among `repeats` runs.
 fn shortest(repeats: usize, run: impl Fn() -> Result<Timed, Failure>) -> Result<Timed, Failure> {
     let mut best = run()?;
     for _ in 1..repeats {
@@ -69,7 +71,7 @@ fn shortest(repeats: usize, run: impl Fn() -> Result<Timed, Failure>) -> Result<
     Ok(best)
 }
 
-/// The largest distance of two ensembles, absolute or relative to the second.
+/// The largest distance between corresponding members of two ensembles, absolute or relative to the second.
 fn distance(a: &[[f64; 2]], b: &[[f64; 2]], relative: bool) -> f64 {
     let of = |(a, b): (&[f64; 2], &[f64; 2])| {
         (a[0] - b[0]).hypot(a[1] - b[1]) / if relative { b[0].hypot(b[1]) } else { 1.0 }
@@ -77,13 +79,13 @@ fn distance(a: &[[f64; 2]], b: &[[f64; 2]], relative: bool) -> f64 {
     contact_geom::max_abs_or_nan(a.iter().zip(b).map(of))
 }
 
-/// The pendula of problem P5: `q0` in [-2, 2] by `v0` in [-1, 1], 400 by 250.
+/// The initial values of problem P5: `q0` in [-2, 2] by `v0` in [-1, 1], 400 by 250.
 fn grid(i: usize) -> VelocityPoint<1> {
     let part = |i: usize, n: usize| i as f64 / (n - 1) as f64;
     VelocityPoint::new([4.0 * part(i / 250, 400) - 2.0], [2.0 * part(i % 250, 250) - 1.0], 0.0)
 }
 
-/// Neighbours of the pendulum of problem P2.
+/// The initial values of the neighbours of the pendulum of problem P2.
 fn neighbour(i: usize) -> VelocityPoint<1> {
     VelocityPoint::new([1.0 + 1e-6 * i as f64], [1.0], 0.0)
 }
@@ -93,7 +95,8 @@ fn candidates() -> Vec<AnyIntegrator> {
     SplittingScheme::ALL.into_iter().map(AnyIntegrator::Splitting).chain(gauss).collect()
 }
 
-/// The fewest steps, within about a tenth, by which an integrator is within an error.
+/// The smallest number of steps, to within a sixteenth, with which an integrator reaches an error; `None` beyond
+/// `most`.
 fn steps_for(
     error: &dyn Fn(usize) -> Result<f64, Failure>,
     wanted: f64,
@@ -109,14 +112,14 @@ fn steps_for(
     Ok(None)
 }
 
-/// A run of heyoka: what, and for each member the seconds, with the largest error.
+/// A run of heyoka: the problem, the time per member in seconds, and the largest error.
 struct Peer {
     what: String,
     seconds: f64,
     error: f64,
 }
 
-/// The runs of heyoka at several tolerances; none where it is not installed.
+/// The runs of heyoka at several tolerances; empty where it is not installed.
 fn heyoka(report: &mut Report) -> Result<Vec<Peer>, Failure> {
     let (count, end, ..) = NEIGHBOURS;
     let input = format!("{:e}\n{count}\n{end}\n", PENDULUM.gamma);
@@ -136,7 +139,8 @@ fn heyoka(report: &mut Report) -> Result<Vec<Peer>, Failure> {
     Ok(peers)
 }
 
-/// heyoka's shortest time for each member to an error, and whether it was measured; by its table otherwise.
+/// The shortest measured time of heyoka per member for an error, or the tabulated one, and a name that says which of
+/// the two.
 fn their_time(peers: &[Peer], what: &str, wanted: f64, by_table: f64) -> (f64, &'static str) {
     let found = peers.iter().filter(|peer| peer.what == what && peer.error <= wanted).map(|peer| peer.seconds);
     let shortest = found.fold(f64::INFINITY, f64::min);
@@ -146,7 +150,7 @@ fn their_time(peers: &[Peer], what: &str, wanted: f64, by_table: f64) -> (f64, &
 fn pendula(report: &mut Report, peers: &[Peer]) -> Result<(), Failure> {
     let (count, end) = (100_000, 10.0);
     let thin = 40;
-    // A part of the grid finds the steps; the whole of it judges them.
+    // The number of steps is found on a part of the grid and verified on the whole grid.
     let part = |i: usize| grid(i * thin);
     let reference = AnyIntegrator::Gauss { stages: 16 };
     let (exact_part, _) = timed(count / thin, part, reference, (20, end), 1)?;
@@ -190,7 +194,7 @@ fn pendula(report: &mut Report, peers: &[Peer]) -> Result<(), Failure> {
 
 fn neighbours(report: &mut Report, peers: &[Peer]) -> Result<(), Failure> {
     let (count, end, wanted, by_table, share) = NEIGHBOURS;
-    // As many as fill the lanes.
+    // Enough members to fill the SIMD lanes.
     let few = 128;
     let part = |i: usize| neighbour(i * (count / few));
     let (exact, _) = timed(few, part, AnyIntegrator::Gauss { stages: 16 }, (1600, end), 1)?;
@@ -231,18 +235,18 @@ fn neighbours(report: &mut Report, peers: &[Peer]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The largest memory of this process since the last call, where the system tells.
+/// The peak memory of this process since the last call, in bytes, where the system reports it.
 fn peak() -> Option<usize> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     let kilobytes: usize = line.split_whitespace().nth(1)?.parse().ok()?;
-    // The next peak begins here.
+    // Resets the peak.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
     Some(kilobytes * 1024)
 }
 
 fn sizes(report: &mut Report) -> Result<(), Failure> {
-    let max_abs_or_nan = if report.quick { 100_000 } else { 1_000_000 };
+    let largest = if report.quick { 100_000 } else { 1_000_000 };
     let start = |i: usize| VelocityPoint::new([2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0], [0.5], 0.0);
     let run = |count: usize, integrator: AnyIntegrator, threads: usize| -> Result<f64, Failure> {
         let ensemble = Ensemble::new(&PENDULUM, 0.0, count, start)
@@ -259,7 +263,7 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
     for integrator in [AnyIntegrator::Splitting(SplittingScheme::BLANES_MOAN_6), AnyIntegrator::Gauss { stages: 4 }] {
         let mut peaks = Vec::new();
         let mut count = 100;
-        while count <= max_abs_or_nan {
+        while count <= largest {
             peak();
             let seconds = run(count, integrator, 1)?;
             let bytes = peak();
@@ -275,8 +279,8 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
                 1.1,
             );
         }
-        // In turn, so that others on the machine disturb both.
-        let count = max_abs_or_nan / 5;
+        // The runs alternate, so that other load on the machine affects both.
+        let count = largest / 5;
         let mut seconds = [f64::INFINITY; 2];
         for _ in 0..20 {
             for threads in [1, 2] {
@@ -299,7 +303,7 @@ fn sizes(report: &mut Report) -> Result<(), Failure> {
 /// Runs the case.
 ///
 /// # Errors
-/// [`Failure`] where a run cannot begin.
+/// [`Failure`] where a run cannot be started.
 pub fn run(report: &mut Report) -> Result<(), Failure> {
     sizes(report)?;
     let peers = heyoka(report)?;

@@ -1,7 +1,8 @@
-"""Pendula by heyoka's Taylor method, in batches as wide as its vectors and one by one, to errors that are found here.
+"""Pendula with drag by heyoka's Taylor method, in batches of the SIMD width and one by one, at several tolerances.
 
-Reads the drag gamma, then the count and the time of the neighbours. Writes a line for each run: what, how, the tolerance, the seconds
-for each member, and the max_abs_or_nan error at the end.
+Reads one number per line: the coefficient gamma of the drag, then the number of neighbours and their final time.
+Writes one line per run: the problem, `batches` or `singles`, the tolerance, the seconds per member, and the largest
+error at the end.
 """
 
 import sys
@@ -55,7 +56,7 @@ def measure(what, ways, start, end, tolerances, relative):
 # Problem P5: the grid of `grid` in ensembles.rs.
 grid = np.array([a.ravel() for a in np.meshgrid(np.linspace(-2, 2, 400), np.linspace(-1, 1, 250), indexing="ij")])
 measure("pendula", [batches], grid, 10.0, [1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13], False)
-# Neighbours of problem P2, as many as are enough to be timed.
+# Neighbours of problem P2: a subset that is large enough to be timed.
 part = 25 * WIDTH
 neighbours = np.array([1 + 1e-6 * (count / part) * np.arange(part), np.ones(part)])
 measure("neighbours", [batches, singles], neighbours, end, [1e-8, 1e-9, 1e-10, 1e-11, 1e-12], True)

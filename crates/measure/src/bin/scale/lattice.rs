@@ -1,4 +1,4 @@
-//! Sine-Gordon lattices in the plane: steps of the implicit midpoint rule, and explicit ones beside them.
+//! Sine-Gordon lattices in the plane: time and memory of steps of the implicit midpoint rule and of explicit steps.
 
 use crate::chain::refused;
 use crate::memory::peak;
@@ -11,7 +11,7 @@ use discrete_herglotz::SplittingScheme;
 
 const CASE: &str = "lattice";
 
-/// What the factors may take: half of a small machine.
+/// The memory that the factors may take, in bytes: half of that of a small machine.
 const MEMORY: usize = 8 << 30;
 
 pub fn run(report: &mut Report) -> Result<(), Failure> {
@@ -21,7 +21,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         // A kink in each row, at rest.
         let q: Vec<f64> = (0..n).map(|i| 4.0 * (0.5 * ((i % side) as f64 - 0.5 * side as f64)).exp().atan()).collect();
         let v = vec![0.0; n];
-        // Without the action, whose energies are a part of the time.
+        // The action is not computed: the potential energies for it would be part of the measured time.
         let from = State { t: 0.0, q: &q, v: &v, z: None };
         let site = SineGordon { omega_squared: 1.0 };
         let (seconds, bytes) = peak(|| {

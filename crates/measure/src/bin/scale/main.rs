@@ -1,14 +1,16 @@
-//! The library at scale: time and peak memory against size.
+//! Run time and peak memory of large problems against their size.
 //!
 //! ```text
 //! cargo run --release --bin scale [-- --case NAME|all --quick --out DIR]
 //! ```
 //!
-//! Each case runs sizes that grow by tens and compares its figures with bounds: loops written by hand, a copy of the memory that is
-//! touched, other programs, a slope of one. Everything that is compared is measured in the same run.
+//! Each case runs increasing sizes, and its figures are compared with bounds: hand-written loops, a copy of the memory
+//! that is touched, other programs, and a log-log slope of one. Both sides of a comparison are measured in the same
+//! run, except for tabulated times of other programs.
 //!
-//! Writes `scale.csv`, a log-log figure of each case, and `verdicts.csv`. Ends with 1 if a figure is above its bound, with 2 if a name
-//! is unknown or the output cannot be written.
+//! Writes `scale.csv` (times and peak memory), log-log diagrams of each case, and `verdicts.csv` (figures with their
+//! bounds) into `--out`. The exit code is 1 if a figure is above its bound, and 2 if a name is unknown or the output
+//! cannot be written.
 
 mod chain;
 mod ensembles;
@@ -41,7 +43,7 @@ struct Arguments {
     out: PathBuf,
 }
 
-/// A case: its name, what its sizes count, and what it does.
+/// A case: its name, the meaning of its sizes, and the function that runs it.
 type Case = (&'static str, &'static str, fn(&mut Report) -> Result<(), Failure>);
 
 const CASES: &[Case] = &[

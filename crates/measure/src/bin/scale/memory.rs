@@ -1,4 +1,4 @@
-//! How much memory is held: an allocator that counts.
+//! Peak memory, by an allocator that counts.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -8,8 +8,8 @@ static MOST: AtomicUsize = AtomicUsize::new(0);
 
 struct Counting;
 
-#[allow(unsafe_code)] // An allocator cannot be written without.
-// SAFETY: all is handed on to the system's allocator; the counters do not touch what it returns.
+#[allow(unsafe_code)] // An allocator cannot be written without unsafe code.
+// SAFETY: every call is forwarded to the system allocator, and the counters do not touch what it returns.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let held = HELD.fetch_add(layout.size(), Relaxed) + layout.size();
@@ -25,7 +25,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// What an action returns, and the most bytes that it held at a time beyond those that were held before.
+/// The result of an action, and the peak memory in bytes that it held beyond what was held before.
 pub fn peak<R>(action: impl FnOnce() -> R) -> (R, usize) {
     let before = HELD.load(Relaxed);
     MOST.store(before, Relaxed);

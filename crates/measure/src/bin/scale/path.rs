@@ -1,4 +1,5 @@
-//! Boundary-value paths: time against the number of nodes, beside a Newton's method written by hand for the one system.
+//! Boundary-value paths: time against the number of nodes, compared with Newton's method written by hand for one system
+//! and with faer's sparse LU.
 
 use crate::report::Report;
 use crate::sparse_path;
@@ -14,7 +15,8 @@ const SPAN: f64 = 1.0;
 const BETA: f64 = 0.5;
 const GAMMA: f64 = -0.1;
 
-/// Times of n = 2 and 6 from 1e2 to 1e5 nodes, their slope, and the ratio to the loops below.
+/// The time per iteration for n = 2 and n = 6 from 1e2 to 1e5 nodes, its log-log slope, and its ratios to the
+/// hand-written loop and to sparse LU.
 pub fn run(report: &mut Report) -> Result<(), Failure> {
     of::<2>(report, ["n=2", "n=2 by hand", "n=2 ratio to the hand-written Newton", "n=2 slope from 1e3 to 1e5"])?;
     of::<6>(report, ["n=6", "n=6 by hand", "n=6 ratio to the hand-written Newton", "n=6 slope from 1e3 to 1e5"])
@@ -28,16 +30,16 @@ fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str;
     let mut times = Vec::new();
     for &steps in &sizes {
         let [mut best, mut best_by_hand, mut best_sparse] = [f64::INFINITY; 3];
-        // Not a number where a rival finds no path.
+        // NaN where a competitor finds no path.
         let mut differences = [f64::NAN; 2];
-        // In turns, so that what disturbs one disturbs the other.
+        // The three alternate, so that other load on the machine affects all of them.
         for _ in 0..(200_000 / steps).clamp(3, 50) {
             let ld = LeftMidpoint::new(Springs::<N>, SPAN / steps as f64)?;
             let problem = BoundaryPath::new(&ld, steps, ends().map(End::Position))?;
             let start = Instant::now();
             let found = black_box(problem.search());
             let seconds = start.elapsed().as_secs_f64();
-            // Each correction is followed by one sweep, beside the first.
+            // One forward elimination precedes the first correction, and one follows each correction.
             best = best.min(seconds / f64::from(found.iterations + 1));
             let start = Instant::now();
             let (points, actions, sweeps) = black_box(by_hand_newton::<N>(steps, ld.step_size()));
@@ -58,8 +60,8 @@ fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str;
         report.row("path", name, steps, best, None);
         report.row("path", by_hand, steps, best_by_hand, None);
         report.row("path", &format!("{name} by faer's sparse LU"), steps, best_sparse, None);
-        // All solve the same equations: a reference that does not would measure nothing. The round-off of positions, eps q / h
-        // in each equation, gathers over the path.
+        // All three solve the same equations, which the differences verify. The round-off of the positions, eps q / h
+        // in each equation, accumulates over the path.
         for (rival, off) in ["the loop by hand", "faer's sparse LU"].into_iter().zip(differences) {
             let what = format!("{name} difference from the path by {rival} at N={steps}");
             report.verdict("path", &what, off, 1e-15 * (steps as f64).powf(1.5));
@@ -73,7 +75,7 @@ fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str;
         report.verdict("path", slope, (to / from).log10() / decades, 1.05);
     }
     if !report.quick {
-        // The whole of a search, with derivatives by automatic differentiation.
+        // The time of a whole search, with derivatives by automatic differentiation.
         let ld = LeftMidpoint::new(Chain::<N> { beta: BETA, gamma: GAMMA, ..Chain::default() }, SPAN / 1e5)?;
         let start = Instant::now();
         let found = BoundaryPath::new(&ld, 100_000, ends().map(End::Position))?.search();
@@ -88,13 +90,13 @@ fn of<const N: usize>(report: &mut Report, [name, by_hand, ratio, slope]: [&str;
     Ok(())
 }
 
-/// Ends far enough apart for the springs to be nonlinear.
+/// End points far enough apart for the springs to be nonlinear.
 fn ends<const N: usize>() -> [SVector<f64, N>; 2] {
     [SVector::from_fn(|i, _| 0.3 * i as f64), SVector::from_fn(|i, _| 1.0 - 0.4 * i as f64)]
 }
 
-/// The chain of Fermi, Pasta, Ulam and Tsingou with its derivatives in closed form, the same that the loop by hand has: what is
-/// compared is all but the formulas of the one system.
+/// The FPUT chain with derivatives in closed form, the same formulas as in the hand-written loop, so that the
+/// evaluation of derivatives does not enter the comparison.
 struct Springs<const N: usize>;
 
 impl<const N: usize> Lagrangian<N> for Springs<N> {
@@ -117,7 +119,7 @@ impl<const N: usize> Lagrangian<N> for Springs<N> {
     }
 }
 
-/// The potential's gradient and second derivative of the chain between two walls, a tridiagonal matrix.
+/// The gradient and the second derivative, a tridiagonal matrix, of the potential of the chain between two walls.
 #[inline(always)]
 fn springs<T: Scalar, const N: usize>(q: &SVector<T, N>) -> (SVector<T, N>, SMatrix<T, N, N>) {
     let (mut gradient, mut hessian) = (SVector::from_element(T::zero()), SMatrix::from_element(T::zero()));
@@ -148,14 +150,15 @@ fn potential<const N: usize>(q: &SVector<f64, N>) -> f64 {
     sum
 }
 
-/// Positions, actions, and the number of sweeps that they took.
+/// Positions, actions, and the number of iterations.
 type ByHand<const N: usize> = (Vec<SVector<f64, N>>, Vec<f64>, u32);
 
-/// Newton's method with block elimination, as one writes it for this system alone: derivatives by hand, of the paper's midpoint rule
-/// `L_d = h (v^2/2 - V((q0 + q1)/2) + gamma z0)`. The same path as the library's search finds, by the same corrections of positions,
-/// and its actions. They are computed once, after the last sweep, and in no sweep: where the drag is linear they do not act on the
-/// positions. What it does not do: no line search, no pivots between points, no test of whether z acts on the positions, no
-/// sizes of terms and no relative residual, no product of the sigma_d, no status.
+/// Newton's method with block elimination, as one would write it for this system only, with derivatives by hand, for
+/// the paper's midpoint rule `L_d = h (v^2/2 - V((q0 + q1)/2) + gamma z0)`. It makes the same corrections of positions
+/// as the library's search and finds the same path and actions. The actions are computed once, after the last
+/// iteration, since with linear drag they do not act on the positions. It has no line search, no pivoting between
+/// points, no test of whether z acts on the positions, no sizes of terms and no relative residual, no product of the
+/// sigma_d, and no status.
 fn by_hand_newton<const N: usize>(steps: usize, h: f64) -> ByHand<N> {
     let [from, to] = ends::<N>();
     let at = |k: usize| k as f64 / steps as f64;
@@ -164,7 +167,7 @@ fn by_hand_newton<const N: usize>(steps: usize, h: f64) -> ByHand<N> {
     let mut rhs = vec![SVector::<f64, N>::zeros(); steps];
     let sigma = 1.0 + h * GAMMA;
     for sweep in 1..=50 {
-        // Of the step before: its D2, D22 and D12.
+        // For step k: the mean velocity, and `(h/2) V_q` and `(h/4) V_qq` at the midpoint.
         let of = |k: usize, q: &[SVector<f64, N>]| {
             let (g, k_mid) = springs(&((q[k] + q[k + 1]) * 0.5));
             (((q[k + 1] - q[k]) / h), g * (0.5 * h), k_mid * (0.25 * h))
@@ -186,15 +189,16 @@ fn by_hand_newton<const N: usize>(steps: usize, h: f64) -> ByHand<N> {
             (next[k], rhs[k]) = (upper, right);
             (u, g, k_mid) = (u1, g1, k1);
         }
-        let (mut change, mut max_abs_or_nan, mut size) = (SVector::<f64, N>::zeros(), 0.0f64, 0.0f64);
+        let (mut change, mut largest, mut size) = (SVector::<f64, N>::zeros(), 0.0f64, 0.0f64);
         for k in (1..steps).rev() {
             change = rhs[k] - next[k] * change;
             q[k] += change;
-            max_abs_or_nan = max_abs_or_nan.max(change.amax());
+            largest = largest.max(change.amax());
             size = size.max(q[k].amax());
         }
-        // Quadratic convergence: after a correction of 1e-8 the next is round-off; the library makes it to be sure.
-        if max_abs_or_nan <= 1e-10 * size {
+        // Convergence is quadratic: after a relative correction of 1e-8 the next one is round-off. The library makes it
+        // to be certain.
+        if largest <= 1e-10 * size {
             let mut z = vec![0.0; steps + 1];
             for k in 0..steps {
                 let v = (q[k + 1] - q[k]) / h;
@@ -207,7 +211,7 @@ fn by_hand_newton<const N: usize>(steps: usize, h: f64) -> ByHand<N> {
     (q, Vec::new(), 50)
 }
 
-/// `a x = b` for a matrix and a vector on the right, with pivots within the block.
+/// Solves `a x = b` for a matrix `b` and a vector `c` of right-hand sides, with row pivoting within the block.
 #[inline(always)]
 fn eliminate<const N: usize>(a: &mut SMatrix<f64, N, N>, b: &mut SMatrix<f64, N, N>, c: &mut SVector<f64, N>) {
     for j in 0..N {

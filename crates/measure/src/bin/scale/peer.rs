@@ -1,10 +1,11 @@
-//! Other programs, in Python, that are measured in the same run.
+//! Runs other programs, in Python, for comparison within the same measurement.
 
 use contact_examples::Failure;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-/// What a program prints that reads an input; `None` where Python is not there, or the program ends with an error, as where it lacks a package.
+/// Runs a Python program on an input and returns its standard output; `None` where Python is not installed or the
+/// program ends with an error, for example for lack of a package.
 ///
 /// # Errors
 /// [`Failure::Terminal`] where the output cannot be read.
@@ -16,7 +17,7 @@ pub fn python(program: &str, input: &str) -> Result<Option<String>, Failure> {
         .stderr(Stdio::null())
         .spawn();
     let Ok(mut child) = child else { return Ok(None) };
-    // Where it has ended already there is nothing to read.
+    // A write fails if the program has already ended; its exit status decides below.
     let _ = child.stdin.take().map(|mut stdin| stdin.write_all(input.as_bytes()));
     let output = child.wait_with_output().map_err(Failure::Terminal)?;
     Ok(output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned()))

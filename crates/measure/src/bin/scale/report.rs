@@ -1,4 +1,4 @@
-//! What the cases find: times and memory against size, and figures with their bounds.
+//! Results of the cases: times and memory against size, and figures with their bounds.
 
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw, number, print};
 
@@ -11,7 +11,7 @@ struct Row {
     bytes: Option<usize>,
 }
 
-/// A figure that must not be above a bound.
+/// A figure with its upper bound.
 struct Verdict {
     case: String,
     what: String,
@@ -26,10 +26,10 @@ impl Verdict {
     }
 }
 
-/// All measurements of a run, and where they are written.
+/// All measurements of a run, and the directory for them.
 pub struct Report {
     out: Directory,
-    /// Whether only small sizes are to be run.
+    /// Whether only small sizes are run.
     pub quick: bool,
     rows: Vec<Row>,
     verdicts: Vec<Verdict>,
@@ -42,20 +42,20 @@ impl Report {
         Report { out, quick, rows: Vec::new(), verdicts: Vec::new(), cases: Vec::new() }
     }
 
-    /// Begins a case, with what its sizes count.
+    /// Begins a case; `size` is the meaning of its sizes.
     pub fn begin(&mut self, case: &'static str, size: &'static str) {
         self.cases.push((case, size));
     }
 
-    /// A measurement: the seconds that something took at a size, and the most memory that it held where that was counted.
+    /// Adds a measurement: the time in seconds at a size, and the peak memory in bytes where it was counted.
     pub fn row(&mut self, case: &str, what: &str, size: usize, seconds: f64, bytes: Option<usize>) {
         let memory = bytes.map_or(String::new(), |b| format!("  {:9.3} MB", b as f64 * 1e-6));
-        // The terminal is a convenience here: what cannot be printed is in the table.
+        // A failure to print is ignored, since the table has the same data.
         let _ = print(&format!("{case:>10}  {what:<40} {size:>9}  {seconds:11.4e} s{memory}\n"));
         self.rows.push(Row { case: case.into(), what: what.into(), size, seconds, bytes });
     }
 
-    /// A figure with its bound.
+    /// Adds a figure with its bound.
     pub fn verdict(&mut self, case: &str, what: &str, figure: f64, bound: f64) {
         let verdict = Verdict { case: case.into(), what: what.into(), figure, bound };
         let word = if verdict.passes() { "pass" } else { "FAIL" };
@@ -63,7 +63,7 @@ impl Report {
         self.verdicts.push(verdict);
     }
 
-    /// Writes tables and figures; fails where a figure is above its bound.
+    /// Writes tables and diagrams; fails if a figure is above its bound.
     pub fn finish(self) -> Result<(), Failure> {
         let row = |r: &Row| {
             let bytes = r.bytes.map_or(String::new(), |b| b.to_string());
@@ -88,7 +88,7 @@ impl Report {
         Err(Failure::Bounds { count: failing.len(), total: self.verdicts.len(), list: list.join("\n") })
     }
 
-    /// Time, and memory where it was counted, against size: of what has more than one size.
+    /// Draws time, and memory where it was counted, against size, for everything with more than one size.
     fn figures(&self, case: &str, size: &str) -> Result<(), Failure> {
         let rows: Vec<&Row> = self.rows.iter().filter(|r| r.case == case).collect();
         let figure = |label: &str, of: fn(&Row) -> Option<f64>| {
@@ -115,7 +115,7 @@ impl Report {
     }
 }
 
-/// The different ones, in the order of their first appearance.
+/// The distinct names, in the order of their first appearance.
 fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut seen = Vec::new();
     for name in names {
@@ -126,7 +126,7 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     seen
 }
 
-/// The powers of ten between which all values lie; none without positive values.
+/// The range of powers of ten that contains all values; `None` without positive values.
 fn decades(values: impl Iterator<Item = f64>) -> Option<Axis> {
     let logs: Vec<f64> = values.filter(|x| *x > 0.0).map(f64::log10).collect();
     let least = logs.iter().copied().reduce(f64::min)?.floor() as i32;

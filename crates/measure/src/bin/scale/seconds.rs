@@ -1,14 +1,15 @@
-//! Times of actions.
+//! Run times of closures.
 
 use std::time::Instant;
 
-/// The shortest time of some rounds, in seconds.
+/// The shortest run time over some rounds, in seconds.
 pub fn best(rounds: usize, mut action: impl FnMut()) -> f64 {
     let [best] = together(rounds, [&mut action]);
     best
 }
 
-/// The shortest times of actions that take turns: what disturbs one disturbs the others.
+/// The shortest run times of several actions, in seconds. The actions alternate, so that other load on the machine
+/// affects all of them.
 pub fn together<const N: usize>(rounds: usize, mut actions: [&mut dyn FnMut(); N]) -> [f64; N] {
     let mut best = [f64::INFINITY; N];
     for _ in 0..rounds {
@@ -21,7 +22,7 @@ pub fn together<const N: usize>(rounds: usize, mut actions: [&mut dyn FnMut(); N
     best
 }
 
-/// The end of what is timed: the compiler must not leave it out.
+/// Consumes the result of a timed action, so that the compiler does not remove the action.
 pub fn done<R>(result: R) {
     let _ = std::hint::black_box(result);
 }

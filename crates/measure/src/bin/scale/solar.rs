@@ -1,4 +1,4 @@
-//! The outer solar system with a drag over 1e4 years, beside REBOUND's IAS15.
+//! The outer solar system with linear drag over 1e4 years: run time against error, compared with REBOUND's IAS15.
 
 use crate::chain::refused;
 use crate::peer::python;
@@ -17,13 +17,13 @@ const CASE: &str = "solar";
 /// Sun to Neptune.
 const BODIES: usize = 5;
 
-/// The drag in 1/day: in 1e4 years momenta fall by the factor e^(-0.037).
+/// The coefficient of the drag in 1/day: over 1e4 years, momenta decay by the factor e^(-0.037).
 const GAMMA: f64 = -1e-8;
 
-/// A run: its error in au, its time in seconds.
+/// A run: error in au, and time in seconds.
 type Found = (f64, f64);
 
-/// Runs of the peer: the positions at the end of its finest, and what all have found.
+/// Runs of IAS15: the final positions of the finest run, and error and time of every run.
 struct Peer {
     finest: Vec<f64>,
     runs: Vec<Found>,
@@ -35,7 +35,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     let system = OuterSolarSystem::system(BODIES, GAMMA).map_err(refused)?;
     let scheme = SplittingScheme::SOFRONIOU_SPALETTA_10;
     let finest = motion(&system, &scheme, days, (days / 60.0).ceil() as usize)?.0;
-    // Of each side the errors are those against the other's finest run.
+    // The errors of each program are measured against the finest run of the other.
     let theirs = ias15(days, &finest)?;
     let exact = theirs.as_ref().map_or(&finest, |peer| &peer.finest);
     if theirs.is_some() {
@@ -53,7 +53,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
             ours.push((error, seconds));
             errors.push((h, error));
         }
-        // An error that is proportional to the drag would be of a lower order.
+        // An error term proportional to the drag would be of lower order.
         let slope = match errors[..] {
             [_, _, (coarse, more), .., (fine, less), _, _, _] => (more / less).ln() / (coarse / fine).ln(),
             _ => f64::NAN,
@@ -61,7 +61,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         let what = format!("order that {} loses by the drag", scheme.name());
         report.verdict(CASE, &what, f64::from(scheme.order()) - slope, 0.5);
     }
-    // So few bodies are a small system too.
+    // Five bodies are also a small system, to which Gauss collocation applies.
     for (stages, widths) in
         [(8, [1000.0, 800.0, 650.0, 520.0, 420.0, 340.0]), (16, [2200.0, 1900.0, 1600.0, 1300.0, 1100.0, 900.0])]
     {
@@ -80,7 +80,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     };
     for (error, seconds) in &theirs.runs {
         report.row(CASE, &format!("REBOUND's IAS15 to {error:.0e} au"), years, *seconds, None);
-        // What is below the difference of the two finest runs is round-off, of both.
+        // Errors below the difference of the two finest runs are round-off of either program.
         let level = max_or_nan(*error, distance(exact, &finest));
         let here = ours.iter().filter(|f| f.0 <= level).map(|f| f.1).fold(f64::INFINITY, f64::min);
         report.verdict(CASE, &format!("time to {error:.0e} au over IAS15's"), here / seconds, 0.5);
@@ -88,7 +88,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The positions at the end by contact Gauss collocation, and the seconds that they took.
+/// The final positions by contact Gauss collocation, and the run time in seconds.
 fn collocation(stages: usize, days: f64, steps: usize) -> Result<(Vec<f64>, f64), Failure> {
     const N: usize = 3 * BODIES;
     let bodies = Bodies::<N>::new(|i| OuterSolarSystem::MASSES[i], OuterSolarSystem::G, GAMMA);
@@ -104,13 +104,13 @@ fn collocation(stages: usize, days: f64, steps: usize) -> Result<(Vec<f64>, f64)
     })
 }
 
-/// The quicker of two runs, as of the peer.
+/// The faster of two runs; IAS15 is measured in the same way.
 fn best_of_two(run: impl Fn() -> Result<(Vec<f64>, f64), Failure>) -> Result<(Vec<f64>, f64), Failure> {
     let (one, other) = (run()?, run()?);
     Ok(if one.1 <= other.1 { one } else { other })
 }
 
-/// The positions at the end, and the seconds that they took.
+/// The final positions by a splitting with compensated sums, and the run time in seconds.
 fn motion(
     system: &AssembledSystem,
     scheme: &SplittingScheme,
@@ -118,7 +118,7 @@ fn motion(
     steps: usize,
 ) -> Result<(Vec<f64>, f64), Failure> {
     let (q, v) = (OuterSolarSystem::positions(BODIES), OuterSolarSystem::velocities(BODIES));
-    // Without the action, whose energies are a part of the time.
+    // The action is not computed: the potential energies for it would be part of the measured time.
     let start = State { t: 0.0, q: &q, v: &v, z: None };
     best_of_two(|| {
         let motion = AssembledSplitting::new(system, scheme, days / steps as f64, start).map_err(refused)?;
@@ -131,7 +131,7 @@ fn motion(
     })
 }
 
-/// Not a number where one of them has fewer numbers, as of a program that has ended early.
+/// The 2-norm of the difference of two vectors; NaN where their lengths differ, as for a program that ended early.
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     if a.len() != b.len() {
         return f64::NAN;
@@ -139,8 +139,8 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// REBOUND's IAS15: its positions at the end with the smallest tolerance, and its errors against others with several; `None` where it is not
-/// installed.
+/// Runs of REBOUND's IAS15 with several tolerances: the final positions with the smallest tolerance, and the error of
+/// each run against `exact`. `None` where REBOUND is not installed.
 fn ias15(days: f64, exact: &[f64]) -> Result<Option<Peer>, Failure> {
     let mut input = format!("{:e}\n{GAMMA:e}\n{days:e}\n", OuterSolarSystem::G);
     for i in 0..BODIES {

@@ -1,7 +1,7 @@
-"""The outer solar system by REBOUND's IAS15 with a linear drag, the force of the drag in C.
+"""The outer solar system with linear drag by REBOUND's IAS15; the force of the drag is compiled from C.
 
-Reads G, the drag, the end, then mass, position and velocity of each body, one number a line. Writes for each tolerance a line: the
-tolerance, the seconds, and the positions at the end.
+Reads one number per line: G, the coefficient of the drag, the final time, then mass, position and velocity of each
+body. Writes one line per tolerance: the tolerance, the shorter of two run times in seconds, and the final positions.
 """
 
 import ctypes

@@ -1,4 +1,5 @@
-//! The same boundary-value problem by faer's sparse LU of all unknowns at once: the rival of the block elimination, and its test.
+//! The boundary-value problem of `path` by Newton's method with faer's sparse LU on all unknowns at once. It is
+//! compared with the block elimination of the library, and it verifies the path.
 
 use contact_geom::DiscretePoint;
 use contact_geom::nalgebra::SVector;
@@ -8,8 +9,9 @@ use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{Pair, SparseColMat, SymbolicSparseColMat};
 use faer::{Mat, Par};
 
-/// A path by Newton's method on positions and actions together, from the straight line between its ends, without a line search; and the
-/// number of its corrections; `None` where it fails. The unknowns `(q_k, z_k)` of a point are neighbours; the pattern is analysed once.
+/// Newton's method on positions and actions together, without a line search, from the straight line between the ends.
+/// Returns the positions and the number of corrections; `None` where it fails. The unknowns `(q_k, z_k)` of a point are
+/// adjacent, and the sparsity pattern is analysed once.
 pub fn newton<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     steps: usize,
@@ -19,7 +21,7 @@ pub fn newton<const N: usize>(
     let at = |k: usize| k as f64 / steps as f64;
     let mut q: Vec<_> = (0..=steps).map(|k| from * (1.0 - at(k)) + to * at(k)).collect();
     let mut z = vec![0.0; steps + 1];
-    // The last point has its action alone.
+    // The last point has only its action as an unknown.
     let size = (steps - 1) * (N + 1) + 1;
     let mut analysed = None;
     for iteration in 1..=50 {
@@ -35,13 +37,13 @@ pub fn newton<const N: usize>(
         let matrix = SparseColMat::new_from_argsort(pattern.clone(), order, &entries.values).ok()?;
         let lu = Lu::try_new_with_symbolic(symbolic.clone(), matrix.as_ref()).ok()?;
         lu.solve_in_place(&mut rhs);
-        let (mut max_abs_or_nan, mut most) = (0.0f64, 0.0f64);
+        let (mut largest, mut most) = (0.0f64, 0.0f64);
         for k in 1..=steps {
             let place = (k - 1) * (N + 1);
             let dz = if k < steps {
                 let change = SVector::<f64, N>::from_fn(|i, _| rhs[(place + i, 0)]);
                 q[k] += change;
-                max_abs_or_nan = max_abs_or_nan.max(change.amax());
+                largest = largest.max(change.amax());
                 most = most.max(q[k].amax());
                 rhs[(place + N, 0)]
             } else {
@@ -49,14 +51,14 @@ pub fn newton<const N: usize>(
             };
             z[k] += dz;
         }
-        if max_abs_or_nan <= 1e-10 * most {
+        if largest <= 1e-10 * most {
             return Some((q, iteration));
         }
     }
     None
 }
 
-/// A sparse matrix by its entries, in an order that is the same in each iteration.
+/// The entries of a sparse matrix, in the same order in each iteration.
 #[derive(Default)]
 struct Entries {
     places: Vec<Pair<usize, usize>>,
@@ -70,8 +72,8 @@ impl Entries {
     }
 }
 
-/// The linearised equations of a path: rows `(k - 1)(N + 1)` on are the discrete Herglotz equation of point k, followed by the recursion
-/// of its action.
+/// The linearised equations of a path: the rows from `(k - 1)(N + 1)` on are the discrete Herglotz equation at point k,
+/// followed by the recursion for its action.
 fn equations<const N: usize>(
     ld: &impl DiscreteLagrangian<N>,
     q: &[SVector<f64, N>],

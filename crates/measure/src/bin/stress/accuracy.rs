@@ -1,4 +1,5 @@
-//! Whether an accuracy that is asked for is kept, and what it costs: random systems, spans, starts and tolerances.
+//! Whether a requested accuracy is kept, and how long it takes, for random systems, spans, initial values and
+//! tolerances.
 
 use crate::formula::{Feature, Force, Formula, Rate, Smooth};
 use crate::motion::{End, Problem, Worth, caught, distance, dop853, end_of_outcome};
@@ -13,7 +14,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::time::Instant;
 
-/// The configurations that a careful user would try by hand.
+/// The configurations that a careful user would try.
 const CONFIGURATIONS: [AnyIntegrator; 8] = [
     AnyIntegrator::Gauss { stages: 4 },
     AnyIntegrator::Gauss { stages: 6 },
@@ -25,7 +26,7 @@ const CONFIGURATIONS: [AnyIntegrator; 8] = [
     AnyIntegrator::Splitting(SplittingScheme::SOFRONIOU_SPALETTA_10),
 ];
 
-/// The integrators that a third of the problems name, with the tightest tolerance that is asked of each.
+/// The integrators that a third of the problems request by name, each with the tightest tolerance requested of it.
 const NAMED: [(AnyIntegrator, f64); 8] = [
     (AnyIntegrator::Discrete(Method::Midpoint), 1e-5),
     (AnyIntegrator::Splitting(SplittingScheme::STRANG), 1e-6),
@@ -37,13 +38,13 @@ const NAMED: [(AnyIntegrator, f64); 8] = [
     (AnyIntegrator::Gauss { stages: 16 }, 1e-12),
 ];
 
-/// The longest run that is tried by hand.
+/// The largest number of steps that is tried for a configuration.
 const MOST_STEPS: f64 = 1e5;
 
-/// A motion takes no longer than this, plan included: longer would be taken for a hang.
+/// The bound on the time of a plan, in seconds: a longer plan would be taken for a hang.
 const PATIENCE: f64 = 10.0;
 
-/// The problem of one degree of freedom with a number.
+/// A random problem with one degree of freedom.
 fn one(random: &mut Random) -> Problem<1> {
     let double_well = random.happens(0.15);
     let spring = if double_well { -random.between(0.3, 1.0) } else { random.spread(0.1, 10.0) };
@@ -55,7 +56,7 @@ fn one(random: &mut Random) -> Problem<1> {
         coupling: 0.0,
     };
     let gamma = if random.happens(0.2) { 0.0 } else { -random.spread(1e-4, 1.0) };
-    // Some drives have whole numbers of periods in each step of a power of two of steps.
+    // Some drives have whole numbers of periods in each step, if the number of steps is a power of two.
     let whole = random.happens(0.2);
     let frequency = if whole { TAU * f64::from(1 << random.below(4)) } else { random.between(0.2, 3.0) };
     let rate = if random.happens(0.15) { Rate::Swinging { size: gamma, frequency } } else { Rate::Constant(gamma) };
@@ -69,13 +70,13 @@ fn one(random: &mut Random) -> Problem<1> {
     let start = VelocityPoint::new([q], [if at_rest { 0.0 } else { v }], z * size);
     let t0 = if random.happens(0.1) { random.between(-1e3, 1e3) } else { 0.0 };
     let system = Formula { smooth, rate, force, action, ..Formula::FREE };
-    // Long spans for those whose phase is not lost.
+    // Long spans only for motions whose phase error remains small.
     let long = random.happens(0.1) && smooth.quartic == 0.0 && smooth.swing == 0.0 && gamma > -0.01;
     let span = if long { random.spread(1e2, 1e5) } else { random.spread(1.0, 100.0) };
     Problem { system, t0, start, span: if whole { span.log2().round().exp2() } else { span } }
 }
 
-/// The problem of two degrees of freedom with a number: an orbit, or a coupled pair.
+/// A random problem with two degrees of freedom: an orbit, or a coupled pair.
 fn two(random: &mut Random) -> Problem<2> {
     let gamma = if random.happens(0.3) { 0.0 } else { -random.spread(1e-5, 0.01) };
     let span = random.spread(1.0, 100.0);
@@ -98,7 +99,7 @@ fn two(random: &mut Random) -> Problem<2> {
     Problem { system, t0: 0.0, start, span }
 }
 
-/// What became of one problem.
+/// The result for one problem.
 struct Found {
     dimension: usize,
     named: Option<AnyIntegrator>,
@@ -106,17 +107,18 @@ struct Found {
     worth: Worth,
     error: f64,
     steps: usize,
-    /// Whether dop853 sides with the run where the exact flow does not.
+    /// Whether the error is above the tolerance and dop853 disagrees with the exact flow too, by more than half of that
+    /// error.
     doubt: bool,
-    /// Where it was refused: whether a configuration of the library solves it.
+    /// For a refused problem: whether a configuration of the library solves it.
     solvable: bool,
-    /// Seconds of the plan, of the run, and of the best configuration's run.
+    /// Seconds of the plan, of the run, and of the run of the fastest configuration.
     plan: f64,
     run: f64,
     best: Option<f64>,
 }
 
-/// The shortest time of some calls, and what the last gave.
+/// The shortest time of a few calls, and the result of the last.
 fn fastest<T>(call: impl Fn() -> T) -> (f64, T) {
     let timed = || {
         let clock = Instant::now();
@@ -136,7 +138,8 @@ fn fastest<T>(call: impl Fn() -> T) -> (f64, T) {
     (least, result)
 }
 
-/// The time of the fastest of the configurations that keeps the tolerance, each with the fewest steps that do.
+/// The shortest time of the configurations that keep the tolerance, each with the smallest number of steps that keeps
+/// it; with `first`, the time of the first such configuration.
 fn by_hand<const N: usize>(problem: &Problem<N>, truth: &PhasePoint<N>, tolerance: f64, first: bool) -> Option<f64> {
     let mut best: Option<f64> = None;
     for integrator in CONFIGURATIONS.into_iter().filter(|i| i.check(&problem.system).is_ok()) {
@@ -163,7 +166,7 @@ fn by_hand<const N: usize>(problem: &Problem<N>, truth: &PhasePoint<N>, toleranc
     best
 }
 
-/// Solves a problem to a tolerance; `None` where no truth is known well enough.
+/// Solves a problem to a tolerance; `None` where the reference solution is not accurate enough.
 fn solve<const N: usize, const D: usize>(
     problem: &Problem<N>,
     tolerance: f64,

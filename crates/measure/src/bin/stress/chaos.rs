@@ -1,4 +1,4 @@
-//! Chaos and reversal: forward and back, and the same bits whatever else is asked for.
+//! Chaos and time reversal: runs forward and backward, and bitwise equal results whatever else a run computes.
 
 use crate::formula::{Force, Formula, Rate, Smooth};
 use crate::motion::{FAMILIES, Problem, distance};
@@ -19,8 +19,8 @@ fn chaotic(gamma: f64) -> Formula<2> {
 /// The step of the chaotic motion.
 const H: f64 = 1.0 / 32.0;
 
-/// The distance of the neighbours by which the growth is measured, and the time after which they are brought back to it: over the
-/// whole span they would be as far apart as the well is wide, whatever the growth.
+/// The initial distance of neighbours by which the growth is measured, and the time after which it is restored: over
+/// the whole span the distance would become the width of the well, whatever the growth.
 const APART: f64 = 1e-9;
 const PIECE: i32 = 4;
 
@@ -32,9 +32,11 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     report.table(&["what", "integrator", "parameter", "figure"], rows)
 }
 
-/// Forward, and back by the reversed motion: with `(q, p, z)` to `(q, -p, -z)` time runs back, and drag with it.
+/// Runs forward, then backward by the reversed motion: the map `(q, p, z)` to `(q, -p, -z)` reverses time, and with it
+/// the sign of the drag.
 ///
-/// The defect against the growth of a small difference on the way back: a symmetric method retraces its steps but for rounding.
+/// The defect is compared with the growth of a small difference on the way back: a symmetric method retraces its steps
+/// up to round-off.
 fn reversal(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let spans = if report.quick { vec![4, 16] } else { vec![4, 8, 16, 32, 64] };
     let symmetric: Vec<AnyIntegrator> = FAMILIES.into_iter().collect();
@@ -87,7 +89,7 @@ fn reversal(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
         }
     }
     for (name, worst) in &of_family {
-        // Some ten roundings a step, each of which may be any of the growing directions.
+        // About ten rounding errors per step, each of which may point in any of the growing directions.
         report.at_most(&format!("{name}: defect after forward and back, over growth and roundings"), *worst, 64.0)?;
     }
     report.markdown(
@@ -112,7 +114,7 @@ fn steps_of(span: i32) -> usize {
     (f64::from(span) / H) as usize
 }
 
-/// The growth of a small difference of states over some pieces, from each of the four directions: the largest.
+/// The growth of a small difference of states over some pieces; the largest over four initial directions.
 fn growth(
     start: &PhasePoint<2>,
     pieces: i32,
@@ -123,7 +125,7 @@ fn growth(
         states.push(run(&states[k])?);
     }
     let entries = |x: &PhasePoint<2>| SVector::<f64, 4>::new(x.q[0], x.q[1], x.p[0], x.p[1]);
-    let mut max_abs_or_nan = 1.0;
+    let mut largest = 1.0;
     for k in 0..4 {
         let (mut growth, mut direction) = (1.0, SVector::<f64, 4>::ith(k, 1.0));
         for ends in states.windows(2) {
@@ -133,9 +135,9 @@ fn growth(
             growth *= apart.norm() / APART;
             direction = apart.normalize();
         }
-        max_abs_or_nan = max_or_nan(max_abs_or_nan, growth);
+        largest = max_or_nan(largest, growth);
     }
-    Ok(max_abs_or_nan)
+    Ok(largest)
 }
 
 fn bits<const N: usize>(x: &PhasePoint<N>) -> Vec<u64> {
@@ -143,7 +145,7 @@ fn bits<const N: usize>(x: &PhasePoint<N>) -> Vec<u64> {
     (0..=2 * N).map(|i| x.component(i).to_bits()).collect()
 }
 
-/// Twice, in pieces, with rows, with the conformal factor: the same bits.
+/// Repeated runs, runs in pieces, with rows and with the conformal factor must have the same bits.
 fn same_bits(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let driven = Formula::<2> { force: Force::Swinging { size: 0.3, frequency: 0.7 }, ..chaotic(-0.1) };
     let mut swinging = chaotic(0.0);
@@ -190,7 +192,7 @@ fn same_bits(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fai
     report.at_most("runs whose bits differ when rows or factors are recorded", f64::from(recorded), 0.0)
 }
 
-/// Stages in vector lanes against the same method one number at a time by Newton's method.
+/// Stages in SIMD lanes compared with the same method in scalar arithmetic, by Newton's method.
 fn lanes(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let mut worst = 0.0;
     for stages in [1, 2, 3, 4, 5, 7, 8, 9, 12, 16] {
@@ -207,6 +209,6 @@ fn lanes(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure
         rows.push(vec!["lanes against single numbers".into(), stages.to_string(), "8".into(), number(ulps)]);
         worst = max_or_nan(worst, ulps);
     }
-    // Eight steps, each with the rounding of its sums and of Newton's last iterate.
+    // Eight steps, each with the rounding of its sums and of the last Newton iterate.
     report.at_most("gauss_1 .. 16 in lanes against single numbers, 8 steps: ulps of one", worst, 32.0)
 }

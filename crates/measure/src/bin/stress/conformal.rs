@@ -1,4 +1,4 @@
-//! Conformality for ever: the product of the `sigma_d`, the momentum of a symmetry, and the contact form, along very many steps.
+//! Conformality over many steps: the product of the `sigma_d`, the momentum of a symmetry, and the contact form.
 
 use crate::formula::Formula;
 use crate::motion::{FAMILIES, Problem};
@@ -8,22 +8,23 @@ use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::{ChartVector, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, InputError, Steps};
 
-/// The drag, and the step: a power of two.
+/// The coefficient of the drag, and the step, a power of two.
 const GAMMA: f64 = -1e-6;
 const H: f64 = 1.0 / 32.0;
 
-/// What a run showed after some steps.
+/// The errors after a number of steps.
 struct Row {
     steps: f64,
-    /// Relative error of the angular momentum against the product of the factors that the method has.
+    /// Relative error of the angular momentum against the product of the conformal factors by the formula of the
+    /// method.
     momentum: f64,
     /// Relative error of the product of the `sigma_d` that the steps report.
     product: f64,
-    /// The defect of `eta` pulled back by one step, relative to its size.
+    /// The defect of the pullback of `eta` by one step, relative to its size.
     contact: f64,
 }
 
-/// The logarithm of a step's factor, as the method's own formula has it.
+/// The logarithm of a step's conformal factor by the formula of the method.
 fn factor(integrator: AnyIntegrator) -> f64 {
     let half = 0.5 * GAMMA * H;
     let rational = |g: f64| (g * half).ln_1p() - (-g * half).ln_1p();
@@ -33,7 +34,8 @@ fn factor(integrator: AnyIntegrator) -> f64 {
         AnyIntegrator::Composition(_, scheme) => {
             scheme.substeps().map_or(f64::NAN, |g| g.iter().map(|g| rational(*g)).sum())
         }
-        // Gauss methods have the Pade approximation of e^x, which at this x is e^x from two stages on; in transformed time its steps differ.
+        // The factor of a Gauss method is a Pade approximation of e^x, which at this x equals e^x from two stages on.
+        // In transformed time the steps differ.
         AnyIntegrator::Gauss { .. }
         | AnyIntegrator::TransformedGauss { .. }
         | AnyIntegrator::Divided(_)
@@ -56,7 +58,7 @@ fn step(integrator: AnyIntegrator, from: &ChartVector<2>) -> Result<(PhasePoint<
     Ok((stepper.state(), if ended { f64::NAN } else { stepper.sigma() }))
 }
 
-/// How far a step's pullback of `dz - p dq` is from `sigma_d` times it: by differences of fourth order.
+/// The defect between a step's pullback of `dz - p dq` and `sigma_d` times the form, by differences of fourth order.
 fn contact_defect(integrator: AnyIntegrator, at: &PhasePoint<2>) -> Result<f64, InputError> {
     const DISTANCE: f64 = 1e-3;
     let from = ChartVector::from(*at);
@@ -87,7 +89,7 @@ fn along(integrator: AnyIntegrator, power: u32) -> Result<Vec<Row>, InputError> 
     let plan = motion.by(integrator).steps(Steps::Count(1)).plan(problem.end())?;
     let mut stepper = plan.stepper()?;
     let (mut rows, mut taken, first) = (Vec::new(), 0, angular(&stepper.state()));
-    // The sum of logarithms, with what each addition loses.
+    // The compensated sum of the logarithms.
     let (mut sum, mut lost) = (0.0, 0.0);
     for k in 4..=power {
         let mut ended = false;
@@ -121,11 +123,11 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
             let numbers = [number(*steps), number(*momentum), number(*product), number(*contact)];
             rows.push([integrator.to_string()].into_iter().chain(numbers).collect());
         }
-        // A rounding of the momentum each substep, as a random walk; a composition has 17.
+        // One rounding error of the momentum per substep, as a random walk; a composition has 17 substeps.
         let stages = if matches!(integrator, AnyIntegrator::Composition(..)) { 17.0 } else { 5.0 };
         let walk = |steps: f64| 8.0 * f64::EPSILON * (stages * steps).sqrt();
         let momentum = max_abs_or_nan(found.iter().map(|r| r.momentum / walk(r.steps)));
-        // Each sigma_d is a number beside one, rounded to half of eps.
+        // Each sigma_d is a number close to one, rounded to half of eps.
         let product = max_abs_or_nan(found.iter().map(|r| r.product / (stages * f64::EPSILON * r.steps)));
         let contact = max_abs_or_nan(found.iter().map(|r| r.contact));
         report.at_most(
@@ -134,7 +136,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
             1.0,
         )?;
         report.at_most(&format!("{integrator}: product of the sigma_d, in roundings of each"), product, 1.0)?;
-        // The differences' own error: the fourth power of 1e-3 times a fifth derivative, and eps / 1e-3.
+        // The error of the difference formula: the fourth power of 1e-3 times a fifth derivative, and eps / 1e-3.
         report.at_most(&format!("{integrator}: defect of the contact form in a step, anywhere"), contact, 1e-8)?;
         let last = found.last().map_or(f64::NAN, |r| r.momentum);
         lines.push(vec![

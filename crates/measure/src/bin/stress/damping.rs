@@ -1,4 +1,5 @@
-//! Damping and stiffness: a few steps of every family over all ratios of the step to the times of the motion.
+//! Damping and stiffness: a few steps of every family of integrators, over all ratios of the step to the time scales of
+//! the motion.
 
 use crate::formula::{Formula, Kinetic, Rate, Smooth};
 use crate::motion::{End, FAMILIES, ORDER_ONE, Problem, Worth, distance};
@@ -17,21 +18,21 @@ const DAMPINGS: [f64; 11] = [-1e6, -1e4, -1e2, -10.0, -1.0, -1e-3, 0.0, 1e-3, 1.
 /// `k h^2`.
 const STIFFNESSES: [f64; 11] = [1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e2, 1e4, 1e8, 1e12];
 
-/// The second mass over the first.
+/// The ratio of the second mass to the first.
 const MASSES: [f64; 7] = [1e-14, 1e-9, 1e-4, 1.0, 1e4, 1e9, 1e14];
 
 /// The steps of a run, each of length 1.
 const STEPS: usize = 4;
 
-/// What the runs of one integrator are worth.
+/// The number of runs of each outcome.
 pub type Tally = BTreeMap<Worth, usize>;
 
-/// Counts of what must never happen.
+/// The number of outcomes that must never occur.
 pub fn bad<'a>(tallies: impl IntoIterator<Item = &'a Tally>) -> f64 {
     tallies.into_iter().flatten().filter(|(worth, _)| worth.is_bad()).map(|(_, count)| *count as f64).sum()
 }
 
-/// A table's row of a tally: its counts of right, said and bad ends.
+/// A table row of a tally: the counts of right, coarse, flagged, stopped, refused and bad runs.
 pub fn row(name: String, tally: &Tally) -> Vec<String> {
     let count = |worths: &[Worth]| worths.iter().filter_map(|w| tally.get(w)).sum::<usize>().to_string();
     vec![
@@ -48,7 +49,7 @@ pub fn row(name: String, tally: &Tally) -> Vec<String> {
 /// The columns of [`row`], after the first.
 pub const COLUMNS: [&str; 6] = ["right", "coarse", "marked", "halted", "refused", "wrong in silence"];
 
-/// The damped oscillator `q'' = -k q + gamma q'` by its closed form: in units of its own time.
+/// The damped oscillator `q'' = -k q + gamma q'` in closed form, computed in units of its own time.
 fn truth(gamma: f64, k: f64, t: f64, start: &VelocityPoint<1>) -> PhasePoint<1> {
     let w = k.sqrt();
     let scaled = VelocityPoint { v: start.v / w, ..*start };
@@ -56,7 +57,7 @@ fn truth(gamma: f64, k: f64, t: f64, start: &VelocityPoint<1>) -> PhasePoint<1> 
     PhasePoint { q: end.q, p: end.v * w, z: end.z * w }
 }
 
-/// With both coordinates as velocities, so that each counts by its energy.
+/// Expresses the position as a velocity, so that each coordinate counts by its energy.
 fn in_velocities(x: &PhasePoint<1>, w: f64) -> PhasePoint<1> {
     PhasePoint { q: x.q * w, ..*x }
 }
@@ -82,7 +83,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
             End::Marked(x) => End::Marked(in_velocities(&x, w)),
             other => other,
         };
-        // What decays is compared with what it was; nothing is left of it in either.
+        // The error of a decayed motion is relative to the initial state, since both solutions tend to zero.
         let scale = (start.q[0] * w).hypot(start.v[0]);
         (end.worth(&exact, scale, ORDER_ONE), end.error(&exact, scale))
     });
@@ -109,7 +110,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         bad(tallies.values()),
         0.0,
     )?;
-    // With exact rate a motion that is nothing but drag and a slow spring has no error to speak of.
+    // The rate of the splitting is exact, so that a motion with drag and a very weak spring has a negligible error.
     let mut worst = 0.0;
     for ((integrator, claims, gamma, k), (worth, error)) in cases.iter().zip(&found) {
         let exact = *integrator == AnyIntegrator::Splitting(SplittingScheme::STRANG);
@@ -136,7 +137,7 @@ fn masses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
         let exact = problem.exact()?;
         for integrator in FAMILIES {
             let end = problem.by(integrator, 32);
-            // Momenta differ by the ratio; positions do not.
+            // Only positions are compared: momenta differ in size by the mass ratio.
             let positions = |x: &PhasePoint<2>| PhasePoint { p: x.p * 0.0, ..*x };
             let worth = match &end {
                 End::Whole(x) if distance(&positions(x), &positions(&exact), 0.0) <= ORDER_ONE => Worth::Right,
@@ -158,6 +159,6 @@ fn masses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
         }
     }
     report.at_most("mass ratios 1e-14 .. 1e14: runs wrong in silence", bad([&tally]), 0.0)?;
-    // Some hundred roundings of positions of size one.
+    // Accumulated rounding errors of positions of size one.
     report.at_most("mass ratios 1e-14 .. 1e14: error of Gauss with 8 and 16 stages", worst, 1e-12)
 }

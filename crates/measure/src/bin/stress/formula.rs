@@ -1,4 +1,4 @@
-//! One Lagrangian with many faces, so that one type stands for all systems of a dimension.
+//! One Lagrangian with many variants, so that a single type covers all systems of a dimension.
 
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Lagrangian, Scalar, Structure, linear};
@@ -10,15 +10,15 @@ pub struct Formula<const N: usize> {
     pub kinetic: Kinetic<N>,
     /// The smooth part of the potential.
     pub smooth: Smooth,
-    /// What is added to the potential that may be singular, narrow or steep.
+    /// An addition to the potential that may be singular, narrow or steep.
     pub feature: Feature,
-    /// The factor of z.
+    /// The coefficient of z.
     pub rate: Rate,
-    /// The factor of `-z^2/2`.
+    /// The coefficient of `-z^2/2`.
     pub action: f64,
     /// The force on the first coordinate.
     pub force: Force,
-    /// What is claimed instead of what is true.
+    /// The structure that is claimed in place of the true one.
     pub claims: Option<Structure>,
 }
 
@@ -31,7 +31,8 @@ pub enum Kinetic<const N: usize> {
     Mass(SMatrix<f64, N, N>),
     /// `-sqrt(1 - v.v)`.
     Relativistic,
-    /// On the sphere with the angle from a pole first, the longitude last: `(v_1^2 + sin(q_1)^2 v_N^2) / 2`.
+    /// `(v_1^2 + sin(q_1)^2 v_N^2) / 2`: on the sphere, with the angle from a pole as the first coordinate and the
+    /// longitude as the last.
     Sphere,
     /// `q_1 v_1`: W is zero.
     Singular,
@@ -47,7 +48,7 @@ pub struct Smooth {
     pub coupling: f64,
 }
 
-/// What is singular, narrow or steep in a potential. Widths are those of a Gaussian or of a hyperbolic tangent.
+/// Singular, narrow or steep parts of a potential. Widths are those of a Gaussian or of a hyperbolic tangent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Feature {
     None,
@@ -55,11 +56,11 @@ pub enum Feature {
     Centre {
         mu: f64,
     },
-    /// `square q.Mq / 2` with the mass matrix, so that each coordinate swings with the same frequency.
+    /// `square q.Mq / 2` with the mass matrix M, so that each coordinate oscillates with the same frequency.
     Metric {
         square: f64,
     },
-    /// A hill of a height on the first axis.
+    /// A Gaussian hill along the first axis.
     Hill {
         at: f64,
         width: f64,
@@ -74,13 +75,13 @@ pub enum Feature {
         at: f64,
         slope: f64,
     },
-    /// From 0 to a height.
+    /// A smooth step from 0 to a height.
     Step {
         at: f64,
         width: f64,
         height: f64,
     },
-    /// `-sqrt(1 - q.q)`: not defined beyond 1.
+    /// `-sqrt(1 - q.q)`: not defined for |q| > 1.
     Domain,
     /// `q_1^(n+1) / (n+1)`.
     Power {
@@ -88,7 +89,7 @@ pub enum Feature {
     },
 }
 
-/// The factors of z.
+/// The coefficients of z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rate {
     Constant(f64),
@@ -97,13 +98,13 @@ pub enum Rate {
         size: f64,
         frequency: f64,
     },
-    /// Of this size beyond a place of the first coordinate.
+    /// Of this size beyond a value of the first coordinate.
     Region {
         size: f64,
         at: f64,
         width: f64,
     },
-    /// Of this size about a time.
+    /// Of this size around a time.
     Pulse {
         size: f64,
         at: f64,
@@ -122,7 +123,7 @@ pub enum Force {
         size: f64,
         frequency: f64,
     },
-    /// Of this size about a time.
+    /// Of this size around a time.
     Pulse {
         size: f64,
         at: f64,
@@ -136,13 +137,13 @@ fn bell<T: Scalar>(x: T, at: f64, width: f64) -> T {
     (-(u * u)).exp()
 }
 
-/// From 0 to 1 about a place.
+/// A smooth step from 0 to 1 at `at`.
 fn ramp<T: Scalar>(x: T, at: f64, width: f64) -> T {
     (((x - at) / width).tanh() + 1.0) * 0.5
 }
 
 impl<const N: usize> Formula<N> {
-    /// `v.v/2` and nothing else.
+    /// The free particle, `v.v/2`.
     pub const FREE: Self = Formula {
         kinetic: Kinetic::Unit,
         smooth: Smooth { linear: 0.0, spring: 0.0, quartic: 0.0, swing: 0.0, coupling: 0.0 },
@@ -168,12 +169,12 @@ impl<const N: usize> Formula<N> {
         Formula { feature: Feature::Centre { mu: 1.0 }, rate: Rate::Constant(gamma), ..Self::FREE }
     }
 
-    /// The same that claims nothing.
+    /// The same Lagrangian without any claim of structure.
     pub fn claiming_nothing(self) -> Self {
         Formula { claims: Some(Structure::default()), ..self }
     }
 
-    /// The velocity of a momentum; NaN where there is none.
+    /// The velocity for a momentum; NaN where there is none.
     pub fn velocity(&self, q: &SVector<f64, N>, p: &SVector<f64, N>) -> SVector<f64, N> {
         let none = SVector::from_element(f64::NAN);
         match &self.kinetic {
@@ -188,7 +189,7 @@ impl<const N: usize> Formula<N> {
         }
     }
 
-    /// What is true of it.
+    /// The true structure.
     fn truth(&self) -> Structure {
         let mass = matches!(self.kinetic, Kinetic::Unit | Kinetic::Mass(_));
         let affine = self.action == 0.0 && !matches!(self.rate, Rate::Region { .. });
@@ -207,7 +208,7 @@ impl<const N: usize> Formula<N> {
         }
     }
 
-    /// The features that are rare in mechanics: not worth a place in the kernels.
+    /// The features that are rare in mechanics, which are not inlined into the kernels.
     #[inline(never)]
     fn rare<T: Scalar>(&self, q: &SVector<T, N>) -> T {
         match self.feature {
@@ -228,7 +229,7 @@ impl<const N: usize> Formula<N> {
         }
     }
 
-    /// The rates and forces that are rare in mechanics.
+    /// The rates that are rare in mechanics, which are not inlined into the kernels.
     #[inline(never)]
     fn rare_rate<T: Scalar>(&self, t: T, x: T) -> T {
         match self.rate {
@@ -253,7 +254,8 @@ fn quadratic<T: Scalar, const N: usize>(m: &SMatrix<f64, N, N>, x: &SVector<T, N
 }
 
 impl<const N: usize> Lagrangian<N> for Formula<N> {
-    /// Not merged with the kernels, as it should be where speed counts: its many faces would be compiled into each of them.
+    /// Not inlined into the kernels, as it should be where speed matters: all its variants would be compiled into each
+    /// kernel.
     #[inline(never)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         let kinetic = match &self.kinetic {
@@ -272,7 +274,7 @@ impl<const N: usize> Lagrangian<N> for Formula<N> {
             Feature::Centre { mu } => q.dot(q).sqrt().recip() * -mu,
             _ => self.rare(q),
         };
-        // What is not there must not cost, least of all a sine.
+        // Absent terms are skipped, since they would take time, a sine above all.
         if spring != 0.0 || quartic != 0.0 {
             let square = q.dot(q);
             potential += square * (square * (0.25 * quartic) + 0.5 * spring);

@@ -1,5 +1,5 @@
-//! Hidden things: narrow forces, walls, kinks, jumps and drags at random places, for an accuracy that is asked for, for the exact
-//! flow, and for claims of structure that hold where one looks first.
+//! Hidden features: narrow forces, walls, kinks, jumps and drags at random positions and times. They test runs to a
+//! requested accuracy, the exact flow, and claims of structure that hold only at the start.
 
 use crate::damping::{COLUMNS, Tally, bad, row};
 use crate::formula::{Feature, Force, Formula, Rate, Smooth};
@@ -11,18 +11,19 @@ use contact_examples::{Failure, number};
 use contact_geom::{PhasePoint, Structure, VelocityPoint};
 use std::collections::BTreeMap;
 
-/// The kinds of what is hidden.
+/// The kinds of hidden features.
 const KINDS: [&str; 9] =
     ["hill", "pulse of force", "pulse of drag", "region of drag", "wall", "kink", "jump", "fast drive", "fast drag"];
 
-/// The accuracy that is asked for, and the error that the exact flow may have.
+/// The requested accuracy, and the error that the exact flow may have.
 const ACCURACY: f64 = 1e-6;
 const EXACT: f64 = 1e-9;
 
-/// The part of the span above which nothing may be missed, by the documents: they are looked at in about a thousand places.
+/// The fraction of the span above which, by the documentation, no feature is missed: a motion is sampled at about a
+/// thousand points.
 const SEEN: f64 = 1e-3;
 
-/// A problem with its true end.
+/// A problem with its exact final state.
 struct Hidden {
     kind: usize,
     width: f64,
@@ -49,7 +50,7 @@ impl Hidden {
         let (at, width) = (random.between(1.0, 8.0), random.spread(finest, 0.3));
         let sign = if random.happens(0.5) { 1.0 } else { -1.0 };
         let strength = random.between(0.3, 2.0);
-        // How many parts of the span are so short that nothing is narrower.
+        // The number of parts of the span such that no feature is narrower than a part.
         let parts = |width: f64| Some((40.0 / width).ceil() as usize);
         let (problem, parts) = match kind {
             0 => (free(Feature::Hill { at, width, height: strength }), parts(width)),
@@ -64,9 +65,9 @@ impl Hidden {
             }
             4 => (free(Feature::Wall { width: at }), Some(2000)),
             5 => (free(Feature::Kink { at, slope: strength }), None),
-            // Narrower than anything: the closed form is that of a jump.
+            // Narrower than any step, so that the closed form is that of a jump.
             6 => (free(Feature::Step { at, width: 1e-10, height: 0.5 * sign * strength }), None),
-            // Whole numbers of periods in a power of two of steps.
+            // Steps whose number is a power of two contain whole numbers of periods.
             7 => {
                 let frequency = std::f64::consts::TAU * f64::from(1 << random.below(6));
                 let force = Force::Swinging { size: 4.0 * strength, frequency };
@@ -81,7 +82,7 @@ impl Hidden {
             }
         };
         let truth = match (parts, problem.system.feature) {
-            // By another method where the exact flow gives up.
+            // By dop853 where the exact flow fails.
             (Some(parts), _) => {
                 problem.exact_in(parts).ok().or_else(|| dop853_in::<1, 3>(&problem, parts, 1e-13, 1e-13))
             }
@@ -92,17 +93,19 @@ impl Hidden {
         Hidden { kind, width, problem, truth }
     }
 
-    /// Whether it is narrower than what the documents promise to see; of the first kinds only is the width theirs.
+    /// Whether the feature is narrower than the documentation promises to detect; only the first four kinds have this
+    /// width.
     fn is_narrow(&self) -> bool {
         self.kind < 4 && self.width < SEEN * self.problem.span
     }
 }
 
-/// From 0 with velocity 1 in `slope |q - at|`, `at > 0`: parabolas.
+/// The motion from 0 with velocity 1 in the potential `slope |q - at|`, `at > 0`: a sequence of parabolas.
 fn over_kink(at: f64, slope: f64, span: f64) -> PhasePoint<1> {
     let (mut t, mut x, mut v) = (0.0, -at, 1.0f64);
     loop {
-        // On this side the force is towards 0; it is left when the parabola is back, at the time of the later root.
+        // On this side of the kink the force points towards it. The particle leaves the side when its parabola returns
+        // to the kink, at the later root.
         let side = if x == 0.0 { v.signum() } else { x.signum() };
         let force = -side * slope;
         let (speed, height) = (side * v, side * x);
@@ -115,7 +118,7 @@ fn over_kink(at: f64, slope: f64, span: f64) -> PhasePoint<1> {
     }
 }
 
-/// From 0 with velocity 1 over a jump of the potential: slower beyond, or back.
+/// The motion from 0 with velocity 1 over a jump of the potential: with another velocity beyond the jump, or reflected.
 fn over_jump(at: f64, height: f64, span: f64) -> PhasePoint<1> {
     let (t, energy) = (at, 0.5 - height);
     let v = if energy > 0.0 { (2.0 * energy).sqrt() } else { -1.0 };
@@ -156,7 +159,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     ] {
         let of = || tallies.iter().filter(|((who, thin, _), _)| (*who, *thin) == (by, narrow)).map(|(_, tally)| tally);
         let all: usize = of().flat_map(|tally| tally.values()).sum();
-        // A quick run has none that narrow.
+        // A quick run has no features that narrow.
         if all > 0 {
             report.at_most(&format!("{what}, {by}: of {all} wrong in silence"), bad(of()), 0.0)?;
         }
@@ -172,7 +175,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     report.table(&["what", "by", "width", "worth", "error"], rows)
 }
 
-/// Claims that are true at the start and false later, and true claims beside the border of a domain.
+/// Claims of structure that are true at the start and false later, and true claims near the border of a domain.
 fn claims(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<Vec<Vec<String>>, Failure> {
     let all = |system: Formula<1>, change: fn(&mut Structure)| {
         let mut claims = contact_geom::Lagrangian::<1>::structure(&system);
@@ -200,14 +203,14 @@ fn claims(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<Vec<Vec<St
     let mut lines = Vec::new();
     let mut tallies = Vec::new();
     for (name, system) in lies {
-        // Fast enough for the wall.
+        // Fast enough to reach the wall.
         let start = VelocityPoint::new([0.4], [1.6], 0.3);
         let problem = Problem { system, t0: 0.0, start, span: 10.0 };
         let honest = Problem { system: Formula { claims: None, ..system }, ..problem };
         let Ok(truth) = honest.exact_in(2000) else { continue };
         let mut tally = Tally::new();
         for integrator in FAMILIES.into_iter().filter(|i| i.check(&system).is_ok()) {
-            // An integrator that takes no notice of the claim is as right as without it.
+            // An integrator that does not use the claim is as accurate as without it.
             let end = problem.by(integrator, 400);
             let bound = match honest.by(integrator, 400) {
                 End::Whole(x) => (2.0 * distance(&x, &truth, 0.0)).max(1e-3),
@@ -227,7 +230,7 @@ fn claims(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<Vec<Vec<St
         tallies.push(tally);
     }
     report.at_most("claims that are false later: runs wrong in silence", bad(&tallies), 0.0)?;
-    // True claims at the border of the domain of L.
+    // True claims near the border of the domain of L.
     let mut refused = 0;
     for q in [0.0, 0.9, 0.99, 0.999, -0.999] {
         let system = Formula { feature: Feature::Domain, rate: Rate::Constant(-0.1), ..Formula::<1>::FREE };
@@ -262,7 +265,7 @@ mod tests {
             let height = if x.q[0] > 2.0 { 0.3 } else { 0.0 };
             assert!((0.5 * x.p[0] * x.p[0] + height - 0.5).abs() < 1e-12, "{span}: {x:?}");
         }
-        // Thrown back.
+        // Reflected.
         assert_eq!(over_jump(2.0, 0.6, 3.0), PhasePoint::new([1.0], [-1.0], 0.0));
     }
 }

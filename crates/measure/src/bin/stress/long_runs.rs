@@ -1,4 +1,4 @@
-//! Runs as long as anyone takes: a thousand million steps against closed forms, and decay through subnormal numbers to zero.
+//! Very long runs: 1e9 steps compared with closed forms, and decay through subnormal numbers to zero.
 
 use crate::formula::{Force, Formula};
 use crate::motion::{FAMILIES, Problem, distance};
@@ -21,7 +21,7 @@ const DRIVE: f64 = 0.5;
 /// The drag of the driven oscillator.
 const GAMMA: f64 = -1.0 / 64.0;
 
-/// A motion that goes on and on.
+/// A long run with a known solution.
 struct Long {
     name: &'static str,
     system: Formula<1>,
@@ -29,13 +29,15 @@ struct Long {
     /// The steps of a full run.
     steps: usize,
     truth: fn(f64) -> PhasePoint<1>,
-    /// Its error may be this many roundings times the square root of the number of steps that count.
+    /// The number of steps whose rounding errors are still present, for a number of steps taken; the bound on the error
+    /// grows as its square root.
     remembered: fn(f64) -> f64,
-    /// The frequency of its drive: a time is a double, and the phase of the drive is rounded with it.
+    /// The frequency of the drive, whose phase is rounded together with the time.
     frequency: f64,
 }
 
-/// The damped oscillator from `(1, 0)`, for a weak drag: the angle `sqrt(1 - g^2/4) t` as t less a small angle, each exact.
+/// The weakly damped oscillator from `(1, 0)`. The angle `sqrt(1 - g^2/4) t` is the difference of t and a small angle,
+/// each of which is exact.
 fn damped(t: f64) -> PhasePoint<1> {
     let half = 0.5 * WEAK;
     let slow = 0.5 * half * half * t;
@@ -46,7 +48,7 @@ fn damped(t: f64) -> PhasePoint<1> {
     PhasePoint::new([size * (cos - half * sin)], [-size * sin], 0.0)
 }
 
-/// The driven oscillator `q'' = -q + g q' + cos(w t)` when its start is forgotten.
+/// The driven oscillator `q'' = -q + g q' + cos(w t)` after its initial state has decayed.
 fn driven(t: f64) -> PhasePoint<1> {
     let (a, b) = (1.0 - DRIVE * DRIVE, -GAMMA * DRIVE);
     let size = a * a + b * b;
@@ -56,7 +58,7 @@ fn driven(t: f64) -> PhasePoint<1> {
 
 fn long_runs() -> [Long; 3] {
     let forced = Formula { force: Force::Swinging { size: 1.0, frequency: DRIVE }, ..Formula::oscillator(GAMMA) };
-    // What is older than 1/|gamma| is forgotten.
+    // Rounding errors older than 1/|gamma| have decayed.
     let memory: fn(f64) -> f64 = |_| 1.0 / (GAMMA.abs() * H);
     [
         Long {
@@ -89,13 +91,13 @@ fn long_runs() -> [Long; 3] {
     ]
 }
 
-/// The roundings of a step whose sum may be seen: some stages, and the sums that end a step.
+/// The number of rounding errors of a step that may add up: those of some stages, and of the sums that end a step.
 const ROUNDINGS: f64 = 16.0;
 
 pub fn run(report: &mut Report) -> Result<(), Failure> {
     let (all, quick) = (long_runs(), report.quick);
     let clock = Instant::now();
-    // The errors after powers of two of steps, seen on the way.
+    // The errors after numbers of steps that double, recorded along the run.
     let found = parallel(&report.bar, all.len(), |i| -> Result<Vec<(f64, f64, f64)>, Failure> {
         let Long { system, integrator, steps, truth, remembered, frequency, .. } = &all[i];
         let steps = if quick { steps / 2000 } else { *steps };
@@ -161,9 +163,10 @@ fn start_of(truth: fn(f64) -> PhasePoint<1>) -> VelocityPoint<1> {
     VelocityPoint { q, v: p, z: 0.0 }
 }
 
-/// Each family on an oscillator that decays to nothing: the error while it is a number, zero in the end, and as fast as before.
+/// Each family on an oscillator that decays to zero: the error while the state is a normal number, zero at the end, and
+/// no slower steps.
 fn decays(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
-    // Half a time unit halves it nearly: at t = 2000 nothing is left.
+    // The amplitude decays as e^(-t/2): at t = 2000 it is below the smallest double.
     let (gamma, h, half) = (-1.0, H, 8000);
     let (mut left, mut broken, mut slower) = (0.0, 0, Vec::new());
     for integrator in FAMILIES {
@@ -184,7 +187,7 @@ fn decays(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
             if part == 1 && integrator.order() >= 16 {
                 let exact = HarmonicOscillator { gamma }.solution(250.0, &problem.start);
                 let error = distance(&stepper.state(), &PhasePoint { q: exact.q, p: exact.v, z: exact.z }, 0.0);
-                // A random walk of relative errors, and the rounding of the closed form's phase.
+                // A random walk of relative rounding errors, and the rounding of the phase of the closed form.
                 let bound = ROUNDINGS * f64::EPSILON * (2000.0f64.sqrt() + 250.0);
                 let name = format!("decayed to {:.0e} by {integrator}", exact.q.amax());
                 report.at_most(&format!("{name}: error of what is left"), error, bound)?;

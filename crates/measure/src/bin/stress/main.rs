@@ -1,17 +1,17 @@
-//! The library under stress: what no tame motion shows.
+//! Stress test of the library's numerics on extreme problems.
 //!
 //! ```text
 //! cargo run --release --bin stress [-- --case NAME|all --quick --out DIR]
 //! ```
 //!
-//! Ten cases attack the numerics where they are weakest: the growth of round-off, runs of 1e9 steps, strong damping, tiny and huge
-//! numbers, singularities, things hidden between steps, chaos, conformality, solvers with poor starts, and whether an accuracy that
-//! is asked for is kept. Each figure has a bound. No result may be wrong in silence: a run that is marked, halted or refused is
-//! no failure, one that is completed and wrong is.
+//! Ten cases test the numerics where failures are most likely: growth of round-off, runs of 1e9 steps, strong damping,
+//! tiny and huge numbers, singularities, features hidden between steps, chaos, conformality, solvers with poor initial
+//! guesses, and whether a requested accuracy is kept. Each figure has a bound. A run that is flagged as unresolved,
+//! stopped or refused is not a failure; a run that is completed without such a report and is wrong is one.
 //!
-//! Writes a table of each case, diagrams of those with a shape, `verdicts.csv` and `stability_tables.md`. The same bytes in every
-//! run: times are printed, not written. Ends with 1 if a figure is above its bound, with 2 if a name is unknown or the output
-//! cannot be written.
+//! Writes a table of each case, diagrams of some, `verdicts.csv` and `stability_tables.md` into `--out`. The CSV files
+//! contain no measured times, so that they are the same in every run. The exit code is 1 if a figure is above its
+//! bound, and 2 if a name is unknown or the output cannot be written.
 
 mod accuracy;
 mod chaos;
@@ -39,24 +39,24 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Attacks the numerics of the library where they are weakest.
+/// Tests the numerics of the library on extreme problems.
 #[derive(Parser)]
 struct Arguments {
     /// The cases, separated by commas.
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "all")]
     case: Vec<String>,
-    /// Short forms of all cases, for a minute instead of half an hour.
+    /// Runs short forms of all cases: one minute instead of half an hour.
     #[arg(long)]
     quick: bool,
     /// The directory for tables and figures; created where it does not exist.
     #[arg(long, value_name = "DIR", default_value = "out/stress")]
     out: PathBuf,
-    /// Makes one call that may never end, for the case that watches it from outside.
+    /// Makes one call that may not return; the case `solvers` runs it in a process of its own.
     #[arg(long, value_name = "CALL", hide = true)]
     probe: Option<String>,
 }
 
-/// A case: its name, what it is about, and what it does.
+/// A case: its name, its title, and the function that runs it.
 type Case = (&'static str, &'static str, fn(&mut Report) -> Result<(), Failure>);
 
 const CASES: [Case; 10] = [
@@ -88,7 +88,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = Directory::create(&arguments.out)?;
     let style = ProgressStyle::with_template("{msg:>14} {bar:30} {pos}/{len}");
     let bar = ProgressBar::new(1).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    // A panic that a case provokes is a finding of it; one line is enough.
+    // A panic that a case provokes is part of its result; one line on stderr suffices.
     let above = bar.clone();
     std::panic::set_hook(Box::new(move |panic| above.suspend(|| eprintln!("note: {panic}"))));
     let mut report = Report::new(out, arguments.quick, bar);

@@ -1,4 +1,4 @@
-//! Runs, what is true of them, and what to call their ends.
+//! Runs, their reference solutions, and the classification of their outcomes.
 
 use crate::formula::Formula;
 use contact_geom::nalgebra::SVector;
@@ -23,44 +23,45 @@ pub struct Problem<const N: usize> {
     pub span: f64,
 }
 
-/// The same for the library.
+/// The same problem as a type of the library.
 pub type Motion<'a, const N: usize> = discrete_herglotz::Problem<'a, Formula<N>, N>;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum End<const N: usize> {
-    /// At the end of the span, with nothing said against it.
+    /// At the end of the span, without any report of a failure.
     Whole(PhasePoint<N>),
-    /// At the end of the span, with a step that is marked as one that does not resolve the motion.
+    /// At the end of the span, with a step that is flagged as unresolved.
     Marked(PhasePoint<N>),
-    /// Before.
+    /// Before the end of the span, by a failed step.
     Halted(StepError),
-    /// It did not begin.
+    /// Not started: the input was refused.
     Refused(InputError),
     /// It panicked.
     Panicked,
 }
 
-/// What an end is worth.
+/// The classification of an outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Worth {
     /// Within the bound.
     Right,
-    /// Not, though each step resolves the motion: many small errors of a method of low order, which is the choice of the step.
+    /// Above the bound although each step resolves the motion: the accumulated error of a method of low order, for
+    /// which the choice of the step is responsible.
     Coarse,
-    /// Not, and said so.
+    /// Flagged as unresolved. This outcome and the two below are reported failures, whatever the error.
     Marked,
     Halted,
     Refused,
-    /// Not, and nothing was said: what must not be.
+    /// Above the bound without any report, which must not happen.
     Wrong,
-    /// A result with a NaN or an infinity in it.
+    /// A result that contains a NaN or an infinity.
     NotANumber,
     Panicked,
 }
 
 impl Worth {
-    /// Whether it must never happen.
+    /// Whether the outcome must never occur.
     pub fn is_bad(self) -> bool {
         matches!(self, Worth::Wrong | Worth::NotANumber | Worth::Panicked)
     }
@@ -80,7 +81,7 @@ impl Worth {
 }
 
 impl<const N: usize> End<N> {
-    /// The error of the state against the truth, by [`distance`].
+    /// The error of the final state against the reference, by [`distance`].
     pub fn error(&self, truth: &PhasePoint<N>, scale: f64) -> f64 {
         match self {
             End::Whole(state) | End::Marked(state) => distance(state, truth, scale),
@@ -88,7 +89,7 @@ impl<const N: usize> End<N> {
         }
     }
 
-    /// What it is worth where the error may be at most a bound.
+    /// The classification of the outcome for a bound on the error.
     pub fn worth(&self, truth: &PhasePoint<N>, scale: f64, bound: f64) -> Worth {
         match self {
             End::Whole(state) | End::Marked(state) if !ChartVector::from(*state).is_finite() => Worth::NotANumber,
@@ -102,7 +103,7 @@ impl<const N: usize> End<N> {
     }
 }
 
-/// The norm of a vector whose entries may be as small or as large as numbers are.
+/// The 2-norm of a vector, without overflow or underflow of the squares.
 pub fn norm(entries: &[f64]) -> f64 {
     let size = contact_geom::max_abs_or_nan(entries.iter().copied());
     if size > 0.0 && size.is_finite() {
@@ -112,7 +113,7 @@ pub fn norm(entries: &[f64]) -> f64 {
     }
 }
 
-/// The 2-norm of the error of (q, p), relative to the truth's or to a scale that is larger.
+/// The 2-norm of the error of (q, p), relative to the norm of the reference or to `scale`, whichever is larger.
 pub fn distance<const N: usize>(state: &PhasePoint<N>, truth: &PhasePoint<N>, scale: f64) -> f64 {
     let entries = |f: &dyn Fn(usize) -> f64| (0..2 * N).map(f).collect::<Vec<_>>();
     let (found, true_one) = (ChartVector::from(*state), ChartVector::from(*truth));
@@ -122,34 +123,34 @@ pub fn distance<const N: usize>(state: &PhasePoint<N>, truth: &PhasePoint<N>, sc
     if error == 0.0 { 0.0 } else { error / size.max(scale) }
 }
 
-/// The outcome of a call that must not panic.
+/// The result of a call, or `None` if it panics.
 pub fn caught<T>(call: impl FnOnce() -> T) -> Option<T> {
     catch_unwind(AssertUnwindSafe(call)).ok()
 }
 
 impl<const N: usize> Problem<N> {
-    /// The state at the start.
+    /// The initial state.
     pub fn state(&self) -> PhasePoint<N> {
         legendre(&self.system, self.t0, &self.start)
     }
 
-    /// It for the library, which may refuse its start.
+    /// The problem for the library, which may refuse the initial values.
     pub fn motion(&self) -> Result<Motion<'_, N>, InputError> {
         Motion::new(&self.system, self.t0, self.start)
     }
 
-    /// Where its runs end.
+    /// The end of the runs.
     pub fn end(&self) -> Until {
         Until::Time(self.t0 + self.span)
     }
 
-    /// The run with a number of steps of one integrator.
+    /// The outcome of a run with a number of steps of one integrator.
     pub fn by(&self, integrator: AnyIntegrator, count: usize) -> End<N> {
         self.run(|motion| motion.by(integrator).steps(Steps::Count(count)))
     }
 
-    /// What a run with fixed steps is worth, and its error: an error of order one in silence is a wrong result where a step of it
-    /// has such an error by itself.
+    /// The classification of a run with fixed steps, and its error. An error of order one without a report is coarse if
+    /// every step has a smaller local error, and wrong otherwise.
     pub fn worth(&self, integrator: AnyIntegrator, count: usize, truth: &PhasePoint<N>, scale: f64) -> (Worth, f64) {
         let end = self.by(integrator, count);
         let (worth, error) = (end.worth(truth, scale, ORDER_ONE), end.error(truth, scale));
@@ -158,7 +159,8 @@ impl<const N: usize> Problem<N> {
         (if coarse { Worth::Coarse } else { worth }, error)
     }
 
-    /// The largest error of a step of a run, each from where it started; `None` where the exact motion is not known.
+    /// The largest local error of a run, where each step is compared with the exact motion from its own start; `None`
+    /// where the exact motion is not known.
     fn local_error(&self, integrator: AnyIntegrator, count: usize, scale: f64) -> Option<f64> {
         let motion = self.motion().ok()?;
         let plan = motion.by(integrator).steps(Steps::Count(count)).plan(self.end()).ok()?;
@@ -177,12 +179,12 @@ impl<const N: usize> Problem<N> {
         Some(worst)
     }
 
-    /// The run to an accuracy, with the integrator that a run takes where none is named.
+    /// The outcome of a run to an accuracy, with the integrator that a run takes by default.
     pub fn to(&self, accuracy: f64) -> End<N> {
         self.run(|motion| motion.accuracy(accuracy))
     }
 
-    /// The end of a run.
+    /// The outcome of a run.
     fn run(&self, run_of: impl for<'p> FnOnce(&'p Motion<'p, N>) -> Run<'p, 'p, Formula<N>, N>) -> End<N> {
         match caught(|| run_of(&self.motion()?).run(self.end())) {
             None => End::Panicked,
@@ -191,13 +193,13 @@ impl<const N: usize> Problem<N> {
         }
     }
 
-    /// The end of the motion by the exact flow, in one go.
+    /// The final state by the exact flow, in one call.
     pub fn exact(&self) -> Result<PhasePoint<N>, ExactError<N>> {
         self.exact_in(1)
     }
 
-    /// The end of the motion by the exact flow, started anew in each of so many equal parts of the span: nothing in it is longer
-    /// than a part.
+    /// The final state by the exact flow, restarted in each of `parts` equal parts of the span, so that no step of the
+    /// flow is longer than a part.
     pub fn exact_in(&self, parts: usize) -> Result<PhasePoint<N>, ExactError<N>> {
         let (mut x, mut t) = (self.start, self.t0);
         for part in 1..=parts {
@@ -209,7 +211,7 @@ impl<const N: usize> Problem<N> {
     }
 }
 
-/// The end that an outcome tells of.
+/// Converts an outcome of the library.
 pub fn end_of_outcome<const N: usize>(outcome: &Outcome<N>) -> End<N> {
     let state = outcome.state();
     match outcome.status {
@@ -236,7 +238,7 @@ impl<const N: usize, const D: usize> ODE<f64, [f64; D]> for Equations<'_, N> {
     }
 }
 
-/// The end of a motion by the dop853 of the crate differential-equations; `None` where it gives up. `D = 2 N + 1`.
+/// The final state by dop853 of the crate differential-equations; `None` where it fails. `D = 2 N + 1`.
 pub fn dop853<const N: usize, const D: usize>(
     problem: &Problem<N>,
     tolerance: f64,
@@ -254,7 +256,7 @@ pub fn dop853<const N: usize, const D: usize>(
     Some(legendre(system, t0 + span, &end))
 }
 
-/// The same, started anew in each of so many equal parts of the span.
+/// The same, restarted in each of `parts` equal parts of the span.
 pub fn dop853_in<const N: usize, const D: usize>(
     problem: &Problem<N>,
     parts: usize,
@@ -270,7 +272,8 @@ pub fn dop853_in<const N: usize, const D: usize>(
     Some(x)
 }
 
-/// A few integrators of every kind: a rule, splittings, a composition, Gauss methods from low to high order.
+/// A few integrators of every kind: discrete Lagrangians, splittings, a composition, Gauss methods of low to high
+/// order.
 pub const FAMILIES: [AnyIntegrator; 9] = [
     AnyIntegrator::Discrete(Method::Midpoint),
     AnyIntegrator::Discrete(Method::Trapezoidal),

@@ -1,4 +1,5 @@
-//! Near singularities: of W, of Kepler's centre, of charts, of light, of time zero, of sigma_d, of conjugate points.
+//! Motions near singularities: an ill-conditioned W, Kepler's centre, the poles of a chart, the speed of light, t = 0,
+//! sigma_d = 0, and conjugate points.
 
 use crate::damping::{Tally, bad};
 use crate::formula::{Feature, Formula, Kinetic, Rate, Smooth};
@@ -54,7 +55,7 @@ impl Table {
 
 type Points = Vec<(f64, f64)>;
 
-/// Two masses with a common frequency, whose matrix has any condition: each coordinate is an oscillator of its own.
+/// Two masses with a common frequency and a mass matrix of any condition: each coordinate is an oscillator of its own.
 fn mass_condition(report: &mut Report, table: &mut Table) -> Result<Points, Failure> {
     let gamma = -0.1;
     let (mut points, mut refused, mut worst) = (Vec::new(), 0, 0.0);
@@ -99,12 +100,12 @@ fn mass_condition(report: &mut Report, table: &mut Table) -> Result<Points, Fail
         }
     }
     report.at_most("W of condition 1e2 .. 1e10: runs that are refused or marked", f64::from(refused), 0.0)?;
-    // A rounding of the momentum in each of 64 steps, through the inverse of W.
+    // One rounding error of the momentum in each of 64 steps, amplified by the inverse of W.
     report.at_most("the same: error of Gauss over the condition", worst, 64.0 * f64::EPSILON)?;
     Ok(points)
 }
 
-/// One revolution from the apocentre of ever thinner orbits.
+/// One revolution from the apocentre, with increasing eccentricity.
 fn eccentric(report: &mut Report, table: &mut Table) -> Result<Points, Failure> {
     let system = Formula::<2>::kepler(0.0);
     let (mut points, mut kept, mut worst) = (Vec::new(), 0, 0.0);
@@ -137,7 +138,8 @@ fn eccentric(report: &mut Report, table: &mut Table) -> Result<Points, Failure> 
         worst = max_or_nan(worst, error * (1.0 - e));
     }
     report.at_most("a revolution with e = 0 .. 0.9999, to 1e-6: above 1e-5", f64::from(kept), 0.0)?;
-    // The passage multiplies a rounding of the velocity at the centre, which is 1/sqrt(1 - e) times that of the orbit, likewise.
+    // A rounding error of the velocity at the centre is 1/sqrt(1 - e) times that on the orbit, and the passage
+    // amplifies it by the same factor.
     report.at_most(
         "gauss_8 with a time transformation, e = 0 .. 0.9999: error times 1 - e",
         worst,
@@ -146,11 +148,11 @@ fn eccentric(report: &mut Report, table: &mut Table) -> Result<Points, Failure> 
     Ok(points)
 }
 
-/// From rest into the centre, where no motion goes on: whatever is completed is wrong.
+/// From rest into the centre, where the motion ends: every completed run is wrong.
 fn fall(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     let start = VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0);
     let problem = Problem { system: Formula::<2>::kepler(-0.01), t0: 0.0, start, span: 3.0 };
-    // Nothing is near it.
+    // No result is close to this state.
     let exact = PhasePoint::new([1e9, 1e9], [1e9, 1e9], 0.0);
     for (integrator, count) in FAMILIES.into_iter().flat_map(|i| [3, 16, 100, 1000].map(|n| (i, n))) {
         let end = problem.by(integrator, count);
@@ -160,7 +162,7 @@ fn fall(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     report.at_most("a fall into the centre by the exact flow and to an accuracy: that go on", f64::from(through), 0.0)
 }
 
-/// Past a pole of the sphere's chart: a great circle, whose longitude turns round all at once.
+/// Past a pole of the chart of the sphere: a great circle, on which the longitude changes abruptly.
 fn poles(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     let system = Formula::<2> { kinetic: Kinetic::Sphere, ..Formula::FREE };
     let mut kept = 0;
@@ -196,7 +198,7 @@ fn poles(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     report.at_most("past a pole, to 1e-6: above 1e-5", f64::from(kept), 0.0)
 }
 
-/// Ever faster relativistic oscillators: the velocity is 1 but for a moment at each turn.
+/// Relativistic oscillators of increasing speed: the speed is close to 1 except near the turning points.
 fn light(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     let smooth = Smooth { spring: 1.0, ..Smooth::default() };
     let system = Formula::<1> { kinetic: Kinetic::Relativistic, smooth, rate: Rate::Constant(-0.01), ..Formula::FREE };
@@ -210,10 +212,11 @@ fn light(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
             let (worth, error) = problem.worth(integrator, count, &exact, 0.0);
             table.add("light", integrator, size, worth, error);
         }
-        // The same exact flow in one go.
+        // The exact flow in one call.
         worst = max_or_nan(worst, problem.exact().map_or(f64::NAN, |x| distance(&x, &exact, 0.0)));
     }
-    // Each of 64 parts starts from a rounded velocity, and W = (1 - v^2)^(-3/2) makes up to 8000 roundings of a momentum of 20 of it.
+    // Each of 64 parts starts from a rounded velocity, which W = (1 - v^2)^(-3/2), up to 8000, turns into an error of
+    // 400 eps relative to a momentum of 20.
     report.at_most(
         "a relativistic oscillator up to 1 - v = 1e-5: the exact flow against itself in parts",
         worst,
@@ -221,13 +224,13 @@ fn light(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     )
 }
 
-/// Lane and Emden's drag 2/t from t = 0, where there is none, and from soon after.
+/// The Lane-Emden equation with drag 2/t from t = 0, where the drag is not defined, and from later times.
 fn time_zero(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     let system = Formula::<1> { feature: Feature::Power { n: 1 }, rate: Rate::OverTime(-2.0), ..Formula::FREE };
     let mut begun = 0;
     for integrator in FAMILIES {
         let start = VelocityPoint::new([1.0], [0.0], 0.0);
-        // What steps from there by luck has the closed form to be right by; the rest must be refused.
+        // A run that starts at t = 0 must agree with the closed form; otherwise it must be refused.
         let problem = Problem { system, t0: 0.0, start, span: 3.0 };
         let exact = LaneEmden { n: 1 }.solution(3.0).map(|x| PhasePoint { q: x.q, p: x.v, z: x.z });
         let exact = exact.unwrap_or(problem.state());
@@ -249,7 +252,7 @@ fn time_zero(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     report.at_most("a drag 2/t from t = 0: families that begin and are wrong", f64::from(begun), 0.0)
 }
 
-/// A rule that is explicit in z with `sigma_d = 1 + h gamma` ever closer to zero, and beyond.
+/// Quadrature rules with `1 + h gamma`, which is sigma_d for rules explicit in z, close to zero and negative.
 fn vanishing_sigma(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     let mut beyond = 0;
     for method in Method::RULES {
@@ -270,7 +273,7 @@ fn vanishing_sigma(report: &mut Report, table: &mut Table) -> Result<(), Failure
     report.at_most("rules explicit in z with sigma_d <= 0: that go on", f64::from(beyond), 0.0)
 }
 
-/// The velocity through two points, ever closer to conjugate ones.
+/// The initial velocity of the motion through two points that are almost conjugate.
 fn conjugate_points(report: &mut Report, table: &mut Table) -> Result<(), Failure> {
     let system = Formula::<1>::oscillator(0.0);
     let (mut worst, mut silent) = (0.0, 0);
@@ -281,7 +284,7 @@ fn conjugate_points(report: &mut Report, table: &mut Table) -> Result<(), Failur
         let x = VelocityPoint::new([0.3], [1.7], 0.0);
         let end = HarmonicOscillator { gamma: 0.0 }.solution(h, &x);
         let found = exponential.retract_near(0.0, &DiscretePoint { q0: x.q, q1: end.q, z0: 0.0 }, &x.v);
-        // Roundings of two positions and of the angle, through 1/sin h.
+        // Rounding errors of two positions and of the angle, amplified by 1/sin h.
         let condition = (2.0 + 2.0 * h) / (h.sin().abs());
         let (worth, error) = match found {
             Ok(found) => {

@@ -4,7 +4,7 @@ use indicatif::ProgressBar;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// The results of the tasks with the numbers from 0, in their order, whoever has done them.
+/// The results of the tasks with the indices 0 to `count - 1`, in the order of the indices.
 pub fn parallel<T: Send>(bar: &ProgressBar, count: usize, task: impl Fn(usize) -> T + Sync) -> Vec<T> {
     bar.set_position(0);
     bar.set_length(count as u64);

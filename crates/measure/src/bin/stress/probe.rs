@@ -1,4 +1,4 @@
-//! Calls that may never end or bring the process down, each in a process of its own.
+//! Calls that may not return or may crash the process, each made in a process of its own.
 
 use crate::formula::{Formula, Kinetic, Rate, Smooth};
 use crate::motion::Problem;
@@ -13,11 +13,11 @@ use std::time::{Duration, Instant};
 /// How a call ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// By itself, with this to say.
+    /// Normally, with this output.
     Said(String),
     /// By a panic or a signal.
     Crashed,
-    /// Not in time.
+    /// The call did not end within the time limit.
     Never,
 }
 
@@ -31,7 +31,7 @@ impl Ended {
     }
 }
 
-/// A call by its name, and the first words of what is right to answer.
+/// A call: its name, the first words of the right answers, and the function.
 pub type Probe = (&'static str, &'static [&'static str], fn() -> String);
 
 /// The calls.
@@ -53,7 +53,7 @@ pub const PROBES: [Probe; 15] = [
     ("a start at rest in a minimum, to 1e-9", &["right"], at_rest),
 ];
 
-/// The answer of the call with a name.
+/// The answer of the call with a name; `None` if there is no such call.
 pub fn answer(name: &str) -> Option<String> {
     PROBES.iter().find(|(known, ..)| *known == name).map(|(.., call)| call())
 }
@@ -84,7 +84,7 @@ pub fn ask(name: &str, patience: Duration) -> std::io::Result<Ended> {
     }
 }
 
-/// What a run came to, with a row for each so many steps where that is asked for.
+/// Runs a problem and describes the outcome; with a row every `stride` steps, if requested.
 fn run<const N: usize>(
     problem: &Problem<N>,
     steps: Option<Steps>,
@@ -131,7 +131,7 @@ fn to(system: Formula<1>, span: f64) -> String {
     said(run(&Problem { system, span, ..oscillator() }, None, None, None))
 }
 
-/// `v q - q^2/2 - 0.1 z`.
+/// `L = v q - q^2/2 - 0.1 z`.
 fn singular(integrator: AnyIntegrator) -> String {
     let smooth = Smooth { spring: 1.0, ..Smooth::default() };
     let system = Formula { kinetic: Kinetic::Singular, smooth, rate: Rate::Constant(-0.1), ..Formula::FREE };
@@ -158,7 +158,7 @@ fn relativistic() -> String {
     }
 }
 
-/// Beside Kepler's centre a radial clock runs at 1e-300.
+/// Near Kepler's centre the rate dt/dtau of a radial time transformation is 1e-300.
 fn standing_clock() -> String {
     let system = Formula::<2>::kepler(0.0);
     let start = VelocityPoint::new([1e-200, 0.0], [0.0, 1e100], 0.0);
@@ -174,7 +174,7 @@ fn standing_clock() -> String {
     said(ended())
 }
 
-/// The end of the exact flow against a point, to some roundings.
+/// Compares the end of the exact flow with a point, to a few rounding errors.
 fn exact(system: Formula<1>, start: VelocityPoint<1>, span: f64, end: [f64; 2]) -> String {
     match herglotz_flow(&system, 0.0, &start, span) {
         Ok(motion) => {
@@ -185,7 +185,7 @@ fn exact(system: Formula<1>, start: VelocityPoint<1>, span: f64, end: [f64; 2]) 
     }
 }
 
-/// A double well with drag: at rest in a minimum long before the end.
+/// A double well with drag, which is at rest in a minimum long before the end.
 fn exact_to_rest() -> String {
     let smooth = Smooth { spring: -1.0, quartic: 1.0, ..Smooth::default() };
     let system = Formula { smooth, rate: Rate::Constant(-0.5), ..Formula::FREE };
@@ -195,14 +195,14 @@ fn exact_to_rest() -> String {
 fn exact_in_subnormals() -> String {
     let start = VelocityPoint::new([1e-310], [0.0], 0.0);
     match herglotz_flow(&Formula::<1>::oscillator(0.0), 0.0, &start, 10.0) {
-        // Numbers are 5e-324 apart there.
+        // Adjacent doubles of this size are 5e-324 apart.
         Ok(motion) if (motion.end.q[0] - 1e-310 * 10f64.cos()).abs() <= 1e-320 => "right".into(),
         Ok(motion) => format!("wrong: q = {:e}", motion.end.q[0]),
         Err(cause) => format!("refused: {cause}"),
     }
 }
 
-/// `v^2/2 - q^2/2 - z^2/2 + 1` as one with a linear potential: the drag grows with z, and the motion comes to rest.
+/// `v^2/2 - q^2/2 + q - z/2 - z^2/2`: the drag grows with z, and the motion comes to rest at `q = 1`.
 fn exact_to_fixed_point() -> String {
     let smooth = Smooth { spring: 1.0, linear: -1.0, ..Smooth::default() };
     let system = Formula { smooth, action: 1.0, rate: Rate::Constant(-0.5), ..Formula::FREE };

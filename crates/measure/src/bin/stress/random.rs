@@ -1,12 +1,14 @@
-//! Random numbers that depend on a place alone: the same in every run, on every machine, in any order of evaluation.
+//! Random numbers that depend only on a seed and an index: the same in every run, on every machine, in any order of
+//! evaluation.
 
-/// A stream of numbers for one problem of one case: the counter-based generator SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
+/// A stream of random numbers for one problem of one case, by the counter-based generator SplitMix64 (Steele, Lea and
+/// Flood, OOPSLA 2014).
 #[derive(Clone, Debug)]
 pub struct Random {
     state: u64,
 }
 
-/// The golden ratio's fraction, odd: the increment of the generator.
+/// The fractional part of the golden ratio as an odd integer: the increment of the generator.
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 fn mixed(x: u64) -> u64 {
@@ -16,7 +18,7 @@ fn mixed(x: u64) -> u64 {
 }
 
 impl Random {
-    /// The stream of the problem with an index, of the case that a seed stands for.
+    /// The stream of the problem with an index, in the case with a seed.
     pub fn new(seed: u64, index: usize) -> Self {
         Random { state: mixed(seed.wrapping_mul(STEP) ^ mixed(index as u64 + 1)) }
     }
@@ -26,27 +28,27 @@ impl Random {
         mixed(self.state)
     }
 
-    /// A number of `[0, 1)`.
+    /// A number in `[0, 1)`.
     pub fn fraction(&mut self) -> f64 {
         (self.next() >> 11) as f64 * (0.5 * f64::EPSILON)
     }
 
-    /// A number between two others.
+    /// A uniformly distributed number between two bounds.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.fraction()
     }
 
-    /// A number between two positive others, its logarithm evenly spread.
+    /// A number between two positive bounds whose logarithm is uniformly distributed.
     pub fn spread(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
     }
 
-    /// A whole number below `count`.
+    /// An integer below `count`.
     pub fn below(&mut self, count: usize) -> usize {
         (self.fraction() * count as f64) as usize
     }
 
-    /// Whether something of a probability happens.
+    /// True with the given probability.
     pub fn happens(&mut self, probability: f64) -> bool {
         self.fraction() < probability
     }
@@ -59,7 +61,7 @@ mod tests {
     #[test]
     fn streams_are_even_and_differ() {
         let mean: f64 = (0..4096).map(|i| Random::new(7, i).fraction()).sum::<f64>() / 4096.0;
-        // The deviation of a mean of n even numbers is 1 / sqrt(12 n) = 0.0045.
+        // The standard deviation of the mean of n uniform numbers is 1 / sqrt(12 n) = 0.0045.
         assert!((mean - 0.5).abs() < 0.02, "{mean}");
         let mut one = Random::new(7, 1);
         let mean: f64 = (0..4096).map(|_| one.fraction()).sum::<f64>() / 4096.0;

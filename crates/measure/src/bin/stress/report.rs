@@ -1,15 +1,16 @@
-//! What the cases find: figures with their bounds, tables, diagrams.
+//! Results of the cases: figures with their bounds, tables, diagrams.
 
 use contact_examples::{Directory, Failure, number, print};
 use indicatif::ProgressBar;
 
-/// A figure that must not be above a bound.
+/// A figure with its upper bound.
 struct Finding {
     case: &'static str,
     what: String,
     figure: f64,
     bound: f64,
-    /// Whether it is a ratio of times, which no two runs share: judged, and not written.
+    /// Whether it is a ratio of times, which differs from run to run: it is compared with its bound, but not written to
+    /// `verdicts.csv`.
     timed: bool,
 }
 
@@ -20,21 +21,21 @@ impl Finding {
     }
 }
 
-/// All findings of a run, and where they are written.
+/// All findings of a run, and the directory for them.
 pub struct Report {
     out: Directory,
     /// Whether the cases are to be short.
     pub quick: bool,
-    /// How far the case at work is.
+    /// The progress of the current case.
     pub bar: ProgressBar,
     case: &'static str,
     findings: Vec<Finding>,
     markdown: String,
 }
 
-/// A number as it is printed: short, and whole where it is a count.
+/// A number as it is printed: short, and as an integer where it is a count.
 pub fn short(x: f64) -> String {
-    // Without the sign of a zero.
+    // Adding zero removes the sign of a negative zero.
     if x == x.round() && x.abs() < 1e6 { format!("{:.0}", x + 0.0) } else { format!("{x:.2e}") }
 }
 
@@ -56,12 +57,12 @@ impl Report {
         self.bar.suspend(|| print(text))
     }
 
-    /// A figure with its bound.
+    /// Adds a figure with its bound.
     pub fn at_most(&mut self, what: &str, figure: f64, bound: f64) -> Result<(), Failure> {
         self.find(Finding { case: self.case, what: what.into(), figure, bound, timed: false })
     }
 
-    /// A ratio of times with its bound.
+    /// Adds a ratio of times with its bound.
     pub fn at_most_timed(&mut self, what: &str, figure: f64, bound: f64) -> Result<(), Failure> {
         self.find(Finding { case: self.case, what: what.into(), figure, bound, timed: true })
     }
@@ -74,22 +75,22 @@ impl Report {
         Ok(())
     }
 
-    /// A CSV file of the case.
+    /// Writes the CSV file of the case.
     pub fn table(&self, columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Result<(), Failure> {
         self.out.table(&format!("{}.csv", self.case), columns, rows)
     }
 
-    /// A figure of the case.
+    /// Writes the diagram of the case.
     pub fn figure(&self, svg: &str) -> Result<(), Failure> {
         self.out.text(&format!("{}.svg", self.case), svg)
     }
 
-    /// A figure of times, which no two runs share.
+    /// Writes a diagram of run times, which differ from run to run.
     pub fn timed_figure(&self, svg: &str) -> Result<(), Failure> {
         self.out.text(&format!("{}_times.svg", self.case), svg)
     }
 
-    /// A table for the page of figures.
+    /// Adds a table to `stability_tables.md`.
     pub fn markdown(&mut self, columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) {
         self.markdown += &format!("\n| {} |\n|{}\n", columns.join(" | "), "---|".repeat(columns.len()));
         for row in rows {
@@ -97,7 +98,7 @@ impl Report {
         }
     }
 
-    /// Writes what all cases share; fails where a figure is above its bound.
+    /// Writes the files of all cases together; fails if a figure is above its bound.
     pub fn finish(self) -> Result<(), Failure> {
         let verdict = |finding: &Finding| if finding.passes() { "pass" } else { "fail" };
         self.out.table(

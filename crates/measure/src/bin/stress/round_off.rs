@@ -1,7 +1,9 @@
-//! How round-off grows: the error of what the motion conserves, over an ensemble of starts that differ in their last digits.
+//! Growth of round-off: the error of a quantity that the motion conserves, over an ensemble of initial values that
+//! differ in their last digits.
 //!
-//! Independent roundings make it grow as the square root of the number of steps (Brouwer, 1937). A systematic one, however
-//! small, makes it grow linearly: it shows as an exponent of 1, and as a mean over the ensemble that is not zero.
+//! Independent rounding errors make it grow as the square root of the number of steps (Brouwer, 1937). A systematic
+//! error, however small, makes it grow linearly, which shows as an exponent of 1 and as a nonzero mean over the
+//! ensemble.
 
 use crate::formula::{Formula, Rate};
 use crate::motion::Problem;
@@ -15,19 +17,19 @@ use contact_geom::systems::Radial;
 use contact_geom::{PhasePoint, Structure, VelocityPoint, legendre, max_abs_or_nan, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Gauss, InputError, Method, SplittingScheme, Stepper, Steps};
 
-/// The starts of an ensemble.
+/// The number of members of an ensemble.
 const STARTS: usize = 64;
 
-/// The largest exponent that a random walk is taken for.
+/// The largest exponent that counts as that of a random walk.
 const EXPONENT: f64 = 0.6;
 
-/// The mean of an ensemble may be this many times its standard error.
+/// The largest accepted mean of an ensemble, in units of its standard error.
 const SIGMAS: f64 = 3.0;
 
 /// The weak drag.
 const WEAK: f64 = -1e-12;
 
-/// The drag of mean zero: its size is small, for the energy not to swing by more than its own round-off where it is no invariant.
+/// The drag of mean zero. It is small, so that the energy varies little where it is not an invariant.
 const SWINGING: Rate = Rate::Swinging { size: 1e-6, frequency: 0.5 };
 
 #[derive(Clone, Copy, PartialEq)]
@@ -44,15 +46,15 @@ enum Drag {
     Swinging,
 }
 
-/// A method, with the structure that is claimed for it.
+/// A method, with the structure that is claimed for the Lagrangian.
 #[derive(Clone, Copy)]
 enum Way {
     By(AnyIntegrator),
-    /// Gauss collocation by its general route: nothing is claimed.
+    /// Gauss collocation by its general route: no structure is claimed.
     General(usize),
-    /// A splitting that is not told that the drag is linear.
+    /// A splitting without the claim that the drag is linear.
     ActionDriven(SplittingScheme),
-    /// Gauss collocation in the time of Kepler's clock.
+    /// Gauss collocation with a time transformation for Kepler's problem.
     TransformedGauss(usize),
 }
 
@@ -81,13 +83,14 @@ struct Ensemble {
     drag: Drag,
     way: Way,
     h: f64,
-    /// The power of two of the number of steps of a full run.
+    /// The exponent of two of the number of steps of a full run.
     power: u32,
-    /// Whether the truncation error is below round-off, or does not enter: then the mean has to vanish.
+    /// Whether a bias can be measured: the truncation error is below round-off or does not enter, so that the mean has
+    /// to vanish.
     has_bias: bool,
 }
 
-/// What an ensemble shows.
+/// The measured growth of the error in an ensemble.
 struct Growth {
     /// Number of steps, rms error and mean error.
     points: Vec<(f64, f64, f64)>,
@@ -95,12 +98,12 @@ struct Growth {
     exponent_error: f64,
     /// The mean at the end, in standard errors.
     sigmas: Option<f64>,
-    /// The mean a step.
+    /// The mean error per step.
     bias: f64,
 }
 
-/// The ensembles: every family of integrators on every motion and drag that it takes, with a step of which the truncation error
-/// is below round-off, or bounded by 1e-6 for those of order 2.
+/// The ensembles: every family of integrators on every motion and drag that it accepts. The truncation error of the
+/// step is below round-off, or bounded by 1e-6 for integrators of order 2.
 fn ensembles() -> Vec<Ensemble> {
     use Motion::{Kepler, Oscillator, Pendulum};
     let gauss = |stages| Way::By(AnyIntegrator::Gauss { stages });
@@ -110,7 +113,8 @@ fn ensembles() -> Vec<Ensemble> {
     let composed = Way::By(AnyIntegrator::Composition(Method::Midpoint, SplittingScheme::KAHAN_LI_8));
     let action = Way::ActionDriven(SplittingScheme::KAHAN_LI_8);
     let fine = 1.0 / 1024.0;
-    // The way, its power of two, and its steps on the oscillator, the pendulum and Kepler's orbit; 0 for none.
+    // The method, the exponent of two of its number of steps, and its step sizes on the oscillator, the pendulum and
+    // Kepler's orbit; 0 where it is not used.
     let table = [
         (midpoint, 16, [0.125, fine, fine]),
         (strang, 18, [0.125, fine, fine]),
@@ -128,8 +132,8 @@ fn ensembles() -> Vec<Ensemble> {
     for (way, power, steps) in table {
         for (motion, h) in [Oscillator, Pendulum, Kepler].into_iter().zip(steps).filter(|(_, h)| *h > 0.0) {
             for drag in [Drag::None, Drag::Weak, Drag::Swinging] {
-                // the time transformation is for autonomous motions, drag by f(z) for a steady f. Where there is no invariant, only the scatter is looked at, and only of
-                // methods that do not swing themselves.
+                // The time transformation requires an autonomous motion, and a drag f(z) a steady f. Where there is no
+                // invariant, only the scatter is measured, and only for methods whose own error does not oscillate.
                 let second = way.order() == 2 && motion != Oscillator;
                 let invariant = motion != Pendulum || drag != Drag::Swinging;
                 let steady = matches!(way, Way::TransformedGauss(_) | Way::ActionDriven(_));
@@ -167,11 +171,12 @@ impl Ensemble {
         [motion.into(), drag.into(), self.way.name()]
     }
 
-    /// The logarithm of the factor by which momenta have been contracted at a time, with its digits.
+    /// The logarithm of the factor by which the method contracts momenta until a time, to full precision.
     fn contraction(&self, t: f64) -> f64 {
         match self.rate() {
             Rate::Constant(rate) => rate * t,
-            // A rule takes the rate in the middle of each of its substeps: a sum over all, instead of the integral.
+            // A discrete Lagrangian takes the rate in the middle of each of its substeps, which gives a sum in place of
+            // the integral.
             Rate::Swinging { size, frequency } => {
                 let half = 0.5 * frequency * self.h;
                 let sum = match self.way {
@@ -185,13 +190,14 @@ impl Ensemble {
         }
     }
 
-    /// How far the starts are from each other. A rounding of a sum is decided by the digits of the term below the last digit of the
-    /// sum, and these must differ from start to start; but the swing of a method's own error must not.
+    /// The relative distance of the initial values. The rounding of a sum is decided by the digits of the term below
+    /// the last digit of the sum, and these must differ between the members; the oscillation of the truncation error
+    /// must not.
     fn apart(&self) -> f64 {
         if self.has_bias { 1e-9 } else { 1e-12 }
     }
 
-    /// The relative errors of the invariant at the sampled numbers of steps, one row for each start.
+    /// The relative errors of the invariant after the sampled numbers of steps, one row for each member.
     fn errors(&self, first: usize, starts: usize, samples: &[usize]) -> Result<Vec<Vec<f64>>, InputError> {
         match self.motion {
             Motion::Kepler => {
@@ -213,7 +219,7 @@ impl Ensemble {
                     (energy - rate * x.z) * (-self.contraction(t)).exp()
                 })
             }
-            // Two motions span an area, which contracts exactly as the step does, whatever its order.
+            // Two solutions span an area, which a step contracts exactly by its conformal factor, whatever its order.
             Motion::Oscillator => {
                 let system = Formula::<1> { rate: self.rate(), ..Formula::oscillator(0.0) };
                 let sides = [([1.0], [0.25]), ([-0.25], [1.0])].map(|(q, p)| VelocityPoint::new(q, p, 0.0));
@@ -245,7 +251,8 @@ impl Ensemble {
         Ok(states.iter().map(|run| relative(run.iter().map(|(t, x)| invariant(*t, x, rate(*t))))).collect())
     }
 
-    /// The states after the sampled numbers of steps, the start before them, from each start. The starts differ by their last digits.
+    /// The states of each member after the sampled numbers of steps, preceded by the initial state. The initial values
+    /// differ in their last digits.
     fn states<const N: usize>(
         &self,
         system: &Formula<N>,
@@ -270,7 +277,7 @@ impl Ensemble {
                     let mut states = vec![(0.0, stepper.state())];
                     let mut taken = 0;
                     for sample in samples {
-                        // A run that breaks off has no energy any more.
+                        // After a failed step, the positions and the invariant are NaN.
                         let ended = stepper.advance(sample - taken).is_err();
                         taken = *sample;
                         let gone = PhasePoint { q: SVector::from_element(f64::NAN), ..stepper.state() };
@@ -305,7 +312,7 @@ impl Ensemble {
     fn measure(&self, first: usize, samples: &[usize]) -> Result<Growth, InputError> {
         let mut errors = self.errors(first, STARTS, samples)?;
         if !self.has_bias {
-            // The truncation error is the same in all starts.
+            // The truncation error is the same for all members, and is subtracted.
             for k in 0..samples.len() {
                 let (middle, _) = mean(&errors.iter().map(|row| row[k]).collect::<Vec<_>>());
                 errors.iter_mut().for_each(|row| row[k] -= middle);
@@ -313,7 +320,7 @@ impl Ensemble {
         }
         let column = |rows: &[Vec<f64>], k: usize| rows.iter().map(|row| row[k]).collect::<Vec<f64>>();
         let fit = |rows: &[Vec<f64>]| {
-            // Two decades: before, the last digit of the energy hides the growth.
+            // Only the last two decades: before them, the last digit of the energy hides the growth.
             let last = samples.last().copied().unwrap_or(1);
             let points: Vec<(f64, f64)> = samples
                 .iter()
@@ -332,14 +339,16 @@ impl Ensemble {
                 .collect(),
             exponent: fit(&errors),
             exponent_error: mean(&parts).1,
-            // Of what all starts share, the factor of the contraction above all, the rounding is no scatter.
+            // Rounding errors that all members share, above all that of the contraction factor, do not show in the
+            // scatter.
             sigmas: self.has_bias.then(|| drift / error.hypot(f64::EPSILON)),
             bias: drift / samples[last] as f64,
         })
     }
 }
 
-/// The mean of the cosine of an angle that grows by `angle` in a step, at the middles of its substeps, over that of the step.
+/// The sum of `g cos(x)` over the substeps g of a scheme. Here x is the angle at the middle of the substep, measured
+/// from the middle of the step; it grows by `angle` in a step.
 fn middles(scheme: &SplittingScheme, angle: f64) -> f64 {
     let mut before = -0.5;
     let of = |g: &f64| {
@@ -364,7 +373,8 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
         let power = if quick { ensemble.power.min(if ensemble.power < 16 { 9 } else { 11 }) } else { ensemble.power };
         let samples: Vec<usize> = (3..=power).map(|k| 1 << k).collect();
         let growth = ensemble.measure(0, &samples)?;
-        // One mean in 400 is beyond three standard errors without any bias. One that has a bias is so again, with other starts.
+        // Without a bias, one mean in 400 is beyond three standard errors. With a bias, it is beyond them again for
+        // other initial values.
         let suspect = growth.sigmas.is_some_and(|s| s.is_nan() || s.abs() > SIGMAS);
         let again = if suspect { ensemble.measure(1 << 10, &samples)?.sigmas } else { growth.sigmas };
         Ok((growth, again))
@@ -382,7 +392,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
             let numbers = [number(ensemble.h), n.to_string(), number(*rms), number(*mean)];
             rows.push(names.iter().cloned().chain(numbers).collect());
         }
-        // The smaller of the two: a bias is in both.
+        // The smaller of the two values: a bias is present in both.
         let sigmas = growth.sigmas.zip(*again).map(|(a, b)| if a.abs() < b.abs() { a } else { b });
         let last = growth.points.last().map_or(f64::NAN, |p| p.1);
         let text = [
@@ -407,7 +417,7 @@ pub fn run(report: &mut Report) -> Result<(), Failure> {
     report.at_most("ensembles that were refused", f64::from(refused), 0.0)?;
     for way in &ways {
         let of = || worst.iter().filter(|(name, ..)| name == way);
-        // Below a half is as good as a half.
+        // A negative exponent counts as zero.
         let exponent = max_abs_or_nan(of().map(|(_, e, _)| if *e < 0.0 { 0.0 } else { *e }));
         report.at_most(&format!("{way}: largest exponent of the growth"), exponent, EXPONENT)?;
         let sigmas = max_abs_or_nan(of().filter_map(|(.., s)| *s));

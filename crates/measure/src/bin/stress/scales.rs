@@ -1,4 +1,4 @@
-//! Tiny and huge: steps, states and times over all the numbers that a double can be.
+//! Scales: very small and very large steps, states and times, over the range of doubles.
 
 use crate::damping::{Tally, bad};
 use crate::formula::{Force, Formula};
@@ -9,10 +9,10 @@ use contact_examples::{Failure, number};
 use contact_geom::systems::HarmonicOscillator;
 use contact_geom::{PhasePoint, VelocityPoint, max_or_nan};
 
-/// Powers of two from 3e-151 to 3e150: their squares, which z is, are still normal numbers.
+/// Exponents of two, for scales from 3e-151 to 3e150; their squares, the scales of z, are still normal numbers.
 const POWERS: [i32; 7] = [-500, -300, -100, 0, 100, 300, 500];
 
-/// A time as late as a nanosecond count of a second.
+/// A late initial time.
 const LATE: f64 = 1e9;
 
 pub fn run(report: &mut Report) -> Result<(), Failure> {
@@ -29,7 +29,8 @@ fn row(what: &str, by: &str, scale: f64, worth: &str, error: f64) -> Vec<String>
     vec![what.into(), by.into(), number(scale), worth.into(), number(error)]
 }
 
-/// A linear motion scaled by a power of two is the same motion scaled, digit by digit but for tolerances of solvers.
+/// A linear motion from a state that is scaled by a power of two is the scaled motion, digit by digit except for the
+/// tolerances of solvers.
 fn states(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let of = |scale: f64| Problem {
         system: Formula::oscillator(-0.1),
@@ -56,11 +57,11 @@ fn states(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failur
             worst = max_or_nan(worst, error);
         }
     }
-    // Some roundings for each of 64 steps.
+    // A few rounding errors in each of 64 steps.
     report.at_most("states scaled by 3e-151 .. 3e150: difference from the same motion unscaled", worst, 1e-13)
 }
 
-/// Steps so short that a step moves by less than a rounding: the sum of many must not lose them.
+/// Steps so short that their increments are close to the round-off of the state; a sum of many must not lose them.
 fn tiny_steps(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let (mut worst, steps) = (0.0, 1000);
     for h in [1e-12, 1e-10, 1e-8, 1e-6] {
@@ -70,7 +71,7 @@ fn tiny_steps(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
         for integrator in FAMILIES {
             let error = problem.by(integrator, steps).error(&exact, 0.0);
             rows.push(row("tiny_step", &integrator.to_string(), h, "-", error));
-            // A rounding a step, in substeps that are up to five times as many.
+            // One rounding error per substep, with up to five substeps per step.
             worst = max_or_nan(worst, error);
         }
     }
@@ -78,7 +79,7 @@ fn tiny_steps(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
     report.at_most("1000 steps of 1e-12 .. 1e-6: error, a random walk of roundings", worst, bound)
 }
 
-/// Steps that no method resolves are right by luck, or say so.
+/// Steps that are too long for any method: a run must be right by chance or report a failure.
 fn huge_steps(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let mut tally = Tally::new();
     for (name, system) in [("oscillator", Formula::oscillator(-0.01)), ("pendulum", Formula::pendulum(-0.01))] {
@@ -96,7 +97,8 @@ fn huge_steps(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
     report.at_most("steps of 3 to 1000 time units: runs wrong in silence", bad([&tally]), 0.0)
 }
 
-/// At t = 1e9 an autonomous motion is the same to the last digit, a driven one to the rounding of the time.
+/// From t0 = 1e9, an autonomous motion is the same to the last digit, and a driven one is accurate to the rounding of
+/// the time.
 fn late_times(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let start = VelocityPoint::new([1.0], [0.5], 0.0);
     let (mut moved, mut worst) = (0.0, 0.0);
@@ -111,7 +113,7 @@ fn late_times(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
 
         let force = Force::Swinging { size: 1.0, frequency: 0.5 };
         let system = Formula { force, ..Formula::pendulum(-0.1) };
-        // Fine steps for those of low order.
+        // Integrators of low order take finer steps.
         let problem = Problem { system, t0: LATE, start, span: 8.0 };
         let error =
             problem.by(integrator, if integrator.order() > 4 { 256 } else { 1 << 16 }).error(&problem.exact()?, 0.0);
@@ -119,11 +121,11 @@ fn late_times(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
         worst = max_or_nan(worst, error);
     }
     report.at_most("autonomous motions from t0 = 1e9: difference from t0 = 0", moved, 0.0)?;
-    // Times are rounded to eps t0, and with them the phase of the drive.
+    // Times, and with them the phase of the drive, are rounded to eps t0.
     report.at_most("driven motions from t0 = 1e9: error", worst, 4.0 * f64::EPSILON * LATE)
 }
 
-/// An accuracy holds for any size of the state and any length of the span.
+/// A requested accuracy is kept for any size of the state and any length of the span.
 fn accuracies(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let gamma = -0.1;
     let sizes = [1e-300, 1e-200, 1e-160, 1e-100, 1e-10, 1.0, 1e10, 1e100, 1e150];
@@ -136,7 +138,7 @@ fn accuracies(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
         let exact = HarmonicOscillator { gamma }.solution(span, &start);
         let exact = PhasePoint { q: exact.q, p: exact.v, z: exact.z };
         let end = problem.to(1e-9);
-        // A number below the normal ones has fewer digits than are asked for: to refuse is right.
+        // A subnormal number has fewer digits than requested, so that a refusal is right.
         let normal = norm(&[exact.q[0], exact.p[0]]) >= f64::MIN_POSITIVE;
         (end.worth(&exact, 0.0, 1e-8), end.error(&exact, 0.0), normal)
     });
@@ -146,7 +148,7 @@ fn accuracies(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fa
         refused += u32::from(*normal && matches!(worth, Worth::Refused | Worth::Halted));
         rows.push(row(&format!("accuracy_over_{span:e}"), "chosen", *size, worth.name(), *error));
     }
-    // The square of 1e-160, which the action and the energy are, is no number any more; (q, p) are.
+    // For a state of 1e-160 the action and the energy underflow, since they are squares; (q, p) do not.
     report.at_most("an oscillator of 1e-300 .. 1e150 over 1e-12 .. 1e3, to 1e-9: above 1e-8", bad([&tally]), 0.0)?;
     report.at_most("the same: refused, though the end is a normal number", f64::from(refused), 0.0)
 }

@@ -1,4 +1,4 @@
-//! Solvers where they have it hard: bounded work, and the right status.
+//! Solvers on difficult problems: the work must be bounded, and the status right.
 
 use crate::formula::{Feature, Formula, Kinetic, Rate, Smooth};
 use crate::motion::{End, FAMILIES, Problem, Worth};
@@ -12,7 +12,7 @@ use contact_geom::{ChartVector, PhasePoint, VelocityPoint, max_or_nan};
 use discrete_herglotz::{AnyIntegrator, Flow, Gauss, InputError, Midpoint, Solver, Stepper, Steps, Trapezoidal};
 use std::time::{Duration, Instant};
 
-/// A step that does not contract may take this many times one that does.
+/// The bound on the time of a step whose iteration does not contract, relative to one whose iteration contracts.
 const PRICE: f64 = 30.0;
 
 pub fn run(report: &mut Report) -> Result<(), Failure> {
@@ -29,9 +29,9 @@ fn row(what: &str, by: &str, parameter: &str, ended: &str, error: f64) -> Vec<St
     vec![what.into(), by.into(), parameter.into(), ended.into(), number(error)]
 }
 
-/// Calls that may never end, or bring the process down.
+/// Calls that may not return, or may crash the process.
 fn alone(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
-    // A hang is ten seconds; the quick form takes less for one.
+    // A call that takes ten seconds counts as one that does not end; the quick form waits for three seconds.
     let patience = Duration::from_secs(if report.quick { 3 } else { 10 });
     let found = parallel(&report.bar, PROBES.len(), |i| ask(PROBES[i].0, patience));
     let (mut crashed, mut endless, mut otherwise) = (0, 0, 0);
@@ -52,7 +52,7 @@ fn alone(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure
     report.at_most("calls that end with something else than what is right", f64::from(otherwise), 0.0)
 }
 
-/// First steps of Newton's method from guesses of the velocity that are far off, where there is only one solution.
+/// First steps from guesses of the velocity that are far from the solution, where there is only one solution.
 fn poor_guesses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let smooth = Smooth { spring: 1.0, quartic: 1.0, ..Smooth::default() };
     let hard = Formula::<1> { smooth, rate: Rate::Constant(-0.1), ..Formula::FREE };
@@ -85,14 +85,14 @@ fn poor_guesses(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), 
     report.at_most("first steps from poor guesses of the velocity: wrong in silence", f64::from(wrong), 0.0)
 }
 
-/// The state after a step, where there is one.
+/// The state after one step; `None` if the step fails.
 fn first_step(stepper: Result<impl Stepper<1>, InputError>) -> Option<PhasePoint<1>> {
     let mut stepper = stepper.ok()?;
     stepper.advance(1).ok()?;
     Some(stepper.state())
 }
 
-/// The velocity of a momentum.
+/// The velocity for a momentum.
 fn velocity(system: &Formula<1>, p: f64) -> f64 {
     match system.kinetic {
         Kinetic::Relativistic => p / (1.0 + p * p).sqrt(),
@@ -100,13 +100,13 @@ fn velocity(system: &Formula<1>, p: f64) -> f64 {
     }
 }
 
-/// Motions out of the domain of L, and over kinks: a status, and never a number that is none.
+/// Motions that leave the domain of L, and motions over kinks: each must end with a status, and no result may be NaN.
 fn domains(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let (mut on, mut broken) = (0, 0);
     for speed in [0.5, 1.5, 3.0, 100.0] {
         let system = Formula { feature: Feature::Domain, rate: Rate::Constant(-0.05), ..Formula::<1>::FREE };
         let problem = Problem { system, t0: 0.0, start: VelocityPoint::new([0.2], [speed], 0.0), span: 5.0 };
-        // Below the height of the border it stays inside, and has a truth.
+        // A particle that is too slow to reach the border of the domain stays inside, and its exact motion is known.
         let truth = problem.exact().ok();
         for (integrator, count) in FAMILIES.into_iter().flat_map(|i| [5, 50, 1000].map(|n| (i, n))) {
             let outside = PhasePoint::new([1e9], [1e9], 0.0);
@@ -152,10 +152,10 @@ fn domains(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failu
     report.at_most("motions over kinks and borders: no number, or a panic", f64::from(broken), 0.0)
 }
 
-/// The size from which faer solves.
+/// The size from which faer solves the linear systems.
 const SIZE: usize = 32;
 
-/// Singular, graded and non-finite matrices: refused, or solved to the rounding of their entries.
+/// Singular, graded and non-finite matrices: each must be refused, or solved to the rounding of its entries.
 fn matrices(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Failure> {
     let mut random = Random::new(9, 0);
     let dense = SMatrix::<f64, SIZE, SIZE>::from_fn(|_, _| random.between(-1.0, 1.0));
@@ -186,7 +186,7 @@ fn matrices(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
             let rhs = matrix * solution;
             let (mut a, mut b) = (matrix, rhs);
             let solved = solver.solve(&mut a, &mut b);
-            // Row by row, each in units of its own terms.
+            // The residual of each row, relative to the sum of its terms.
             let residual = contact_geom::max_abs_or_nan((0..SIZE).map(|i| {
                 let terms: f64 = (0..SIZE).map(|j| (matrix[(i, j)] * b[j]).abs()).sum();
                 let sum: f64 = (0..SIZE).map(|j| matrix[(i, j)] * b[j]).sum();
@@ -197,7 +197,7 @@ fn matrices(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
                 (Ok(()), _) if residual <= 1e-10 => "solved",
                 (Ok(()), _) => "wrong",
             };
-            // A regular matrix that is refused is as wrong as a singular one that is not.
+            // Refusing a regular matrix is as wrong as accepting a singular one.
             let regular = matches!(name, "dense" | "rows graded to 1e-279" | "all of 1e300" | "all of 1e-300");
             let singular = matches!(
                 name,
@@ -218,7 +218,7 @@ fn matrices(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
     report.at_most("residuals of the solved, over their terms", worst, 1e-13)
 }
 
-/// What a step costs where the iteration of the stages does not contract, over one where it does.
+/// The time of a step whose stage iteration does not contract, relative to one whose iteration contracts.
 fn price(report: &mut Report) -> Result<(), Failure> {
     let smooth = Smooth { spring: 0.25, coupling: 1.0, quartic: 1.0, ..Smooth::default() };
     let coupled = Formula::<2> { smooth, rate: Rate::Constant(-0.05), ..Formula::FREE };
@@ -239,7 +239,7 @@ fn price(report: &mut Report) -> Result<(), Failure> {
             [("pendulum", pendulum), ("pendulum, acting z", general), ("pair", coupled)].into_iter().enumerate()
         {
             let contracting = times[..4].iter().map(|(_, [taken, _])| *taken).fold(0.0, max_or_nan);
-            // Zero where there is none.
+            // Zero if there is no such step.
             let dearest = |which: usize| times.iter().map(|(_, of)| of[which]).fold(0.0, max_or_nan);
             for (which, of) in ["step that is taken", "step that is given up"].into_iter().enumerate() {
                 report.at_most_timed(
@@ -267,7 +267,8 @@ fn price(report: &mut Report) -> Result<(), Failure> {
     report.timed_figure(&svg)
 }
 
-/// The time of a step, from a run that goes on as long as it can, and of one that is given up; zero where there is none.
+/// The time of a step in a run that advances as far as it can, and the time of a step that fails; zero where there is
+/// none.
 fn of_step<const N: usize>(system: Formula<N>, start: VelocityPoint<N>, integrator: AnyIntegrator, h: f64) -> [f64; 2] {
     let problem = Problem { system, t0: 0.0, start, span: h };
     let Ok(motion) = problem.motion() else { return [f64::NAN; 2] };
@@ -284,7 +285,7 @@ fn of_step<const N: usize>(system: Formula<N>, start: VelocityPoint<N>, integrat
             let now = clock.elapsed().as_secs_f64();
             match taken {
                 Ok(()) => (tried, until) = (tried + 5, now),
-                // With up to four steps before it.
+                // The time includes up to four successful steps before the one that fails.
                 Err(_) => given_up = now - until,
             }
         }

@@ -12,7 +12,7 @@ pub fn slope(points: &[(f64, f64)]) -> f64 {
     xy / xx
 }
 
-/// The root of the mean square.
+/// The root mean square.
 pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
     for value in values {
@@ -30,7 +30,7 @@ pub fn mean(values: &[f64]) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-/// The value below which a fraction of the values lies; NaN of none. NaNs are the largest.
+/// The quantile of the absolute values; NaN without values. A NaN counts as the largest value.
 pub fn quantile(values: &[f64], fraction: f64) -> f64 {
     let mut sorted: Vec<f64> = values.iter().map(|v| v.abs()).collect();
     sorted.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! What is measured: something that solves a problem, and has one number to trade time for accuracy.
+//! Candidates: solvers of a problem with one parameter that trades run time for accuracy.
 
 use crate::problems::Problem;
 use contact_geom::{Lagrangian, VelocityPoint};
@@ -6,7 +6,7 @@ use discrete_herglotz::{AnyIntegrator, InputError, StepFailure, Steps, Until};
 use std::time::Instant;
 use thiserror::Error;
 
-/// The number that trades time for accuracy.
+/// The parameter that trades run time for accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Control {
     /// The time step of a method with a fixed one.
@@ -15,7 +15,7 @@ pub enum Control {
     Tolerance,
 }
 
-/// A method, set on one problem with or without the action.
+/// A method for one problem, with or without the action.
 pub trait Candidate {
     /// The name in tables and arguments, in lower case with underscores.
     fn name(&self) -> &str;
@@ -23,7 +23,7 @@ pub trait Candidate {
     /// The order.
     fn order(&self) -> u32;
 
-    /// What [`run`](Self::run) is passed.
+    /// The meaning of the argument of [`run`](Self::run).
     fn control(&self) -> Control;
 
     /// Solves the problem once.
@@ -33,34 +33,34 @@ pub trait Candidate {
     fn run(&self, control: f64) -> Result<Run, RunError>;
 }
 
-/// A problem solved.
+/// The solution of a problem.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// The final state: q, v, and z where it was asked for.
+    /// The final state: q, v, and z where it was requested.
     pub state: Vec<f64>,
     /// The steps taken.
     pub steps: u64,
     /// The evaluations of right-hand sides, forces or gradients.
     pub evaluations: u64,
-    /// The wall time of the integration: from a solver at the start to one at the end.
+    /// The wall time of the integration, without the set-up of the solver.
     pub seconds: f64,
 }
 
 /// Why a run has no final state.
 #[derive(Debug, Error)]
 pub enum RunError {
-    /// The step is none, or nothing starts with it.
+    /// The step size is invalid, or no run can start with it.
     #[error(transparent)]
     Input(#[from] InputError),
     /// A step could not be taken.
     #[error("after {} steps: {}", .0.taken, .0.cause)]
     StepFailure(StepFailure),
-    /// A peer gave up.
+    /// A peer failed.
     #[error("{0}")]
     Peer(String),
 }
 
-/// An integrator of the library on a problem's Lagrangian.
+/// An integrator of the library for a problem's Lagrangian.
 struct OfLibrary<L: 'static, const N: usize> {
     lagrangian: &'static L,
     integrator: AnyIntegrator,
@@ -69,8 +69,8 @@ struct OfLibrary<L: 'static, const N: usize> {
     z: bool,
 }
 
-/// A candidate that runs an integrator of the library, by a plan. The plan is made before the clock starts, as the
-/// peers' solvers are.
+/// A candidate that runs an integrator of the library by a plan. The plan is made before the time measurement starts,
+/// like the peers' solvers.
 pub fn of_library<L: Lagrangian<N>, const N: usize>(
     lagrangian: &'static L,
     integrator: AnyIntegrator,

@@ -1,18 +1,19 @@
-//! Work-precision diagrams: error against run time, one curve a method.
+//! Work-precision diagrams: error against run time, one curve per method.
 
 use crate::problems::Problem;
 use crate::row::{Origin, Row, switch};
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw};
 
-/// The errors that are drawn. Above, the motion is lost; below is less than a rounded final state has.
+/// The exponents of ten between which errors are drawn. With larger errors the motion is lost; smaller ones are below
+/// the rounding of a final state.
 const ERRORS: (i32, i32) = (-16, 0);
 
-/// Writes the diagram of a problem, with or without the action, if there is anything to be drawn. The rows are sorted.
+/// Writes the diagram of a problem, with or without the action, if it has any rows. The rows are sorted.
 pub fn write(out: &Directory, problem: &Problem, z: bool, rows: &[Row]) -> Result<(), Failure> {
     let (least, most) = (10f64.powi(ERRORS.0), 10f64.powi(ERRORS.1));
     let drawn = |row: &&Row| row.problem == problem.name && row.z == z && (least..=most).contains(&row.error);
     let mut rows: Vec<&Row> = rows.iter().filter(drawn).collect();
-    // The library heads the legend; each part of it stays in the order of the table.
+    // The library comes first in the legend; the sort is stable, so that each group keeps the order of the table.
     rows.sort_by_key(|row| row.origin != Origin::Library);
     let seconds = || rows.iter().map(|row| row.seconds);
     let (fastest, slowest) = (seconds().fold(f64::INFINITY, f64::min), seconds().fold(0.0, f64::max));

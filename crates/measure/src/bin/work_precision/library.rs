@@ -1,12 +1,12 @@
-//! The methods of the library, set on the problems.
+//! The integrators of the library as candidates.
 
 use crate::candidate::{Candidate, of_library};
 use crate::problems::{KEPLER, OSCILLATOR, PENDULUM, Problem, QUADRATIC, System};
 use contact_geom::Lagrangian;
 use discrete_herglotz::AnyIntegrator;
 
-/// The integrators of the library that apply to a problem, with or without the action. A flow of a discrete Lagrangian always
-/// has the action; without it, nobody looks.
+/// The integrators of the library that apply to a problem, with or without the action. The flow of a discrete
+/// Lagrangian always computes the action; without the action, it is ignored.
 pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
     match problem.system {
         System::Oscillator => of(&OSCILLATOR, problem, z),
@@ -17,14 +17,14 @@ pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
 }
 
 fn of<L: Lagrangian<N>, const N: usize>(lagrangian: &'static L, problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
-    // Those of one step size: by a clock the number of steps is found by the run.
+    // Only integrators with a fixed step size: in transformed time, the number of steps is known only after the run.
     let fixed = |integrator: &AnyIntegrator| !matches!(integrator, AnyIntegrator::TransformedGauss { .. });
     let applicable = |integrator: &AnyIntegrator| fixed(integrator) && integrator.check(lagrangian).is_ok();
     let chosen = AnyIntegrator::all().into_iter().filter(applicable);
     chosen.map(|integrator| of_library(lagrangian, integrator, problem, z)).collect()
 }
 
-/// The integrators that are measured where none is named: one or two of each kind, as many as a diagram's legend holds.
+/// The integrators that are measured by default: one or two of each kind, as many as the legend of a diagram holds.
 pub const DIAGRAMS: [&str; 10] = [
     "midpoint",
     "strang",

@@ -1,18 +1,18 @@
-//! Work against precision: what an error costs with the library's methods, and with what else there is.
+//! Work-precision measurements: run time against error, for the library's methods and for other ODE solvers.
 //!
 //! ```text
 //! cargo run --release --bin work_precision [-- --problem NAME --method NAME --z on|off --out DIR] [--peers FILE] [--quick]
 //! ```
 //!
-//! Four motions with known ends, solved with ever finer steps or tolerances, with the action and without. Each run is repeated
-//! (seven times at least, short ones for 20 ms or 200 times) and its median time taken. What is timed is the integration: plans,
-//! tables and solvers are made before, for the library and for the peers. Two implementations of dop853 are measured in the
-//! same run; rows of peers that are not in Rust are read from the file of `--peers`, which must have been measured on the same
-//! machine.
+//! Four problems with known final states are solved with decreasing steps or tolerances, with the action and without.
+//! Each run is repeated (at least seven times, short ones for 20 ms or 200 times), and the median of the times is
+//! taken. Only the integration is timed: plans, tables and solvers are made before, for the library and for the peers.
+//! Two implementations of dop853 are measured in the same run; rows of peers that are not in Rust are read from the
+//! file of `--peers`, which must have been measured on the same machine.
 //!
-//! Writes `work_precision.csv` and a diagram of each problem, and prints the times to three errors. Runs without a final state
-//! are counted on stderr. Ends with 2 if a name is unknown, the file of the peers is not what it should be, or the output cannot
-//! be written.
+//! Writes `work_precision.csv` and a diagram of each problem into `--out`, and prints the times to reach three errors.
+//! Runs without a final state are counted on stderr. The exit code is 2 if a name is unknown, the file of the peers is
+//! invalid, or the output cannot be written.
 
 mod candidate;
 mod diagrams;
@@ -34,40 +34,41 @@ use row::{Origin, Row, switch};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Measures what an error costs, with the library's methods and with others.
+/// Measures the run time for an error, with the library's methods and with others.
 #[derive(Parser)]
 struct Arguments {
     /// The problems, separated by commas.
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "all")]
     problem: Vec<String>,
-    /// The methods, separated by commas; `all` for each that applies, `chosen` for one or two of each kind and the peers.
+    /// The methods, separated by commas; `all` for each that applies, `chosen` for one or two of each kind and the
+    /// peers.
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "chosen")]
     method: Vec<String>,
-    /// With or without the action; both, if it is not said.
+    /// With or without the action; both by default.
     #[arg(long)]
     z: Option<Switch>,
     /// The directory for table and diagrams; created where it does not exist.
     #[arg(long, value_name = "DIR", default_value = "out/work_precision")]
     out: PathBuf,
-    /// Rows of peers measured elsewhere, of which those of heyoka are taken.
+    /// Rows of peers measured elsewhere, of which those of heyoka are used.
     #[arg(long, value_name = "FILE")]
     peers: Option<PathBuf>,
-    /// Takes the rows of all peers in that file.
+    /// Uses the rows of all peers in that file.
     #[arg(long, requires = "peers")]
     all_peers: bool,
-    /// Measures a third of the steps, and none that takes long.
+    /// Measures a third of the steps, and ends each sweep at a shorter run time.
     #[arg(long)]
     quick: bool,
 }
 
-/// A switch.
+/// On or off.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Switch {
     On,
     Off,
 }
 
-/// A candidate with what it is a candidate for.
+/// A candidate, with the problem that it solves and its origin.
 struct Entry {
     problem: &'static Problem,
     z: bool,
@@ -121,13 +122,13 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     ))
 }
 
-/// The problems without the action where they have a solution without, and with it.
+/// The problems without the action, where they can be solved without it, and with the action.
 fn variants() -> impl Iterator<Item = (&'static Problem, bool)> {
     let both = PROBLEMS.iter().flat_map(|problem| [false, true].map(|z| (problem, z)));
     both.filter(|(problem, z)| *z || !problem.needs_z())
 }
 
-/// Everything that can be measured.
+/// All candidates.
 fn entries() -> Vec<Entry> {
     let of = |(problem, z)| {
         let entry = move |origin| move |candidate| Entry { problem, z, origin, candidate };
@@ -137,7 +138,7 @@ fn entries() -> Vec<Entry> {
     variants().flat_map(of).collect()
 }
 
-/// Refuses names that are neither known nor stand for several.
+/// Rejects names that are neither known nor the name of a group.
 fn check_names(what: &'static str, names: &[String], known: &[&str]) -> Result<(), Failure> {
     match names.iter().find(|name| !["all", "chosen"].contains(&name.as_str()) && !known.contains(&name.as_str())) {
         Some(name) => Err(Failure::Unknown { what, name: name.clone(), known: known.join(", ") }),
@@ -145,7 +146,7 @@ fn check_names(what: &'static str, names: &[String], known: &[&str]) -> Result<(
     }
 }
 
-/// Measures all entries, with a bar that shows how far it is.
+/// Measures all entries, with a progress bar.
 fn measure(entries: &[Entry], effort: Effort) -> Vec<Row> {
     let style = ProgressStyle::with_template("measuring {bar:30} {pos}/{len}  {msg}");
     let bar = ProgressBar::new(entries.len() as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));

@@ -1,60 +1,60 @@
-//! Sweeps: a candidate solves its problem again and again, ever more accurately.
+//! Sweeps: a candidate solves its problem repeatedly, with decreasing steps or tolerances.
 
 use crate::candidate::{Candidate, Control, Run, RunError};
 use crate::problems::Problem;
 use crate::row::{Origin, Row};
 
-/// The fewest runs of which a median is taken.
+/// The minimum number of runs from which a median is taken.
 const RUNS: usize = 7;
 
-/// Short runs are repeated until they took this many seconds together, or were that many.
+/// Short runs are repeated until they have taken this many seconds in total, or this many times.
 const REPEATS: (f64, usize) = (0.02, 200);
 
-/// The coarsest step tried, in time units: a period of the problems.
+/// The coarsest step tried, in time units: about a period of the problems.
 const COARSEST: f64 = 6.5;
 
 /// The largest number of steps tried.
 const MOST_STEPS: f64 = 1e8;
 
-/// Below this error, two steps of a sweep that do not lower it end the sweep: what is left is round-off.
+/// Once the error is below this value, two steps that do not reduce it end a sweep: the rest of the error is round-off.
 const ACCURATE: f64 = 1e-9;
 
-/// The tolerances tried have these exponents of ten.
+/// The tolerances tried are 10^-k for k in this range.
 const TOLERANCES: std::ops::RangeInclusive<i32> = 3..=15;
 
-/// How finely, and how long, it is swept.
+/// The resolution and the time limit of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// Whether only powers of two are taken as numbers of steps.
+    /// Whether the numbers of steps are powers of two only.
     pub quick: bool,
 }
 
 impl Effort {
-    /// A run that takes longer, in seconds, is the last of its sweep.
+    /// A run that takes longer than this, in seconds, is the last of its sweep.
     fn bound(self) -> f64 {
         if self.quick { 0.02 } else { 0.05 }
     }
 
-    /// The factors between successive powers of two of numbers of steps.
+    /// The factors that multiply powers of two to give the numbers of steps.
     fn factors(self) -> &'static [f64] {
         if self.quick { &[1.0] } else { &[1.0, 1.25, 1.5625] }
     }
 }
 
-/// What a sweep found.
+/// The results of a sweep.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sweep {
     /// A row for each run with a final state, in the order of the sweep.
     pub rows: Vec<Row>,
-    /// For each run without one: with which step or tolerance, and why.
+    /// For each run without a final state: the step or tolerance, and the cause.
     pub failed: Vec<(f64, String)>,
 }
 
-/// The values of the control of a candidate, from coarse to fine.
+/// The steps or tolerances of a candidate, from coarse to fine.
 ///
-/// Numbers of steps are 2^k times 1, 5/4 and 25/16. The problems' durations have such factors too, so each step is a double,
-/// and that many of them end at the final time exactly: a rounded step would miss it by up to 1e-13, which a late error
-/// shows.
+/// Numbers of steps are 2^k times 1, 5/4 and 25/16. The durations of the problems have such factors too, so that each
+/// step size is a double and the steps end at the final time exactly. A rounded step size would miss it by up to 1e-13,
+/// which would be visible in small errors.
 fn controls(control: Control, problem: &Problem, effort: Effort) -> Vec<f64> {
     let duration = problem.duration;
     match control {
@@ -70,7 +70,7 @@ fn controls(control: Control, problem: &Problem, effort: Effort) -> Vec<f64> {
     }
 }
 
-/// Solves the problem often enough for a median of the time; all else is the same in every run.
+/// Solves the problem often enough for a median of the run time; all other results are the same in every run.
 fn timed(candidate: &dyn Candidate, control: f64) -> Result<Run, RunError> {
     let mut run = candidate.run(control)?;
     let mut seconds = vec![run.seconds];
@@ -85,7 +85,7 @@ fn timed(candidate: &dyn Candidate, control: f64) -> Result<Run, RunError> {
     Ok(run)
 }
 
-/// Measures a candidate from coarse to fine, until it is slow or does not get better.
+/// Measures a candidate from coarse to fine, until a run is slow or the error no longer decreases.
 pub fn sweep(candidate: &dyn Candidate, origin: Origin, problem: &Problem, z: bool, effort: Effort) -> Sweep {
     let mut sweep = Sweep::default();
     let (mut last, mut strikes) = (f64::INFINITY, 0);

@@ -1,5 +1,5 @@
-//! Peers: what else there is in Rust for these equations. Two implementations of dop853, Hairer's explicit method of order 8,
-//! with right-hand sides written by hand as their users would.
+//! Peers in Rust: two implementations of dop853, Hairer's explicit Runge-Kutta method of order 8, with hand-written
+//! right-hand sides.
 
 use crate::candidate::{Candidate, Control, Run, RunError};
 use crate::problems::{KEPLER, OSCILLATOR, PENDULUM, Problem, QUADRATIC, System};
@@ -11,7 +11,7 @@ use std::time::Instant;
 /// The largest number of steps of a run, of either peer.
 const MOST_STEPS: u32 = 100_000_000;
 
-/// The peers, set on a problem with or without the action.
+/// The peers as candidates for a problem, with or without the action.
 pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
     match (problem.system, z) {
         (System::Oscillator, false) => both(problem, |[q, v]: [f64; 2]| [v, OSCILLATOR.gamma * v - q]),
@@ -37,7 +37,7 @@ pub fn candidates(problem: &Problem, z: bool) -> Vec<Box<dyn Candidate>> {
         (System::Quadratic, true) => both(problem, |[q, v, z]: [f64; 3]| {
             [v, -q - QUADRATIC.c * z * v, 0.5 * (v * v - q * q) - 0.5 * QUADRATIC.c * z * z]
         }),
-        // Its position needs the action.
+        // The equation of motion depends on the action.
         (System::Quadratic, false) => Vec::new(),
     }
 }
@@ -49,7 +49,7 @@ fn attraction(x: f64, y: f64) -> (f64, f64) {
     (inverse, inverse * inverse * inverse)
 }
 
-/// Both peers with a right-hand side of D variables.
+/// Both peers for a right-hand side with D variables.
 fn both<const D: usize>(
     problem: &Problem,
     rhs: impl Fn([f64; D]) -> [f64; D] + Copy + 'static,
@@ -76,7 +76,7 @@ impl<F: Fn([f64; D]) -> [f64; D], const D: usize> ode_solvers::System<f64, SVect
     }
 }
 
-/// A problem of D variables with its right-hand side.
+/// A problem with D variables, and its right-hand side.
 #[derive(Clone, Copy)]
 struct Adaptive<F, const D: usize> {
     rhs: Rhs<F>,
@@ -84,19 +84,20 @@ struct Adaptive<F, const D: usize> {
 }
 
 impl<F, const D: usize> Adaptive<F, D> {
-    /// The start.
+    /// The initial values.
     fn start(&self) -> [f64; D] {
         std::array::from_fn(|i| self.problem.start.get(i).copied().unwrap_or(f64::NAN))
     }
 
-    /// The absolute tolerances: relative to the size that the motion ends with, as it decays by many orders of magnitude.
+    /// The absolute tolerances, relative to the size of the motion at its end, since it decays by many orders of
+    /// magnitude.
     fn absolute(&self, tolerance: f64) -> [f64; D] {
         let components = self.problem.components();
         std::array::from_fn(|i| tolerance * if i < components { self.problem.amplitude } else { self.problem.z_scale })
     }
 }
 
-/// The dop853 of differential-equations.
+/// dop853 of the crate differential-equations.
 struct DifferentialEquations<F, const D: usize>(Adaptive<F, D>);
 
 impl<F: Fn([f64; D]) -> [f64; D], const D: usize> Candidate for DifferentialEquations<F, D> {
@@ -131,7 +132,7 @@ impl<F: Fn([f64; D]) -> [f64; D], const D: usize> Candidate for DifferentialEqua
     }
 }
 
-/// The dop853 of ode_solvers. It has one absolute tolerance for all variables: that of (q, v).
+/// dop853 of the crate ode_solvers. It has one absolute tolerance for all variables: that of (q, v).
 struct OdeSolvers<F, const D: usize>(Adaptive<F, D>);
 
 impl<F: Fn([f64; D]) -> [f64; D] + Copy, const D: usize> Candidate for OdeSolvers<F, D> {
@@ -150,7 +151,8 @@ impl<F: Fn([f64; D]) -> [f64; D] + Copy, const D: usize> Candidate for OdeSolver
     fn run(&self, tolerance: f64) -> Result<Run, RunError> {
         let Adaptive { rhs, problem } = self.0;
         let end = problem.duration;
-        // Its defaults, but for the number of steps; and no step is too small to be tried, nor suspected of stiffness.
+        // The defaults of the crate, except for the number of steps, the sparse output, and the test for stiffness,
+        // which is disabled.
         let mut solver = Dop853::from_param(
             rhs,
             0.0,
@@ -194,7 +196,7 @@ mod tests {
             assert_eq!(peers.len(), if problem.needs_z() && !z { 0 } else { 2 });
             for peer in peers {
                 let run = peer.run(1e-12)?;
-                // The orbit of P3 amplifies the tolerance by 1e6; a wrong term would show in the first digit.
+                // The orbit of P3 amplifies the tolerance by 1e6; a wrong term would change the first digit.
                 assert!(problem.error(&run.state) < 1e-5, "{} {}: {run:?}", problem.name, peer.name());
                 assert_eq!(problem.error_z(&run.state).is_some(), z);
                 assert!(problem.error_z(&run.state).is_none_or(|e| e < 1e-7), "{} {}", problem.name, peer.name());

@@ -1,4 +1,4 @@
-//! The problems: Lagrangians, starts, durations, and trusted final states.
+//! The problems: Lagrangians, initial values, durations, and reference solutions.
 
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
@@ -16,8 +16,8 @@ pub const KEPLER: Kepler<2> = Kepler { mu: 1.0, gamma: -1e-4 };
 /// The Lagrangian of P6.
 pub const QUADRATIC: QuadraticInZ = QuadraticInZ { c: 0.1 };
 
-/// Which of the Lagrangians above a problem has. They differ in type and dimension; what is done with one begins with a
-/// match on this.
+/// Identifies the Lagrangian of a problem. The Lagrangians differ in type and dimension, so that code that uses one
+/// matches on this enum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum System {
     /// [`OSCILLATOR`].
@@ -30,32 +30,33 @@ pub enum System {
     Quadratic,
 }
 
-/// An initial value problem from t = 0, and its solution. `L_v = v` in all of them, so momenta are velocities.
+/// An initial value problem from t = 0, with its solution at the final time. `L_v = v` in all of them, so momenta are
+/// velocities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Problem {
     /// The name in tables and arguments.
     pub name: &'static str,
-    /// What it is, for titles.
+    /// A description for titles.
     pub title: &'static str,
     /// The Lagrangian.
     pub system: System,
     /// The final time, a whole number of time units.
     pub duration: f64,
-    /// The start, in the order q, v, z.
+    /// The initial values, in the order q, v, z.
     pub start: &'static [f64],
     /// The final state in the same order.
     pub end: &'static [f64],
-    /// The smallest root mean square of (q, v) towards the end of the motion: what absolute tolerances are relative to.
+    /// The smallest root mean square of (q, v) towards the end of the motion; absolute tolerances are relative to it.
     pub amplitude: f64,
-    /// The largest |z| during the last `max(7, T/100)` time units: what errors of z are relative to.
+    /// The largest |z| during the last `max(7, T/100)` time units; errors of z are relative to it.
     pub z_scale: f64,
 }
 
 /// The problems, in the order of the tables.
 ///
-/// The final states are those of the double initial data and parameters, rounded once: P1 from its closed form with 60
-/// digits, the others by Taylor's method (heyoka's) with 200 bits; that of 113 bits agrees to all digits of a double. The scales are
-/// read off 2001 states of the last stretch of the motion.
+/// The final states are those of the initial values and parameters as doubles, rounded once: P1 from its closed form
+/// with 60 digits, the others by heyoka's Taylor method with 200 bits; the result with 113 bits agrees to all digits of
+/// a double. The scales are taken from 2001 states near the end of the motion.
 pub const PROBLEMS: [Problem; 4] = [
     Problem {
         name: "P1",
@@ -100,12 +101,13 @@ pub const PROBLEMS: [Problem; 4] = [
 ];
 
 impl Problem {
-    /// Whether the position needs the action, so that there is no solving it without.
+    /// Whether the equation of motion depends on z, so that the problem cannot be solved without the action.
     pub fn needs_z(&self) -> bool {
         self.system == System::Quadratic
     }
 
-    /// The largest relative tolerance that leaves a motion of the kind: with a larger one, the orbit of P3 collapses.
+    /// The largest relative tolerance with which the motion keeps its character: with a larger one, the orbit of P3
+    /// collapses.
     pub fn coarsest_tolerance(&self) -> f64 {
         if self.system == System::Kepler { 2e-6 } else { 1.0 }
     }
@@ -115,7 +117,7 @@ impl Problem {
         self.start.len() - 1
     }
 
-    /// The start as a point of T\*Q x R, for the dimension that the problem has.
+    /// The initial values as a point of T\*Q x R, for the dimension of the problem.
     pub fn phase_point<const N: usize>(&self) -> PhasePoint<N> {
         let component = |i: usize| self.start.get(i).copied().unwrap_or(f64::NAN);
         PhasePoint {
@@ -125,7 +127,8 @@ impl Problem {
         }
     }
 
-    /// The error of a final state `q, v` or `q, v, z`: the 2-norm of that of (q, v), relative to the solution's.
+    /// The error of a final state `q, v` or `q, v, z`: the 2-norm of the error of (q, v), relative to the norm of the
+    /// solution.
     pub fn error(&self, state: &[f64]) -> f64 {
         let pairs = || state.iter().zip(self.end).take(self.components());
         let error: f64 = pairs().map(|(found, true_one)| (found - true_one).powi(2)).sum();
@@ -133,7 +136,7 @@ impl Problem {
         (error / size).sqrt()
     }
 
-    /// The error of the z of a final state that has one, relative to the problem's scale.
+    /// The error of z in a final state, relative to the scale of the problem; `None` for a state without z.
     pub fn error_z(&self, state: &[f64]) -> Option<f64> {
         let (found, true_one) = state.iter().zip(self.end).nth(self.components())?;
         Some((found - true_one).abs() / self.z_scale)
@@ -144,7 +147,8 @@ impl Problem {
 mod tests {
     use super::*;
 
-    /// The motion of P1 at a time: `e^(-gamma t) L` without its z is `-(cos 2wt + B sin 2wt)/2`, which is easily integrated.
+    /// The solution of P1 at a time: `e^(-gamma t) L` without its term in z is `-(cos 2wt + B sin 2wt)/2`, which has an
+    /// elementary integral.
     fn oscillator(t: f64) -> [f64; 3] {
         let gamma = OSCILLATOR.gamma;
         let w = (1.0 - 0.25 * gamma * gamma).sqrt();
@@ -159,7 +163,7 @@ mod tests {
     fn the_reference_of_p1_is_its_closed_form() {
         let problem = PROBLEMS[0];
         let end = oscillator(problem.duration);
-        // The phase of a thousand is rounded to 1e-13 in doubles.
+        // A phase of about 1000 is rounded to 1e-13 in doubles.
         assert!(problem.error(&end) < 1e-12, "{:e}", problem.error(&end));
         assert!(problem.error_z(&end).is_some_and(|e| e < 1e-12));
         assert_eq!(oscillator(0.0).to_vec(), problem.start);

@@ -1,4 +1,4 @@
-//! Peers measured by another program on the same machine: rows of its CSV file.
+//! Reads the results of peers that were measured by another program on the same machine, from its CSV file.
 
 use crate::problems::PROBLEMS;
 use crate::row::{Origin, Row};
@@ -24,19 +24,19 @@ const COLUMNS: [&str; 15] = [
     "status",
 ];
 
-/// The peer whose rows are taken when not all are.
+/// The peer whose rows are used unless all are requested.
 pub const PEER: &str = "heyoka";
 
-/// One configuration with the times of all rounds.
+/// A configuration of a peer, with the times of all rounds.
 struct Configuration {
-    /// The tolerance, as it is written: what tells configurations of one method apart.
+    /// The tolerance as text, which distinguishes the configurations of a method.
     control: String,
     row: Row,
     seconds: Vec<f64>,
 }
 
-/// Reads the rows of a peer, or of all peers; the time of a configuration is the median over the rounds. Rows of problems that
-/// are not among ours, and of runs that the file says went wrong, are skipped.
+/// Reads the rows of a peer, or of all peers; the time of a configuration is the median over the rounds. Rows of other
+/// problems, and of runs that failed, are skipped.
 pub fn read(path: &Path, all_peers: bool) -> Result<Vec<Row>, Failure> {
     std::fs::read_to_string(path).map_err(|cause| cause.to_string()).and_then(|text| parse(&text, all_peers)).map_err(
         |cause| Failure::Table {
@@ -51,7 +51,7 @@ pub fn read(path: &Path, all_peers: bool) -> Result<Vec<Row>, Failure> {
     )
 }
 
-/// The rows of the text of such a file; or the first thing that is wrong with it.
+/// Parses the text of such a file; the error names the first invalid part.
 fn parse(text: &str, all_peers: bool) -> Result<Vec<Row>, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let found = reader.headers().map_err(|error| error.to_string())?;
@@ -81,7 +81,7 @@ fn parse(text: &str, all_peers: bool) -> Result<Vec<Row>, String> {
     Ok(configurations.into_iter().map(median).collect())
 }
 
-/// One record, if it is wanted.
+/// The configuration of a record; `None` if the record is skipped.
 fn configuration(record: &csv::StringRecord, all_peers: bool) -> Result<Option<Configuration>, String> {
     let field = |name: &str| {
         let place = COLUMNS.iter().position(|column| *column == name);

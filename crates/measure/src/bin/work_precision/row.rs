@@ -1,4 +1,4 @@
-//! Rows of the table, and which of them is the fastest at an error.
+//! Rows of the table, and the fastest row for an error.
 
 use contact_examples::number;
 
@@ -13,7 +13,7 @@ pub enum Origin {
     Recorded,
 }
 
-/// A method on a problem, with one step or tolerance.
+/// The result of a method on a problem, with one step or tolerance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// The problem.
@@ -22,7 +22,7 @@ pub struct Row {
     pub method: String,
     /// Where the row comes from.
     pub origin: Origin,
-    /// The order of a method that has one.
+    /// The order of the method, where it is known.
     pub order: Option<u32>,
     /// Whether the action was solved for.
     pub z: bool,
@@ -50,7 +50,7 @@ pub fn switch(z: bool) -> &'static str {
 }
 
 impl Row {
-    /// Its fields, in the order of the columns; empty where it has no such thing.
+    /// The fields, in the order of the columns; a missing value is empty.
     pub fn fields(&self) -> [String; 10] {
         let or_empty = |x: Option<f64>| x.map_or(String::new(), number);
         [
@@ -68,13 +68,13 @@ impl Row {
     }
 }
 
-/// Orders rows by problem, action and method; those of one sweep stay in its order.
+/// Sorts rows by problem, action and method; the rows of a sweep keep their order.
 pub fn sort(rows: &mut [Row]) {
     rows.sort_by(|a, b| (a.problem, a.z, &a.method).cmp(&(b.problem, b.z, &b.method)));
 }
 
-/// The cheapest of the rows with an error at or below a level: the time to that error. A row of a better error may be the
-/// cheaper one.
+/// The fastest of the rows with an error at or below a level. A row with a smaller error may be faster than one with a
+/// larger error.
 pub fn fastest<'a>(rows: impl IntoIterator<Item = &'a Row>, level: f64) -> Option<&'a Row> {
     rows.into_iter().filter(|row| row.error <= level).min_by(|a, b| a.seconds.total_cmp(&b.seconds))
 }
@@ -88,7 +88,7 @@ pub fn best<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<&'a Row> {
 pub mod tests {
     use super::*;
 
-    /// A row of which only this is of interest.
+    /// A row with the given method, error and time; the other fields are arbitrary.
     pub fn row(method: &str, error: f64, seconds: f64) -> Row {
         Row {
             problem: "P1",

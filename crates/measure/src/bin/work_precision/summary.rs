@@ -1,4 +1,4 @@
-//! The printed summary: the time to an error, of the library and of its peers.
+//! The printed summary: the run time that the library and its peers need for an error.
 
 use crate::problems::Problem;
 use crate::recorded::PEER;
@@ -7,10 +7,10 @@ use crate::row::{Origin, Row, best, fastest, switch};
 /// The errors at which times are compared.
 const LEVELS: [f64; 3] = [1e-6, 1e-9, 1e-12];
 
-/// The two peers that the library is compared with, by what the names of their methods contain.
+/// The two peers with which the library is compared, by a part of the names of their methods.
 const PEERS: [&str; 2] = [PEER, "dop853"];
 
-/// A time with a unit that suits it.
+/// A time with a suitable unit.
 fn time(seconds: f64) -> String {
     match seconds {
         s if s < 1e-3 => format!("{:.1} us", s * 1e6),
@@ -23,14 +23,14 @@ fn time(seconds: f64) -> String {
 pub fn of(problem: &Problem, z: bool, rows: &[Row]) -> String {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.problem == problem.name && row.z == z).collect();
     let library = || rows.iter().copied().filter(|row| row.origin == Origin::Library);
-    // Of the dop853s, those measured in the same run.
+    // Of the implementations of dop853, only those measured in the same run.
     let peer = |name: &str| {
         let origin = if name == PEER { Origin::Recorded } else { Origin::Peer };
         rows.iter().copied().filter(|row| row.origin == origin && row.method.contains(name)).collect::<Vec<_>>()
     };
 
     let mut levels: Vec<(f64, String)> = LEVELS.iter().map(|level| (*level, format!("{level:.0e}"))).collect();
-    // Where the recorded peer does not get to the last level, its own best is one to compare at.
+    // Where the recorded peer does not reach all levels, its smallest error is a further level.
     let floor = best(peer(PEER)).map(|row| row.error).filter(|error| LEVELS.iter().any(|level| error > level));
     levels.extend(floor.map(|error| (error, format!("{error:.1e} *"))));
 
@@ -61,14 +61,14 @@ pub fn of(problem: &Problem, z: bool, rows: &[Row]) -> String {
     text
 }
 
-/// Time and error of z of a row.
+/// The time and the error of z of a row.
 fn cell(row: Option<&Row>) -> String {
     let seconds = row.map_or("-".into(), |row| time(row.seconds));
     let error_z = row.and_then(|row| row.error_z).map_or("-".into(), |error| format!("{error:.0e}"));
     format!("{seconds:>10}{error_z:>9}")
 }
 
-/// A ratio of times: above 1 the library is the faster one.
+/// A ratio of times; above 1 the library is faster.
 fn ratio(ratio: f64) -> String {
     match ratio {
         r if r < 0.1 => format!("{r:.0e}"),
@@ -77,7 +77,7 @@ fn ratio(ratio: f64) -> String {
     }
 }
 
-/// The smallest error of somebody, with its time.
+/// The smallest error among the rows of one origin, with its method and time.
 fn smallest(row: Option<&Row>, whose: &str) -> String {
     row.map_or_else(
         || format!("none {whose}"),

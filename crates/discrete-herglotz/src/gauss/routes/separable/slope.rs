@@ -39,13 +39,13 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
     /// The largest of what the force adds to the linear one.
     #[inline(always)]
     pub(crate) fn largest_rest<S: Simd>(&self) -> f64 {
-        let mut max_abs_or_nan = Lanes::<S>::splat(0.0);
+        let mut largest = Lanes::<S>::splat(0.0);
         for rest in &self.rest {
             for r in 0..blocks::<S>(self.table.s) {
-                max_abs_or_nan = max_abs_or_nan.max(rest.block::<S>(r).abs());
+                largest = largest.max(rest.block::<S>(r).abs());
             }
         }
-        max_abs_or_nan.max_abs_or_nan()
+        largest.max_abs_or_nan()
     }
 
     /// Looks at the slope of the force, and refines matrices that last.
