@@ -1,12 +1,12 @@
-//! Vectors that begin where a vector register does.
+//! Vectors that are aligned to cache lines.
 
 use std::ops::{Deref, DerefMut};
 
-/// The numbers in a line of the cache, or in the widest register.
+/// The number of doubles in a cache line, and in the widest vector register.
 const LINE: usize = 8;
 
-/// A vector of which one component is at the beginning of a line of the cache: registers that are read and written one after the other from there
-/// on do not lie across two lines.
+/// A vector in which a given component lies at the beginning of a cache line. Vector registers that are loaded or
+/// stored one after the other from there on do not straddle two cache lines.
 #[derive(Debug)]
 pub(crate) struct Aligned {
     all: Vec<f64>,
@@ -15,23 +15,24 @@ pub(crate) struct Aligned {
 }
 
 impl Aligned {
-    /// Zeros, with the component `first` at the beginning of a line.
+    /// Zeros, with the component `first` at the beginning of a cache line.
     pub fn zeros(len: usize, first: usize) -> Self {
         let all = vec![0.0; len + 2 * LINE];
-        // As many as `align_offset` leaves to the next line, and `first` before it. Where it cannot tell nothing is lost but time.
+        // The component `first` is placed at the next cache line, whose distance `align_offset` gives. Where
+        // `align_offset` cannot compute it, the vector is not aligned, which costs only time.
         let offset = all.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE);
         let begin = (offset + LINE - first % LINE) % LINE;
         Aligned { all, begin, len }
     }
 
-    /// A copy of a slice with its first component at the beginning of a line.
+    /// A copy of a slice with its first component at the beginning of a cache line.
     pub fn from_slice(x: &[f64]) -> Self {
         let mut aligned = Self::zeros(x.len(), 0);
         aligned.copy_from_slice(x);
         aligned
     }
 
-    /// Unknowns between two fixed places, the first of them at the beginning of a line.
+    /// The unknowns, padded with one fixed place at each end; the first unknown is at the beginning of a cache line.
     pub fn between_fixed(x: &[f64]) -> Self {
         let mut aligned = Self::zeros(x.len() + 2, 1);
         if let Some(inner) = aligned.get_mut(1..=x.len()) {

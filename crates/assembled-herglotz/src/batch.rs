@@ -1,4 +1,4 @@
-//! The elements that are in no run, some registers of them at a time.
+//! Forces of the elements outside runs, a batch of SIMD registers at a time.
 
 use crate::Potential;
 use crate::blocks::{self, BLOCK, ByBlock};
@@ -7,39 +7,41 @@ use crate::kernels::Weight;
 use crate::lanes::{LANES, Lanes};
 use crate::term::column;
 
-/// The registers of elements of a batch: so many that their forces are in the first cache, and that what they have in common is summed up before it
-/// goes to the velocities.
+/// Number of SIMD registers of elements in a batch: few enough that their forces stay in the L1 cache, and enough that
+/// several forces on one unknown are summed before they are added to its velocity.
 const GROUPS: usize = 4;
 
-/// Elements with unknowns in one block: they are evaluated first, then each unknown takes its forces together. One that waits for
-/// the velocity that the element before it has written would make them follow each other.
+/// Elements with unknowns in one block. All elements are evaluated first; then the forces on each unknown are summed
+/// and applied at once. If the elements updated the velocities one after the other, each update would have to wait for
+/// the preceding one.
 #[derive(Clone, Debug)]
 pub(crate) struct Batch<const K: usize, const P: usize> {
     groups: Vec<Group<K, P>>,
     targets: Vec<Targets>,
-    /// For the targets in turn, where their forces stand among those of the groups: a row has one of each.
+    /// The rows of `targets`, one target after the other: each row holds one index per lane into the forces of the
+    /// groups.
     rows: Vec<[u16; LANES]>,
 }
 
-/// The elements of a register; lanes that are left repeat the first.
+/// The elements of one SIMD register; unused lanes repeat the first element.
 #[derive(Clone, Debug)]
 struct Group<const K: usize, const P: usize> {
-    /// The places of their unknowns.
+    /// The padded indices of their unknowns.
     places: [[u32; LANES]; K],
     parameters: [[f64; LANES]; P],
 }
 
-/// Unknowns of the block.
+/// A SIMD register of unknowns of the block.
 #[derive(Clone, Copy, Debug)]
 struct Targets {
-    /// Counted from the block's first; lanes that are left have a number beyond its last.
+    /// Indices relative to the first unknown of the block; unused lanes hold an index beyond the last.
     unknowns: [u32; LANES],
-    /// How many rows are theirs.
+    /// The number of rows of these unknowns.
     rows: usize,
 }
 
 impl<const K: usize, const P: usize> Batch<K, P> {
-    /// Of elements by their numbers, for the unknowns of a block.
+    /// The batch of the elements with these numbers, for the unknowns of a block.
     fn new(elements: &Elements<K, P>, numbers: &[u32], block: usize, unknowns: usize) -> Self {
         const { assert!((GROUPS + 1) * LANES * 32 <= 1 << 16, "an entry has 16 bits, an element up to 32 unknowns") };
         let place = |e: u32, k: usize| elements.loose.get(e as usize).map_or(0, |places| places[k]);
@@ -49,7 +51,7 @@ impl<const K: usize, const P: usize> Batch<K, P> {
             let places = std::array::from_fn(|k| std::array::from_fn(|lane| place(of(lane), k)));
             Group { places, parameters: std::array::from_fn(|p| std::array::from_fn(|lane| parameter(of(lane), p))) }
         });
-        // A fixed place, or one of another block, is no unknown of this one.
+        // Fixed places and unknowns of other blocks are skipped.
         let inside = block * BLOCK + 1..((block + 1) * BLOCK).min(unknowns) + 1;
         let mut all = Vec::new();
         for (i, e) in numbers.iter().enumerate() {
@@ -68,7 +70,7 @@ impl<const K: usize, const P: usize> Batch<K, P> {
             let longest = lanes.iter().map(|entries| entries.len()).max().unwrap_or(0);
             let unknown = |lane: usize| lanes.get(lane).and_then(|entries| entries.first()).map_or(u32::MAX, |e| e.0);
             targets.push(Targets { unknowns: std::array::from_fn(unknown), rows: longest });
-            // What is left of a row is the zero behind the groups.
+            // Unused entries of a row refer to the zeros after the groups.
             let entry = |lane: usize, i: usize| lanes.get(lane).and_then(|entries| entries.get(i));
             rows.extend(
                 (0..longest)
@@ -84,7 +86,7 @@ impl<const K: usize, const P: usize> Batch<K, P> {
         let Some(last) = q.len().checked_sub(1) else { return };
         let mut slopes = [[[0.0; LANES]; K]; GROUPS + 1];
         for (slopes, group) in slopes.iter_mut().zip(&self.groups) {
-            // By loops: maps of arrays would be calls.
+            // Loops, since `map` on arrays would compile to function calls.
             let (mut x, mut c) = ([Lanes::splat(0.0); K], [Lanes::splat(0.0); P]);
             for (x, places) in x.iter_mut().zip(&group.places) {
                 *x = gathered(q, last, places);
@@ -120,7 +122,8 @@ impl<const K: usize, const P: usize> Batch<K, P> {
     }
 }
 
-/// The numbers at eight places. They are inside by construction; without a branch the compiler loads them to registers at once.
+/// The values at eight indices. The indices are in range by construction; clamping them instead of branching lets the
+/// compiler load the values directly into registers.
 #[inline(always)]
 fn gathered(q: &[f64], last: usize, [a, b, c, d, e, f, g, h]: &[u32; LANES]) -> Lanes {
     let at = |place: u32| q[(place as usize).min(last)];

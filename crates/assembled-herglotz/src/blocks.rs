@@ -1,23 +1,23 @@
-//! Unknowns in blocks of one size: what is in the cache at a time, and what a thread takes.
+//! Blocks of unknowns of a fixed size: the unit for the cache and for the distribution over threads.
 
-/// The unknowns of a block. Positions, velocities and forces of a block are in the first cache together.
+/// The number of unknowns in a block. Positions, velocities and forces of a block fit into the L1 cache together.
 pub(crate) const BLOCK: usize = 1024;
 
-/// The number of blocks of so many unknowns.
+/// The number of blocks for the given number of unknowns.
 pub(crate) fn count(unknowns: usize) -> usize {
     unknowns.div_ceil(BLOCK)
 }
 
-/// Items by block, all in one vector.
+/// Items grouped by block, stored in one vector.
 #[derive(Clone, Debug)]
 pub(crate) struct ByBlock<T> {
     items: Vec<T>,
-    /// Where the items of each block end.
+    /// The end of the items of each block.
     ends: Vec<usize>,
 }
 
 impl<T> ByBlock<T> {
-    /// From items in any order with their blocks; the order within a block is kept.
+    /// Groups items, given in any order with the number of their block. The order within a block is kept.
     pub fn new(blocks: usize, mut items: Vec<(u32, T)>) -> Self {
         items.sort_by_key(|(block, _)| *block);
         let mut ends = vec![0; blocks];

@@ -1,15 +1,16 @@
-//! The linear drag `gamma(t) z`, and the flow of the kinetic part with it.
+//! The linear drag `gamma(t) z`, and the flow of the kinetic energy with this drag.
 
 /// The rate of the drag.
 pub(crate) enum Drag {
-    /// The same at all times.
+    /// A constant rate.
     Constant(f64),
     /// A function of time.
     Timed(Box<dyn Fn(f64) -> f64 + Send + Sync>),
 }
 
-/// The nodes and weights of the Gauss formula of order 12 on `[0, 1]`: its error along a drift is far below that of any scheme here.
-/// Abramowitz and Stegun, Handbook of Mathematical Functions (1964), table 25.4.
+/// The nodes and weights of the Gauss quadrature of order 12 on `[0, 1]`. Its error along a drift is far below that of
+/// any splitting scheme of this library. Source: Abramowitz and Stegun, Handbook of Mathematical Functions (1964),
+/// table 25.4.
 const NODES: [[f64; 2]; 6] = {
     let half = [
         [0.238_619_186_083_196_9, 0.467_913_934_572_691],
@@ -36,7 +37,7 @@ impl Drag {
         }
     }
 
-    /// The integral of the rate over a time s from t.
+    /// The integral of the rate from t to t + s.
     fn growth(&self, t: f64, s: f64) -> f64 {
         match self {
             Drag::Constant(gamma) => gamma * s,
@@ -44,7 +45,7 @@ impl Drag {
         }
     }
 
-    /// The drift over a time s, which may be negative, from the time t.
+    /// The drift from the time t over a time s, which may be negative.
     pub fn drift(&self, t: f64, s: f64) -> Drift {
         let damping = self.growth(t, s).exp_m1();
         let length = match self {
@@ -56,8 +57,9 @@ impl Drag {
     }
 }
 
-/// The flow of the kinetic part with the drag over a time, with g the integral of gamma from its start: `q += length v` with the integral of
-/// `e^g`, `v += damping v` with `e^g - 1`, `z += damping z + lift v.Mv`. A conformal contact map of rate `1 + damping`.
+/// The flow of the kinetic energy with drag over a time interval. With g(t) the integral of gamma from the start of the
+/// interval, it is `q += length v` with `length` the integral of `e^g`, `v += damping v` with `damping = e^g - 1` at
+/// the end, and `z += damping z + lift v.Mv`. It is a conformal contact map with the factor `1 + damping`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drift {
     pub length: f64,
@@ -66,10 +68,10 @@ pub(crate) struct Drift {
 }
 
 impl Drift {
-    /// Over no time.
+    /// The drift over zero time, which is the identity.
     pub const NONE: Drift = Drift { length: 0.0, damping: 0.0, lift: 0.0 };
 
-    /// Moves velocities, and positions to others.
+    /// Updates the velocities in place, and writes the positions after the drift to `next`.
     #[inline(always)]
     pub fn go(&self, q: &[f64], v: &mut [f64], next: &mut [f64]) {
         for ((next, q), v) in next.iter_mut().zip(q).zip(v) {
@@ -79,7 +81,7 @@ impl Drift {
     }
 }
 
-/// `a * b + c`, fused where the build has the instruction: elsewhere it would be a call.
+/// `a * b + c`, fused if the build target has the instruction; otherwise `mul_add` would be a function call.
 #[inline(always)]
 fn fused(a: f64, b: f64, c: f64) -> f64 {
     if cfg!(target_feature = "fma") { a.mul_add(b, c) } else { a * b + c }

@@ -1,13 +1,13 @@
-//! Lists of elements: the unknowns of each, and where they follow each other.
+//! Lists of elements, divided into runs of consecutive elements and other elements.
 
 use crate::AssemblyError;
 use crate::batch::{self, Batch};
 use crate::blocks::{self, BLOCK, ByBlock};
 
-/// Instead of an unknown of an element: a place that is held at 0, as by a wall.
+/// Stands for an unknown of an element that is held at 0, for example at a wall.
 pub const FIXED: usize = usize::MAX;
 
-/// The unknowns and the parameters of one element. Made of `[usize; K]`, or of `([usize; K], [f64; P])`.
+/// The unknowns and the parameters of one element. Converts from `[usize; K]`, and from `([usize; K], [f64; P])`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ElementData<const K: usize, const P: usize> {
     /// The unknowns, or [`FIXED`].
@@ -28,35 +28,35 @@ impl<const K: usize, const P: usize> From<([usize; K], [f64; P])> for ElementDat
     }
 }
 
-/// The fewest elements of a run: fewer do not fill a register.
+/// The minimum number of elements of a run; fewer do not fill a vector register.
 const LEAST: usize = 8;
 
-/// Elements in a row whose unknowns all go up by one: the bonds of a chain, or of a row of a lattice. Their unknowns are read as
-/// they stand in memory.
+/// Consecutive elements whose unknowns all increase by one, such as the bonds of a chain or of a row of a lattice.
+/// Their unknowns are loaded from consecutive memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Run<const K: usize> {
-    /// The places of the first element's unknowns.
+    /// The padded indices of the unknowns of the first element.
     pub start: [usize; K],
     /// The number of elements.
     pub len: usize,
-    /// The place of the first element's parameters.
+    /// The index of the parameters of the first element.
     pub first: usize,
 }
 
-/// Unknowns of a block, in a row, on which the same slots of a run act.
+/// Consecutive unknowns of a block on which the same slots of a run act. Slot k is the k-th unknown of an element.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
-    /// Which run.
+    /// The number of the run.
     pub run: u32,
-    /// The first unknown, from the block's first.
+    /// The first unknown, relative to the first unknown of the block.
     pub from: u32,
-    /// The end.
+    /// The end of the unknowns, exclusive.
     pub to: u32,
-    /// A bit for each slot in which elements of the run have these unknowns.
+    /// The bit k is set if elements of the run have these unknowns in slot k.
     pub slots: u32,
 }
 
-/// Elements of a run in a row.
+/// Consecutive elements of a run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Span {
     pub run: u32,
@@ -64,21 +64,23 @@ pub(crate) struct Span {
     pub to: usize,
 }
 
-/// The elements of one kind. Places count from 1, so that [`FIXED`] is a place too: 0, or the one after the last unknown.
+/// The elements of one list. Unknowns have padded indices, which start from 1, so that [`FIXED`] has an index too: 0,
+/// or the one after the last unknown.
 ///
-/// A list that was given element by element is taken apart into runs, which need no memory for each element, and the rest.
+/// The list is given element by element. It is divided into runs, which store no indices for each element, and the
+/// remaining elements.
 #[derive(Clone, Debug)]
 pub(crate) struct Elements<const K: usize, const P: usize> {
     pub runs: Vec<Run<K>>,
     pub run_parameters: [Vec<f64>; P],
-    /// What the runs do to each block of unknowns.
+    /// The pieces of runs that act on each block of unknowns.
     pub pieces: ByBlock<Piece>,
     /// The elements of runs by the block of their first unknown.
     pub spans: ByBlock<Span>,
-    /// The places of the elements that are in no run.
+    /// The padded indices of the elements outside runs.
     pub loose: Vec<[u32; K]>,
     pub loose_parameters: [Vec<f64>; P],
-    /// Those with unknowns in each block.
+    /// The elements outside runs that have unknowns in each block.
     pub batches: ByBlock<Batch<K, P>>,
 }
 
@@ -120,7 +122,7 @@ impl<const K: usize, const P: usize> Elements<K, P> {
         Ok(found)
     }
 
-    /// Keeps a run, or its elements one by one where they are few.
+    /// Stores a run, or its elements one by one if they are few.
     fn close(&mut self, run: Option<Run<K>>) {
         let Some(run) = run else { return };
         if run.len >= LEAST {
@@ -140,7 +142,7 @@ impl<const K: usize, const P: usize> Elements<K, P> {
         for (number, run) in self.runs.iter().enumerate() {
             let number = number as u32;
             cut(run, number, unknowns, &mut pieces);
-            // The fixed place before the first unknown counts to the first block.
+            // The fixed place before the first unknown belongs to the first block.
             let block_of = |e: usize| (run.start[0] + e).saturating_sub(1).min(unknowns - 1) / BLOCK;
             let mut from = 0;
             while from < run.len {
@@ -158,7 +160,7 @@ impl<const K: usize, const P: usize> Elements<K, P> {
     }
 }
 
-/// Whether an unknown is the one that stands at a place.
+/// Whether an unknown has the padded index `place`; [`FIXED`] has the index after the last unknown here.
 fn follows(place: usize, unknown: usize, unknowns: usize) -> bool {
     if unknown == FIXED { place == unknowns + 1 } else { place == unknown + 1 }
 }
@@ -187,9 +189,9 @@ fn check(
     }
 }
 
-/// Cuts the unknowns that a run acts on where a slot begins or ends, and at the ends of blocks.
+/// Divides the unknowns on which a run acts where a slot begins or ends, and at the ends of blocks.
 fn cut<const K: usize>(run: &Run<K>, number: u32, unknowns: usize, pieces: &mut Vec<(u32, Piece)>) {
-    // The unknowns of a slot; fixed places left out.
+    // The unknowns of a slot, without fixed places.
     let slot = |k: usize| (run.start[k].max(1) - 1)..(run.start[k] + run.len - 1).min(unknowns);
     let mut cuts: Vec<usize> = (0..K).flat_map(|k| [slot(k).start, slot(k).end]).collect();
     cuts.sort_unstable();

@@ -1,20 +1,20 @@
-//! Bad input, found before the first step.
+//! Errors for invalid input, detected before the first step.
 
 use discrete_herglotz::InputError;
 use thiserror::Error;
 
-/// Bad input to an assembled system or to an integrator of one, found before the first step.
+/// Invalid input to an assembled system or to one of its integrators, detected before the first step.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum AssemblyError {
-    /// A system has no unknowns, or more than indices can count.
+    /// The number of unknowns is 0 or exceeds the range of the indices.
     #[error("a system of {found} unknowns; it must have from 1 to {most}")]
     Unknowns {
-        /// The number that was asked for.
+        /// The requested number.
         found: usize,
-        /// The most that are possible.
+        /// The largest possible number.
         most: usize,
     },
-    /// An element names an unknown that there is none of.
+    /// An element refers to an unknown that does not exist.
     #[error(
         "element {element} of list {list} has the unknown {unknown}; the system has the unknowns 0 to {last} (and FIXED)"
     )]
@@ -23,19 +23,19 @@ pub enum AssemblyError {
         list: usize,
         /// The element in the list.
         element: usize,
-        /// The unknown that was named.
+        /// The unknown that the element refers to.
         unknown: usize,
         /// The last unknown of the system.
         last: usize,
     },
-    /// An element names an unknown twice.
+    /// An element contains an unknown twice.
     #[error("element {element} of list {list} has the unknown {unknown} twice; an element's unknowns must differ")]
     Repeated {
         /// The list of elements.
         list: usize,
         /// The element in the list.
         element: usize,
-        /// The unknown that was named twice.
+        /// The repeated unknown.
         unknown: usize,
     },
     /// A parameter of an element is not finite.
@@ -48,7 +48,7 @@ pub enum AssemblyError {
         /// The parameter.
         value: f64,
     },
-    /// An unknown has no mass, or one that is no mass.
+    /// The mass of an unknown is missing, or is not positive and finite.
     #[error("the unknown {unknown} has the mass {mass}; the method needs a positive finite mass of each unknown")]
     Mass {
         /// The first such unknown.
@@ -56,22 +56,22 @@ pub enum AssemblyError {
         /// Its mass.
         mass: f64,
     },
-    /// A vector is not as long as the system is large.
+    /// The length of a vector differs from the number of unknowns.
     #[error("{what} has {found} components; the system has {expected} unknowns")]
     Length {
-        /// The vector.
+        /// The name of the vector.
         what: &'static str,
-        /// The number of its components.
+        /// Its length.
         found: usize,
         /// The number of unknowns.
         expected: usize,
     },
-    /// A number is infinite or not a number.
+    /// A value is infinite or NaN.
     #[error("component {index} of {what} is {value}; it must be finite")]
     NonFinite {
-        /// The vector or number.
+        /// The name of the vector or number.
         what: &'static str,
-        /// The component, 0 for a number.
+        /// The index of the component; 0 for a number.
         index: usize,
         /// The value.
         value: f64,
@@ -84,12 +84,12 @@ pub enum AssemblyError {
         /// The first such unknown.
         unknown: usize,
     },
-    /// A method for separable systems is asked of one with general local terms.
+    /// A method for separable systems was applied to a system with general local terms.
     #[error(
         "the system has general local terms; splittings and `AssembledMidpoint` take potentials only: use `AssembledGauss`"
     )]
     NotSeparable,
-    /// What needs the action is asked of a state without it.
+    /// An operation needs the action, which the state does not have.
     #[error(
         "the Lagrangian depends on the action z, which the state does not have; start the motion with one, as `z: Some(0.0)`"
     )]
@@ -107,17 +107,17 @@ pub enum AssemblyError {
         /// The limit that was set, or the memory that is available.
         limit: usize,
     },
-    /// A catalogue system has bad dimensions or parameters.
+    /// A system of the catalogue has invalid dimensions or parameters.
     #[error("{what} = {value}; {remedy}")]
     Parameters {
         /// The parameter.
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What would be accepted.
+        /// The accepted values.
         remedy: &'static str,
     },
-    /// What the integrators of small systems refuse as well.
+    /// Input that the integrators of small systems reject as well.
     #[error(transparent)]
     Input(#[from] InputError),
 }

@@ -9,7 +9,7 @@ use crate::lanes::{LANES, Lanes};
 use crate::term::column;
 use contact_geom::nalgebra::SVector;
 
-/// What a force is multiplied by where it is added to a velocity.
+/// The weight with which a force is added to a velocity.
 #[derive(Clone, Copy)]
 pub(crate) enum Weight<'a> {
     /// The same factor for all unknowns.
@@ -18,37 +18,40 @@ pub(crate) enum Weight<'a> {
     Masses(f64, &'a [f64]),
 }
 
-/// The drift after a kick, and where the positions of the block go by it.
+/// The drift after a kick, and the slice for the new positions of the block.
 pub(crate) struct Then<'a> {
     pub drift: Drift,
     pub next: &'a mut [f64],
 }
 
-/// A list of potentials, whatever the number of their unknowns.
+/// A list of potentials with any number of unknowns per element.
 pub(crate) trait PotentialList: Send + Sync {
-    /// Adds the weighted forces `-V_q` on the unknowns of a block. `q` begins with a fixed place and ends with one.
+    /// Adds the weighted forces `-V_q` on the unknowns of a block. `q` is padded with one fixed place at each end.
     ///
-    /// Tells whether it took the drift too, which it does while the velocities are in registers: where all unknowns have the same
-    /// mass, and this list goes to each of them once.
+    /// Returns whether the drift was applied as well. This is done while the velocities are in registers, if all
+    /// unknowns have the same mass and one piece of a run covers the whole block with all its slots.
     fn kick(&self, block: usize, t: f64, q: &[f64], weight: Weight, v: &mut [f64], then: Option<Then>) -> bool;
 
-    /// The energy of the elements that begin in a block.
+    /// The energy of the elements assigned to a block: those of runs by their first unknown, the others in equal
+    /// shares.
     fn energy(&self, block: usize, blocks: usize, t: f64, q: &[f64]) -> f64;
 
-    /// Calls a function with the places of each element.
+    /// Calls a function with the padded indices of the unknowns of each element.
     fn visit(&self, f: &mut dyn FnMut(&[usize]));
 
-    /// Where the second derivatives of each element stand in a matrix: for each pair of unknowns with the second not after the first.
+    /// The indices of the second derivatives of each element among the entries of a matrix: for each pair of unknowns
+    /// of which the second does not follow the first.
     fn entries(&self, pattern: &Pattern) -> Vec<u32>;
 
     /// Adds the second derivatives, times a factor, to the entries of the matrix.
     fn hessian(&self, t: f64, q: &[f64], factor: f64, places: &[u32], entries: &mut [f64]);
 
-    /// Adds the product of the second derivatives with a vector x; q, x and the product begin with a fixed place and end with one.
+    /// Adds the product of the second derivatives with a vector x. The vectors q, x and the product are padded with one
+    /// fixed place at each end.
     fn hessian_times(&self, t: f64, q: &[f64], x: &[f64], product: &mut [f64]);
 }
 
-/// A potential with its elements.
+/// A potential and its elements.
 pub(crate) struct Kind<V, const K: usize, const P: usize> {
     pub term: V,
     pub elements: Elements<K, P>,
@@ -153,16 +156,16 @@ pub(crate) fn unknowns<const K: usize>(q: &[f64], run: &Run<K>, e: usize) -> SVe
     column(std::array::from_fn(|i| Lanes::load(q, run.start[i] + e)))
 }
 
-/// The unknowns of fewer.
+/// The unknowns of fewer than eight elements of a run.
 #[inline(always)]
 pub(crate) fn unknowns_part<const K: usize>(q: &[f64], run: &Run<K>, e: usize, count: usize) -> SVector<Lanes, K> {
     column(std::array::from_fn(|i| Lanes::load_part(q, run.start[i] + e, count)))
 }
 
 impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
-    /// The kick of the unknowns of a piece: each is gone to once, and has its forces from all elements of the run there. An element is
-    /// evaluated once for each of its unknowns, which costs less than to write its forces and to read them again. With `DRIFT` the
-    /// drift follows.
+    /// Applies the kick to the unknowns of a piece. Each unknown is visited once and receives the forces of all
+    /// elements of the run. An element is evaluated once for each of its unknowns, which costs less than storing its
+    /// forces and loading them again. With `DRIFT` the drift follows.
     #[inline(always)]
     #[expect(
         clippy::too_many_arguments,
@@ -184,13 +187,13 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         let Some(v) = v.get_mut(from..to) else { return };
         let inverse_masses = if MASSES { inverse_masses.get(from..to).unwrap_or(&[]) } else { &[] };
         let t = Lanes::splat(t);
-        // The place of the piece's first unknown.
+        // The padded index of the first unknown of the piece.
         let place = block * BLOCK + from + 1;
         let acts = |k: usize| FULL || piece.slots >> k & 1 == 1;
         let (chunks, rest) = v.as_chunks_mut::<LANES>();
         let count = chunks.len();
-        // For each slot its elements' unknowns and parameters, as many registers of each as there are of velocities: then no load
-        // asks whether it is inside.
+        // For each slot, the unknowns and parameters of its elements, as slices of as many registers as there are of
+        // velocities: then loads need no bounds checks.
         let of = |x: &'a [f64], from: usize| {
             x.get(from..).and_then(|x| x.as_chunks::<LANES>().0.get(..count)).unwrap_or(&[])
         };
@@ -251,7 +254,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
 }
 
 impl<const K: usize, const P: usize> Elements<K, P> {
-    /// Calls a function with the places of each element: those of runs first.
+    /// Calls a function with the padded indices of each element, first those of runs.
     pub(crate) fn visit(&self, mut f: impl FnMut([usize; K])) {
         for run in &self.runs {
             (0..run.len).for_each(|e| f(run.start.map(|s| s + e)));
@@ -265,13 +268,13 @@ impl<const K: usize, const P: usize> Elements<K, P> {
         std::array::from_fn(|p| Lanes::load(&self.run_parameters[p], run.first + e))
     }
 
-    /// Those of fewer.
+    /// The parameters of fewer than eight elements of a run.
     #[inline(always)]
     pub(crate) fn parameters_part(&self, run: &Run<K>, e: usize, count: usize) -> [Lanes; P] {
         std::array::from_fn(|p| Lanes::load_part(&self.run_parameters[p], run.first + e, count))
     }
 
-    /// Unknowns and parameters of elements that are in no run; the first stands in the lanes that are left.
+    /// The unknowns and parameters of elements outside runs; unused lanes repeat the first element.
     #[inline(always)]
     pub(crate) fn gathered(
         &self,
@@ -279,7 +282,7 @@ impl<const K: usize, const P: usize> Elements<K, P> {
         count: usize,
         element: impl Fn(usize) -> usize,
     ) -> (SVector<Lanes, K>, [Lanes; P]) {
-        // By loops: maps of arrays would be calls.
+        // Loops, since `map` on arrays would compile to function calls.
         let (mut x, mut c) = ([[f64::NAN; LANES]; K], [[f64::NAN; LANES]; P]);
         for lane in 0..LANES {
             let e = element(if lane < count { lane } else { 0 });

@@ -1,4 +1,4 @@
-//! Eight numbers in vector registers, over which local terms are evaluated.
+//! Eight numbers in vector registers: the scalar type for the evaluation of local terms.
 
 use contact_geom::{Scalar, scalar_operators};
 use std::ops::Neg;
@@ -7,8 +7,8 @@ use wide::f64x8;
 /// The number of lanes.
 pub(crate) const LANES: usize = 8;
 
-/// Eight numbers, worked on at once: the same local term of eight elements. The instructions are those that the build is for
-/// (`target-cpu`).
+/// Eight numbers that are processed at once, for the same local term of eight elements. The instruction set is that of
+/// the build (`target-cpu`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Lanes(f64x8);
 
@@ -23,7 +23,7 @@ impl Lanes {
         Lanes(f64x8::splat(x))
     }
 
-    /// The eight numbers from a place of a slice on; not numbers where it ends before.
+    /// The eight numbers of a slice from the index `at` on; NaN if the slice is too short.
     #[inline(always)]
     pub fn load(x: &[f64], at: usize) -> Self {
         match x.get(at..).and_then(|rest| rest.first_chunk::<LANES>()) {
@@ -32,7 +32,7 @@ impl Lanes {
         }
     }
 
-    /// The numbers from a place of a slice on, fewer than eight; the first of them stands in the lanes that are left.
+    /// Fewer than eight numbers of a slice from the index `at` on; unused lanes repeat the first of them.
     #[inline(always)]
     pub fn load_part(x: &[f64], at: usize, count: usize) -> Self {
         let part = x.get(at..at + count).unwrap_or(&[]);
@@ -43,7 +43,7 @@ impl Lanes {
         Self::new(all)
     }
 
-    /// `self * b + c`, fused where the build has the instruction.
+    /// `self * b + c`, fused if the build target has the instruction.
     #[inline(always)]
     pub fn mul_add(self, b: Self, c: Self) -> Self {
         Lanes(self.0.mul_add(b.0, c.0))
@@ -54,21 +54,21 @@ impl Lanes {
         self.0.to_array()
     }
 
-    /// A function of one number, lane by lane: for those that are rare in mechanics.
+    /// Applies a function lane by lane, for functions that are rare in mechanics.
     #[inline]
     fn each(self, f: impl Fn(f64) -> f64) -> Self {
         Self::new(self.to_array().map(f))
     }
 
-    /// Whether all lanes are in the range in which sines are reduced without loss.
+    /// Whether all lanes are in the range in which the argument reduction of sine and cosine is exact.
     #[inline(always)]
     fn reducible(self) -> bool {
         self.0.abs().simd_lt(f64x8::splat(REDUCIBLE)).all()
     }
 }
 
-/// The arguments up to which the three parts of pi/2 of `wide` reduce a sine: the first two have 27 and 23 binary digits less than a
-/// double, so that their products with up to 2^19 quarter turns are exact.
+/// The bound of the arguments that `wide` reduces with its three parts of pi/2 without loss. The first two parts have
+/// 27 and 23 binary digits fewer than a double, so that their products with up to 2^19 quarter turns are exact.
 const REDUCIBLE: f64 = 5e5;
 
 impl From<f64> for Lanes {
@@ -94,7 +94,7 @@ scalar_operators! { [] Lanes;
 }
 
 impl Scalar for Lanes {
-    /// Not a number where lanes differ: a formula that branches on it gives no number, and the step is refused.
+    /// NaN if the lanes differ: a formula that branches on it returns NaN, and the step is refused.
     #[inline(always)]
     fn re(self) -> f64 {
         let lanes = self.to_array();

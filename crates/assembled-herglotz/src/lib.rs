@@ -1,8 +1,8 @@
 //! Large contact systems: Lagrangians that are sums of local terms, of any number of unknowns.
 //!
-//! A site, a bond, a finite element: the user writes its term once, generic in the scalar, with the list of the elements that have
-//! it. The crate assembles forces and sparse second derivatives from small fixed jets, and takes explicit and implicit steps
-//! whose cost grows linearly with the size.
+//! The user writes the term of one element (a site, a bond, a finite element) once, generic in the scalar, and lists
+//! the elements that have it. The crate assembles forces and sparse second derivatives from dual numbers of fixed size,
+//! and takes explicit and implicit steps. The cost of an explicit step grows linearly with the number of elements.
 //!
 //! ```
 //! use assembled_herglotz::systems::{FputBond, fput_chain};
@@ -45,7 +45,7 @@ pub use splitting::AssembledSplitting;
 pub use system::{AssembledSystem, State};
 pub use term::{Difference, Potential};
 
-/// The program of the README.
+/// Runs the program of the README as a doctest.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 pub struct Readme;

@@ -1,17 +1,18 @@
-//! General local terms: what a user writes once, and their derivatives, eight elements at a time.
+//! General local terms of a Lagrangian, and their derivatives for eight elements at a time.
 
 use crate::elements::Elements;
 use crate::implicit::FullPattern;
 use crate::lanes::{LANES, Lanes};
 use crate::term::column;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, Dual, Scalar, seed};
+use contact_geom::{ChartVector, Dual, Scalar, support::seed};
 
-/// A local term `l(t, q, v, z; c)` of a Lagrangian: any function of `K` unknowns, their velocities and the action z of the whole system, with
-/// `P` parameters.
+/// A local term `l(t, q, v, z; c)` of a Lagrangian: any function of `K` unknowns, their velocities and the action z of
+/// the whole system, with `P` parameters.
 ///
-/// A [`Potential`](crate::Potential) is the special case `l = -V(t, q; c)`, and cheaper. As there, choose values by
-/// [`Scalar::if_less`] and the like, never by `if`: elements are evaluated eight at a time. At a [`FIXED`](crate::FIXED) place q and v are 0.
+/// A [`Potential`](crate::Potential) is the special case `l = -V(t, q; c)`, and less expensive. As there, select values
+/// with [`Scalar::if_less`] and similar functions, never with `if`, since eight elements are evaluated at once. At a
+/// [`FIXED`](crate::FIXED) place q and v are 0.
 ///
 /// ```
 /// use assembled_herglotz::LocalLagrangian;
@@ -32,7 +33,7 @@ pub trait LocalLagrangian<const K: usize, const P: usize = 0>: Send + Sync + 'st
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, K>, v: &SVector<T, K>, z: T, c: &[T; P]) -> T;
 }
 
-/// Where a Lagrangian is evaluated. Positions and velocities begin with a fixed place and end with one.
+/// The point at which a Lagrangian is evaluated. Positions and velocities are padded with one fixed place at each end.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<'a> {
     pub t: f64,
@@ -41,7 +42,7 @@ pub(crate) struct Place<'a> {
     pub z: f64,
 }
 
-/// A Lagrangian and its first derivatives.
+/// The value of a Lagrangian and its first derivatives.
 #[derive(Clone, Debug)]
 pub(crate) struct First {
     pub l: f64,
@@ -56,7 +57,8 @@ impl First {
     }
 }
 
-/// Its second derivatives; `qv` is that in the position of the row and the velocity of the column, `vq` the other way.
+/// The second derivatives of a Lagrangian; `qv` is with respect to the position of the row and the velocity of the
+/// column, `vq` with respect to the velocity of the row and the position of the column.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Second {
     pub qq: Vec<f64>,
@@ -89,28 +91,28 @@ impl Second {
     }
 }
 
-/// A list of general terms, whatever the number of their unknowns.
+/// A list of general terms with any number of unknowns per element.
 pub(crate) trait LocalList: Send + Sync {
-    /// Calls a function with the places of each element.
+    /// Calls a function with the padded indices of the unknowns of each element.
     fn visit(&self, f: &mut dyn FnMut(&[usize]));
 
     /// Adds the terms and their first derivatives.
     fn first(&self, at: Place, sums: &mut First);
 
-    /// Where the second derivatives of each element stand in a matrix, row by row.
+    /// The indices of the second derivatives of each element among the entries of a sparse matrix, row by row.
     fn entries(&self, pattern: &FullPattern) -> Vec<u32>;
 
-    /// Adds the second derivatives, at these places.
+    /// Adds the second derivatives to the entries with the indices `places`.
     fn second(&self, at: Place, places: &[u32], sums: &mut Second);
 }
 
-/// A general term with its elements.
+/// A general term and its elements.
 pub(crate) struct LocalKind<V, const K: usize, const P: usize> {
     pub term: V,
     pub elements: Elements<K, P>,
 }
 
-/// Eight elements, or the fewer that are left.
+/// Up to eight elements, one per lane.
 struct SimdBatch<const K: usize, const P: usize> {
     count: usize,
     places: [[usize; K]; LANES],
@@ -118,7 +120,7 @@ struct SimdBatch<const K: usize, const P: usize> {
 }
 
 impl<const K: usize, const P: usize> SimdBatch<K, P> {
-    /// Their unknowns.
+    /// The components of `x` that belong to the unknowns of the elements.
     #[inline(always)]
     fn gather(&self, x: &[f64]) -> SVector<Lanes, K> {
         let of = |place: usize| x.get(place).copied().unwrap_or(f64::NAN);
@@ -130,7 +132,7 @@ impl<const K: usize, const P: usize> SimdBatch<K, P> {
         ChartVector { x: self.gather(at.q), y: self.gather(at.v), z: Lanes::splat(at.z) }
     }
 
-    /// Adds to a vector over the unknowns; what is fixed has no place in it.
+    /// Adds the values to a vector over the unknowns, which has no entries for fixed places.
     #[inline(always)]
     fn scatter(&self, values: &SVector<Lanes, K>, sums: &mut [f64]) {
         for k in 0..K {
@@ -148,13 +150,13 @@ impl<const K: usize, const P: usize> SimdBatch<K, P> {
 }
 
 impl<V: LocalLagrangian<K, P>, const K: usize, const P: usize> LocalKind<V, K, P> {
-    /// Calls a function with the elements, eight at a time, in the order of [`Elements::visit`].
+    /// Calls a function with the elements, up to eight at a time, in the order of [`Elements::visit`].
     #[inline(always)]
     fn packs(&self, mut f: impl FnMut(SimdBatch<K, P>)) {
         for run in &self.elements.runs {
             for e in (0..run.len).step_by(LANES) {
                 let count = LANES.min(run.len - e);
-                // The first stands in the lanes that are left.
+                // Unused lanes repeat the first element.
                 let places = std::array::from_fn(|lane| run.start.map(|s| s + e + if lane < count { lane } else { 0 }));
                 f(SimdBatch { count, places, c: self.elements.parameters_part(run, e, count) });
             }
@@ -218,7 +220,7 @@ impl<V: LocalLagrangian<K, P>, const K: usize, const P: usize> LocalList for Loc
             for (lane, places) in (0..pack.count).zip(&mut places) {
                 for (place, [qq, qv, vq, vv]) in places.iter().zip(matrices.iter().flatten()) {
                     let place = *place as usize;
-                    // What is in a fixed row or column stands nowhere.
+                    // Rows and columns of fixed places have no entry in the matrix.
                     if place < sums.qq.len() {
                         sums.qq[place] += qq[lane];
                         sums.qv[place] += qv[lane];

@@ -1,33 +1,38 @@
-//! Whether steps resolve a motion, by the energy that is provably dissipated along it.
+//! Detection of steps that do not resolve the motion, from the known evolution of the energy.
 
 use crate::drag::Drag;
 use crate::system::{AssembledSystem, State};
-use contact_geom::max_or_nan;
-use discrete_herglotz::{EnergyDrift, EnergyLook, UnresolvedStep};
+use contact_geom::numbers::max_or_nan;
+use discrete_herglotz::{
+    UnresolvedStep,
+    checks::{EnergyDrift, EnergyLook},
+};
 
-/// The steps between two looks in long runs: one costs about five of the cheapest steps, half a per cent of them.
+/// The number of steps between two energy checks in long runs. A check costs about five of the least expensive steps,
+/// which is half a per cent of 1024 steps.
 const APART: usize = 1024;
 
-/// The times at which a system is asked whether it depends on them, at the most.
+/// The maximum number of times at which a system is tested for dependence on time.
 const TIMES: usize = 4096;
 
-/// The error of `ln sigma_d` in a step from which on the step does not resolve the drag, as of Gauss collocation on small systems.
+/// The error of `ln sigma_d` in a step above which the step does not resolve the drag; the same value as for Gauss
+/// collocation on small systems.
 const SIGMA: f64 = 0.1;
 
-/// What is known of the energy along a motion.
+/// The property of the energy along a motion that is checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Known {
-    /// `E_L` over the conformal factor does not change, where the system does not depend on time.
+    /// `E_L` divided by the conformal factor is constant, if the system does not depend on time.
     Conserved,
-    /// `T + V` does not grow, where V does not depend on time: its rate is `2 gamma T`. It is looked at without the action, and where gamma
-    /// depends on time.
+    /// `T + V`, whose rate of change is `2 gamma T`, does not grow while the drag dissipates, if V does not depend on
+    /// time. This is checked if the action is not computed, and if gamma depends on time.
     Bounded,
 }
 
-/// Looks at the energy of a run now and then: after 4, 16, 64 and 256 steps, every 1024, and where it is asked.
+/// Checks the energy of a run after 4, 16, 64 and 256 steps, every 1024 steps, and on request.
 #[derive(Clone, Debug)]
 pub(crate) struct EnergyMonitor {
-    /// `None` where nothing is known, or was found not to hold.
+    /// `None` if no property of the energy is known, or if it was found not to hold.
     known: Option<(Known, EnergyDrift)>,
     /// The energy at the start, and the size of its terms.
     start: [f64; 2],
@@ -36,17 +41,17 @@ pub(crate) struct EnergyMonitor {
     unresolved: Option<UnresolvedStep>,
 }
 
-/// The parts of an energy.
+/// The total energy and the size of its parts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Energies {
-    /// `E_L`, or `T + V` where that is asked for.
+    /// `E_L`, or `T + V` if that is requested.
     pub total: f64,
     pub kinetic: f64,
-    /// The size of the other terms.
+    /// The sum of the absolute values of the other terms.
     pub terms: f64,
 }
 
-/// How far a run has come.
+/// The point that a run has reached.
 #[derive(Clone, Copy)]
 pub(crate) struct Reached {
     pub t: f64,
@@ -55,7 +60,7 @@ pub(crate) struct Reached {
     pub taken: usize,
 }
 
-/// What steps have in common: their length, `ln sigma_d` of the first, and the order of the method.
+/// Data of the steps of a run: the step size, `ln sigma_d` of the first step, and the order of the method.
 #[derive(Clone, Copy)]
 pub(crate) struct StepFacts {
     pub h: f64,
@@ -64,7 +69,8 @@ pub(crate) struct StepFacts {
 }
 
 impl EnergyMonitor {
-    /// From a start, with or without the action. `energies` are those of the start's position and velocity, `T + V` where that is asked for.
+    /// The monitor of a run from `start`, with or without the action. `energies` returns the energies at the start; its
+    /// argument requests `T + V` instead of `E_L`.
     pub fn new(
         system: &AssembledSystem,
         start: State,
@@ -99,24 +105,25 @@ impl EnergyMonitor {
         monitor
     }
 
-    /// Whether a look is due after so many steps.
+    /// Whether a check is due after `taken` steps.
     #[inline]
     pub fn is_due(&self, taken: usize) -> bool {
         let early = matches!(taken, 4 | 16 | 64 | 256);
         (early || taken.is_multiple_of(APART)) && self.tells(taken)
     }
 
-    /// Whether a look after so many steps can tell something.
+    /// Whether a check after `taken` steps can give new information.
     pub fn tells(&self, taken: usize) -> bool {
         self.unresolved.is_none() && self.known.is_some() && taken > self.looked
     }
 
-    /// What was seen so far.
+    /// The first unresolved step found so far.
     pub fn unresolved(&self) -> Option<UnresolvedStep> {
         self.unresolved
     }
 
-    /// Looks at a state, whose energies are those at a time, `T + V` where that is asked for.
+    /// Checks the energy of a state. `energies` returns the energies of this state at a given time; its second argument
+    /// requests `T + V` instead of `E_L`.
     pub fn look(
         &mut self,
         system: &AssembledSystem,
@@ -127,14 +134,15 @@ impl EnergyMonitor {
         let Reached { t, log_factor, taken } = reached;
         let bounded = *known == Known::Bounded;
         let Energies { kinetic, total, terms } = energies(t, bounded);
-        // What may only fall is no drift where it falls.
+        // A decrease of the bounded energy is not a drift.
         let [start, start_terms] = self.start;
         let (found, log_factor) = if bounded { (max_or_nan(total, start), 0.0) } else { (total, log_factor) };
         let look = EnergyLook { total: found, kinetic, terms, log_factor, taken };
         let rounding = |sigma: f64| f64::EPSILON * (kinetic + terms + start_terms * sigma);
         self.looked = taken;
         let Some(defect) = drift.defect(&look, rounding) else { return };
-        // Only the times of the steps matter; and no more than a few thousand of them.
+        // The test for dependence on time uses the times of the steps, or `TIMES` equidistant times if there are more
+        // steps.
         let span = t - self.t0;
         let times = taken.min(TIMES);
         let steady = (0..times).all(|i| {

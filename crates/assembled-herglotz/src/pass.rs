@@ -1,4 +1,4 @@
-//! One pass over memory: a kick and the drift after it, block by block.
+//! One pass over memory: a kick and the drift that follows it, block by block.
 
 use crate::blocks::{self, BLOCK};
 use crate::drag::Drift;
@@ -6,13 +6,14 @@ use crate::kernels::{Then, Weight};
 use crate::splitting::Stage;
 use crate::system::{AssembledSystem, Masses};
 
-/// The number of unknowns from which a pass is shared among threads.
+/// The number of unknowns from which on a pass is distributed over threads.
 pub(crate) const SHARED: usize = 1 << 17;
 
-/// The blocks that a thread takes at a time.
+/// The number of blocks in a parallel task.
 const TOGETHER: usize = 16;
 
-/// The unknowns whose kicks take few lines of the cache, so that clearing them costs nothing.
+/// The size of the buffer of kicks for systems with few unknowns. It occupies few cache lines, so that clearing it
+/// costs nothing.
 const FEW: usize = 64;
 
 pub(crate) enum InverseMasses {
@@ -20,18 +21,18 @@ pub(crate) enum InverseMasses {
     Each(Vec<f64>),
 }
 
-/// A kick and a drift, from the positions `q` to others.
+/// A kick and a drift, from the positions `q` to new positions.
 pub(crate) struct Pass<'p> {
     pub system: &'p AssembledSystem,
     pub inverse: &'p InverseMasses,
-    /// Between fixed places.
+    /// The positions, padded.
     pub q: &'p [f64],
     pub t: f64,
     pub stage: Stage,
 }
 
-/// What a pass writes: velocities, the positions after it, and where they are wanted, else empty, for each block its energies,
-/// for each unknown what the last digits of its position and velocity leave out.
+/// The output of a pass: the velocities, the positions after it, and, if requested and otherwise empty, the energies of
+/// each block, and the rounding errors of each position and velocity.
 pub(crate) struct Passed<'p> {
     pub v: &'p mut [f64],
     pub next: &'p mut [f64],
@@ -41,7 +42,7 @@ pub(crate) struct Passed<'p> {
 }
 
 impl<'p> Passed<'p> {
-    /// The first so many blocks, and the others.
+    /// Splits the output after the given number of blocks.
     fn split_at(self, blocks: usize) -> (Self, Self) {
         fn at<T>(x: &mut [T], middle: usize) -> (&mut [T], &mut [T]) {
             x.split_at_mut(middle.min(x.len()))
@@ -71,7 +72,7 @@ impl Pass<'_> {
         }
     }
 
-    /// Blocks from a first one on, by as many threads as there are.
+    /// Processes the blocks from the number `first` on, distributed over the available threads.
     fn share(&self, first: usize, all: Passed) {
         let count = blocks::count(all.v.len());
         if count <= TOGETHER {
@@ -82,7 +83,7 @@ impl Pass<'_> {
         rayon::join(|| self.share(first, one), || self.share(first + half, other));
     }
 
-    /// Blocks from a first one on, one after the other.
+    /// Processes the blocks from the number `first` on, one after the other.
     fn blocks(&self, first: usize, mut all: Passed) {
         let mut block = first;
         while !all.v.is_empty() {
@@ -109,7 +110,7 @@ impl Pass<'_> {
         if kick != 0.0 {
             let (lists, weight) = (&self.system.potentials, self.weight(block, v.len()));
             for (i, list) in lists.iter().enumerate() {
-                // The energies are those between the kick and the drift.
+                // Energies are evaluated between the kick and the drift, so that these cannot be fused.
                 let last = i + 1 == lists.len() && energies.is_empty();
                 if list.kick(block, self.t, self.q, weight, v, last.then_some(Then { drift, next: &mut *next })) {
                     return;
@@ -120,7 +121,7 @@ impl Pass<'_> {
         drift.go(self.q.get(block * BLOCK + 1..).unwrap_or(&[]), v, next);
     }
 
-    /// The same by compensated sums, of at most B unknowns.
+    /// The same with compensated summation, for a block of at most B unknowns.
     fn compensated<const B: usize>(&self, block: usize, Passed { v, next, energies, q_rest, v_rest }: Passed) {
         let Stage { kick, drift: Drift { length, damping, .. }, .. } = self.stage;
         let mut kicks = [0.0; B];
@@ -142,13 +143,13 @@ impl Pass<'_> {
         }
     }
 
-    /// Takes the energies of a block between kick and drift, where they are wanted.
+    /// Evaluates the energies of a block between the kick and the drift, if they are requested.
     fn weigh(&self, block: usize, v: &[f64], energies: &mut [[f64; 2]]) {
         let Some(energies) = energies.first_mut() else { return };
         let blocks = blocks::count(self.system.unknowns());
         let lists = self.system.potentials.iter();
         let potential = lists.map(|list| list.energy(block, blocks, self.t, self.q)).sum();
-        // Without a kick the action has nothing of it.
+        // The potential changes the action only in a kick.
         energies[0] = if self.stage.kick == 0.0 { 0.0 } else { potential };
         let from = block * BLOCK;
         energies[1] = match &self.system.masses {
@@ -158,7 +159,7 @@ impl Pass<'_> {
     }
 }
 
-/// The sum of two numbers and what its rounding takes away, by Knuth: either may be the larger.
+/// The sum of two numbers and its rounding error, by Knuth's algorithm, in which either number may be the larger.
 #[inline(always)]
 fn exact_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;

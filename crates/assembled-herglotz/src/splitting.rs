@@ -1,4 +1,4 @@
-//! Explicit steps: kicks and drifts.
+//! Explicit integrators: kicks and drifts.
 
 use crate::AssemblyError;
 use crate::aligned::Aligned;
@@ -10,65 +10,69 @@ use crate::pass::{InverseMasses, Pass, Passed};
 use crate::system::{AssembledSystem, Masses, State};
 use discrete_herglotz::{InputError, SplittingScheme, StepError, StepFailure, UnresolvedStep};
 
-/// The steps between two looks whether all numbers are finite.
+/// The number of steps between two checks that all numbers are finite.
 const LOOK: usize = 256;
 
-/// A splitting at work on `L = sum m_i v_i^2/2 - V(t, q) + gamma z`.
+/// A splitting method for `L = sum m_i v_i^2/2 - V(t, q) + gamma z`.
 ///
-/// The flow of the kinetic part with the drag, over a time s, is `q += (e^(gamma s) - 1)/gamma v`, `v = e^(gamma s) v`; that of
-/// `-V` is the kick `m v -= s V_q`; each is exact, with its action, and a conformal contact map. So every step has
-/// `sigma_d = e^(gamma h)`; of a drag that depends on time, the exponential of its integral, which a Gauss formula of order 12 takes along each
-/// drift. It is that of [`Splitting`](discrete_herglotz::Splitting) on a small system.
+/// The flow of the kinetic energy with the drag over a time s is `q += (e^(gamma s) - 1)/gamma v`, `v = e^(gamma s) v`;
+/// that of `-V` is the kick `m v -= s V_q`. Both are exact, with their action, and conformal contact maps, so that
+/// every step has `sigma_d = e^(gamma h)`. If the drag depends on time, `sigma_d` is the exponential of its integral,
+/// which is computed by a Gauss formula of order 12 along each drift. The map is that of
+/// [`Splitting`](discrete_herglotz::Splitting) on a small system.
 ///
-/// A kick and the drift after it are one pass over memory, block by block: the block's forces are gathered and its velocities
-/// and positions moved while it is in the first cache. The new positions go to a second vector, so that blocks are independent:
-/// large systems are shared among threads, and the numbers are the same to the last bit for any number of them.
+/// A kick and the drift after it are one pass over memory, block by block: the forces of a block are evaluated, and its
+/// velocities and positions are updated, while it is in the L1 cache. The new positions go to a second vector, so that
+/// blocks are independent. Large systems are distributed over threads, and the results are bitwise equal for any number
+/// of them.
 ///
-/// The last kick of a step and the first of the next are one. A state that is asked for is completed on a copy, so the numbers
-/// do not depend on how many steps are taken at once.
+/// The last kick of a step and the first of the next are merged. A requested state is completed on a copy, so that the
+/// results do not depend on how many steps are taken at once.
 pub struct AssembledSplitting<'a> {
     system: &'a AssembledSystem,
     table: SubstepTable,
     h: f64,
     t0: f64,
     taken: usize,
-    /// Positions between fixed places, before and after a pass.
+    /// The padded positions before (`q`) and after (`next`) a pass.
     q: Aligned,
     next: Aligned,
     v: Aligned,
-    /// The velocities of a state that is asked for.
+    /// The velocities of a requested state.
     end: Aligned,
-    /// Of compensated sums what the last digits of positions and velocities leave out, and of a state that is asked for. Else empty.
+    /// The rounding errors of compensated sums (`rests`), and those of a requested state (`end_rests`); otherwise
+    /// empty.
     rests: Rests,
     end_rests: Rests,
     inverse_masses: InverseMasses,
     z: f64,
     action: bool,
-    /// What each block adds to the action: its potential energy, twice its kinetic energy. Empty without the action.
+    /// The contribution of each block to the action: its potential energy, and twice its kinetic energy. Empty without
+    /// the action.
     energies: Vec<[f64; 2]>,
     monitor: EnergyMonitor,
 }
 
-/// What the last digits of positions and velocities leave out.
+/// The accumulated rounding errors of positions and velocities.
 #[derive(Debug, Default)]
 struct Rests {
     q: Vec<f64>,
     v: Vec<f64>,
 }
 
-/// A kick, and the drift that follows.
+/// A kick and the drift that follows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stage {
     pub kick: f64,
     pub drift: Drift,
     /// The length of the drift in time.
     span: f64,
-    /// The time of the kick after the step's start.
+    /// The time of the kick, relative to the start of the step.
     time: f64,
 }
 
 impl Stage {
-    /// In a step from the time t. A drag that depends on time has a drift of its own in each step.
+    /// The stage in a step that starts at the time t. With a time-dependent drag the drift differs from step to step.
     fn at(&self, drag: &Drag, t: f64) -> Self {
         match drag {
             Drag::Constant(_) => *self,
@@ -80,7 +84,7 @@ impl Stage {
 /// The stages of a step.
 struct SubstepTable {
     first: Vec<Stage>,
-    /// Those of a later step: its first kick, or its first drift, is one with the last of the step before.
+    /// The stages of a later step, whose first kick or drift is merged with the last of the step before.
     joined: Vec<Stage>,
     closing: Stage,
 }
@@ -104,7 +108,7 @@ impl SubstepTable {
         // Only a scheme that begins with a drift ends with one.
         let (last_kick, last_drift) = (kicks[stages], drifts.get(stages).copied().unwrap_or(0.0));
         let mut joined = first.clone();
-        // Its kick stands before the last drift.
+        // The merged kick precedes the last drift of the step before.
         joined[0] = stage(last_kick + kicks[0], last_drift + drifts[0], -last_drift * h);
         SubstepTable {
             first,
@@ -115,12 +119,13 @@ impl SubstepTable {
 }
 
 impl<'a> AssembledSplitting<'a> {
-    /// From a state; with the action z where the state has one, which costs the energies at each stage.
+    /// Starts from a state. The action z is computed if the start has one, which costs the energies at each stage.
     ///
     /// # Errors
-    /// [`AssemblyError::Input`] with [`InputError::Step`] unless h is finite and not 0 (negative goes back);
-    /// [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state; [`AssemblyError::Mass`] where an unknown has
-    /// none; [`AssemblyError::NotSeparable`] of general terms; [`AssemblyError::Undefined`] where a force is not finite.
+    /// [`AssemblyError::Input`] with [`InputError::Step`] unless h is finite and not 0 (a negative h runs backward in
+    /// time); [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state; [`AssemblyError::Mass`] if an
+    /// unknown has no mass; [`AssemblyError::NotSeparable`] for general terms; [`AssemblyError::Undefined`] if a force
+    /// is not finite.
     pub fn new(
         system: &'a AssembledSystem,
         scheme: &SplittingScheme,
@@ -140,7 +145,7 @@ impl<'a> AssembledSplitting<'a> {
             Masses::Same(m) => InverseMasses::Same(1.0 / m),
             Masses::Each(masses) => InverseMasses::Each(masses.iter().map(|m| 1.0 / m).collect()),
         };
-        // That of the flow: splittings have no other.
+        // Splittings have the conformal factor of the flow.
         let log_sigma = system.rate(start.t) * h;
         let info = StepFacts { h, log_sigma, order: scheme.order() };
         let monitor = EnergyMonitor::new(system, start, info, |bounded| {
@@ -179,20 +184,22 @@ impl<'a> AssembledSplitting<'a> {
         Ok(splitting)
     }
 
-    /// With compensated sums (Kahan's): what the last digits of positions and velocities leave out is carried from stage to stage. For few unknowns
-    /// over very many steps, as planets over thousands of revolutions: what is rounded then is the kick, which is smaller than the velocity by
-    /// about the number of stages in a revolution. It takes four vectors of memory more, and a quarter more of the time of five bodies.
+    /// With compensated (Kahan) summation: the rounding errors of positions and velocities are carried from stage to
+    /// stage. This is useful for few unknowns over very many steps, such as planets over thousands of revolutions.
+    /// There the kick is rounded, which is smaller than the velocity by about the number of stages in a revolution. It
+    /// needs four more vectors, and a quarter more time for five bodies.
     pub fn compensated(mut self) -> Self {
         let rests = || Rests { q: vec![0.0; self.v.len()], v: vec![0.0; self.v.len()] };
         (self.rests, self.end_rests) = (rests(), rests());
         self
     }
 
-    /// Takes steps.
+    /// Takes the given number of steps.
     ///
     /// # Errors
-    /// [`StepFailure`] with [`StepError::NonFinite`] where a velocity is no number any more. That is looked for every 256 steps, and
-    /// `taken` are the steps up to the last look at which all was well; the state is that after it was found.
+    /// [`StepFailure`] with [`StepError::NonFinite`] if a velocity or the action is infinite or NaN. This is checked
+    /// every 256 steps: `taken` is the number of steps up to the last check that was passed, and the state is that at
+    /// the failed check.
     pub fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         let mut taken = 0;
         while taken < steps {
@@ -203,7 +210,7 @@ impl<'a> AssembledSplitting<'a> {
                     self.look();
                 }
             }
-            // A number that is none makes the sum one.
+            // The sum is not finite if one of its terms is not.
             if !(self.v.iter().sum::<f64>() + self.z).is_finite() {
                 return Err(StepFailure { taken, cause: StepError::NonFinite });
             }
@@ -230,7 +237,7 @@ impl<'a> AssembledSplitting<'a> {
         self.taken += 1;
     }
 
-    /// Looks at the energy.
+    /// Checks the energy.
     #[cold]
     fn look(&mut self) {
         let (t, z) = self.complete();
@@ -240,10 +247,13 @@ impl<'a> AssembledSplitting<'a> {
         monitor.look(system, reached, |t, bounded| system.energies((t, next, end, z), bounded));
     }
 
-    /// The first step at which the steps were seen not to resolve the motion, where they were: by the energy, which is multiplied by the
-    /// conformal factor where L does not depend on time, and without the action at least does not grow by drag. It is looked at after 4, 16, 64 and 256
-    /// steps, every 1024, and here: what follows such a step may be wrong. Nothing is seen without the action where gamma is positive, and of
-    /// systems that depend on time.
+    /// The first step at which the energy showed that the steps do not resolve the motion, if there is one: results
+    /// from this step on may be wrong.
+    ///
+    /// The energy `E_L`, which is multiplied by the conformal factor if L does not depend on time, is checked after 4,
+    /// 16, 64 and 256 steps, every 1024 steps, and by this call. Without the action, or with a time-dependent gamma,
+    /// the check is that `T + V` does not grow while the drag dissipates. The check detects nothing if the potential
+    /// depends on time, nor from `T + V` if `gamma h > 0`.
     pub fn unresolved(&mut self) -> Option<UnresolvedStep> {
         if self.monitor.tells(self.taken) {
             self.look();
@@ -258,7 +268,7 @@ impl<'a> AssembledSplitting<'a> {
         State { t, q: &self.next[1..=n], v: &self.end, z: self.action.then_some(z) }
     }
 
-    /// Completes the last step, in `next` and `end`; the time and the action.
+    /// Completes the last step in `next` and `end`, and returns the time and the action.
     fn complete(&mut self) -> (f64, f64) {
         let n = self.system.unknowns();
         let t = self.t0 + self.taken as f64 * self.h;
@@ -282,7 +292,8 @@ impl<'a> AssembledSplitting<'a> {
         (t, z)
     }
 
-    /// `sigma_d` of the last step, `e^(gamma h)`, or the exponential of the integral of gamma over it; before the first one, of that.
+    /// `sigma_d` of the last step: `e^(gamma h)`, or the exponential of the integral of gamma over it; before the first
+    /// step, `sigma_d` of the first.
     pub fn sigma(&self) -> f64 {
         let drag = &self.system.drag;
         if let Drag::Constant(gamma) = drag {

@@ -1,4 +1,4 @@
-//! A Lagrangian as a sum of local terms.
+//! A system whose Lagrangian is a sum of local terms.
 
 use crate::blocks::{self, BLOCK};
 use crate::drag::Drag;
@@ -10,13 +10,15 @@ use crate::pass::{SHARED, sum_of_squares};
 use crate::{AssemblyError, LocalLagrangian, Potential};
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 
-/// The most unknowns that a system can have: places are counted in 32 bits, with a fixed one at each end.
+/// The maximum number of unknowns: padded indices have 32 bits, and there is one fixed place at each end.
 const MOST: usize = u32::MAX as usize - 2;
 
-/// A system of any size, `L = sum_i m_i v_i^2/2 - sum_e V_e(t, q_e; c_e) + gamma(t) z + sum_e l_e(t, q_e, v_e, z; c_e)`.
+/// A system of any size,
+/// `L = sum_i m_i v_i^2/2 - sum_e V_e(t, q_e; c_e) + gamma(t) z + sum_e l_e(t, q_e, v_e, z; c_e)`.
 ///
 /// Its dimension is known at run time. Each potential is a [`Potential`] with its list of elements, each general term a
-/// [`LocalLagrangian`] with its own. Without general terms all integrators take the system; with them, [`AssembledGauss`](crate::AssembledGauss).
+/// [`LocalLagrangian`] with its own list. A system without general terms can be integrated by all integrators, one with
+/// general terms by [`AssembledGauss`](crate::AssembledGauss).
 ///
 /// ```
 /// use assembled_herglotz::{AssembledSystem, Difference, FIXED, Potential};
@@ -48,17 +50,17 @@ pub struct AssembledSystem {
 /// The diagonal of the mass matrix.
 #[derive(Clone, Debug)]
 pub(crate) enum Masses {
-    /// One mass for all.
+    /// The same mass for all unknowns.
     Same(f64),
-    /// One for each unknown.
+    /// One mass for each unknown.
     Each(Vec<f64>),
 }
 
 impl AssembledSystem {
-    /// Without masses, drag and elements.
+    /// A system without masses, drag and elements.
     ///
     /// # Errors
-    /// [`AssemblyError::Unknowns`] for none, or more than 2^32 - 3.
+    /// [`AssemblyError::Unknowns`] if `unknowns` is 0 or exceeds 2^32 - 3.
     pub fn new(unknowns: usize) -> Result<Self, AssemblyError> {
         if unknowns == 0 || unknowns > MOST {
             return Err(AssemblyError::Unknowns { found: unknowns, most: MOST });
@@ -72,23 +74,24 @@ impl AssembledSystem {
         })
     }
 
-    /// With the same mass for all unknowns.
+    /// Sets the same mass for all unknowns.
     pub fn with_mass(self, mass: f64) -> Self {
         AssembledSystem { masses: Masses::Same(mass), ..self }
     }
 
-    /// With a mass for each unknown.
+    /// Sets a mass for each unknown.
     pub fn with_masses(self, masses: Vec<f64>) -> Self {
         AssembledSystem { masses: Masses::Each(masses), ..self }
     }
 
-    /// With the drag `gamma z`: negative for dissipation.
+    /// Sets the drag `gamma z`, with gamma negative for dissipation.
     pub fn with_drag(self, gamma: f64) -> Self {
         AssembledSystem { drag: Drag::Constant(gamma), ..self }
     }
 
-    /// With a drag `gamma(t) z` whose rate depends on time, periodically or else: a smooth function, since splittings integrate it along a drift by
-    /// a Gauss formula of order 12. Instead of [`with_drag`](Self::with_drag).
+    /// Sets a drag `gamma(t) z` with a time-dependent rate, instead of [`with_drag`](Self::with_drag). The rate must be
+    /// a smooth function, since splittings integrate it along a drift by a Gauss formula of order 12; it need not be
+    /// periodic.
     ///
     /// ```
     /// use assembled_herglotz::systems::OuterSolarSystem;
@@ -102,13 +105,15 @@ impl AssembledSystem {
         AssembledSystem { drag: Drag::Timed(Box::new(rate)), ..self }
     }
 
-    /// With a potential for each of a list of elements.
+    /// Adds a potential for each element of a list.
     ///
-    /// Elements that follow each other in memory, each with all unknowns one further than the one before, are found and evaluated
-    /// without gathering; such runs need no memory for each element. So give the bonds of a lattice row by row, not site by site.
+    /// Consecutive elements, each with all unknowns one higher than those of the element before, are detected and
+    /// evaluated without gathering; such runs store no indices for each element. Therefore list the bonds of a lattice
+    /// row by row, not site by site.
     ///
     /// # Errors
-    /// [`AssemblyError::OutOfRange`], [`AssemblyError::Repeated`] and [`AssemblyError::Parameter`], with the element.
+    /// [`AssemblyError::OutOfRange`], [`AssemblyError::Repeated`] and [`AssemblyError::Parameter`], with the index of
+    /// the element.
     pub fn with_potential<V, const K: usize, const P: usize>(
         mut self,
         term: V,
@@ -122,7 +127,7 @@ impl AssembledSystem {
         Ok(self)
     }
 
-    /// With a general term for each of a list of elements.
+    /// Adds a general term for each element of a list.
     ///
     /// # Errors
     /// Those of [`with_potential`](Self::with_potential).
@@ -139,7 +144,7 @@ impl AssembledSystem {
         Ok(self)
     }
 
-    /// The lists of elements so far.
+    /// The number of lists of elements so far.
     fn lists(&self) -> usize {
         self.potentials.len() + self.locals.len()
     }
@@ -154,12 +159,12 @@ impl AssembledSystem {
         self.drag.rate(t)
     }
 
-    /// The energy `E_L = v.L_v - L`; without general terms `sum m_i v_i^2/2 + V - gamma z`, which decays as `e^(gamma t)` where V does not
-    /// depend on time.
+    /// The energy `E_L = v.L_v - L`. Without general terms it is `sum m_i v_i^2/2 + V - gamma z`, which for a constant
+    /// gamma varies as `e^(gamma t)` if V does not depend on time.
     ///
     /// # Errors
-    /// [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state; [`AssemblyError::NoAction`] of one without the action, where L
-    /// depends on it.
+    /// [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state; [`AssemblyError::NoAction`] if L
+    /// depends on the action and the state does not have it.
     pub fn energy(&self, state: State) -> Result<f64, AssemblyError> {
         state.check(self)?;
         let z = self.action(state)?;
@@ -171,7 +176,7 @@ impl AssembledSystem {
         Ok(twice_kinetic - first.l)
     }
 
-    /// L and its first derivatives; without general terms the value of L only where it is asked for.
+    /// Evaluates L and its first derivatives; without general terms the value of L only if it is requested.
     pub(crate) fn first(&self, at: Place, value: bool, sums: &mut First) {
         let First { l, q, v, z } = sums;
         (*l, *z) = (0.0, self.rate(at.t));
@@ -195,19 +200,19 @@ impl AssembledSystem {
         }
     }
 
-    /// The potential energy, of positions between fixed places.
+    /// The potential energy at padded positions.
     pub(crate) fn potential(&self, t: f64, q: &[f64]) -> f64 {
         (0..blocks::count(self.unknowns)).map(|block| self.potential_of(block, t, q)).sum()
     }
 
-    /// That of the elements which begin in a block.
+    /// The potential energy of the elements that are assigned to a block.
     fn potential_of(&self, block: usize, t: f64, q: &[f64]) -> f64 {
         let blocks = blocks::count(self.unknowns);
         self.potentials.iter().map(|list| list.energy(block, blocks, t, q)).sum()
     }
 
-    /// The energies of a system without general terms, at positions between fixed places: `E_L`, or `T + V` where that is asked for. Shared among
-    /// threads where passes are, so that the last bits depend on their number.
+    /// The energies of a system without general terms at padded positions: `E_L`, or `T + V` if that is requested. For
+    /// large systems the sum is distributed over threads as passes are, so that its last bits depend on their number.
     pub(crate) fn energies(&self, (t, q, v, z): (f64, &[f64], &[f64], f64), bounded: bool) -> Energies {
         let kinetic = 0.5
             * match &self.masses {
@@ -232,7 +237,7 @@ impl AssembledSystem {
         }
     }
 
-    /// The action of a state, or any number where L does not depend on it.
+    /// The action of a state; 0 if the state has none and L does not depend on it.
     pub(crate) fn action(&self, state: State) -> Result<f64, AssemblyError> {
         let free = self.locals.is_empty() && self.rate(state.t) == 0.0;
         state.z.or(free.then_some(0.0)).ok_or(AssemblyError::NoAction)
@@ -243,7 +248,7 @@ impl AssembledSystem {
         if self.locals.is_empty() { Ok(()) } else { Err(AssemblyError::NotSeparable) }
     }
 
-    /// Checks that each unknown has a mass; with general terms these may give it, and 0 is accepted.
+    /// Checks that each unknown has a mass; with general terms 0 is accepted, since these may contribute the mass.
     pub(crate) fn check_masses(&self, general: bool) -> Result<(), AssemblyError> {
         let accepted = |mass: f64| mass > 0.0 || general && mass == 0.0;
         let check = |unknown: usize, mass: f64| {
@@ -258,7 +263,7 @@ impl AssembledSystem {
         }
     }
 
-    /// Checks the length of a vector, and that it is finite.
+    /// Checks the length of a vector, and that its components are finite.
     pub(crate) fn check_vector(&self, what: &'static str, x: &[f64]) -> Result<(), AssemblyError> {
         if x.len() != self.unknowns {
             return Err(AssemblyError::Length { what, found: x.len(), expected: self.unknowns });
@@ -269,7 +274,7 @@ impl AssembledSystem {
         }
     }
 
-    /// Checks a number.
+    /// Checks that a number is finite.
     pub(crate) fn check_number(what: &'static str, value: f64) -> Result<(), AssemblyError> {
         if value.is_finite() { Ok(()) } else { Err(AssemblyError::NonFinite { what, index: 0, value }) }
     }
@@ -284,13 +289,13 @@ pub struct State<'a> {
     pub q: &'a [f64],
     /// The velocities.
     pub v: &'a [f64],
-    /// The action. A start without it is that of a motion whose action is not computed, which saves the energies at each stage; its states
-    /// have none either.
+    /// The action. If the start has none, the action of the motion is not computed, which saves the energies at each
+    /// stage; the states of such a motion have no action either.
     pub z: Option<f64>,
 }
 
 impl State<'_> {
-    /// Checks a start.
+    /// Checks an initial state.
     pub(crate) fn check(&self, system: &AssembledSystem) -> Result<(), AssemblyError> {
         system.check_vector("q", self.q)?;
         system.check_vector("v", self.v)?;

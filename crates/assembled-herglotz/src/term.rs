@@ -1,13 +1,15 @@
-//! Local terms: what a user writes once.
+//! Local potential energies: the code that a user writes for one element.
 
 use contact_geom::nalgebra::{ArrayStorage, SVector};
-use contact_geom::{KernelDual, Scalar};
+use contact_geom::{Scalar, support::KernelDual};
 
-/// A local potential energy `V(t, q; c)` of `K` unknowns with `P` parameters: a site, a bond, a finite element.
+/// A local potential energy `V(t, q; c)` of `K` unknowns with `P` parameters: that of a site, a bond or a finite
+/// element.
 ///
-/// It enters the Lagrangian as `-V`. The function is written once, for any number of elements: each has its unknowns and its own
-/// parameters `c`. Mark it `#[inline(always)]`: elements are evaluated eight at a time in the lanes of vector registers, and
-/// what is not merged into those loops is slow. Choose values by [`Scalar::if_less`] and the like, never by `if`.
+/// It enters the Lagrangian as `-V`. The function is written once for any number of elements; each element has its own
+/// unknowns and parameters `c`. Annotate it with `#[inline(always)]`: elements are evaluated eight at a time in the
+/// lanes of vector registers, and a function that is not inlined into those loops is slow. Select values with
+/// [`Scalar::if_less`] and similar functions, never with `if`.
 ///
 /// ```
 /// use assembled_herglotz::Potential;
@@ -28,7 +30,7 @@ pub trait Potential<const K: usize, const P: usize = 0>: Send + Sync + 'static {
     /// The energy `V(t, q; c)`.
     fn energy<T: Scalar>(&self, t: T, q: &SVector<T, K>, c: &[T; P]) -> T;
 
-    /// The derivative `V_q`, by duals unless the term has it in closed form.
+    /// The gradient `V_q`, by dual numbers unless the term provides it in closed form.
     #[inline(always)]
     fn gradient<T: Scalar>(&self, t: T, q: &SVector<T, K>, c: &[T; P]) -> SVector<T, K> {
         let lifted = std::array::from_fn(|i| {
@@ -40,10 +42,11 @@ pub trait Potential<const K: usize, const P: usize = 0>: Send + Sync + 'static {
     }
 }
 
-/// A term in the difference `r = q_b - q_a` of unknowns, from one in `r`: a bond. With `W` of one variable it is an element
-/// `[a, b]`, with two or three variables a pair of points, `[a_x, a_y, b_x, b_y]` and so on.
+/// A potential of the difference `r = q_b - q_a` of unknowns, built from a potential of `r`: a bond. If `W` has one
+/// variable, an element is `[a, b]`; if it has two or three, an element is a pair of points, `[a_x, a_y, b_x, b_y]` and
+/// so on.
 ///
-/// Its forces on the two ends are opposite to the last bit, and cost one derivative.
+/// Its forces on the two ends are exactly opposite, and cost one evaluation of the gradient of `W`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference<W>(pub W);
 
@@ -64,7 +67,7 @@ macro_rules! difference {
 }
 difference! { 1, 2; 2, 4; 3, 6; }
 
-/// A vector of these components.
+/// A vector with these components.
 #[inline(always)]
 pub(crate) fn column<T, const K: usize>(x: [T; K]) -> SVector<T, K> {
     SVector::from_array_storage(ArrayStorage([x]))

@@ -1,6 +1,6 @@
-//! Bad input is a typed error, with the element or the unknown; bad luck is a status.
+//! Invalid input is a typed error that contains the element or the unknown; a failure during the motion is a status.
 
-// What a test cannot go on without is a failure of it.
+// A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{FputBond, Gravitation, OuterSolarSystem, SineGordon, Spring, fput_chain, lattice};
@@ -17,11 +17,11 @@ fn of(system: AssembledSystem, elements: &[[usize; 2]]) -> Option<AssemblyError>
     system.with_potential(Difference(Spring { stiffness: 1.0 }), elements.iter().copied()).err()
 }
 
-/// The error of an explicit and of an implicit method, which are the same.
+/// The error of an explicit and an implicit method, which must be the same.
 fn refused(system: &AssembledSystem, h: f64, start: State) -> AssemblyError {
     let explicit = AssembledSplitting::new(system, &SplittingScheme::STRANG, h, start).err().unwrap();
     let implicit = AssembledMidpoint::new(system, h, start, None).err().unwrap();
-    // As text: a NaN in an error is not equal to itself.
+    // Compared as text, since a NaN in an error is not equal to itself.
     assert_eq!(explicit.to_string(), implicit.to_string());
     explicit
 }
@@ -34,7 +34,7 @@ fn elements() {
         of(system(), &[[0, 1], [1, 3]]),
         Some(AssemblyError::OutOfRange { list: 0, element: 1, unknown: 3, last: 2 })
     );
-    // In the middle of a run as well.
+    // An unknown within a run of elements is checked as well.
     let large = AssembledSystem::new(30).unwrap();
     assert_eq!(of(large, &many), Some(AssemblyError::OutOfRange { list: 0, element: 29, unknown: 30, last: 29 }));
     assert_eq!(of(chain(), &[[0, 1], [5, 5]]), Some(AssemblyError::Repeated { list: 1, element: 1, unknown: 5 }));
@@ -82,7 +82,7 @@ fn starts_and_steps() {
     assert_eq!(refused(&none, 0.1, start), AssemblyError::Mass { unknown: 0, mass: 0.0 });
     let few = refused(&chain().with_masses(vec![1.0; 19]), 0.1, start);
     assert_eq!(few, AssemblyError::Length { what: "the masses", found: 19, expected: 20 });
-    // Two bodies in one place attract each other without bound.
+    // The force between two bodies at the same position is infinite.
     let solar = OuterSolarSystem::system(2, 0.0).unwrap();
     assert_eq!(
         refused(&solar, 1.0, State { q: &[1.0; 6], v: &[0.0; 6], ..start }),
@@ -93,7 +93,7 @@ fn starts_and_steps() {
     assert!(matches!(long, Some(AssemblyError::Input(InputError::Sigma { sigma })) if sigma < 0.0));
 }
 
-/// The memory for the factors is estimated, and refused, before it is asked for.
+/// The memory for the factors is estimated, and refused if necessary, before it is allocated.
 #[test]
 fn too_little_memory() {
     let system = lattice([30, 30], SineGordon { omega_squared: 1.0 }, 1.0, 0.0).unwrap();
@@ -104,16 +104,16 @@ fn too_little_memory() {
     else {
         panic!("1000 bytes are not enough");
     };
-    // At least the matrix itself, 900 + 1740 entries of 8 bytes.
+    // The estimate is larger than the matrix itself, 900 + 1740 entries of 8 bytes.
     assert!(needed > 2640 * 8, "{needed}");
     assert!(AssembledMidpoint::new(&system, 0.1, start, Some(needed)).is_ok());
     assert!(AssembledMidpoint::new(&system, 0.1, start, Some(needed - 1)).is_err());
 }
 
-/// A motion without bound ends with a status; that of the implicit rule leaves the state before the step.
+/// An unbounded motion ends with a status. The implicit method then keeps the state before the failed step.
 #[test]
 fn motions_that_end() {
-    // Of negative stiffness beyond r = 1: positions grow without bound in finite time.
+    // Bonds repel beyond r = 1: positions become infinite in finite time.
     let unbound = fput_chain(20, FputBond { alpha: 0.0, beta: -1.0 }, 0.0).unwrap();
     let q: Vec<f64> = (0..20).map(|i| if i % 2 == 0 { 3.0 } else { -3.0 }).collect();
     let v = vec![0.0; 20];

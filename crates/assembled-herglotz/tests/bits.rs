@@ -1,6 +1,6 @@
-//! The same bits for any number of threads, and however many steps are taken at once.
+//! Results are bitwise equal for any number of threads, and for any number of steps taken at once.
 
-// What a test cannot go on without is a failure of it.
+// A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{SineGordon, lattice};
@@ -26,7 +26,7 @@ fn run(system: &AssembledSystem, threads: usize, parts: &[usize]) -> Vec<u64> {
 
 #[test]
 fn bits_do_not_depend_on_threads() {
-    // Above the size from which threads share a pass, and no multiple of a block.
+    // Above the size from which on a pass is distributed over threads, and not a multiple of the block size.
     let system = lattice([523, 307], SineGordon { omega_squared: 1.0 }, 1.0, -0.01).unwrap();
     let one = run(&system, 1, &[5]);
     for threads in [2, 3, 7] {

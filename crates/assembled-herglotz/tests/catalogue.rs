@@ -1,13 +1,13 @@
-//! Catalogue systems against closed forms.
+//! Systems of the catalogue compared with closed-form solutions.
 
-// What a test cannot go on without is a failure of it.
+// A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{Mesh, OuterSolarSystem, cloth, consistent_membrane, membrane};
 use assembled_herglotz::{AssembledGauss, AssembledMidpoint, AssembledSplitting, AssemblyError, State};
 use discrete_herglotz::SplittingScheme;
 
-/// Nodes, triangles and held edges of a square of `k x k` cells.
+/// Nodes, triangles and held boundary nodes of a square of `k x k` cells.
 fn square(k: usize) -> (Vec<[f64; 2]>, Vec<[usize; 3]>, Vec<bool>) {
     let nodes: Vec<[f64; 2]> =
         (0..(k + 1) * (k + 1)).map(|i| [(i % (k + 1)) as f64 / k as f64, (i / (k + 1)) as f64 / k as f64]).collect();
@@ -20,8 +20,8 @@ fn square(k: usize) -> (Vec<[f64; 2]>, Vec<[usize; 3]>, Vec<bool>) {
     (nodes.clone(), triangles.collect(), held)
 }
 
-/// The first mode of a square membrane, `sin(pi x) sin(pi y)`, has the frequency `sqrt(2 pi^2 - gamma^2/4)`: linear elements reach it with an
-/// error that falls with the square of their width.
+/// The first mode of a square membrane, `sin(pi x) sin(pi y)`, has the frequency `sqrt(2 pi^2 - gamma^2/4)`. The error
+/// of linear elements is proportional to the square of their width.
 #[test]
 fn a_membrane() {
     let (gamma, t) = (-0.5f64, 0.3);
@@ -41,19 +41,21 @@ fn a_membrane() {
         q.iter().zip(&end).fold(0.0f64, |worst, (q, end)| worst.max((end - amplitude * q).abs()))
     };
     let (coarse, fine) = (error(8), error(16));
-    // Twice as fine, a quarter of the error; its next term is (pi/8)^2 of it, with a factor below one.
+    // Half the width gives a quarter of the error. The next term of the error is (pi/8)^2 of the first, times a factor
+    // below one.
     assert!((coarse / fine - 4.0).abs() < 0.6, "{coarse:e}, {fine:e}");
     assert!(fine < 0.02, "{fine:e}");
 }
 
-/// With consistent masses the error falls with the square of the width as well; that of Gauss collocation in time is far below.
+/// With consistent masses the error is proportional to the square of the width as well. The error of Gauss collocation
+/// in time is far below it.
 #[test]
 fn a_membrane_with_consistent_masses() {
     let (gamma, t) = (-0.5f64, 0.3);
     let pi = std::f64::consts::PI;
     let w = (2.0 * pi * pi - gamma * gamma / 4.0).sqrt();
     let amplitude = (0.5 * gamma * t).exp() * ((w * t).cos() - 0.5 * gamma / w * (w * t).sin());
-    // In the middle of the membrane, where the mode is 1.
+    // At the centre of the membrane, where the mode is 1.
     let error = |k: usize| {
         let (nodes, triangles, held) = square(k);
         let system =
@@ -63,12 +65,13 @@ fn a_membrane_with_consistent_masses() {
         let start = State { t: 0.0, q: &q, v: &vec![0.0; q.len()], z: Some(0.0) };
         let mut motion = AssembledGauss::new(&system, 2, t / 30.0, start, None).unwrap();
         motion.advance(30).unwrap();
-        // The rate is constant: sigma_d is the diagonal Padé approximation of the exponential, with an error of (gamma h)^5/720 = 4e-15.
+        // For a constant rate sigma_d is the diagonal Padé approximation of the exponential, with an error of (gamma
+        // h)^5/720 = 4e-15.
         assert!((motion.sigma() - (gamma * t / 30.0).exp()).abs() < 1e-14, "{}", motion.sigma());
         (motion.q()[q.len() / 2] - amplitude).abs()
     };
     let (coarse, fine) = (error(8), error(16));
-    // Twice as fine, a quarter of the error; as for the lumped masses.
+    // Half the width gives a quarter of the error, as for the lumped masses.
     assert!((coarse / fine - 4.0).abs() < 0.6, "{coarse:e}, {fine:e}");
     assert!(fine < 0.02, "{fine:e}");
 }
@@ -84,7 +87,7 @@ fn bad_meshes() {
     assert_eq!(out, AssemblyError::OutOfRange { list: 0, element: 1, unknown: 9, last: 8 });
     assert!(matches!(refused(&nodes, &[[0, 1, 2]], &held), AssemblyError::Parameters { value: 0.0, .. }));
     assert!(matches!(refused(&nodes, &triangles, &[true; 9]), AssemblyError::Unknowns { found: 0, .. }));
-    // A free node of no triangle.
+    // A free node that belongs to no triangle.
     let lone = membrane(Mesh { nodes: &nodes, triangles: &[[0, 1, 3]], held: &[false; 9] }, 1.0, 0.0).unwrap();
     let zeros = [0.0; 9];
     let start = State { t: 0.0, q: &zeros, v: &zeros, z: Some(0.0) };
@@ -92,8 +95,8 @@ fn bad_meshes() {
     assert_eq!(none, Some(AssemblyError::Mass { unknown: 2, mass: 0.0 }));
 }
 
-/// A free cloth in its natural shape falls with drag: `q = -g (1 + gamma t - e^(gamma t))/gamma^2`, which kicks and drifts
-/// reach to their order, and the midpoint rule too; its threads stay as they are.
+/// A free cloth in its natural shape falls with drag, `q = -g (1 + gamma t - e^(gamma t))/gamma^2`. Splittings and the
+/// midpoint rule reproduce this to their order, and the lengths of the threads do not change.
 #[test]
 fn a_cloth_falls() {
     let (g, gamma, t) = (0.7f64, -0.4f64, 2.0f64);
@@ -106,7 +109,7 @@ fn a_cloth_falls() {
     explicit.advance(20).unwrap();
     let mut implicit = AssembledMidpoint::new(&system, 0.01, start, None).unwrap();
     implicit.advance(200).unwrap();
-    // The order of the first leaves 1e-10; that of the second (gamma h)^2/12 of the way.
+    // The error of the first method is 1e-10, that of the second (gamma h)^2/12 of the distance.
     for (end, tolerance) in [(explicit.state(), 1e-9), (implicit.state(), 1e-5)] {
         for i in 0..30 {
             let expected = [q[3 * i], q[3 * i + 1], fallen];
@@ -118,7 +121,8 @@ fn a_cloth_falls() {
     }
 }
 
-/// The outer solar system keeps to what Kepler's third law says of Jupiter's period, 4332.6 days, to a hundredth: the data and G fit each other.
+/// Jupiter's orbit closes to within a hundredth of its length after the period of Kepler's third law, 4332.6 days: the
+/// initial data and G are consistent.
 #[test]
 fn jupiter_comes_back() {
     let system = OuterSolarSystem::system(2, 0.0).unwrap();
@@ -130,6 +134,6 @@ fn jupiter_comes_back() {
     let away = |q: &[f64]| [0, 1, 2].map(|k| q[3 + k] - q[k]);
     let (a, b) = (away(&q), away(end));
     let missed = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-    // The orbit is 33 au long.
+    // The length of the orbit is 33 au.
     assert!(missed < 0.33, "{missed} au");
 }

@@ -1,6 +1,7 @@
-//! Compensated sums: the same motion to round-off, with less round-off; and the bodies of the library for small systems.
+//! Compensated sums give the same motion to round-off, with smaller round-off. The system of bodies agrees with that of
+//! the library for small systems.
 
-// What a test cannot go on without is a failure of it.
+// A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{FputBond, OuterSolarSystem, fput_chain};
@@ -8,11 +9,11 @@ use assembled_herglotz::{AssembledSplitting, AssembledSystem, State};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Bodies;
 use contact_geom::{PhasePoint, VelocityPoint, check_closed_derivatives};
-use discrete_herglotz::{Splitting, SplittingScheme, Stepper};
+use discrete_herglotz::{SplittingScheme, Stepper, splitting::Splitting};
 
 const SCHEME: SplittingScheme = SplittingScheme::BLANES_MOAN_6;
 
-/// Position, velocity and action after some steps, from a start, with and without compensated sums.
+/// Position, velocity and action after some steps, with and without compensated sums.
 fn after(system: &AssembledSystem, start: State, h: f64, steps: usize, compensated: bool) -> (Vec<f64>, Vec<f64>, f64) {
     by(&SCHEME, system, start, (h, steps), compensated)
 }
@@ -35,7 +36,8 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// In one block and in many, which go over threads, with one mass and with many.
+/// The motions agree for one block and for many blocks, which are distributed over threads, and for equal and different
+/// masses.
 #[test]
 fn the_same_motion() {
     for n in [3, 70, 1500, 200_000] {
@@ -47,7 +49,7 @@ fn the_same_motion() {
             let start = State { t: 0.0, q: &q, v: &v, z: Some(0.3) };
             let (plain, compensated) = (after(&system, start, 0.1, 20, false), after(&system, start, 0.1, 20, true));
             for (a, b) in plain.0.iter().chain(&plain.1).zip(compensated.0.iter().chain(&compensated.1)) {
-                // A few roundings in each of the stages of 20 steps.
+                // A few roundings in each stage of 20 steps.
                 assert!((a - b).abs() <= 500.0 * f64::EPSILON, "{n} unknowns: {a:e}, {b:e}");
             }
             assert!((plain.2 - compensated.2).abs() <= 500.0 * f64::EPSILON * n as f64, "{n} unknowns: z");
@@ -55,7 +57,7 @@ fn the_same_motion() {
     }
 }
 
-/// There and back: what is left of the start is round-off.
+/// After a run forward and backward in time, the distance from the start is round-off.
 #[test]
 fn less_round_off() {
     let system = OuterSolarSystem::system(5, 0.0).unwrap();
@@ -68,11 +70,12 @@ fn less_round_off() {
         distance(&by(scheme, &system, start, (-150.0, 20_000), compensated).0, &q)
     };
     let (plain, compensated) = (back(false), back(true));
-    // With 35 stages in each of 29 steps of Jupiter's period a kick is less than a hundredth of its velocity, and is rounded some ten times.
+    // With 35 stages in each of the 29 steps of Jupiter's period, a kick is less than a hundredth of its velocity and
+    // is rounded some ten times.
     assert!(compensated < 0.1 * plain && compensated < 1e-9, "{compensated:e} au, {plain:e} au without");
 }
 
-/// What belongs to a state that is asked for in mid-run leaves the run as it is.
+/// A state that is requested in mid-run does not change the run.
 #[test]
 fn states_that_are_asked_for_change_nothing() {
     let system = OuterSolarSystem::system(3, -1e-6).unwrap();
@@ -88,7 +91,7 @@ fn states_that_are_asked_for_change_nothing() {
     assert_eq!(at_once.state(), one_by_one.state());
 }
 
-/// The bodies of the two libraries are one system: a step is the same map.
+/// The systems of bodies of the two libraries are the same: a step is the same map.
 #[test]
 fn bodies_of_both_libraries() {
     const N: usize = 9;
@@ -99,7 +102,7 @@ fn bodies_of_both_libraries() {
     let p = SVector::<f64, N>::from_fn(|d, _| bodies.masses()[d] * v[d]);
     let from = PhasePoint { q: SVector::<f64, N>::from_column_slice(&q), p, z: 0.1 };
     let at = VelocityPoint { q: from.q, v: SVector::from_column_slice(&v), z: 0.1 };
-    // In units of the round-off of the terms.
+    // The error is relative to the size of the terms.
     let (gradient, _) = check_closed_derivatives(&bodies, 0.0, &at);
     assert!(gradient.is_some_and(|off| off <= 1e-14), "{gradient:?}");
     for wrong in [f64::NAN, f64::INFINITY, 0.0] {
@@ -112,11 +115,11 @@ fn bodies_of_both_libraries() {
     let state = small.state();
     for d in 0..N {
         let (dq, dp) = (state.q[d] - large.0[d], state.p[d] - bodies.masses()[d] * large.1[d]);
-        // Roundings of positions up to 10 au, along a revolution of Jupiter.
+        // Round-off of positions up to 10 au along a revolution of Jupiter.
         assert!(dq.abs() <= 1e-13 && dp.abs() <= 1e-15, "{d}: {dq:e}, {dp:e}");
     }
     assert!((state.z - large.2).abs() <= 1e-14, "{:e}", state.z - large.2);
-    // Total momentum decays as the conformal factor.
+    // The total momentum is multiplied by the conformal factor.
     let total = |p: &SVector<f64, N>| p.iter().step_by(3).sum::<f64>();
     let (decayed, expected) = (total(&state.p), total(&from.p) * (gamma * 5000.0).exp());
     assert!((decayed - expected).abs() <= 1e-14 * expected.abs().max(1e-5), "{decayed:e}, {expected:e}");

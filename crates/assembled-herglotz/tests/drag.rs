@@ -1,6 +1,7 @@
-//! A drag whose rate is periodic in time: the maps of the library for small systems, `sigma_d`, and no loss of order.
+//! A drag whose rate is periodic in time: the maps agree with those of the library for small systems, `sigma_d` is
+//! correct, and the order is not reduced.
 
-// What a test cannot go on without is a failure of it.
+// A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{FputBond, OuterSolarSystem, fput_chain};
@@ -9,12 +10,17 @@ use assembled_herglotz::{
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
-use discrete_herglotz::{Flow, Gauss, Midpoint, Splitting, SplittingScheme, StepError, Stepper};
+use discrete_herglotz::{
+    SplittingScheme, StepError, Stepper,
+    gauss::Gauss,
+    rules::{Flow, Midpoint},
+    splitting::Splitting,
+};
 
 const N: usize = 5;
 const STEPS: usize = 20;
 
-/// Of both signs, so that the motion is driven at times.
+/// The rate has both signs, so that the motion is driven at times.
 fn rate<T: Scalar>(t: T) -> T {
     (t * 3.0).cos() * 0.3 - 0.1
 }
@@ -57,12 +63,14 @@ fn small_systems() {
     let from = State { t, q: q.as_slice(), v: p.as_slice(), z: Some(z) };
     let state = PhasePoint { q, p, z };
     for h in [0.1, -0.1] {
-        // As in small_systems.rs: rounding, times ten for the separation of motions, and of Newton's methods over h.
+        // As in small_systems.rs: round-off, times ten for the divergence of neighbouring motions; divided by h for
+        // Newton's method.
         let tolerance = |stages: usize| 200.0 * f64::EPSILON * (STEPS * stages) as f64;
         for scheme in SplittingScheme::ALL {
             let mut a = AssembledSplitting::new(&large, &scheme, h, from).unwrap();
             let mut b = Splitting::new(&Whole, &scheme, h, t, state).unwrap();
-            // That of a step: the exponential of the integral, 0.1 sin(3t) - 0.1 t, as far as the quadrature's order 12 has it.
+            // The conformal factor of a step is the exponential of the integral, 0.1 sin(3t) - 0.1 t, to the order 12
+            // of the quadrature.
             a.advance(1).unwrap();
             let integral = |t: f64| 0.1 * (3.0 * t).sin() - 0.1 * t;
             let sigma = (integral(t + h) - integral(t)).exp();
@@ -88,15 +96,15 @@ fn small_systems() {
     }
 }
 
-/// Bodies with a periodic drag: the order of the scheme is seen, to 0.3 as the next power of the step is still there (at twice the step the order
-/// is 4.4), and no error is proportional to the drag.
+/// For bodies with a periodic drag the order of the scheme is found to within 0.3, since the next power of the step
+/// contributes (with twice the step the measured order is 4.4). No part of the error is proportional to the drag.
 #[test]
 fn bodies() {
     let (q, v) = (OuterSolarSystem::positions(5), OuterSolarSystem::velocities(5));
     let from = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     let run = |gamma: f64, scheme: &SplittingScheme, steps: usize| {
         let system = OuterSolarSystem::system(5, 0.0).unwrap();
-        // With the period of about a year.
+        // The period is about a year.
         let system = system.with_timed_drag(move |t| gamma * (1.0 + (0.0172 * t).cos()));
         let mut motion = AssembledSplitting::new(&system, scheme, 20_000.0 / steps as f64, from).unwrap();
         motion.advance(steps).unwrap();
@@ -112,7 +120,7 @@ fn bodies() {
     assert!(((coarse / fine).log2() - 4.0).abs() < 0.3, "{coarse:e}, {fine:e}");
 }
 
-/// A rate that is not finite, or too large for the step: at the start an error, later a status.
+/// A rate that is not finite, or too large for the step, is an error at the start and a status later.
 #[test]
 fn bad_rates() {
     let zeros = [0.1; N];

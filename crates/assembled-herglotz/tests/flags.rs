@@ -1,6 +1,6 @@
-//! Steps that do not resolve a motion are flagged, and those that do are not.
+//! Steps that do not resolve the motion are flagged, and steps that do are not.
 
-// What a test cannot go on without is a failure of it.
+// A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{FputBond, OuterSolarSystem, SineGordon, bodies, fput_chain, lattice};
@@ -11,7 +11,7 @@ use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{SplittingScheme, UnresolvedStep};
 
-/// The flag after some steps, and the largest position.
+/// The flag after some steps, and the largest component of the position.
 fn explicit(system: &AssembledSystem, start: State, h: f64, steps: usize) -> (Option<UnresolvedStep>, f64) {
     let mut motion = AssembledSplitting::new(system, &SplittingScheme::STRANG, h, start).unwrap();
     motion.advance(steps).unwrap();
@@ -19,8 +19,8 @@ fn explicit(system: &AssembledSystem, start: State, h: f64, steps: usize) -> (Op
     (motion.unresolved(), largest)
 }
 
-/// A lattice whose fastest waves have the frequency 5.7: steps of 0.4 are unstable, with a drag of either sign, with the action and where z does
-/// not matter without it.
+/// A lattice whose fastest waves have the frequency 5.7. Steps of 0.4 are unstable for a drag of either sign with the
+/// action, and without it if gamma is not positive.
 #[test]
 fn an_unstable_lattice() {
     let q: Vec<f64> = (0..8000).map(|i| 0.1 * (0.7 * i as f64).sin()).collect();
@@ -31,18 +31,19 @@ fn an_unstable_lattice() {
         let (found, largest) = explicit(&system, start, 0.4, 50);
         assert!(largest > 1e3, "{largest:e}");
         assert!(found.is_some_and(|s| s.step < 50 && s.defect > 1.0), "gamma = {gamma}, {z:?}: {found:?}");
-        // Seen in mid-run, it stays.
+        // Once detected, the flag is kept.
         let later = explicit(&system, start, 0.4, 300).0;
         assert!(later.is_some_and(|s| s.step < 64), "{later:?}");
         for (h, steps) in [(0.1, 1100), (-0.1, 200), (0.2, 100)] {
             let (found, largest) = explicit(&system, start, h, steps);
-            // Waves of 0.1 in all add up to some times that at places, and grow by e^(0.01 * 110) at the most.
+            // Waves with a total amplitude of 0.1 add up to some times that value at single sites, and grow by at most
+            // e^(0.01 * 110).
             assert!(found.is_none() && largest < 1.0, "h = {h}: {found:?}, {largest}");
         }
     }
 }
 
-/// Two bodies that fall onto each other: what a step beside the collision makes of it is no motion.
+/// Two bodies that fall onto each other: a step close to the collision does not approximate the motion.
 #[test]
 fn two_bodies_head_on() {
     let (q, v) = ([-0.5, 0.0, 0.0, 0.5, 0.0, 0.0], [0.0; 6]);
@@ -60,7 +61,7 @@ fn two_bodies_head_on() {
     }
 }
 
-/// A softened centre that attracts, as a general term with a drag of its own, or as a potential.
+/// A softened attracting centre, as a general term with its own drag, or as a potential.
 struct Centre;
 
 impl LocalLagrangian<1> for Centre {
@@ -77,8 +78,8 @@ impl Potential<1> for Centre {
     }
 }
 
-/// From rest at 1 no motion goes beyond 1: where steps jump the centre and come out with an energy that sets them free, they are flagged, or have
-/// ended; with short steps away from the centre they are not flagged.
+/// A motion from rest at 1 stays within 1. If steps jump over the centre and gain enough energy to escape, they must be
+/// flagged or have ended with an error. Short steps away from the centre are not flagged.
 #[test]
 fn implicit_steps_past_a_centre() {
     let start = State { t: 0.0, q: &[1.0, 0.8], v: &[0.0, 0.0], z: Some(0.0) };
@@ -110,7 +111,7 @@ fn implicit_steps_past_a_centre() {
     }
 }
 
-/// A rate that the rational factor of a step does not follow.
+/// A rate so large that the rational conformal factor of a step does not approximate the exponential.
 #[test]
 fn a_strong_drag() {
     let (q, v) = ([0.1; 5], [0.0; 5]);
@@ -123,7 +124,7 @@ fn a_strong_drag() {
     }
 }
 
-/// A site that is driven by a short pulse of time, or by a wave.
+/// A site that is driven by a short pulse in time, or periodically.
 struct Driven {
     pulse: bool,
 }
@@ -136,7 +137,8 @@ impl Potential<1> for Driven {
     }
 }
 
-/// What is resolved is not flagged: systems that depend on time, drags that do, motions from rest and at rest, planets.
+/// Resolved motions are not flagged: time-dependent systems and drags, motions that approach rest or are at rest,
+/// planets.
 #[test]
 fn no_false_flags() {
     let (q, v) = ([0.01, 0.0, -0.02], [0.0; 3]);
@@ -154,7 +156,7 @@ fn no_false_flags() {
     let chain = || fput_chain(3, FputBond { alpha: 0.0, beta: 0.1 }, 0.0).unwrap();
     let swaying = chain().with_timed_drag(|t| 0.3 * (0.5 * t).sin());
     assert_eq!(explicit(&swaying, start, 0.05, 2000).0, None);
-    // To rest, and at rest.
+    // Motions that approach rest, and a motion at rest.
     let damped = chain().with_drag(-0.5);
     let rest = State { q: &[0.0; 3], ..start };
     for start in [start, rest] {

@@ -1,6 +1,7 @@
-//! Contact Gauss collocation of assembled systems: the same maps as the library for small systems, its orders, its momenta, and what is refused.
+//! Contact Gauss collocation of assembled systems: agreement with the library for small systems, orders, momenta, and
+//! the input that is rejected.
 
-// What a test cannot go on without is a failure of it.
+// A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{FputBond, fput_chain};
@@ -10,13 +11,14 @@ use assembled_herglotz::{
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint};
-use discrete_herglotz::{Gauss, InputError, SplittingScheme, StepError, Stepper};
+use discrete_herglotz::{InputError, SplittingScheme, StepError, Stepper, gauss::Gauss};
 
 const N: usize = 5;
 const H: f64 = 0.1;
 const STEPS: usize = 20;
 
-/// A linear finite element of a string with consistent masses, a gyroscopic and a time-dependent part, all of it coupled to z nonlinearly.
+/// A linear finite element of a string with consistent masses, a gyroscopic and a time-dependent term, coupled
+/// nonlinearly to z.
 struct Piece;
 
 impl LocalLagrangian<2, 1> for Piece {
@@ -30,7 +32,7 @@ impl LocalLagrangian<2, 1> for Piece {
     }
 }
 
-/// A site, in a potential.
+/// The potential of a site.
 struct Site;
 
 impl Potential<1> for Site {
@@ -43,7 +45,7 @@ impl Potential<1> for Site {
 const PIECES: [([usize; 2], [f64; 1]); 6] =
     [([FIXED, 0], [0.5]), ([0, 1], [0.3]), ([1, 2], [0.4]), ([2, 3], [0.35]), ([3, 4], [0.45]), ([4, 1], [0.25])];
 
-/// The mass of the last unknown beyond that of its elements.
+/// The masses in addition to those of the elements.
 const MASSES: [f64; N] = [0.0, 0.0, 0.0, 0.0, 0.7];
 
 fn large() -> AssembledSystem {
@@ -53,7 +55,7 @@ fn large() -> AssembledSystem {
         .unwrap()
 }
 
-/// The same in one.
+/// The same system as a single Lagrangian.
 struct Whole;
 
 impl Lagrangian<N> for Whole {
@@ -78,8 +80,8 @@ fn start() -> VelocityPoint<N> {
     VelocityPoint { q: SVector::from_fn(|i, _| of(i, 0.3)), v: SVector::from_fn(|i, _| of(i, 1.1)), z: 0.4 }
 }
 
-/// General terms with consistent masses, gyroscopic, in time, and nonlinear in z: the map of the library for small systems, for one and two
-/// stages, both ways in time, and its conformal factor.
+/// General terms with consistent masses, gyroscopic and time-dependent terms, nonlinear in z: the map is that of the
+/// library for small systems, for one and two stages, forward and backward in time.
 #[test]
 fn general_terms_are_those_of_the_whole() {
     let (system, x) = (large(), start());
@@ -90,8 +92,8 @@ fn general_terms_are_those_of_the_whole() {
         let gauss = Gauss::new(Whole, stages, h).unwrap();
         let mut b = gauss.stepper(from.t, PhasePoint { q: x.q, p, z: x.z }, x.v).unwrap();
         assert_eq!((a.advance(STEPS), b.advance(STEPS)), (Ok(()), Ok(())));
-        // Newton's methods end within the rounding of q/h; the motion separates by at most ten over the time of 2, and W has a condition of
-        // about ten.
+        // Newton's methods stop within the round-off of q/h. Neighbouring motions diverge by at most a factor of ten
+        // over the time of 2, and W has a condition number of about ten.
         let tolerance = 100.0 * f64::EPSILON * STEPS as f64 / H;
         let expected = b.state();
         for i in 0..N {
@@ -103,7 +105,7 @@ fn general_terms_are_those_of_the_whole() {
             "z differs by {:e}",
             a.z().unwrap() - expected.z
         );
-        // The velocity of a state belongs to its momentum.
+        // The velocity of a state has the momentum of the state.
         let (momenta, state) = (a.p().to_vec(), a.state().unwrap());
         let end = VelocityPoint {
             q: SVector::from_column_slice(state.q),
@@ -115,7 +117,7 @@ fn general_terms_are_those_of_the_whole() {
     }
 }
 
-/// A motion without symmetry.
+/// An initial state without symmetry.
 fn motion_of(n: usize) -> (Vec<f64>, Vec<f64>) {
     let of = |shift: f64| (0..n).map(|i| 0.8 * (0.37 * i as f64 + shift).sin()).collect();
     (of(0.2), of(1.4))
@@ -125,7 +127,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// With one stage it is the midpoint rule, whose code is another.
+/// With one stage the method is the midpoint rule, which is implemented separately.
 #[test]
 fn one_stage_is_the_midpoint_rule() {
     let n = 50;
@@ -135,16 +137,16 @@ fn one_stage_is_the_midpoint_rule() {
     let mut a = AssembledGauss::new(&chain, 1, H, from, None).unwrap();
     let mut b = AssembledMidpoint::new(&chain, H, from, None).unwrap();
     assert_eq!((a.advance(STEPS), b.advance(STEPS)), (Ok(()), Ok(())));
-    // One rounding of the product gamma h, and of each of the quotients.
+    // One rounding of the product gamma h, and one of each quotient.
     assert!((a.sigma() - b.sigma()).abs() <= 8.0 * f64::EPSILON);
     let (a, b) = (a.state().unwrap(), b.state());
-    // As in small_systems.rs: Newton's method ends within the rounding of q/h.
+    // As in small_systems.rs: Newton's method stops within the round-off of q/h.
     let tolerance = 200.0 * f64::EPSILON * STEPS as f64 / H;
     assert!(distance(a.q, b.q) <= tolerance && distance(a.v, b.v) <= tolerance, "{:e}", distance(a.v, b.v));
     assert!((a.z.unwrap() - b.z.unwrap()).abs() <= n as f64 * tolerance, "{:e}", a.z.unwrap() - b.z.unwrap());
 }
 
-/// Two stages have order 4 on a nonlinear chain: the slope of the error, to 0.15.
+/// Two stages have order 4 on a nonlinear chain: the slope of the error is 4 to within 0.15.
 #[test]
 fn two_stages_have_order_four() {
     let n = 50;
@@ -168,11 +170,11 @@ fn two_stages_have_order_four() {
     let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
         / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
     assert!((slope - 4.0).abs() <= 0.15, "order {slope}: {points:?}");
-    // Above what rounding leaves.
+    // The errors are above round-off.
     assert!(points[3].1.exp() > 1e-11, "{points:?} is round-off");
 }
 
-/// What is refused before the first step.
+/// Input that is rejected before the first step.
 #[test]
 fn bad_input() {
     let x = start();
@@ -194,27 +196,27 @@ fn bad_input() {
     let out = AssemblyError::OutOfRange { list: 2, element: 1, unknown: 5, last: 4 };
     assert_eq!(list(&[[0, 1], [1, 5]]), Some(out));
     assert_eq!(list(&[[3, 3]]), Some(AssemblyError::Repeated { list: 2, element: 0, unknown: 3 }));
-    // Without a mass: an unknown of no element, and one whose element has no kinetic energy.
+    // An unknown without mass that belongs to no general term, and a negative mass.
     let some = || AssembledSystem::new(N).unwrap().with_masses(MASSES.to_vec());
     let first = some().with_term(Piece, PIECES[2..].iter().copied()).unwrap();
     assert_eq!(refused(&first, 1, H, None), Some(AssemblyError::Mass { unknown: 0, mass: 0.0 }));
     let negative = large().with_mass(-1.0);
     assert_eq!(refused(&negative, 1, H, None), Some(AssemblyError::Mass { unknown: 0, mass: -1.0 }));
-    // With the masses of the differences of velocities only.
+    // The kinetic energy depends only on differences of velocities.
     let singular = AssembledSystem::new(N).unwrap().with_term(Relative, (1..N).map(|i| [i - 1, i])).unwrap();
     assert_eq!(refused(&singular, 1, H, None), Some(AssemblyError::SingularMass));
     let undefined = large().with_term(Inverse, [[2]]).unwrap();
     let zero = [0.0; N];
     let at_zero = AssembledGauss::new(&undefined, 2, H, State { q: &zero, ..from }, None).err();
     assert_eq!(at_zero, Some(AssemblyError::Undefined { unknown: 2 }));
-    // A limit of memory.
+    // A memory limit.
     let Some(AssemblyError::Memory { needed, limit: 100 }) = refused(&system, 2, H, Some(100)) else {
         panic!("100 bytes are not enough");
     };
     assert!(needed > 100);
 }
 
-/// A kinetic energy of relative motion: singular.
+/// A kinetic energy of the relative motion, whose matrix is singular.
 struct Relative;
 
 impl LocalLagrangian<2> for Relative {
@@ -223,7 +225,7 @@ impl LocalLagrangian<2> for Relative {
     }
 }
 
-/// Not defined at 0.
+/// A term that is not defined at 0.
 struct Inverse;
 
 impl LocalLagrangian<1> for Inverse {
@@ -232,7 +234,8 @@ impl LocalLagrangian<1> for Inverse {
     }
 }
 
-/// A drag so strong that a step has no positive factor: a status, and the state before the step.
+/// With a drag so strong that a step has no positive conformal factor, the step returns a status and the state before
+/// it is kept.
 #[test]
 fn a_step_that_fails_keeps_the_state() {
     let strong = large().with_drag(-60.0);

@@ -1,4 +1,4 @@
-//! Midpoint steps by conjugate gradients, whose matrix is not formed, are those by its factors.
+//! Midpoint steps by conjugate gradients, without forming the matrix, agree with those by matrix factors.
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -8,7 +8,8 @@ use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::StepError;
 
-/// The largest difference of positions and velocities, each in units of the largest of its kind, after the same steps by both.
+/// The largest difference of positions, velocities and action after the same steps by both solvers, relative to the
+/// largest of its kind, and the number of matrix-vector products.
 fn apart(system: &AssembledSystem, h: f64, start: State, steps: usize) -> (f64, u64) {
     let mut factors = AssembledMidpoint::new(system, h, start, None).unwrap();
     let mut products = AssembledMidpoint::matrix_free(system, h, start).unwrap();
@@ -26,7 +27,8 @@ fn apart(system: &AssembledSystem, h: f64, start: State, steps: usize) -> (f64, 
     (off(a.q, b.q).max(off(a.v, b.v)).max(z), products.products())
 }
 
-/// Both end where a correction is below round-off, which may differ by some units a step; errors of positions grow with the steps again.
+/// Both solvers stop when a correction is below round-off, so that they may differ by some units of round-off per step.
+/// The resulting errors of the positions grow with the number of steps as well.
 fn tolerance(steps: usize) -> f64 {
     4.0 * f64::EPSILON * (steps * steps) as f64
 }
@@ -38,7 +40,7 @@ fn planets() {
         let (q, v) = (OuterSolarSystem::positions(6), OuterSolarSystem::velocities(6));
         let (apart, products) = apart(&planets, 40.0, State { t: 0.0, q: &q, v: &v, z: Some(0.3) }, 200);
         assert!(apart <= tolerance(200), "gamma = {gamma}: {apart:e}");
-        // A few products a step: in its variables the matrix is near the identity.
+        // A few products per step suffice, since the matrix is close to the identity in the variables of the solver.
         assert!((200..10 * 200).contains(&products), "{products}");
     }
 }
@@ -48,13 +50,13 @@ fn a_chain_from_wall_to_wall() {
     let n = 50;
     let chain = fput_chain(n, FputBond { alpha: 0.25, beta: 1.0 }, -0.05).unwrap();
     let q: Vec<f64> = (1..=n).map(|i| (0.3 * i as f64).sin()).collect();
-    // Steps longer than those of the fastest wave: the matrix is far from the identity.
+    // The steps are longer than the time scale of the fastest wave, so that the matrix is far from the identity.
     let (apart, products) = apart(&chain, 1.5, State { t: 0.0, q: &q, v: &vec![0.1; n], z: Some(0.0) }, 40);
     assert!(apart <= tolerance(40), "{apart:e}");
     assert!(products > 40);
 }
 
-/// A hill that is steeper than a step can bear: the matrix has a negative eigenvalue.
+/// A hill that is too steep for the step: the matrix has a negative eigenvalue.
 struct Hill;
 
 impl Potential<1> for Hill {

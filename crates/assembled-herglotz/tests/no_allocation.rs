@@ -1,6 +1,7 @@
-//! Steps of assembled systems allocate nothing, but for a refactorisation; and how much memory a long chain holds.
+//! Steps of assembled systems do not allocate, except for new factorisations; and the memory of a long chain is
+//! bounded.
 
-// What a test cannot go on without is a failure of it.
+// A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{FputBond, OuterSolarSystem, SineGordon, fput_chain, lattice};
@@ -10,7 +11,8 @@ use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
 
 thread_local! {
-    /// Of this thread, since the test runner's own do not count: the allocations, the bytes that are held, and the most that were.
+    /// Counters of this thread, so that those of the test runner do not count: the number of allocations, the bytes
+    /// held, and their maximum.
     static COUNT: Cell<usize> = const { Cell::new(0) };
     static HELD: Cell<isize> = const { Cell::new(0) };
     static MOST: Cell<isize> = const { Cell::new(0) };
@@ -25,7 +27,7 @@ fn count(bytes: isize) {
     });
 }
 
-#[allow(unsafe_code)] // An allocator cannot be written without.
+#[allow(unsafe_code)] // An allocator requires unsafe code.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let _ = COUNT.try_with(|c| c.set(c.get() + 1));
@@ -61,7 +63,7 @@ fn steps() {
         explicit.state();
     });
     assert_eq!(found, 0);
-    // With compensated sums, and with elements that are in no run.
+    // With compensated sums, and with elements outside runs.
     let planets = OuterSolarSystem::system(5, -1e-8).unwrap();
     let (at, moving) = (OuterSolarSystem::positions(5), OuterSolarSystem::velocities(5));
     let begin = State { t: 0.0, q: &at, v: &moving, z: Some(0.0) };
@@ -83,7 +85,7 @@ fn steps() {
     );
 }
 
-/// A chain and its motion hold at most six vectors, the start of the user included.
+/// A chain and its motion hold at most six vectors, including the initial state of the user.
 #[test]
 fn memory_of_a_chain() {
     let n = 100_000;
@@ -96,11 +98,12 @@ fn memory_of_a_chain() {
     motion.advance(2).unwrap();
     motion.state();
     let most = MOST.with(Cell::get) - before;
-    // And 64 kB for the lists of blocks.
+    // The lists of blocks may take 64 kB more.
     assert!(most <= 6 * 8 * n as isize + 65_536, "{most} bytes, {} vectors", most as f64 / (8 * n) as f64);
 }
 
-/// Steps of Gauss collocation with kept factors allocate nothing, and what it holds is within the estimate that a limit is compared with.
+/// Steps of Gauss collocation with kept factors do not allocate, and the memory held is within the estimate that is
+/// compared with the limit.
 #[test]
 fn memory_of_gauss() {
     let side = 40;
@@ -118,9 +121,10 @@ fn memory_of_gauss() {
     let mut motion = AssembledGauss::new(&system, 2, 0.05, start, Some(needed)).unwrap();
     motion.advance(5).unwrap();
     let held = HELD.with(Cell::get) - before;
-    // The vectors, the pattern and the lists of places are not in the estimate: some 30 and 60 numbers for each unknown.
+    // The estimate does not include the vectors, and the pattern and the lists of indices: some 30 and 60 numbers for
+    // each unknown.
     assert!(held <= needed as isize + 100 * 8 * n as isize, "{held} bytes are held, {needed} were estimated");
-    // And it is no idle bound.
+    // The estimate is not excessively large either.
     assert!(held >= needed as isize / 20, "{held} bytes are held, {needed} were estimated");
     let factorisations = motion.factorisations();
     let found = allocations(|| motion.advance(10).unwrap());

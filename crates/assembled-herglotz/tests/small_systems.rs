@@ -1,6 +1,7 @@
-//! Assembled systems of few unknowns against the library for small systems: every splitting scheme, and the midpoint rule.
+//! Assembled systems of few unknowns compared with the library for small systems, for every splitting scheme and the
+//! midpoint rule.
 
-// What a test cannot go on without is a failure of it.
+// A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{FputBond, SineGordon, Spring, fput_chain, lattice};
@@ -8,7 +9,11 @@ use assembled_herglotz::{AssembledMidpoint, AssembledSplitting, AssembledSystem,
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Chain, Ends};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
-use discrete_herglotz::{Flow, Midpoint, Splitting, SplittingScheme, Stepper};
+use discrete_herglotz::{
+    SplittingScheme, Stepper,
+    rules::{Flow, Midpoint},
+    splitting::Splitting,
+};
 
 const STEPS: usize = 20;
 const H: f64 = 0.1;
@@ -19,8 +24,8 @@ fn start<const N: usize>() -> (SVector<f64, N>, SVector<f64, N>, f64) {
     (SVector::from_fn(|i, _| of(i, 0.3)), SVector::from_fn(|i, _| of(i, 1.1)), 0.4)
 }
 
-/// What rounding may make of `STEPS` steps of a motion of size one: each of the additions of a stage rounds once, there are some twenty of
-/// them, and over a time of 2 these motions separate by no more than a factor of ten.
+/// The round-off of `STEPS` steps of a motion of size one. A stage has some twenty additions, each of which rounds
+/// once, and over a time of 2 neighbouring motions diverge by at most a factor of ten.
 fn tolerance(stages: usize) -> f64 {
     20.0 * 10.0 * f64::EPSILON * (STEPS * stages) as f64
 }
@@ -31,11 +36,11 @@ fn assert_same<const N: usize>(name: &str, found: State, expected: PhasePoint<N>
         assert!(dq.abs() <= tolerance && dp.abs() <= tolerance, "{name}, unknown {i}: {dq:e}, {dp:e} > {tolerance:e}");
     }
     let dz = found.z.unwrap() - expected.z;
-    // z is of the size of the number of unknowns.
+    // The size of z is that of the number of unknowns.
     assert!(dz.abs() <= N as f64 * tolerance, "{name}: z differs by {dz:e}");
 }
 
-/// Runs both, with every scheme and with the midpoint rule.
+/// Compares both libraries for every scheme and for the midpoint rule.
 fn compare<const N: usize, L: Lagrangian<N>>(small: &L, large: &AssembledSystem, masses: [f64; N]) {
     let (q, v, z) = start::<N>();
     let p = SVector::from_fn(|i, _| masses[i] * v[i]);
@@ -55,12 +60,12 @@ fn compare<const N: usize, L: Lagrangian<N>>(small: &L, large: &AssembledSystem,
         assert_eq!((a.advance(STEPS), b.advance(STEPS)), (Ok(()), Ok(())));
         let sigma = (a.sigma() - b.sigma()).abs();
         assert!(sigma <= 4.0 * f64::EPSILON, "midpoint: sigma_d differs by {sigma:e}");
-        // Newton's method ends within its round-off, which is of the size of q/h.
+        // Newton's method stops within its round-off, which has the size of q/h.
         assert_same("midpoint", a.state(), Stepper::state(&b), masses, tolerance(1) / H);
     }
 }
 
-/// Bonds in one run, fixed at both ends (8 sites), and bonds one by one (5 sites).
+/// Bonds in one run of elements, fixed at both ends (8 sites), and bonds outside runs (5 sites).
 #[test]
 fn chains_between_walls() {
     let chain = |n| fput_chain(n, FputBond { alpha: 0.0, beta: 0.5 }, -0.1).unwrap();
@@ -73,7 +78,7 @@ fn chains_between_walls() {
     );
 }
 
-/// A sine-Gordon lattice of 3 x 3 sites, whole.
+/// A sine-Gordon lattice of 3 x 3 sites as a single Lagrangian.
 struct Sites;
 
 impl Lagrangian<9> for Sites {
@@ -106,7 +111,7 @@ fn a_lattice() {
 
 const MASSES: [f64; 4] = [1.0, 2.0, 0.5, 3.0];
 
-/// Three unknowns at once, in time, with two parameters.
+/// A time-dependent potential of three unknowns with two parameters.
 struct Triangle;
 
 impl Potential<3, 2> for Triangle {
@@ -116,7 +121,7 @@ impl Potential<3, 2> for Triangle {
     }
 }
 
-/// The same in one.
+/// The same system as a single Lagrangian.
 struct Whole;
 
 impl Lagrangian<4> for Whole {
@@ -135,7 +140,7 @@ impl Lagrangian<4> for Whole {
     }
 }
 
-/// Unequal masses, parameters, a fixed place, a force in time, two lists.
+/// Unequal masses, parameters, a fixed place, a time-dependent force, and two lists.
 #[test]
 fn elements_of_any_kind() {
     let large = AssembledSystem::new(4)

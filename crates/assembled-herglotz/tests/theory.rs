@@ -1,6 +1,7 @@
-//! What the theory says of the flows of assembled systems: orders, conformal factors, decay of momenta and of the energy.
+//! Theoretical properties of the flows of assembled systems: orders, conformal factors, decay of the momenta and of the
+//! energy.
 
-// What a test cannot go on without is a failure of it.
+// A failed `unwrap` is a failure of the test.
 #![allow(clippy::unwrap_used)]
 
 use assembled_herglotz::systems::{FputBond, KleinGordon, OuterSolarSystem, SineGordon, fput_chain, lattice};
@@ -11,13 +12,13 @@ use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::SplittingScheme;
 
-/// A motion without symmetry.
+/// An initial state without symmetry.
 fn start(n: usize) -> (Vec<f64>, Vec<f64>) {
     let of = |shift: f64| (0..n).map(|i| 0.8 * (0.37 * i as f64 + shift).sin()).collect();
     (of(0.2), of(1.4))
 }
 
-/// Positions and velocities after a time.
+/// Positions, velocities and action after a time.
 fn explicit(system: &AssembledSystem, scheme: &SplittingScheme, start: State, time: f64, steps: usize) -> Vec<f64> {
     let mut motion = AssembledSplitting::new(system, scheme, time / steps as f64, start).unwrap();
     motion.advance(steps).unwrap();
@@ -36,7 +37,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The least-squares slope of the logarithms.
+/// The slope of a least-squares fit to the logarithms.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
     let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|(h, e)| (h.ln(), e.ln())).unzip();
@@ -46,7 +47,7 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     top / bottom
 }
 
-/// A nonlinear chain of 50 sites: the error of each rule falls with its power of the step, to 0.15.
+/// On a nonlinear chain of 50 sites the measured order of each method is the theoretical one to within 0.15.
 #[test]
 fn orders() {
     let n = 50;
@@ -58,7 +59,7 @@ fn orders() {
         let points = steps.map(|k| (4.0 / k as f64, distance(&run(k), &exact)));
         let found = slope(&points);
         assert!((found - order).abs() <= 0.15, "{name}: order {found}, not {order}: {points:?}");
-        // Above what rounding leaves of some 1e3 stages of 50 sites.
+        // Above the round-off of some 1e3 stages of 50 sites.
         assert!(points[3].1 > 1e-12, "{name}: {points:?} is round-off");
     };
     for (scheme, steps) in [
@@ -71,7 +72,8 @@ fn orders() {
     check("midpoint", 2.0, [128, 192, 256, 384], &|k| implicit(&chain, from, 4.0, k));
 }
 
-/// With free ends and no force on single sites the sum of the momenta is multiplied by `sigma_d` in each step, by any rule.
+/// With free ends and no forces on single sites the total momentum is multiplied by `sigma_d` in each step of any
+/// method.
 #[test]
 fn momenta_decay_with_the_conformal_factor() {
     let size = [12, 5, 3];
@@ -83,7 +85,8 @@ fn momenta_decay_with_the_conformal_factor() {
     let from = State { t: 0.0, q: &q, v: &v, z: Some(0.0) };
     let (h, steps) = (0.1, 50);
     let before: f64 = v.iter().sum();
-    // The forces are opposite to the last bit; each unknown rounds about four times a stage, at random.
+    // The forces on the ends of a bond are exactly opposite; each unknown is rounded about four times per stage, at
+    // random.
     let tolerance = |stages: usize| 4.0 * f64::EPSILON * (n * steps * stages) as f64;
     for scheme in [SplittingScheme::STRANG, SplittingScheme::BLANES_MOAN_6_LONG] {
         let mut motion = AssembledSplitting::new(&system, &scheme, h, from).unwrap();
@@ -96,12 +99,12 @@ fn momenta_decay_with_the_conformal_factor() {
     motion.advance(steps).unwrap();
     let after: f64 = motion.state().v.iter().sum();
     let expected = before * motion.sigma().powi(steps as i32);
-    // Newton's method ends within the rounding of q/h.
+    // Newton's method stops within the round-off of q/h.
     assert!((after - expected).abs() <= tolerance(1) / h, "midpoint: {after} {expected}");
 }
 
-/// The energy `E_L` of an autonomous system is multiplied by `e^(gamma t)` along the motion; a splitting keeps to that within an error of its
-/// order that does not grow with time.
+/// The energy `E_L` of an autonomous system is multiplied by `e^(gamma t)` along the motion. A splitting reproduces
+/// this with an error of its order, which does not grow with time.
 #[test]
 fn energy_decays() {
     let system = lattice([16, 16], SineGordon { omega_squared: 1.0 }, 1.0, -0.05).unwrap();
@@ -126,7 +129,7 @@ fn energy_decays() {
     assert!((coarse / fine).log2() > 1.8, "order of the energy's error: {coarse:e}, {fine:e}");
 }
 
-/// A drag of one unknown, as a general term.
+/// A drag as a general term of one unknown.
 struct Drag;
 
 impl LocalLagrangian<1> for Drag {
@@ -136,7 +139,8 @@ impl LocalLagrangian<1> for Drag {
     }
 }
 
-/// A motion whose start has no action has none either: the energy is refused where L depends on it, and is the same where it does not.
+/// A motion that starts without the action has none later. The energy is then refused if L depends on the action, and
+/// is the same otherwise.
 #[test]
 fn no_energy_without_the_action() {
     let (q, v) = start(50);
@@ -162,7 +166,7 @@ fn no_energy_without_the_action() {
         let expected = chain.energy(with).unwrap();
         for found in energies {
             if gamma == 0.0 {
-                // The errors of steps of a twentieth, of second order, of waves of frequencies up to 4.
+                // The error of second-order steps of 0.05 for waves of frequencies up to 4.
                 assert!((found.unwrap() / expected - 1.0).abs() < 0.01, "{found:?}, {expected}");
             } else {
                 assert_eq!(found, Err(AssemblyError::NoAction));
@@ -177,9 +181,10 @@ fn no_energy_without_the_action() {
     assert!(AssembledGauss::new(&general, 2, 0.05, from, None).is_ok());
 }
 
-/// With drag the outer solar system has the same error as without: nothing is proportional to the drag.
+/// The error for the outer solar system with drag is that without drag: no part of it is proportional to the drag.
 ///
-/// In the time `tau = int e^(gamma t) dt` an orbit with drag is not one without, so each is compared with its own fine run.
+/// An orbit with drag differs from one without even in the time `tau = int e^(gamma t) dt`, so each is compared with
+/// its own reference solution.
 #[test]
 fn outer_solar_system() {
     let (q, v) = (OuterSolarSystem::positions(6), OuterSolarSystem::velocities(6));
@@ -191,7 +196,8 @@ fn outer_solar_system() {
         distance(&found[..18], &exact[..18])
     };
     let free = error(0.0, 100);
-    // A drag of 1e-6/day halves no orbit in 20 000 days, but its error as a force of low order would be 1e-6 * h of each position.
+    // A drag of 1e-6/day does not halve any orbit in 20 000 days. Its error as a force of low order would be 1e-6 * h
+    // of each position.
     for gamma in [-1e-7, -1e-6] {
         let dragged = error(gamma, 100);
         assert!(dragged < 1.5 * free && free > 1e-9, "gamma {gamma:e}: {dragged:e}, without {free:e}");

@@ -6,7 +6,7 @@ use contact_geom::systems::{DoublePendulum, Kepler, Pendulum, System};
 use contact_geom::{ChartVector, DiscretePoint, VelocityPoint, herglotz_field};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use differential_equations::prelude::{ExplicitRungeKutta, IVP, ODE};
-use discrete_herglotz::{DiscreteLagrangian, derived_jet};
+use discrete_herglotz::{DiscreteLagrangian, theory::derived_jet};
 use exact_lagrangian::{ContactExponential, ExactLagrangian, herglotz_flow};
 use std::hint::black_box;
 

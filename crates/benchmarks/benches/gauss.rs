@@ -5,7 +5,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, Kepler, Pendulum, QuadraticInZ, System};
 use contact_geom::{Lagrangian, Scalar, VelocityPoint, WithoutClosedDerivatives, legendre};
 use criterion::{Criterion, criterion_group, criterion_main};
-use discrete_herglotz::{Gauss, Stepper};
+use discrete_herglotz::{Stepper, gauss::Gauss};
 use std::hint::black_box;
 
 /// The number of steps in a sample: few, so that the motion stays near its start.

@@ -151,7 +151,7 @@ fn lines() -> Result<Vec<Line>, InputError> {
         line(("mass matrix at the stages", "pendulum, gauss_8"), general(&plain), general(&constant_mass))?,
         line(
             ("Newton's method", "double pendulum, midpoint by composition or gauss_3"),
-            by(AnyIntegrator::Composition(discrete_herglotz::Method::Midpoint, SplittingScheme::YOSHIDA_6)),
+            by(AnyIntegrator::Composition(discrete_herglotz::rules::Method::Midpoint, SplittingScheme::YOSHIDA_6)),
             by(AnyIntegrator::Gauss { stages: 3 }),
         )?,
         line(("rows", "pendulum, blanes_moan_6"), whole(recorded), whole(unrecorded))?,

@@ -2,8 +2,8 @@
 //! faer is faster.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use discrete_herglotz::Solver;
 use discrete_herglotz::contact_geom::nalgebra::{SMatrix, SVector};
+use discrete_herglotz::solve::Solver;
 use std::hint::black_box;
 
 /// Measures both solvers for one size, with a matrix for which the choice of pivots is not critical.

@@ -9,7 +9,7 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Kepler, Pendulum};
 use contact_geom::{Lagrangian, PhasePoint, WithoutClosedDerivatives};
 use criterion::{Criterion, criterion_group, criterion_main};
-use discrete_herglotz::{Splitting, SplittingScheme, Stepper};
+use discrete_herglotz::{SplittingScheme, Stepper, splitting::Splitting};
 use std::hint::black_box;
 
 const STEPS: usize = 10_000;

@@ -5,7 +5,10 @@ use contact_geom::PhasePoint;
 use contact_geom::nalgebra::{Matrix2, Vector2};
 use contact_geom::systems::{DoublePendulum, Pendulum};
 use criterion::{Criterion, criterion_group, criterion_main};
-use discrete_herglotz::{DiscreteLagrangian, Flow, LeftMidpoint, Stepper};
+use discrete_herglotz::{
+    DiscreteLagrangian, Stepper,
+    rules::{Flow, LeftMidpoint},
+};
 use std::hint::black_box;
 
 const H: f64 = 0.1;

@@ -1,18 +1,18 @@
-//! What can be wrong with the input of the geometry.
+//! Errors of the geometric formulas.
 
 use thiserror::Error;
 
-/// Bad input to a formula of the geometry, found before an answer is given.
+/// Invalid input to a geometric formula, reported instead of a result.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum GeometryError {
     /// A slice has the wrong number of entries.
     #[error("{what} has {found} entries where the configuration space has dimension {expected}; pass {expected}")]
     WrongSize {
-        /// The coordinate that the slice was meant for.
+        /// The coordinate that the slice specifies.
         what: &'static str,
         /// The dimension N.
         expected: usize,
-        /// The entries that were passed.
+        /// The number of entries that were passed.
         found: usize,
     },
     /// A number is infinite or not a number.
@@ -28,17 +28,18 @@ pub enum GeometryError {
     /// A matrix that the formula inverts is singular.
     #[error("{what} is singular (pivot {pivot:e}): {remedy}")]
     Singular {
-        /// The matrix, in the field's terms.
+        /// The usual name of the matrix.
         what: &'static str,
-        /// The vanishing or non-finite pivot, relative to the largest entry.
+        /// The absolute value of the pivot that vanishes or is not finite, or the smallest singular value relative to
+        /// the largest.
         pivot: f64,
-        /// What to do.
+        /// A suggestion for the caller.
         remedy: &'static str,
     },
     /// A function is not defined at a point, or could not be evaluated there.
     #[error("{what} is not defined at this point; choose one inside its domain")]
     Undefined {
-        /// The function, in the field's terms.
+        /// The usual name of the function.
         what: &'static str,
     },
 }

@@ -1,10 +1,11 @@
-//! Contact geometry of mechanical systems with dissipation, pointwise and exact.
+//! Contact geometry of mechanical systems with dissipation, evaluated at points to round-off.
 //!
-//! A system is one function, a Lagrangian `L(t, q, v, z)`; its motion makes the end value of the action critical, where
-//! `zdot = L` (Herglotz' principle). This crate computes what the geometry says about it at a point: the contact forms of
-//! T\*Q x R, TQ x R and Q x Q x R with their Reeb fields, pullbacks and conformal factors, contact Hamiltonian and Herglotz
-//! vector fields, the Legendre transformation, symmetries and their dissipated momenta. It holds no time step, no
-//! iteration and no tolerance. [`statements`] checks the theory on any system, [`systems`] is a catalogue to start from.
+//! A system is given by one function, its Lagrangian `L(t, q, v, z)`; its motion makes the final value of the action z
+//! critical, where `zdot = L` (Herglotz' principle). This crate evaluates the geometry at a point: the contact forms of
+//! T\*Q x R, TQ x R and Q x Q x R with their Reeb fields, pullbacks and conformal factors, contact Hamiltonian and
+//! Herglotz vector fields, the Legendre transformation, symmetries and their dissipated momenta. It contains no time
+//! steps, iterations or tolerances. [`statements`] checks the theory on any system; [`systems`] is a catalogue of
+//! examples.
 //!
 //! ```
 //! use contact_geom::{herglotz_field, nalgebra::SVector, Lagrangian, Scalar, VelocityPoint};
@@ -22,7 +23,7 @@
 //! # Ok::<(), contact_geom::GeometryError>(())
 //! ```
 //!
-//! Symbols and their names in code are in the project's `NOTATION.md`.
+//! The project's `NOTATION.md` lists the symbols with their names in code.
 
 mod dynamics;
 mod error;
@@ -32,24 +33,38 @@ mod statement;
 pub mod statements;
 pub mod systems;
 
+/// Contact Hamiltonian vector fields and their algebra: brackets, Lie derivatives, infinitesimal conformality.
+pub mod hamiltonian {
+    pub use crate::dynamics::{
+        DarbouxBracket, DarbouxField, InfinitesimalConformality, conformal_factor_along, derivative_along,
+        dissipation_defect, hamiltonian_vector_field, infinitesimal_conformality, jacobi_bracket, lie_bracket,
+        lie_derivative,
+    };
+}
+
+/// Vector spaces of dual parts, and maxima that keep a NaN.
+pub mod numbers {
+    pub use crate::number::{AugmentedVector, MaxAbsOrNan, MaxOrNan, TangentVector, max_abs_or_nan, max_or_nan};
+}
+
+/// What the other crates of this project build on: derivatives by dual numbers, seeds, small linear systems, rounding.
+pub mod support {
+    pub use crate::dynamics::{derived_gradient, derived_hessian, gradient_rounding, herglotz_rates};
+    pub use crate::forms::{conformality_with_jacobian, generic, seed};
+    pub use crate::number::{KernelDual, legendre_polynomials, linear};
+}
+
 pub use dynamics::{
-    DarbouxBracket, DarbouxField, Defect, Defects, Derivatives, Energy, HerglotzField, Hessian,
-    InfinitesimalConformality, Lagrangian, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, Quotient,
-    Regularity, Structure, Symmetry, TimeTransformation, WithoutClosedDerivatives, check_closed_derivatives,
-    conformal_factor_along, derivative_along, derived_gradient, derived_hessian, dissipation_defect, gradient_rounding,
-    hamiltonian_vector_field, herglotz_field, herglotz_rates, infinitesimal_conformality, jacobi_bracket, legendre,
-    legendre_jacobian, lie_bracket, lie_derivative, regularity,
+    Defect, Defects, Derivatives, Energy, HerglotzField, Hessian, Lagrangian, Legendre, LiftedAction, NoetherMomentum,
+    OneParameterGroup, Quotient, Regularity, Structure, Symmetry, TimeTransformation, WithoutClosedDerivatives,
+    check_closed_derivatives, herglotz_field, legendre, legendre_jacobian, regularity,
 };
 pub use error::GeometryError;
 pub use forms::{
     ChartVector, Conformality, ContactForm, Darboux, DiscreteJet, DiscretePoint, EtaMinus, EtaPlus, Form,
     LagrangianForm, PhasePoint, SecondDiscreteJet, Smooth, SmoothFunction, VelocityPoint, conformality,
-    conformality_with_jacobian, generic, seed,
 };
-pub use number::{
-    AugmentedVector, Dual, KernelDual, MaxAbsOrNan, MaxOrNan, Scalar, TangentVector, legendre_polynomials, linear,
-    max_abs_or_nan, max_or_nan,
-};
+pub use number::{Dual, Scalar};
 pub use statement::Statement;
 
 pub use nalgebra;

@@ -1,29 +1,29 @@
-//! The list of the paper's statements that a program can check.
+//! The list of the paper's statements that can be checked numerically.
 
 use std::fmt;
 
-/// What the list says of a statement besides its name and number.
+/// The entries of the list for a statement, besides its name and number.
 struct Row {
     section: &'static str,
     title: &'static str,
     text: &'static str,
 }
 
-/// Makes [`Statement`] from the list: the sentence above a variant is both its documentation and its text; its number,
-/// section of the paper and title follow.
+/// Defines [`Statement`] from the list. The sentence above a variant is both its documentation and its text; its
+/// number, the section of the paper and its title follow.
 macro_rules! statements {
     ($(#[doc = $text:literal] $name:ident = $number:literal, $section:literal, $title:literal;)*) => {
-        /// A statement of the paper *On the geometry of discrete contact mechanics*, with the paper's slips corrected.
+        /// A statement of the paper *On the geometry of discrete contact mechanics*, with its errata applied.
         ///
-        /// The number is that of its rows in `statements.csv` and, but for three that share one, of its test
-        /// `tests/sNN_*.rs`. Most are evaluated by the function `residual` in the module `statements` of a library.
+        /// The number is that of its rows in `statements.csv`; its tests are in `tests/paper`. Most statements are
+        /// evaluated by the function `residual` in the module `statements` of a library.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Statement {
             $(#[doc = $text] $name = $number,)*
         }
 
         impl Statement {
-            /// All of them, by number.
+            /// All statements, in the order of their numbers.
             pub const ALL: [Statement; 41] = [$(Statement::$name),*];
 
             fn row(self) -> Row {
@@ -126,23 +126,23 @@ impl Statement {
         self as u32
     }
 
-    /// The statement of a number; `None` if the list has no such number.
+    /// The statement with a given number; `None` if the list has no such number.
     pub fn from_number(number: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|statement| statement.number() == number)
     }
 
-    /// A few words, for tables.
+    /// A short title, for tables.
     pub fn title(self) -> &'static str {
         self.row().title
     }
 
-    /// What it says, in a sentence.
+    /// The statement in one sentence.
     pub fn text(self) -> &'static str {
-        // What follows `///` begins with a space.
+        // The text of a doc comment begins with a space.
         self.row().text.trim_start()
     }
 
-    /// The paper's section that makes it, as `2.2.1`.
+    /// The section of the paper that contains the statement, such as `2.2.1`.
     pub fn section(self) -> &'static str {
         self.row().section
     }

@@ -1,18 +1,25 @@
-//! The paper's section 2 as residuals: each statement evaluated at a point of a system, relative to its terms' size.
+//! Residuals of the statements of the paper's section 2: each statement is evaluated at a point of a system, relative
+//! to the size of its terms.
 //!
-//! A residual of a true statement is round-off times the conditions of the matrices involved; a test compares it with a
-//! tolerance, this module has none.
+//! The residual of a true statement is round-off times the condition numbers of the matrices involved. Tolerances are
+//! set by the tests, not by this module.
 
-// In a check `f64::max` and `amax` would lose a NaN.
+// `f64::max` and `amax` discard a NaN, which would make a check pass.
 #![deny(clippy::disallowed_methods)]
 
 use crate::systems::{FreeParticle, HarmonicOscillator, System};
 use crate::{
-    ChartVector, ContactForm, Darboux, DarbouxBracket, DarbouxField, Derivatives, Dual, Energy, Form, GeometryError,
-    HerglotzField, Lagrangian, LagrangianForm, Legendre, LiftedAction, MaxAbsOrNan, MaxOrNan, NoetherMomentum,
-    OneParameterGroup, PhasePoint, Quotient, Scalar, Smooth, SmoothFunction, Statement, VelocityPoint,
-    conformal_factor_along, conformality, dissipation_defect, generic, hamiltonian_vector_field, herglotz_field,
-    infinitesimal_conformality, jacobi_bracket, legendre, legendre_jacobian, lie_bracket, lie_derivative, regularity,
+    ChartVector, ContactForm, Darboux, Derivatives, Dual, Energy, Form, GeometryError, HerglotzField, Lagrangian,
+    LagrangianForm, Legendre, LiftedAction, NoetherMomentum, OneParameterGroup, PhasePoint, Quotient, Scalar, Smooth,
+    SmoothFunction, Statement, VelocityPoint, conformality,
+    hamiltonian::{
+        DarbouxBracket, DarbouxField, conformal_factor_along, dissipation_defect, hamiltonian_vector_field,
+        infinitesimal_conformality, jacobi_bracket, lie_bracket, lie_derivative,
+    },
+    herglotz_field, legendre, legendre_jacobian,
+    numbers::{MaxAbsOrNan, MaxOrNan},
+    regularity,
+    support::generic,
 };
 use nalgebra::SVector;
 
@@ -56,8 +63,8 @@ pub fn residual<const N: usize>(
     })
 }
 
-/// A function on a contact manifold without symmetry, for statements about any `f`: a wave plus a cubic, with coefficients
-/// that the field makes different.
+/// A function without symmetry on a contact manifold, for statements about any `f`: a sine plus a cubic, whose
+/// coefficients depend on the parameter.
 #[derive(Clone, Copy, Debug)]
 pub struct AnyFunction(pub f64);
 
@@ -79,7 +86,7 @@ pub struct SystemHamiltonian<'a, S>(pub &'a S);
 
 impl<const N: usize, S: System<N>> SmoothFunction<N> for SystemHamiltonian<'_, S> {
     fn value<T: Scalar>(&self, t: T, x: &ChartVector<N, T>) -> T {
-        // Only built where `hamiltonian` is known, which does not depend on the point.
+        // Constructed only where `hamiltonian` is known, which does not depend on the point.
         self.0.hamiltonian(t, &(*x).into()).unwrap_or_else(T::zero)
     }
 }
@@ -90,17 +97,18 @@ pub fn known_hamiltonian<const N: usize, S: System<N>>(system: &S) -> Option<Sys
     system.hamiltonian(t, &PhasePoint { q: x.q, p: x.v, z: x.z }).map(|_| SystemHamiltonian(system))
 }
 
-/// The difference of two elements relative to the larger of them (and to `least`, for what may vanish).
+/// The difference of two elements relative to the larger of them, or to `least` where both are smaller.
 fn relative<const N: usize>(a: ChartVector<N>, b: ChartVector<N>, least: f64) -> f64 {
     a.minus(b).max_abs_or_nan() / a.max_abs_or_nan().max_or_nan(b.max_abs_or_nan()).max_or_nan(least)
 }
 
-/// The difference of two numbers relative to the larger of them (and to `least`).
+/// The difference of two numbers relative to the larger of them, or to `least` where both are smaller.
 fn relative_number(a: f64, b: f64, least: f64) -> f64 {
     (a - b).abs() / a.abs().max_or_nan(b.abs()).max_or_nan(least)
 }
 
-/// The contact condition, flat, sharp and Reeb field of one form: closed against generic, and against their definitions.
+/// The residual of flat, sharp and Reeb field of one form: the closed expressions against the generic ones, and against
+/// their definitions.
 fn form_residual<const N: usize>(form: &impl ContactForm<N>, x: &ChartVector<N>) -> Result<f64, GeometryError> {
     let (eta, d_eta, reeb) = (form.eta(x)?, form.d_eta(x)?, form.reeb(x)?);
     let contraction = crate::forms::smooth::apply_transposed(&d_eta, &reeb).max_abs_or_nan()
@@ -122,7 +130,7 @@ fn form_residual<const N: usize>(form: &impl ContactForm<N>, x: &ChartVector<N>)
     Ok(worst)
 }
 
-/// The forms of a system at a point: Darboux' with its point, and eta_L.
+/// The forms of a system with their points: the point of the Darboux form, the form eta_L, and its point.
 fn forms<'a, const N: usize, L: Lagrangian<N>>(
     lagrangian: &'a L,
     t: f64,
@@ -131,7 +139,7 @@ fn forms<'a, const N: usize, L: Lagrangian<N>>(
     (legendre(lagrangian, t, x).into(), LagrangianForm { lagrangian, t }, (*x).into())
 }
 
-/// The volume of a form in closed form against the generic one; infinite where it vanishes.
+/// The difference of the closed and the generic volume of a form; infinite where the volume vanishes.
 fn volume_residual<const N: usize>(form: &impl ContactForm<N>, x: &ChartVector<N>) -> Result<f64, GeometryError> {
     let (closed, generic) = (form.volume(x)?, generic::volume(form, x)?);
     Ok(if generic == 0.0 { f64::INFINITY } else { (closed - generic).abs() / generic.abs() })
@@ -148,13 +156,13 @@ fn reeb<const N: usize>(system: &impl System<N>, t: f64, x: &VelocityPoint<N>) -
     let (phase, eta_l, velocity) = forms(system, t, x);
     let dz = ChartVector { x: SVector::zeros(), y: SVector::zeros(), z: 1.0 };
     let darboux = relative(generic::reeb(&Darboux, &phase)?, dz, 0.0).max_or_nan(form_residual(&Darboux, &phase)?);
-    // eta_L's d eta in closed form against that by differentiating its components.
+    // Compare d eta_L in closed form with the derivative of its components.
     let (closed, derived) = (eta_l.d_eta(&velocity)?, Form(&eta_l).d_eta(&velocity)?);
     let d_eta = (&closed - &derived).max_abs_or_nan() / derived.max_abs_or_nan();
     Ok(darboux.max_or_nan(d_eta).max_or_nan(form_residual(&eta_l, &velocity)?))
 }
 
-/// `flat(X_f) = df - (f + R(f)) eta`, `f = -eta(X_f)` and `eta`-component by component, for one form and function.
+/// The residual of `flat(X_f) = df - (f + R(f)) eta` and `f = -eta(X_f)`, for one form and one function.
 fn hamiltonian_field_residual<const N: usize>(
     form: &impl ContactForm<N>,
     f: &impl SmoothFunction<N>,
@@ -170,8 +178,8 @@ fn hamiltonian_field_residual<const N: usize>(
     Ok(flat.max_or_nan((value + eta.dot(&field)).abs() / terms.max_or_nan(value.abs())))
 }
 
-/// Statement 3: the contact Hamiltonian vector field, of E_L on TQ x R, of any f on both; closed form in Darboux
-/// coordinates.
+/// Statement 3: the contact Hamiltonian vector field, of E_L on TQ x R and of any f on both spaces, and its closed form
+/// in Darboux coordinates.
 fn hamiltonian_field<const N: usize>(
     system: &impl System<N>,
     t: f64,
@@ -186,7 +194,7 @@ fn hamiltonian_field<const N: usize>(
         .max_or_nan(hamiltonian_field_residual(&eta_l, &Energy(system), t, &velocity)?))
 }
 
-/// A function of `(q, p)` alone, for a strict contactomorphism: `R(f) = 0`.
+/// A function of `(q, p)` alone, for an infinitesimal strict contactomorphism: `R(f) = 0`.
 struct WithoutAction(AnyFunction);
 
 impl<const N: usize> SmoothFunction<N> for WithoutAction {
@@ -195,7 +203,7 @@ impl<const N: usize> SmoothFunction<N> for WithoutAction {
     }
 }
 
-/// `L_X eta = -R(f) eta` for `X = X_f`.
+/// The residual of `L_X eta = -R(f) eta` for `X = X_f`.
 fn conformal_residual<const N: usize, F: Smooth<N> + ContactForm<N>>(
     form: &F,
     field: &impl Smooth<N>,
@@ -209,7 +217,8 @@ fn conformal_residual<const N: usize, F: Smooth<N> + ContactForm<N>>(
     Ok(measured.defect.max_or_nan((measured.rate - rate).abs() / size))
 }
 
-/// Statement 4: `L_{X_f} eta = -R(f) eta`, strict where `R(f) = 0`; and `X_{f,g} = [X_f, X_g]`, on T\*Q x R; xi_L on TQ x R.
+/// Statement 4: `L_{X_f} eta = -R(f) eta`, strict where `R(f) = 0`, and `X_{f,g} = [X_f, X_g]`, on T\*Q x R; the first
+/// for xi_L on TQ x R.
 fn infinitesimal_conformal<const N: usize>(
     system: &impl System<N>,
     t: f64,
@@ -247,8 +256,8 @@ fn energy_decay<const N: usize>(system: &impl System<N>, t: f64, x: &VelocityPoi
         .max_or_nan(dissipation_defect(&Darboux, &any, &any, t, &phase)?))
 }
 
-/// Statement 7: L is regular exactly if eta_L is contact, since `eta_L ^ (d eta_L)^n` is `det W` times the canonical
-/// volume; R_L through W.
+/// Statement 7: L is regular if and only if eta_L is contact, since `eta_L ^ (d eta_L)^n` is `det W` times the
+/// canonical volume; the formula for R_L in terms of W.
 fn regular_iff_contact<const N: usize>(
     system: &impl System<N>,
     t: f64,
@@ -268,8 +277,8 @@ fn regular_iff_contact<const N: usize>(
 
 /// Statement 8: `xi_L = X_{E_L}` is a second-order equation that solves Herglotz' equations.
 ///
-/// `X_{E_L}` is taken at a fixed time, so it is compared where `L_v` does not depend on time explicitly, as in the whole
-/// catalogue.
+/// `X_{E_L}` is evaluated at a fixed time. The comparison therefore requires that `L_v` does not depend on time
+/// explicitly, which holds in the whole catalogue.
 fn second_order_equation<const N: usize>(
     system: &impl System<N>,
     t: f64,
@@ -280,7 +289,7 @@ fn second_order_equation<const N: usize>(
     let hamiltonian = hamiltonian_vector_field(&eta_l, &Energy(system), t, &velocity)?;
     let second_order = (field.x - x.v).max_abs_or_nan().max_or_nan((hamiltonian.x - x.v).max_abs_or_nan())
         / (1.0 + x.v.max_abs_or_nan());
-    // d/dt L_v along the field, by a dual along it.
+    // d/dt L_v along the field, by dual numbers in its direction.
     let along = |re: f64, d: f64| Dual { re, d: SVector::<f64, 1>::new(d) };
     let moving = VelocityPoint {
         q: SVector::<_, N>::from_fn(|i, _| along(x.q[i], field.x[i])),
@@ -319,8 +328,8 @@ fn legendre_is_contact<const N: usize>(
     Ok(worst)
 }
 
-/// Statement 11, infinitesimally: E_L is dissipated, and quotients of two dissipated quantities are conserved; a function
-/// that is not dissipated is seen to be so.
+/// Statement 11, infinitesimally: E_L is dissipated, and quotients of two dissipated quantities are conserved. The
+/// residual is infinite if the defect of a function that is not dissipated is not detected.
 fn dissipated_quantities<const N: usize>(
     system: &impl System<N>,
     t: f64,
@@ -332,7 +341,7 @@ fn dissipated_quantities<const N: usize>(
     for symmetry in system.symmetries() {
         let momentum = NoetherMomentum { lagrangian: system, group: &symmetry };
         worst = worst.max_or_nan(dissipation_defect(&eta_l, &energy, &momentum, t, &velocity)?);
-        // Conserved: X_H(momentum / energy) = 0, relative to the rates of the two.
+        // Conserved: X_H(momentum / energy) = 0, relative to the size of its terms.
         let field = hamiltonian_vector_field(&eta_l, &energy, t, &velocity)?;
         let d = Quotient { f: &momentum, g: &energy }.differential(t, &velocity);
         let size = d.x.abs().dot(&field.x.abs()) + d.y.abs().dot(&field.y.abs()) + (d.z * field.z).abs();
@@ -370,7 +379,7 @@ fn noether<const N: usize>(
     Ok(worst)
 }
 
-/// A motion in closed form as a map of T\*Q x R, for the statements about flows.
+/// A flow in closed form as a map of T\*Q x R, for the statements about flows.
 pub trait ClosedFlow {
     /// The system's name.
     fn name(&self) -> &'static str;
@@ -404,7 +413,8 @@ impl ClosedFlow for HarmonicOscillator {
     }
 }
 
-/// The contact Hamiltonian `c z^2 / 2`, nonlinear in z: its flow scales `z` by `1/(1 + c z t/2)` and `p` by its square.
+/// The contact Hamiltonian `c z^2 / 2`, nonlinear in z: its flow scales `z` by `1/(1 + c z t/2)` and `p` by the square
+/// of this factor.
 #[derive(Clone, Copy, Debug)]
 pub struct ActionSquared {
     /// The coefficient.

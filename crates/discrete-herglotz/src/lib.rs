@@ -23,44 +23,43 @@
 //!
 //! Symbols and their names in code are in the project's `NOTATION.md`.
 
-mod boundary;
-mod ensemble;
+pub mod boundary;
+pub mod ensemble;
 mod error;
-mod gauss;
+pub mod gauss;
 mod integration;
 mod numbers;
 mod resolution;
 pub mod rules;
 mod run;
-mod solve;
-mod splitting;
+pub mod solve;
+pub mod splitting;
 mod switching;
-mod theory;
+pub mod theory;
 
-pub use boundary::{BoundaryPath, CriticalPath, End, PathStatus, branch, continuation};
-pub use ensemble::{Ending, Ensemble, EnsembleError, Member, Merge, ObservedEnsemble, ShardedEnsemble, Tally};
+/// Checks of a motion for programs that take its steps themselves: claims of structure, the drift of the energy, suspect intervals, jumps of L.
+pub mod checks {
+    pub use crate::integration::{SuspectInterval, check_claims};
+    pub use crate::run::{EnergyDrift, EnergyLook};
+    pub use crate::switching::jumps_between;
+}
+
+pub use ensemble::builder::Ensemble;
 pub use error::{InputError, SelectionFailure, Status, StepError, UnresolvedStep};
-pub use gauss::{Gauss, GaussCollocation, GaussRoute, GaussStepper, TransformedGauss, TransformedStepper};
+pub use gauss::integrator::{GaussCollocation, TransformedGauss};
 pub use integration::{
-    BatchKernel, DenseStep, INTERRUPTION, Integrator, Interrupt, MethodInfo, PlanEntry, Problem, SplittingScheme,
-    Start, StepFailure, Stepper, StepperOptions, SuspectInterval, check_claims,
+    DenseStep, INTERRUPTION, Integrator, Interrupt, MethodInfo, PlanEntry, Problem, SplittingScheme, Start,
+    StepFailure, Stepper, StepperOptions,
 };
-pub use rules::*;
+pub use rules::integrator::CustomMethod;
 #[cfg(feature = "csv")]
 pub use run::CsvRows;
 pub use run::{
-    AnyIntegrator, Checkpoint, CheckpointError, Crossing, EnergyDrift, EnergyLook, Event, Events, LastStep,
-    MomentumDecay, MomentumRow, Observer, Outcome, OutputRequest, Plan, Progress, Quotient, ResumeState, Row, Rows,
-    Run, RunInfo, StepView, Steps, Stop, Terminal, UnknownIntegrator, Until,
+    AnyIntegrator, Checkpoint, CheckpointError, Crossing, Event, Events, LastStep, MomentumDecay, MomentumRow,
+    Observer, Outcome, OutputRequest, Plan, Progress, Quotient, ResumeState, Row, Rows, Run, RunInfo, StepView, Steps,
+    Stop, Terminal, UnknownIntegrator, Until,
 };
-pub use solve::{CROSSOVER, ITERATION_LIMIT, Solver, last_correction};
-pub use splitting::{ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, RiccatiMap, Splitting, Strang};
-pub use switching::{DividedGauss, jumps_between};
-pub use theory::{
-    DiscreteLagrangian, DiscretePath, DiscreteRegularity, DiscreteStep, HamiltonianFlow, derived_jet,
-    derived_second_jet, discrete_action, discrete_flow, discrete_flow_jacobian, discrete_momentum, discrete_regularity,
-    discrete_symmetry_defect, hamiltonian_flow, hamiltonian_flow_jacobian, legendre_inverse, legendre_minus,
-    legendre_minus_inverse, legendre_plus, legendre_plus_inverse, sigma_d, statements,
-};
+pub use switching::DividedGauss;
+pub use theory::discrete_lagrangian::{DiscreteLagrangian, DiscreteStep};
 
 pub use contact_geom;

@@ -1,8 +1,8 @@
 //! Steps that are solved by Newton's method on all stages at once, with the feature `faer` or without: `.ci/run` runs both.
 
 use contact_geom::systems::HarmonicOscillator;
-use contact_geom::{ChartVector, DiscretePoint, VelocityPoint, legendre, max_abs_or_nan};
-use discrete_herglotz::{DiscreteLagrangian, Gauss, Solver};
+use contact_geom::{ChartVector, DiscretePoint, VelocityPoint, legendre, numbers::max_abs_or_nan};
+use discrete_herglotz::{DiscreteLagrangian, gauss::Gauss, solve::Solver};
 
 /// Eight steps of order 24 by Newton's method on the stages meet the closed form, to the rounding of eight sums.
 #[test]

@@ -5,7 +5,10 @@
 
 use contact_geom::VelocityPoint;
 use contact_geom::systems::Pendulum;
-use discrete_herglotz::{CheckpointError, Ensemble, EnsembleError, SplittingScheme, Steps, Tally, Until};
+use discrete_herglotz::{
+    CheckpointError, Ensemble, SplittingScheme, Steps, Until,
+    ensemble::{EnsembleError, Tally},
+};
 
 const PENDULUM: Pendulum = Pendulum { gamma: -0.1 };
 const UNTIL: Until = Until::Time(2.0);

@@ -1,6 +1,6 @@
 //! Errors of an ensemble on several ranks.
 
-use discrete_herglotz::EnsembleError;
+use discrete_herglotz::ensemble::EnsembleError;
 use thiserror::Error;
 
 /// The reason why an ensemble on several ranks cannot start or continue.

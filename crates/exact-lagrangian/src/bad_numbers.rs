@@ -1,11 +1,12 @@
 //! Every public function with numbers that are none, infinite, hardly above zero, zero and huge: an error or an answer, never a NaN
 //! in an answer, a panic, or more than bounded work.
 
+use crate::principle::{Curve, MotionCurve, NonHolonomic, SplineCurve, action, action_derivative};
 use crate::*;
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{HarmonicOscillator, Pendulum};
 use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint};
-use discrete_herglotz::{DiscreteLagrangian, Midpoint, Solver};
+use discrete_herglotz::{DiscreteLagrangian, rules::Midpoint, solve::Solver};
 use std::fmt::Debug;
 
 /// Any answer in words, in which a number that is none says so.

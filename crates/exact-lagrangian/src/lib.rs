@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use contact_geom::{DiscretePoint, legendre, systems::CoupledInZ};
-//! use discrete_herglotz::legendre_minus;
+//! use discrete_herglotz::theory::legendre_minus;
 //! use exact_lagrangian::ExactLagrangian;
 //!
 //! let system = CoupledInZ::default(); // nonlinear in q and z, W depends on q, v, z
@@ -45,7 +45,7 @@ mod bad_numbers;
 mod error;
 mod map;
 mod numerics;
-mod principle;
+pub mod principle;
 mod quadratic_exact;
 pub mod statements;
 mod variational_error;
@@ -58,8 +58,5 @@ pub use map::exponential::{ContactExponential, ExponentialDifferential, Herglotz
 pub use map::joined_steps::{JoinedSteps, compose, through};
 pub use map::retraction::{Retraction, RetractionRoute};
 pub use numerics::flow::{EVALUATIONS, Motion, herglotz_flow};
-pub use principle::curve::{Curve, CurveAction, MotionCurve, VariedCurve, action, action_derivative};
-pub use principle::nonholonomic::{Chetaev, ExtendedMotion, ExtendedPoint, NonHolonomic};
-pub use principle::spline_curve::SplineCurve;
 pub use quadratic_exact::QuadraticExact;
 pub use variational_error::{ErrorOrders, MeasuredOrder, Order, error_orders};

@@ -6,8 +6,8 @@ mod tests;
 
 use crate::map::conjugate::Fold;
 use crate::map::exponential::singular_values;
-use contact_geom::linear::solve;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
+use contact_geom::support::linear::solve;
 use contact_geom::{Derivatives, DiscretePoint, GeometryError, Lagrangian, Regularity, Scalar, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, InputError, StepError};
 use evolution::Evolution;
@@ -273,7 +273,7 @@ fn row_sum<const N: usize>(m: &SMatrix<f64, N, N>) -> f64 {
 fn inverse_times<const N: usize, const M: usize>(
     a: &SMatrix<f64, N, N>,
     b: &SMatrix<f64, N, M>,
-) -> Result<SMatrix<f64, N, M>, contact_geom::linear::SingularMatrix> {
+) -> Result<SMatrix<f64, N, M>, contact_geom::support::linear::SingularMatrix> {
     let mut solution = *b;
     for j in 0..M {
         let mut column = b.column(j).into_owned();

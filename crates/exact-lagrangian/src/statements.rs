@@ -16,17 +16,21 @@
 use crate::map::exponential::HerglotzFlow;
 use crate::numerics::gauss::collocations;
 use crate::{
-    ContactExponential, ExactError, ExactLagrangian, MotionCurve, NonHolonomic, VariedCurve, action, action_derivative,
-    compose, herglotz_flow, through,
+    ContactExponential, ExactError, ExactLagrangian, compose, herglotz_flow,
+    principle::{MotionCurve, NonHolonomic, VariedCurve, action, action_derivative},
+    through,
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::systems::System;
 use contact_geom::{
-    ChartVector, Derivatives, DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, MaxAbsOrNan, MaxOrNan, PhasePoint,
-    Scalar, SecondDiscreteJet, Smooth, Statement, VelocityPoint, herglotz_rates, legendre, max_or_nan, seed,
+    ChartVector, Derivatives, DiscreteJet, DiscretePoint, HerglotzField, Lagrangian, PhasePoint, Scalar,
+    SecondDiscreteJet, Smooth, Statement, VelocityPoint, legendre,
+    numbers::{MaxAbsOrNan, MaxOrNan, max_or_nan},
+    support::{herglotz_rates, seed},
 };
 use discrete_herglotz::{
-    DiscreteLagrangian, InputError, StepError, derived_jet, derived_second_jet, discrete_flow, legendre_minus_inverse,
+    DiscreteLagrangian, InputError, StepError,
+    theory::{derived_jet, derived_second_jet, discrete_flow, legendre_minus_inverse},
 };
 
 /// The statements of section 4 that [`residual`] evaluates, and [`Statement::HerglotzPrinciple`] of section 2.

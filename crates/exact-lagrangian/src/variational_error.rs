@@ -1,8 +1,14 @@
 //! Variational error analysis: how well a discrete Lagrangian matches the exact one, and what order its flow has.
 
 use crate::{ExactError, herglotz_flow};
-use contact_geom::{ChartVector, Derivatives, DiscretePoint, Lagrangian, PhasePoint, VelocityPoint, max_or_nan};
-use discrete_herglotz::{DiscreteLagrangian, InputError, Solver, legendre_minus, legendre_plus};
+use contact_geom::{
+    ChartVector, Derivatives, DiscretePoint, Lagrangian, PhasePoint, VelocityPoint, numbers::max_or_nan,
+};
+use discrete_herglotz::{
+    DiscreteLagrangian, InputError,
+    solve::Solver,
+    theory::{legendre_minus, legendre_plus},
+};
 
 /// What the errors at all time steps say of an order.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +85,7 @@ const CLEAR: f64 = 200.0;
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::QuadraticInZ};
-/// use discrete_herglotz::Midpoint;
+/// use discrete_herglotz::rules::Midpoint;
 /// use exact_lagrangian::error_orders;
 ///
 /// let system = QuadraticInZ { c: 1.0 };
@@ -200,7 +206,7 @@ mod tests {
     use super::*;
     use contact_geom::Scalar;
     use contact_geom::systems::CoupledInZ;
-    use discrete_herglotz::{Midpoint, StepError};
+    use discrete_herglotz::{StepError, rules::Midpoint};
 
     /// The midpoint rule by its value alone: its momenta and steps are differences that lose digits like `1/h`.
     struct WithoutClosedDerivatives<'a>(Midpoint<&'a CoupledInZ>);

@@ -5,7 +5,11 @@
 
 use contact_geom::systems::{CoupledInZ, CoupledPlane, QuadraticInZ};
 use contact_geom::{Lagrangian, VelocityPoint, legendre};
-use discrete_herglotz::{BoundaryPath, DiscreteLagrangian, DiscretePath, End};
+use discrete_herglotz::{
+    DiscreteLagrangian,
+    boundary::{BoundaryPath, End},
+    theory::DiscretePath,
+};
 use exact_lagrangian::{ExactLagrangian, Motion, herglotz_flow};
 
 const EPS: f64 = f64::EPSILON;

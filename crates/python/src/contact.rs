@@ -2,7 +2,7 @@
 
 use crate::arrays::{matrix, number, numbers, value_error, vector};
 use contact_geom::nalgebra::{DMatrix, SVector};
-use contact_geom::{ChartVector, Darboux, Dual, conformality_with_jacobian};
+use contact_geom::{ChartVector, Darboux, Dual, support::conformality_with_jacobian};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use runtime_herglotz::Formula;

@@ -66,7 +66,7 @@ pub const CONTACT: f64 = 1e-9;
 impl Check {
     /// The largest contact defect.
     pub fn contact_defect(&self) -> f64 {
-        contact_geom::max_abs_or_nan(self.places.iter().map(|place| place.contact_defect))
+        contact_geom::numbers::max_abs_or_nan(self.places.iter().map(|place| place.contact_defect))
     }
 
     /// Whether every step that was checked is contact to within [`CONTACT`], with a conformal factor that is finite and
@@ -85,8 +85,8 @@ impl Check {
     /// since a momentum that vanishes gives no scale.
     pub fn momentum_defect(&self) -> f64 {
         let all = || self.places.iter().flat_map(|place| &place.momenta);
-        let size = contact_geom::max_abs_or_nan(all().map(|m| m.predicted));
-        let apart = contact_geom::max_abs_or_nan(all().map(|m| m.momentum - m.predicted));
+        let size = contact_geom::numbers::max_abs_or_nan(all().map(|m| m.predicted));
+        let apart = contact_geom::numbers::max_abs_or_nan(all().map(|m| m.momentum - m.predicted));
         if size > 0.0 { apart / size } else { apart }
     }
 }

@@ -1,7 +1,7 @@
 //! Work-precision comparison (run time against error) of all integrators that apply to a motion.
 
 use crate::{FirstOrder, Interrupt, Motion, Outcome, Peer, PeerEnd, RunMonitor, RuntimeError, StepControl, System};
-use contact_geom::max_abs_or_nan;
+use contact_geom::numbers::max_abs_or_nan;
 use discrete_herglotz::{AnyIntegrator, InputError, Steps};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};

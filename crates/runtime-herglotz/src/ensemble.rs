@@ -1,7 +1,7 @@
 //! Many motions of one formula.
 
 use crate::{Column, Crossing, Event, Interrupt, OutputTimes, RuntimeError, Start, StepControl, System};
-use discrete_herglotz::{InputError, Status, Tally, UnresolvedStep};
+use discrete_herglotz::{InputError, Status, UnresolvedStep, ensemble::Tally};
 use std::ops::ControlFlow;
 
 /// Parameter values as functions of a member's index.

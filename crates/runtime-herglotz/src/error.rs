@@ -2,7 +2,7 @@
 
 use assembled_herglotz::AssemblyError;
 use contact_geom::GeometryError;
-use discrete_herglotz::{CheckpointError, EnsembleError, InputError, StepError};
+use discrete_herglotz::{CheckpointError, InputError, StepError, ensemble::EnsembleError};
 use formula_lagrangian::FormulaError;
 use thiserror::Error;
 

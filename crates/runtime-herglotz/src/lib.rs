@@ -54,7 +54,7 @@ pub use system::{SeenSymmetry, System};
 
 pub use contact_geom::{Statement, Structure};
 pub use discrete_herglotz::{
-    AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PathStatus, PlanEntry, ResumeState, Status, Steps, Tally,
-    UnknownIntegrator, UnresolvedStep,
+    AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, Status, Steps, UnknownIntegrator,
+    UnresolvedStep, boundary::PathStatus, ensemble::Tally,
 };
 pub use formula_lagrangian::{Expression, Formula, FormulaError, Graph, ParseError, Symbol, Symbols, nearest_name};

@@ -2,7 +2,7 @@
 
 use crate::kernel::path;
 use crate::{RuntimeError, System};
-use discrete_herglotz::{AnyIntegrator, PathStatus, UnresolvedStep};
+use discrete_herglotz::{AnyIntegrator, UnresolvedStep, boundary::PathStatus};
 
 /// A discrete boundary value problem: find a path between two positions that is critical for the discrete action of
 /// Herglotz' principle.

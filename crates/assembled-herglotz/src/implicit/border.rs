@@ -1,4 +1,4 @@
-//! The coupling of all unknowns through the global action: a border of the sparse matrix, eliminated.
+//! The coupling of all unknowns through the global action: a border of the sparse matrix, which is eliminated.
 
 use super::lu::LuFactors;
 use super::stages::{MOST, Table};
@@ -6,16 +6,17 @@ use crate::local::{First, Second};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use discrete_herglotz::StepError;
 
-/// The unknowns of the border: the actions and the integrating factors of the stages.
+/// The number of unknowns of the border: the actions and the integrating factors of the stages.
 const WIDTH: usize = 2 * MOST;
 
-/// The action and the integrating factor of each stage: first the actions, then, from [`MOST`] on, the factors.
+/// The unknowns of the border: first the actions of the stages, then, from index [`MOST`] on, their integrating
+/// factors.
 pub(crate) type Scalars = SVector<f64, WIDTH>;
 
-/// The system `J x + B w = R`, `C x + D w = r` of a sparse J with factors of its own, solved by the Schur complement `D - C J^-1 B`: nothing
-/// dense enters J.
+/// The bordered system `J x + B w = R`, `C x + D w = r` with a sparse, separately factorised J. It is solved with the
+/// Schur complement `D - C J^-1 B`, so that J stays sparse.
 pub(crate) struct Border {
-    /// B; `J^-1 B` when it is reduced.
+    /// B; `J^-1 B` after `reduce`.
     columns: Vec<Vec<f64>>,
     /// C.
     rows: Vec<Vec<f64>>,
@@ -26,21 +27,22 @@ pub(crate) struct Border {
 }
 
 impl Border {
-    /// For so many stage velocities.
+    /// A border for the given number of stage velocities.
     pub fn new(len: usize) -> Self {
         let all = vec![vec![0.0; len]; WIDTH];
         let identity = SMatrix::identity();
         Border { columns: all.clone(), rows: all, corner: identity, inverse: identity, work: vec![0.0; len] }
     }
 
-    /// Begins anew. The rows and columns of stages that there are none of keep a one in the corner.
+    /// Resets the border to zero, with the identity as its corner. The rows and columns of unused stages keep this
+    /// form.
     pub fn clear(&mut self) {
         self.columns.iter_mut().chain(&mut self.rows).for_each(|x| x.fill(0.0));
         self.corner = SMatrix::identity();
     }
 
-    /// Adds what the stage j contributes, with the equations of the actions, `Z_i = z0 + h sum a_ij L_j`, and of the factors,
-    /// `rho_i = 1 - h sum a_ij rho_j (L_z)_j`.
+    /// Adds the contribution of the stage j to the linearised equations of the actions, `Z_i = z0 + h sum a_ij L_j`,
+    /// and of the integrating factors, `rho_i = 1 - h sum a_ij rho_j (L_z)_j`.
     pub fn add_stage(&mut self, table: &Table, j: usize, rho: f64, first: &First, second: &Second) {
         let (s, a) = (table.s, &table.a);
         let of_factor = MOST + j;
@@ -64,10 +66,10 @@ impl Border {
         }
     }
 
-    /// Eliminates the border with fresh factors of J.
+    /// Eliminates the border with new factors of J.
     ///
     /// # Errors
-    /// [`StepError::Singular`] where J or the Schur complement is singular.
+    /// [`StepError::Singular`] if J or the Schur complement is singular.
     pub fn reduce(&mut self, s: usize, factors: &mut LuFactors) -> Result<(), StepError> {
         let Border { columns, rows, corner, inverse, work } = self;
         let used = |i: usize| i % MOST < s;
@@ -82,7 +84,7 @@ impl Border {
         if inverse.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(failed) }
     }
 
-    /// From `J^-1 R` in x and r the solution, x in its place.
+    /// Computes the solution from `J^-1 R`, given in `x`, and from `r`. Replaces `x` by its solution, and returns w.
     pub fn solve(&self, x: &mut [f64], r: &Scalars) -> Scalars {
         let w = self.inverse * Scalars::from_fn(|i, _| r[i] - dot(&self.rows[i], x));
         for (column, w) in self.columns.iter().zip(w.iter()) {

@@ -1,21 +1,22 @@
-//! When Newton's method with kept factors is done, and when new factors are worth their price.
+//! The stopping criterion of Newton's method with kept factors, and the decision to factorise anew.
 
-/// The most iterations with kept factors that are worth one factorisation.
+/// New factors are computed if more than this number of further iterations is expected; fewer iterations are less
+/// expensive than a factorisation.
 const PATIENCE: f64 = 6.0;
 
-/// The corrections of one solution so far.
+/// The convergence history of one solution by Newton's method.
 pub(crate) struct Corrections {
     last: f64,
 }
 
-/// What to do after a correction.
+/// The decision after a correction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Verdict {
-    /// What is left is round-off.
+    /// The remaining error is round-off.
     Done,
-    /// Go on with the same factors.
+    /// Continue with the same factors.
     Further,
-    /// Go on with new ones.
+    /// Continue with new factors.
     Factorise,
 }
 
@@ -24,26 +25,26 @@ impl Corrections {
         Corrections { last: f64::INFINITY }
     }
 
-    /// After new factors the last correction tells nothing of the next.
+    /// Discards the last correction, since with new factors the rate of convergence changes.
     pub fn forget(&mut self) {
         self.last = f64::INFINITY;
     }
 
-    /// Judges a correction of this size, where those below `round_off` change nothing.
+    /// Judges a correction of size `now`, where corrections below `round_off` do not change the result.
     pub fn judge(&mut self, now: f64, round_off: f64) -> Verdict {
         if now <= round_off * f64::EPSILON {
             return Verdict::Done;
         }
         let mut verdict = Verdict::Further;
-        // The first correction tells nothing of the next.
+        // The rate of convergence is known from the second correction on.
         if self.last.is_finite() {
             let rate = now / self.last;
             let next = if rate < 1.0 { now * rate / (1.0 - rate) } else { f64::INFINITY };
-            // What round-off leaves of the residual comes back at each solve.
+            // Round-off in the residual causes corrections that no longer decrease.
             if next <= round_off || rate >= 0.5 && now <= 8.0 * round_off {
                 return Verdict::Done;
             }
-            // The solves that are left at this rate; new factors are worth their price where those are many.
+            // The number of further solves at this rate. If there are many, new factors are less expensive.
             let left = (round_off / now).ln() / rate.min(1.0).ln();
             if left.is_nan() || left > PATIENCE {
                 verdict = Verdict::Factorise;

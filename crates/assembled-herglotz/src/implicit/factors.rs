@@ -1,4 +1,4 @@
-//! faer's factors of a symmetric sparse matrix.
+//! Sparse Cholesky factors of a symmetric matrix, by faer.
 
 use super::pattern::Pattern;
 use crate::AssemblyError;
@@ -10,8 +10,8 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
-/// The factors of one matrix after another of the same pattern: `L L^T` where the matrix is positive definite, else `L D L^T`.
-/// The symbolic analysis is made once.
+/// The factors of a sequence of matrices with the same pattern: `L L^T` if the matrix is positive definite, else
+/// `L D L^T`. The symbolic analysis is made once.
 pub(crate) struct Factors {
     pattern: Pattern,
     symbolic: SymbolicCholesky<u32>,
@@ -24,10 +24,11 @@ impl Factors {
     /// Analyses a pattern.
     ///
     /// # Errors
-    /// [`AssemblyError::Memory`] where factors and workspace need more than a limit, in bytes: nothing of that size is allocated before.
+    /// [`AssemblyError::Memory`] if factors and workspace need more than `limit` bytes. The check is made before
+    /// anything of that size is allocated.
     pub fn new(pattern: Pattern, limit: usize) -> Result<Self, AssemblyError> {
         let n = pattern.unknowns();
-        // faer has no other cause to fail here than memory; the pattern alone is too much then.
+        // faer fails here only for lack of memory; then the size of the pattern is reported.
         let own = 4 * pattern.rows.len();
         let too_much = |needed: usize| AssemblyError::Memory { needed, limit };
         let lower = SymbolicSparseColMatRef::new_checked(n, n, &pattern.begins, None, &pattern.rows);
@@ -58,9 +59,9 @@ impl Factors {
     /// Factorises the matrix with these entries of its lower triangle.
     ///
     /// # Errors
-    /// [`StepError::NonFinite`] where an entry is not finite, [`StepError::Singular`] where a pivot vanishes.
+    /// [`StepError::NonFinite`] if an entry is not finite, [`StepError::Singular`] if a pivot vanishes.
     pub fn factorise(&mut self, entries: &[f64]) -> Result<(), StepError> {
-        // faer would be silent on it.
+        // faer does not report entries that are not finite.
         if !entries.iter().sum::<f64>().is_finite() {
             return Err(StepError::NonFinite);
         }
@@ -87,10 +88,10 @@ impl Factors {
         ldlt.map(|_| ()).map_err(|_| StepError::Singular { pivot: 0.0 })
     }
 
-    /// Solves with the last factors; `b` becomes the solution.
+    /// Solves with the last factors; `b` is overwritten with the solution.
     ///
     /// # Errors
-    /// [`StepError::Singular`] where the solution is not finite.
+    /// [`StepError::Singular`] if the solution is not finite.
     pub fn solve(&mut self, b: &mut [f64]) -> Result<(), StepError> {
         let n = b.len();
         let rhs = MatMut::from_column_major_slice_mut(b, n, 1);
@@ -105,7 +106,7 @@ impl Factors {
         if b.iter().sum::<f64>().is_finite() { Ok(()) } else { Err(StepError::Singular { pivot: 0.0 }) }
     }
 
-    /// `|A x - b|` and the size of its terms, `|A| |x|`, both largest components.
+    /// The largest component of `|A x - b|`, and the largest term of the lower triangle in `|A| |x|`.
     pub fn residual(&self, entries: &[f64], x: &[f64], b: &[f64], work: &mut [f64]) -> (f64, f64) {
         work.copy_from_slice(b);
         let mut size = 0.0f64;

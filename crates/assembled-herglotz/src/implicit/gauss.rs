@@ -10,19 +10,20 @@ use crate::local::{First, Place};
 use crate::memory::limit;
 use crate::monitor::{Energies, EnergyMonitor, Reached, StepFacts};
 use crate::system::{AssembledSystem, State};
-use discrete_herglotz::{ITERATION_LIMIT, InputError, StepError, StepFailure, UnresolvedStep};
+use discrete_herglotz::{InputError, StepError, StepFailure, UnresolvedStep, solve::ITERATION_LIMIT};
 
-/// Contact Gauss collocation with one or two stages, of order 2 or 4, for systems of any size and any local terms: the stage equations of
-/// [`Gauss`](discrete_herglotz::Gauss),
+/// Contact Gauss collocation with one or two stages, of order 2 or 4, for systems of any size and any local terms. The
+/// stage equations are those of [`Gauss`](discrete_herglotz::Gauss):
 ///
-/// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`,
+/// `Q = q0 + hA V`, `Z = z0 + hA L`, `rho = 1 - hA (rho L_z)`, `rho L_v = p0 + hA (rho L_q)`.
 ///
-/// whose sums with `hb` end the step: `q1 = q0 + hb.V`, `z1 = z0 + hb.L`, `p1 = (p0 + hb.(rho L_q))/rho1`, `sigma_d = 1/rho1`. With one stage it is
-/// the midpoint rule.
+/// The step is completed with the weights `hb`: `q1 = q0 + hb.V`, `z1 = z0 + hb.L`, `p1 = (p0 + hb.(rho L_q))/rho1`,
+/// `sigma_d = 1/rho1`. With one stage this is the midpoint rule.
 ///
-/// Newton's method in the velocities of the stages, with faer's sparse LU: analysed once, and factorised anew only where the corrections shrink
-/// slowly. All unknowns are coupled through Z and rho; these are a border of at most four columns and rows, eliminated by its Schur complement, so
-/// that the matrix stays sparse. Without general terms rho is known in advance, and there is no border.
+/// The stage velocities are found by Newton's method with faer's sparse LU, which is analysed once and factorised anew
+/// only if the corrections decrease slowly. All unknowns are coupled through Z and rho. These are a border of at most
+/// four columns and rows, which is eliminated by its Schur complement, so that the matrix stays sparse. Without general
+/// terms rho does not depend on the unknowns, and there is no border.
 ///
 /// ```
 /// use assembled_herglotz::systems::{FputBond, fput_chain};
@@ -40,7 +41,7 @@ pub struct AssembledGauss<'a> {
     table: Table,
     assembly: Assembly,
     factors: LuFactors,
-    /// With general terms only, as the factors of `L_vv`.
+    /// Present only with general terms, as are the factors `mass` of `L_vv`.
     border: Option<Border>,
     mass: Option<LuFactors>,
     h: f64,
@@ -49,12 +50,13 @@ pub struct AssembledGauss<'a> {
     factorisations: u64,
     iterations: u64,
     action: bool,
-    /// Positions between fixed places.
+    /// The positions, padded.
     q: Vec<f64>,
     p: Vec<f64>,
     z: f64,
     sigma: f64,
-    /// The velocities of the last step's stages, those of one unknown after the other; of the next; and the work of a correction.
+    /// The stage velocities of the last step (`v`), with the stages of one unknown after those of another; those of the
+    /// next step (`next`); and work space for a correction (`change`).
     v: Vec<f64>,
     next: Vec<f64>,
     change: Vec<f64>,
@@ -63,25 +65,27 @@ pub struct AssembledGauss<'a> {
     actions: [f64; MOST],
     rho: [f64; MOST],
     stages: Vec<First>,
-    /// A stage's position and velocity between fixed places.
+    /// The position and velocity of a stage, padded.
     place_q: Vec<f64>,
     place_v: Vec<f64>,
-    /// The velocity of a state that is asked for.
+    /// The velocity of a requested state.
     end: Vec<f64>,
     log_factor: f64,
     monitor: EnergyMonitor,
 }
 
 impl<'a> AssembledGauss<'a> {
-    /// From a state, with 1 or 2 stages; with the action z where the state has one, which costs the energies once a step unless there are general
-    /// terms. The matrix, its factors and the workspace are refused where they may need more than `memory` bytes; with
-    /// `None` more than the system has available (Linux' `MemAvailable`; elsewhere there is no limit then).
+    /// Starts from a state, with 1 or 2 stages. The action z is computed if the start has one, which costs one
+    /// evaluation of the energies per stage unless there are general terms. The matrix, its factors and the workspace
+    /// are refused if they may need more than `memory` bytes; `None` stands for the memory that the system has
+    /// available (`MemAvailable` on Linux; elsewhere there is no limit).
     ///
     /// # Errors
-    /// [`InputError::Stages`], [`InputError::Step`]; [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of the state and the masses;
-    /// [`AssemblyError::Mass`] where an unknown has no mass, be it of its own or in a general term; [`AssemblyError::SingularMass`];
-    /// [`AssemblyError::NoAction`] of general terms from a state without the action; [`AssemblyError::Undefined`] where a derivative of L is not
-    /// finite at the start; [`AssemblyError::Memory`] with the estimate.
+    /// [`InputError::Stages`] and [`InputError::Step`]; [`AssemblyError::Length`] and [`AssemblyError::NonFinite`] of
+    /// the state and the masses; [`AssemblyError::Mass`] if an unknown has no mass, neither its own nor from a general
+    /// term; [`AssemblyError::SingularMass`]; [`AssemblyError::NoAction`] for general terms and a state without the
+    /// action; [`AssemblyError::Undefined`] if a derivative of L is not finite at the start; [`AssemblyError::Memory`]
+    /// with the estimate.
     pub fn new(
         system: &'a AssembledSystem,
         stages: usize,
@@ -165,11 +169,12 @@ impl<'a> AssembledGauss<'a> {
         Ok(gauss)
     }
 
-    /// Takes steps.
+    /// Takes the given number of steps.
     ///
     /// # Errors
-    /// [`StepFailure`] with the steps taken before and the cause: [`StepError::NotConverged`], [`StepError::Singular`], [`StepError::NonFinite`],
-    /// [`StepError::StageFactor`] or [`StepError::SigmaVanished`]. The state is that before the step which failed.
+    /// [`StepFailure`] with the number of steps taken before the failure and the cause: [`StepError::NotConverged`],
+    /// [`StepError::Singular`], [`StepError::NonFinite`], [`StepError::StageFactor`] or [`StepError::SigmaVanished`].
+    /// The state is that before the step that failed.
     pub fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
             self.step().map_err(|cause| StepFailure { taken, cause })?;
@@ -180,7 +185,8 @@ impl<'a> AssembledGauss<'a> {
         Ok(())
     }
 
-    /// Looks at the energy. With general terms that takes the velocity; where none is found, nothing is seen.
+    /// Checks the energy. With general terms this requires the velocity; if it cannot be computed, the check is
+    /// omitted.
     #[cold]
     fn look(&mut self) {
         let Ok(State { t, .. }) = self.state() else { return };
@@ -197,10 +203,15 @@ impl<'a> AssembledGauss<'a> {
         });
     }
 
-    /// The first step at which the steps were seen not to resolve the motion, where they were: by the energy, which is multiplied by the
-    /// conformal factor where L does not depend on time, and without the action at least does not grow by drag. It is looked at after 4, 16, 64 and 256
-    /// steps, every 1024, and here: what follows such a step may be wrong. Nothing is seen without the action where gamma is positive, and of
-    /// systems that depend on time; without general terms the conformal factor of a step is compared with the exponential as well.
+    /// The first step at which the energy showed that the steps do not resolve the motion, if there is one: results
+    /// from this step on may be wrong.
+    ///
+    /// The energy `E_L`, which is multiplied by the conformal factor if L does not depend on time, is checked after 4,
+    /// 16, 64 and 256 steps, every 1024 steps, and by this call. Without the action, or with a time-dependent gamma and
+    /// no general terms, the check is that `T + V` does not grow while the drag dissipates. The check detects nothing
+    /// if the potential depends on time, or with general terms any part of L, nor from `T + V` if `gamma h > 0`.
+    /// Without general terms and for a constant gamma the conformal factor of a step is also compared with
+    /// `e^(gamma h)`.
     pub fn unresolved(&mut self) -> Option<UnresolvedStep> {
         if self.monitor.tells(self.taken) {
             self.look();
@@ -223,30 +234,31 @@ impl<'a> AssembledGauss<'a> {
         &self.p
     }
 
-    /// The action, where the start has one.
+    /// The action, if the start has one.
     pub fn z(&self) -> Option<f64> {
         self.action.then_some(self.z)
     }
 
-    /// `sigma_d` of the last step; 1 before the first.
+    /// `sigma_d` of the last step; 1 before the first step.
     pub fn sigma(&self) -> f64 {
         self.sigma
     }
 
-    /// The numeric factorisations made, those for a state's velocity included.
+    /// The number of numeric factorisations so far, including those for the velocity of a state.
     pub fn factorisations(&self) -> u64 {
         self.factorisations
     }
 
-    /// The iterations made, each a solve and the derivatives of L at each stage.
+    /// The number of Newton iterations so far; each has one linear solve and one evaluation of the derivatives of L per
+    /// stage.
     pub fn iterations(&self) -> u64 {
         self.iterations
     }
 
-    /// The state. With general terms the velocity is that which `p = L_v` gives, by Newton's method.
+    /// The state. With general terms the velocity is computed from `p = L_v` by Newton's method.
     ///
     /// # Errors
-    /// [`StepError`] where no velocity is found. The motion can go on: it does not use it.
+    /// [`StepError`] if no velocity is found. The motion can be continued, since the steps do not use this velocity.
     pub fn state(&mut self) -> Result<State<'_>, StepError> {
         let n = self.system.unknowns();
         match self.mass.take() {
@@ -264,7 +276,7 @@ impl<'a> AssembledGauss<'a> {
         Ok(State { t: self.time(), q: &self.q[1..=n], v: &self.end, z: self.z() })
     }
 
-    /// Solves `L_v = p` for the velocity, from that of the last state, into `end`.
+    /// Solves `L_v = p` for the velocity, starting from that of the last requested state; the result is in `end`.
     fn velocity(&mut self, mass: &mut LuFactors) -> Result<(), StepError> {
         let (n, t) = (self.system.unknowns(), self.time());
         let mut corrections = Corrections::new();
@@ -298,7 +310,7 @@ impl<'a> AssembledGauss<'a> {
         Err(StepError::NotConverged { residual: size, iterations: ITERATION_LIMIT })
     }
 
-    /// Checks that `L_vv` is regular at the start, and keeps its factors for the velocities of states.
+    /// Checks that `L_vv` is regular at the start, and keeps its pattern and factors for the velocities of states.
     fn check_regular(&mut self, limit: usize) -> Result<(), AssemblyError> {
         let (begins, rows) = self.assembly.pattern.blocks(1)?;
         let mut mass = LuFactors::new(begins, rows, limit)?;
@@ -310,7 +322,7 @@ impl<'a> AssembledGauss<'a> {
             return Err(AssemblyError::Mass { unknown, mass: 0.0 });
         }
         let n = self.system.unknowns();
-        // What no kernel that a user thinks of is orthogonal to.
+        // A right-hand side that is not orthogonal to the typical kernels of a singular `L_vv`.
         let b: Vec<f64> = (0..n).map(|i| 1.0 + 0.5 * (1.7 * i as f64).sin()).collect();
         let mut x = b.clone();
         let regular = mass.factorise().and_then(|()| mass.solve(&mut x)).and_then(|()| mass.check(&x, &b));
@@ -321,7 +333,8 @@ impl<'a> AssembledGauss<'a> {
 
     fn step(&mut self) -> Result<(), StepError> {
         let Table { s, ahead, .. } = self.table;
-        // The guess continues the stages of the last step; with one stage those of the last two.
+        // The initial guess is extrapolated from the stages of the last step, or with one stage from those of the last
+        // two steps.
         for (next, v) in self.next.chunks_exact_mut(s).zip(self.v.chunks_exact(s)) {
             match (self.taken, s) {
                 (0, _) => next.copy_from_slice(v),
@@ -336,7 +349,7 @@ impl<'a> AssembledGauss<'a> {
         let (actions, rho) = (self.actions, self.rho);
         let done = self.solve().and_then(|()| self.finish());
         if done.is_err() {
-            // What was known before the step, for another try.
+            // Restores the data from before the step, so that it can be retried.
             self.next.copy_from_slice(&self.v);
             (self.actions, self.rho) = (actions, rho);
             self.factors.discard();
@@ -344,7 +357,7 @@ impl<'a> AssembledGauss<'a> {
         done
     }
 
-    /// The sums that end the step.
+    /// Completes the step with the weighted sums over its stages.
     fn finish(&mut self) -> Result<(), StepError> {
         let Table { s, b, .. } = self.table;
         self.evaluate(self.action);
@@ -353,7 +366,8 @@ impl<'a> AssembledGauss<'a> {
             return Err(StepError::StageFactor { rho: least });
         }
         if self.action && self.border.is_none() {
-            // What is affine in z is solved for the stages' actions now; the stages were evaluated with that of the start.
+            // L is affine in z: its stages were evaluated at the action of the start, and are corrected here by the
+            // actions of the stages.
             let of = |f: fn(&First) -> f64| std::array::from_fn(|j| self.stages.get(j).map_or(0.0, f));
             let actions = self.table.actions(of(|l| l.z), of(|l| l.l));
             self.stages.iter_mut().zip(actions).for_each(|(stage, action)| stage.l += stage.z * action);
@@ -381,7 +395,7 @@ impl<'a> AssembledGauss<'a> {
         Ok(())
     }
 
-    /// The position and the velocity of a stage.
+    /// Computes the position and the velocity of a stage, and returns its time.
     fn place(&mut self, j: usize) -> f64 {
         let Table { s, a, c, .. } = self.table;
         let row = a[j];
@@ -393,7 +407,8 @@ impl<'a> AssembledGauss<'a> {
         self.time() + c[j]
     }
 
-    /// L and its first derivatives at the stages; without general terms the value only where it is asked for.
+    /// Evaluates L and its first derivatives at the stages; without general terms the value of L only if it is
+    /// requested.
     fn evaluate(&mut self, value: bool) {
         for j in 0..self.table.s {
             let t = self.place(j);
@@ -401,17 +416,17 @@ impl<'a> AssembledGauss<'a> {
             self.system.first(at, value, &mut self.stages[j]);
         }
         if self.border.is_none() {
-            // Z enters by L = .. + gamma z alone, and rho not at all.
+            // Without general terms z enters L only as gamma z, so that rho follows from the rates.
             let mut rates = [0.0; MOST];
             rates.iter_mut().zip(&self.stages).for_each(|(rate, l)| *rate = l.z);
             self.rho = self.table.factors(rates);
         }
     }
 
-    /// Solves for the velocities, from the guess in `next` and into it.
+    /// Solves for the stage velocities; `next` holds the initial guess, and then the solution.
     fn solve(&mut self) -> Result<(), StepError> {
         let Table { s, a, .. } = self.table;
-        // Below this times eps a correction does not move the position.
+        // A correction below this times the machine epsilon does not change the position.
         let resolution = max_abs_or_nan(&self.q) / self.h.abs();
         let mut corrections = Corrections::new();
         let mut size = f64::INFINITY;
@@ -456,7 +471,8 @@ impl<'a> AssembledGauss<'a> {
         Err(StepError::NotConverged { residual: size, iterations: ITERATION_LIMIT })
     }
 
-    /// Corrects Z and rho, and the correction of the velocities for what these change; how much they moved, each in units of its size.
+    /// Corrects Z and rho, and adapts the correction of the velocities to these changes. Returns the largest change of
+    /// Z and rho relative to their sizes.
     fn border_change(&mut self) -> Result<f64, StepError> {
         let Some(border) = &self.border else { return Ok(0.0) };
         let Table { s, a, .. } = self.table;
@@ -474,7 +490,7 @@ impl<'a> AssembledGauss<'a> {
             self.actions[i] -= w[i];
             self.rho[i] -= w[MOST + i];
             let relative = if w[i] == 0.0 { 0.0 } else { w[i].abs() / size };
-            // `max` would hide a NaN.
+            // `f64::max` would ignore a NaN.
             for relative in [relative, (w[MOST + i] / self.rho[i]).abs()] {
                 if relative.is_nan() {
                     return Err(StepError::NonFinite);
@@ -506,7 +522,8 @@ impl<'a> AssembledGauss<'a> {
     }
 }
 
-/// The energies of a Lagrangian with its first derivatives, of a velocity and its momentum. The kinetic energy is that of a form of degree two.
+/// The energies of a Lagrangian, from its first derivatives, the velocity and the momentum. The kinetic energy is
+/// `|p.v|/2`, as for a quadratic form in the velocity.
 fn energies(first: &First, (v, p): (&[f64], &[f64]), z: f64) -> Energies {
     let twice_kinetic: f64 = p.iter().zip(v).map(|(p, v)| p * v).sum();
     let terms = first.l.abs() + (first.z * z).abs();

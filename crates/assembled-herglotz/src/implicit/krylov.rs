@@ -1,4 +1,4 @@
-//! Conjugate gradients on the matrix of a midpoint step, which is not formed.
+//! Conjugate gradients for the matrix of a midpoint step, without forming the matrix.
 
 use crate::AssemblyError;
 use crate::system::AssembledSystem;
@@ -9,18 +9,19 @@ use faer::matrix_free::{IdentityPrecond, InitialGuessStatus, LinOp};
 use faer::{MatMut, MatRef, Par};
 use std::sync::{Mutex, PoisonError};
 
-/// What a solution may leave of the right side: Newton's method makes up for the rest.
+/// The relative residual of a solution. Newton's method corrects the remaining error.
 const LEFT: f64 = 1e-8;
 
-/// The most products of one solution. A step that needs more is far too long for its forces.
+/// The maximum number of matrix-vector products for one solution. A step that needs more is far too long for its
+/// forces.
 const MOST: u32 = 1000;
 
-/// faer's conjugate gradients for `(M + (h^2/4) V_qq) x = b`, in the variables `M^(1/2) x`: there the matrix is the identity and what the
-/// forces add to it, whatever the masses.
+/// Solves `(M + (h^2/4) V_qq) x = b` by faer's conjugate gradients in the variables `M^(1/2) x`. In these variables the
+/// matrix is the identity plus the contribution of the forces, for any masses.
 pub(super) struct Krylov {
     /// `M^(-1/2)`.
     roots: Vec<f64>,
-    /// A vector and its product, between fixed places.
+    /// A vector and its product with the matrix, both padded.
     padded: Mutex<[Vec<f64>; 2]>,
     scaled: Vec<f64>,
     scratch: MemBuffer,
@@ -28,7 +29,7 @@ pub(super) struct Krylov {
 }
 
 impl Krylov {
-    /// For a system with a mass for each unknown.
+    /// The solver for a system in which every unknown has a mass.
     ///
     /// # Errors
     /// [`AssemblyError::Memory`].
@@ -47,15 +48,16 @@ impl Krylov {
         })
     }
 
-    /// The products of the matrix with a vector that were made.
+    /// The number of matrix-vector products so far.
     pub fn products(&self) -> u64 {
         self.products
     }
 
-    /// Solves at positions between fixed places, with `factor = h^2/4`; b becomes the solution.
+    /// Solves the system at padded positions, with `factor = h^2/4`; `b` is overwritten with the solution.
     ///
     /// # Errors
-    /// [`StepError::Singular`] where the matrix is not positive definite, [`StepError::NotConverged`] with what is left of b.
+    /// [`StepError::Singular`] if the matrix is not positive definite, [`StepError::NotConverged`] with the residual,
+    /// [`StepError::NonFinite`] if the solution is not finite.
     pub fn solve(
         &mut self,
         system: &AssembledSystem,
@@ -70,7 +72,7 @@ impl Krylov {
         }
         let matrix = Scaled { system, t, q, factor, roots, padded };
         let params = CgParams {
-            // With `Zero` faer 0.24.4 takes a residual that it has not set.
+            // With `Zero`, faer 0.24.4 uses a residual that it has not initialised.
             initial_guess: InitialGuessStatus::MaybeNonZero,
             rel_tolerance: LEFT,
             max_iters: MOST as usize,
@@ -100,7 +102,7 @@ impl Krylov {
     }
 }
 
-/// `1 + (h^2/4) M^(-1/2) V_qq M^(-1/2)`, by the derivatives of forces along a vector.
+/// `1 + (h^2/4) M^(-1/2) V_qq M^(-1/2)`, applied to vectors by directional derivatives of the forces.
 struct Scaled<'a> {
     system: &'a AssembledSystem,
     t: f64,

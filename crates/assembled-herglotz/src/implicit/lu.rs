@@ -1,4 +1,4 @@
-//! faer's factors of a sparse matrix without symmetry.
+//! Sparse LU factors of an unsymmetric matrix, by faer.
 
 use super::max_abs_or_nan;
 use crate::AssemblyError;
@@ -12,7 +12,7 @@ use faer::sparse::linalg::qr::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par};
 
-/// The factors `P A Q = L U` of one matrix after another of the same pattern. The symbolic analysis is made once.
+/// The factors `P A Q = L U` of a sequence of matrices with the same pattern. The symbolic analysis is made once.
 pub(crate) struct LuFactors {
     begins: Vec<u32>,
     rows: Vec<u32>,
@@ -26,24 +26,25 @@ pub(crate) struct LuFactors {
 }
 
 impl LuFactors {
-    /// Analyses a pattern, given by the beginnings of its columns and the row of each entry.
+    /// Analyses a pattern, given by the start of each column and the row of each entry.
     ///
     /// # Errors
-    /// [`AssemblyError::Memory`] where the matrix, its factors and the workspace may need more than a limit, in bytes. The estimate for the
-    /// factors is a bound for any choice of pivots: that of the Cholesky factor of `A^T A` (George and Ng 1985), once for L and once for U.
+    /// [`AssemblyError::Memory`] if the matrix, its factors and the workspace may need more than `limit` bytes. The
+    /// estimate for the factors is a bound for any choice of pivots: that of the Cholesky factor of `A^T A` (George and
+    /// Ng 1985), once for L and once for U.
     pub fn new(begins: Vec<u32>, rows: Vec<u32>, limit: usize) -> Result<Self, AssemblyError> {
         let n = begins.len() - 1;
         let own = 12 * rows.len() + 8 * n;
         let too_much = |needed: usize| AssemblyError::Memory { needed, limit };
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, &begins, None, &rows);
-        // faer has no other cause to fail here than memory.
+        // faer fails here only for lack of memory.
         let symbolic = factorize_symbolic_lu(pattern, LuSymbolicParams::default()).map_err(|_| too_much(2 * own))?;
         let request = StackReq::any_of(&[
             symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Default::default()),
             symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
         ]);
         let count = count_of_ata(pattern, &symbolic).ok_or(too_much(2 * own))?;
-        // A value and an index each, in L and in U, in vectors that faer grows by doubling them.
+        // Each entry of L and of U has a value and an index, 12 bytes. faer grows their vectors by doubling them.
         let needed = own.saturating_add(count.saturating_mul(2 * 2 * 12)).saturating_add(request.size_bytes());
         if needed > limit {
             return Err(too_much(needed));
@@ -54,12 +55,12 @@ impl LuFactors {
         Ok(LuFactors { begins, rows, entries, symbolic, numeric, scratch, residual: vec![0.0; n], ready: false })
     }
 
-    /// Whether there are factors.
+    /// Whether current factors are available.
     pub fn ready(&self) -> bool {
         self.ready
     }
 
-    /// Asks for new factors before the next solve.
+    /// Discards the factors, so that new ones are computed before the next solve.
     pub fn discard(&mut self) {
         self.ready = false;
     }
@@ -67,10 +68,10 @@ impl LuFactors {
     /// Factorises the matrix with the present entries.
     ///
     /// # Errors
-    /// [`StepError::NonFinite`] where an entry is not finite, [`StepError::Singular`] where no pivot is found.
+    /// [`StepError::NonFinite`] if an entry is not finite, [`StepError::Singular`] if no pivot is found.
     pub fn factorise(&mut self) -> Result<(), StepError> {
         self.ready = false;
-        // faer would be silent on it.
+        // faer does not report entries that are not finite.
         if !self.entries.iter().sum::<f64>().is_finite() {
             return Err(StepError::NonFinite);
         }
@@ -88,10 +89,10 @@ impl LuFactors {
         }
     }
 
-    /// Solves with the last factors; `b` becomes the solution.
+    /// Solves with the last factors; `b` is overwritten with the solution.
     ///
     /// # Errors
-    /// [`StepError::Singular`] without factors, or where the solution is not finite.
+    /// [`StepError::Singular`] if there are no factors, or if the solution is not finite.
     pub fn solve(&mut self, b: &mut [f64]) -> Result<(), StepError> {
         if !self.ready {
             return Err(StepError::Singular { pivot: 0.0 });
@@ -107,11 +108,11 @@ impl LuFactors {
         Err(StepError::Singular { pivot: 0.0 })
     }
 
-    /// Whether x solves `A x = b`, to half of the digits: faer does not say where factors are singular, and Newton's method makes up for
-    /// the other half.
+    /// Checks that x solves `A x = b` to half of the digits: faer does not report singular factors. Newton's method
+    /// corrects the remaining error.
     ///
     /// # Errors
-    /// [`StepError::Singular`] where it does not.
+    /// [`StepError::Singular`] if it does not.
     pub fn check(&mut self, x: &[f64], b: &[f64]) -> Result<(), StepError> {
         self.residual.copy_from_slice(b);
         let mut size = max_abs_or_nan(b);
@@ -131,7 +132,8 @@ impl LuFactors {
     }
 }
 
-/// The entries of the Cholesky factor of `A^T A` in faer's order of the columns; `None` where there is no memory to count them.
+/// The number of entries of the Cholesky factor of `A^T A` in faer's column ordering; `None` if there is not enough
+/// memory to count them.
 fn count_of_ata(pattern: SymbolicSparseColMatRef<u32>, symbolic: &SymbolicLu<u32>) -> Option<usize> {
     let n = pattern.ncols();
     let mut memory = MemBuffer::try_new(StackReq::any_of(&[

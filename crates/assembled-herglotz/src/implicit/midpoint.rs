@@ -9,18 +9,18 @@ use crate::blocks::BLOCK;
 use crate::kernels::Weight;
 use crate::monitor::{EnergyMonitor, Reached, StepFacts};
 use crate::system::{AssembledSystem, State};
-use discrete_herglotz::{ITERATION_LIMIT, InputError, StepError, StepFailure, UnresolvedStep};
+use discrete_herglotz::{InputError, StepError, StepFailure, UnresolvedStep, solve::ITERATION_LIMIT};
 
 /// The symmetric midpoint rule on `L = sum m_i v_i^2/2 - V(t, q) + gamma z`: the discrete Herglotz equations of
-/// [`Midpoint`](discrete_herglotz::Midpoint), for systems of any size.
+/// [`Midpoint`](discrete_herglotz::rules::Midpoint), for systems of any size.
 ///
 /// With the mean velocity u as the unknown, `q' = q0 + h u/2` and `V_q` at `(t + h/2, q')`, a step solves
 /// `M u + (h/2) V_q = (1 + gamma h/2) p0`; then `q1 = q0 + h u`, `(1 - gamma h/2) p1 = M u - (h/2) V_q`, and
-/// `sigma_d = (1 + gamma h/2)/(1 - gamma h/2)`. The rank-one coupling through z is eliminated by hand: what is left to factorise is
-/// `M + (h^2/4) V_qq`, sparse and symmetric.
+/// `sigma_d = (1 + gamma h/2)/(1 - gamma h/2)`. The rank-one coupling through z is eliminated analytically, so that
+/// only `M + (h^2/4) V_qq`, which is sparse and symmetric, is factorised.
 ///
-/// Newton's method keeps the factors from step to step. It factorises anew only where the corrections shrink so slowly that more
-/// solves would cost more, and stops where the next correction is below round-off.
+/// Newton's method keeps the factors from step to step. It factorises anew only if the corrections decrease so slowly
+/// that further solves would cost more, and stops when the estimated next correction is below round-off.
 pub struct AssembledMidpoint<'a> {
     system: &'a AssembledSystem,
     pub(super) linear: Linear,
@@ -34,7 +34,7 @@ pub struct AssembledMidpoint<'a> {
     v: Vec<f64>,
     z: f64,
     action: bool,
-    /// The mean velocities of the last two steps, the latter first.
+    /// The mean velocities of the last step (`u`) and of the step before it (`before`).
     u: Vec<f64>,
     before: Vec<f64>,
     middle: Vec<f64>,
@@ -43,21 +43,22 @@ pub struct AssembledMidpoint<'a> {
     monitor: EnergyMonitor,
 }
 
-/// How a correction is solved for.
+/// The solver for the corrections of Newton's method.
 pub(super) enum Linear {
-    /// By factors of the sparse matrix.
+    /// Factors of the sparse matrix.
     Sparse(Box<Sparse>),
-    /// By products with it.
+    /// Conjugate gradients, by products with the matrix.
     Krylov(Krylov),
 }
 
 impl<'a> AssembledMidpoint<'a> {
-    /// From a state; with the action z where the state has one, which costs the energies once a step. Factors and workspace of more than `memory` bytes are refused; with `None` of more than the system
-    /// has available (Linux' `MemAvailable`; elsewhere there is no limit then).
+    /// Starts from a state. The action z is computed if the start has one, which costs one evaluation of the energies
+    /// per step. Factors and workspace of more than `memory` bytes are refused; `None` stands for the memory that the
+    /// system has available (`MemAvailable` on Linux; elsewhere there is no limit).
     ///
     /// # Errors
-    /// As [`AssembledSplitting`](crate::AssembledSplitting::new), [`AssemblyError::NotSeparable`] among them; [`InputError::Sigma`] unless `|gamma h| < 2`;
-    /// [`AssemblyError::Memory`] with the estimate.
+    /// Those of [`AssembledSplitting`](crate::AssembledSplitting::new), including [`AssemblyError::NotSeparable`];
+    /// [`InputError::Sigma`] unless `|gamma h| < 2`; [`AssemblyError::Memory`] with the estimate.
     pub fn new(
         system: &'a AssembledSystem,
         h: f64,
@@ -67,10 +68,12 @@ impl<'a> AssembledMidpoint<'a> {
         Self::with(system, h, start, || Ok(Linear::Sparse(Box::new(Sparse::new(system, memory)?))))
     }
 
-    /// The same steps by Newton's method with conjugate gradients, for systems whose matrix is full, as that of bodies in space: it is not
-    /// formed, and products with it are derivatives of the forces along a vector. The memory is a few vectors.
+    /// The same steps by Newton's method with conjugate gradients, for systems with a full matrix, such as N bodies.
+    /// The matrix is not formed: its products with vectors are directional derivatives of the forces. The memory is
+    /// that of a few vectors.
     ///
-    /// `M + (h^2/4) V_qq` must be positive definite: so it is for steps that are short beside the motion.
+    /// `M + (h^2/4) V_qq` must be positive definite, which holds for steps that are short compared with the time scales
+    /// of the motion.
     ///
     /// ```
     /// use assembled_herglotz::systems::OuterSolarSystem;
@@ -142,11 +145,12 @@ impl<'a> AssembledMidpoint<'a> {
         }
     }
 
-    /// Takes steps.
+    /// Takes the given number of steps.
     ///
     /// # Errors
-    /// [`StepFailure`] with the steps taken before and the cause: [`StepError::NotConverged`], [`StepError::Singular`],
-    /// [`StepError::NonFinite`], or [`StepError::SigmaVanished`] of a rate that has grown beyond `|gamma h| < 2`. The state is that before the step which failed.
+    /// [`StepFailure`] with the number of steps taken before the failure and the cause: [`StepError::NotConverged`],
+    /// [`StepError::Singular`], [`StepError::NonFinite`], or [`StepError::SigmaVanished`] if a time-dependent rate no
+    /// longer satisfies `|gamma h| < 2`. The state is that before the step that failed.
     pub fn advance(&mut self, steps: usize) -> Result<(), StepFailure> {
         for taken in 0..steps {
             self.step().map_err(|cause| StepFailure { taken, cause })?;
@@ -157,7 +161,7 @@ impl<'a> AssembledMidpoint<'a> {
         Ok(())
     }
 
-    /// Looks at the energy.
+    /// Checks the energy.
     #[cold]
     fn look(&mut self) {
         let State { t, z, .. } = self.state();
@@ -167,10 +171,14 @@ impl<'a> AssembledMidpoint<'a> {
         monitor.look(system, reached, |t, bounded| system.energies((t, q, v, z), bounded));
     }
 
-    /// The first step at which the steps were seen not to resolve the motion, where they were: by the energy, which is multiplied by the
-    /// conformal factor where L does not depend on time, and without the action at least does not grow by drag. It is looked at after 4, 16, 64 and 256
-    /// steps, every 1024, and here: what follows such a step may be wrong. Nothing is seen without the action where gamma is positive, and of
-    /// systems that depend on time; the conformal factor of a step is compared with the exponential as well.
+    /// The first step at which the energy showed that the steps do not resolve the motion, if there is one: results
+    /// from this step on may be wrong.
+    ///
+    /// The energy `E_L`, which is multiplied by the conformal factor if L does not depend on time, is checked after 4,
+    /// 16, 64 and 256 steps, every 1024 steps, and by this call. Without the action, or with a time-dependent gamma,
+    /// the check is that `T + V` does not grow while the drag dissipates. The check detects nothing if the potential
+    /// depends on time, nor from `T + V` if `gamma h > 0`. For a constant gamma the conformal factor of a step is also
+    /// compared with `e^(gamma h)`.
     pub fn unresolved(&mut self) -> Option<UnresolvedStep> {
         if self.monitor.tells(self.taken) {
             self.look();
@@ -189,28 +197,28 @@ impl<'a> AssembledMidpoint<'a> {
         }
     }
 
-    /// `sigma_d` of the last step; before the first one, of that.
+    /// `sigma_d` of the last step; before the first step, `sigma_d` of the first.
     pub fn sigma(&self) -> f64 {
         let half = self.half(self.taken.saturating_sub(1));
         (1.0 + half) / (1.0 - half)
     }
 
-    /// `gamma h/2` in the middle of a step.
+    /// `gamma h/2` at the midpoint of a step.
     fn half(&self, step: usize) -> f64 {
         0.5 * self.h * self.system.rate(self.t0 + (step as f64 + 0.5) * self.h)
     }
 
-    /// The numeric factorisations made.
+    /// The number of numeric factorisations so far.
     pub fn factorisations(&self) -> u64 {
         self.factorisations
     }
 
-    /// The products of the matrix with a vector that conjugate gradients have made.
+    /// The number of matrix-vector products of the conjugate gradients so far.
     pub fn products(&self) -> u64 {
         if let Linear::Krylov(krylov) = &self.linear { krylov.products() } else { 0 }
     }
 
-    /// The iterations made, each a solve and a force.
+    /// The number of Newton iterations so far; each has one linear solve and one evaluation of the forces.
     pub fn iterations(&self) -> u64 {
         self.iterations
     }
@@ -219,17 +227,17 @@ impl<'a> AssembledMidpoint<'a> {
         let (h, n) = (self.h, self.system.unknowns());
         let t = self.t0 + (self.taken as f64 + 0.5) * h;
         let half = self.half(self.taken);
-        // A rate that depends on time may have become too large for the step.
+        // A time-dependent rate may have become too large for the step.
         if half.is_nan() || half.abs() >= 1.0 {
             return Err(StepError::SigmaVanished { sigma: (1.0 + half) / (1.0 - half) });
         }
-        // The guess continues the mean velocities linearly; `before` holds it.
+        // The initial guess is the linear extrapolation of the mean velocities, stored in `before`.
         for ((before, u), v) in self.before.iter_mut().zip(&self.u).zip(&self.v) {
             *before = if self.taken == 0 { *v } else { 2.0 * u - *before };
         }
         let root = self.solve(t, half);
         if root.is_err() {
-            // What was known before the step, for another try.
+            // A retry starts from the mean velocity of the last step.
             self.before.copy_from_slice(&self.u);
         }
         root?;
@@ -253,7 +261,7 @@ impl<'a> AssembledMidpoint<'a> {
         Ok(())
     }
 
-    /// Solves for the mean velocity, from the guess in `before` and into it.
+    /// Solves for the mean velocity; `before` holds the initial guess, and then the solution.
     fn solve(&mut self, t: f64, half: f64) -> Result<(), StepError> {
         let (h, n) = (self.h, self.system.unknowns());
         let resolution = max_abs_or_nan(&self.q) / h.abs();
@@ -263,7 +271,7 @@ impl<'a> AssembledMidpoint<'a> {
             for i in 0..n {
                 self.middle[i + 1] = self.q[i + 1] + 0.5 * h * self.before[i];
             }
-            // -(h/2) V_q, then the residual.
+            // `residual` first holds -V_q, then the residual of the equation.
             self.forces(t);
             for i in 0..n {
                 let m = self.system.mass(i);
@@ -286,7 +294,7 @@ impl<'a> AssembledMidpoint<'a> {
             if !now.is_finite() {
                 return Err(StepError::NonFinite);
             }
-            // Below this a correction does not move the position or the velocity.
+            // A correction below this changes neither the position nor the velocity.
             let round_off = f64::EPSILON * (speed + resolution);
             match corrections.judge(now, round_off) {
                 Verdict::Done => return Ok(()),
@@ -298,7 +306,7 @@ impl<'a> AssembledMidpoint<'a> {
         Err(StepError::NotConverged { residual: size, iterations: ITERATION_LIMIT })
     }
 
-    /// `-V_q` at the middle, into `residual`.
+    /// Computes `-V_q` at the midpoint, into `residual`.
     fn forces(&mut self, t: f64) {
         for (block, force) in self.residual.chunks_mut(BLOCK).enumerate() {
             force.fill(0.0);
@@ -308,7 +316,7 @@ impl<'a> AssembledMidpoint<'a> {
         }
     }
 
-    /// Solves for the correction of this residual.
+    /// Computes the correction for the present residual, into `change`.
     fn correct(&mut self, t: f64) -> Result<(), StepError> {
         let factor = 0.25 * self.h * self.h;
         self.change.copy_from_slice(&self.residual);
@@ -329,7 +337,7 @@ impl<'a> AssembledMidpoint<'a> {
         Ok(())
     }
 
-    /// Factorises `M + (h^2/4) V_qq` at the middle.
+    /// Factorises `M + (h^2/4) V_qq` at the midpoint.
     pub(super) fn factorise(&mut self, t: f64) -> Result<(), StepError> {
         if let Linear::Sparse(sparse) = &mut self.linear {
             sparse.factorise(self.system, (t, &self.middle), 0.25 * self.h * self.h)?;

@@ -1,4 +1,4 @@
-//! Implicit steps: sparse equations, solved with faer.
+//! Implicit integrators: sparse nonlinear equations, solved with faer.
 
 mod border;
 mod corrections;
@@ -18,7 +18,7 @@ pub use gauss::AssembledGauss;
 pub use midpoint::AssembledMidpoint;
 pub(crate) use pattern::{FullPattern, Pattern};
 
-/// The largest absolute component; infinite where one is not a number.
+/// The largest absolute component; infinite if a component is NaN.
 fn max_abs_or_nan(x: &[f64]) -> f64 {
     let mut largest = 0.0f64;
     let mut sum = 0.0;

@@ -1,27 +1,28 @@
-//! Where the entries of a sparse matrix stand.
+//! Sparsity patterns of assembled matrices.
 
 use crate::AssemblyError;
 
-/// The pattern of a matrix assembled from elements, by columns: its lower triangle where the matrix is symmetric.
+/// The pattern of the lower triangle of a matrix that is assembled from elements, in compressed columns.
 #[derive(Clone, Debug)]
 pub(crate) struct Pattern {
-    /// Where the entries of each column begin, and the end.
+    /// The index of the first entry of each column, and the total number of entries at the end.
     pub begins: Vec<u32>,
     /// The row of each entry, sorted in each column.
     pub rows: Vec<u32>,
 }
 
-/// What stands for an entry in a fixed row or column.
+/// The index of an entry in the row or column of a fixed place, which is not stored.
 pub(crate) const NOWHERE: u32 = u32::MAX;
 
 impl Pattern {
-    /// The diagonal, and what the elements couple. `visit` calls its argument with the places of each element, 1 for the first unknown.
+    /// The pattern of the diagonal and of all pairs of unknowns that share an element. `visit` calls its argument with
+    /// the padded indices of each element, in which the first unknown has the index 1.
     ///
     /// # Errors
-    /// [`AssemblyError::Unknowns`] where there are more entries than 32 bits count.
+    /// [`AssemblyError::Unknowns`] if there are more entries than 32-bit indices allow.
     pub fn new(unknowns: usize, visit: impl Fn(&mut dyn FnMut(&[usize]))) -> Result<Self, AssemblyError> {
         let real = |place: usize| (1..=unknowns).contains(&place);
-        // Column before row, so that sorted entries are in the order of the matrix.
+        // The column is in the high bits, so that sorting gives the order of the matrix.
         let mut entries: Vec<u64> = (0..unknowns as u64).map(|i| i << 32 | i).collect();
         visit(&mut |places| {
             for (i, &a) in places.iter().enumerate() {
@@ -53,7 +54,7 @@ impl Pattern {
         self.begins.len() - 1
     }
 
-    /// Where the entry of two places stands; [`NOWHERE`] where one is fixed.
+    /// The index of the entry of two padded indices, in either order; [`NOWHERE`] if one is fixed.
     pub fn entry(&self, a: usize, b: usize) -> u32 {
         let n = self.unknowns();
         if !(1..=n).contains(&a) || !(1..=n).contains(&b) {
@@ -66,22 +67,22 @@ impl Pattern {
     }
 }
 
-/// The pattern of a whole matrix that has both triangles.
+/// The pattern of a whole matrix, with both triangles.
 #[derive(Clone, Debug)]
 pub(crate) struct FullPattern {
-    /// Where the entries of each column begin, and the end.
+    /// The index of the first entry of each column, and the total number of entries at the end.
     pub begins: Vec<u32>,
     /// The row of each entry, sorted in each column.
     pub rows: Vec<u32>,
-    /// Where each entry, or the one across the diagonal, stands in the lower triangle.
+    /// The index in the lower triangle of each entry or of its mirror image.
     pub lower: Vec<u32>,
 }
 
 impl FullPattern {
-    /// Of a lower triangle.
+    /// Builds the pattern from that of the lower triangle.
     ///
     /// # Errors
-    /// [`AssemblyError::Unknowns`] where there are more entries than 32 bits count.
+    /// [`AssemblyError::Unknowns`] if there are more entries than 32-bit indices allow.
     pub fn new(triangle: &Pattern) -> Result<Self, AssemblyError> {
         let n = triangle.unknowns();
         let total = 2 * triangle.rows.len() - n;
@@ -109,7 +110,7 @@ impl FullPattern {
             (rows[place], lower[place]) = (row, at as u32);
             next[column] += 1;
         };
-        // When a column's turn comes the rows above its diagonal are there, in order: they came with the columns before.
+        // When a column is reached, its rows above the diagonal are already there in order, from the columns before it.
         for (column, range) in columns() {
             for at in range {
                 let row = triangle.rows[at];
@@ -127,7 +128,7 @@ impl FullPattern {
         self.begins.len() - 1
     }
 
-    /// Where the entry in the row of one place and the column of another stands; [`NOWHERE`] where one is fixed.
+    /// The index of the entry in the row of the padded index `a` and the column of `b`; [`NOWHERE`] if one is fixed.
     pub fn entry(&self, a: usize, b: usize) -> u32 {
         let n = self.unknowns();
         if !(1..=n).contains(&a) || !(1..=n).contains(&b) {
@@ -138,15 +139,16 @@ impl FullPattern {
         rows.binary_search(&(a as u32 - 1)).map_or(NOWHERE, |at| begin + at as u32)
     }
 
-    /// The columns with their entries.
+    /// The columns, each with the range of its entries.
     pub fn columns(&self) -> impl Iterator<Item = (usize, std::ops::Range<usize>)> {
         self.begins.windows(2).enumerate().map(|(c, ends)| (c, ends[0] as usize..ends[1] as usize))
     }
 
-    /// With a block of `size` times `size` in the place of each entry; the unknowns of a block follow each other.
+    /// Replaces each entry by a dense block of `size` times `size`; the unknowns of a block are consecutive. Returns
+    /// the starts of the columns, and the rows.
     ///
     /// # Errors
-    /// [`AssemblyError::Unknowns`] where there are more entries than faer's 32 bits count.
+    /// [`AssemblyError::Unknowns`] if there are more entries than `i32::MAX`, the range of faer's 32-bit indices.
     pub fn blocks(&self, size: usize) -> Result<(Vec<u32>, Vec<u32>), AssemblyError> {
         let n = self.unknowns();
         let most = i32::MAX as usize;

@@ -1,4 +1,4 @@
-//! Second derivatives of a list of elements, eight at a time, put where they stand in a sparse matrix.
+//! Second derivatives of a list of elements, evaluated eight at a time and added to a sparse matrix.
 
 use crate::Potential;
 use crate::kernels::{Kind, unknowns, unknowns_part};
@@ -11,7 +11,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
     /// See [`PotentialList::hessian`](crate::kernels::PotentialList::hessian).
     pub(crate) fn add_second(&self, t: f64, q: &[f64], factor: f64, places: &[u32], entries: &mut [f64]) {
         let t = Lanes::splat(t);
-        // The places of each element: the lower triangle of its second derivatives.
+        // For each element, the indices of the lower triangle of its second derivatives.
         let mut places = places.chunks_exact(K * (K + 1) / 2);
         for run in &self.elements.runs {
             for e in (0..run.len).step_by(LANES) {
@@ -61,7 +61,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         }
     }
 
-    /// The derivative of the gradient of eight elements along a direction.
+    /// The directional derivative of the gradient of eight elements.
     #[inline(always)]
     fn along(&self, t: Lanes, x: &SVector<Lanes, K>, direction: &SVector<Lanes, K>, c: &[Lanes; P]) -> [Lanes; K] {
         let lifted = std::array::from_fn(|i| Dual { re: x[i], d: SVector::<Lanes, 1>::from([direction[i]]) });
@@ -69,7 +69,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
         std::array::from_fn(|i| gradient[i].d[0])
     }
 
-    /// The second derivatives of eight elements, by one more dual over the gradient.
+    /// The second derivatives of eight elements, by dual numbers over the gradient.
     #[inline(always)]
     fn second(&self, t: Lanes, x: &SVector<Lanes, K>, c: &[Lanes; P]) -> [SVector<Lanes, K>; K] {
         let lifted = std::array::from_fn(|i| {
@@ -82,7 +82,7 @@ impl<V: Potential<K, P>, const K: usize, const P: usize> Kind<V, K, P> {
     }
 }
 
-/// Adds the second derivatives of so many elements to the entries of the matrix.
+/// Adds the second derivatives of the first `count` elements, times `factor`, to the entries of the matrix.
 #[inline(always)]
 fn add<'p, const K: usize>(
     second: [SVector<Lanes, K>; K],
@@ -95,7 +95,7 @@ fn add<'p, const K: usize>(
     for (lane, places) in (0..count).zip(places) {
         let triangle = (0..K).flat_map(|i| (0..=i).map(move |j| (i, j)));
         for ((i, j), place) in triangle.zip(places) {
-            // What is in a fixed row stands nowhere.
+            // Rows and columns of fixed places have no entry in the matrix.
             if let Some(entry) = entries.get_mut(*place as usize) {
                 *entry += second[i][j][lane];
             }

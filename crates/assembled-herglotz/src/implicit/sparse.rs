@@ -8,17 +8,17 @@ use crate::memory::limit;
 use crate::system::{AssembledSystem, Masses};
 use discrete_herglotz::StepError;
 
-/// `M + (h^2/4) V_qq` by its entries that are not always zero: the pattern is found once.
+/// `M + (h^2/4) V_qq` as a sparse matrix, whose pattern is determined once.
 pub(super) struct Sparse {
     pub factors: Factors,
-    /// The entries of each list's elements.
+    /// For each list, the indices of the matrix entries of its elements.
     places: Vec<Vec<u32>>,
     diagonal: Vec<u32>,
     pub entries: Vec<f64>,
 }
 
 impl Sparse {
-    /// Finds the pattern of a system; see [`AssembledMidpoint::new`](super::AssembledMidpoint::new) for `memory`.
+    /// Determines the pattern of a system. For `memory` see [`AssembledMidpoint::new`](super::AssembledMidpoint::new).
     pub fn new(system: &AssembledSystem, memory: Option<usize>) -> Result<Self, AssemblyError> {
         let n = system.unknowns();
         let pattern = Pattern::new(n, |f| system.potentials.iter().for_each(|list| list.visit(f)))?;
@@ -28,7 +28,7 @@ impl Sparse {
         Ok(Sparse { factors: Factors::new(pattern, limit(memory))?, places, diagonal, entries })
     }
 
-    /// Factorises it for positions between fixed places, with `factor = h^2/4`.
+    /// Assembles and factorises the matrix at padded positions, with `factor = h^2/4`.
     pub fn factorise(&mut self, system: &AssembledSystem, (t, q): (f64, &[f64]), factor: f64) -> Result<(), StepError> {
         self.entries.fill(0.0);
         for (i, at) in self.diagonal.iter().enumerate() {
@@ -43,8 +43,8 @@ impl Sparse {
         self.factors.factorise(&self.entries)
     }
 
-    /// Whether x solves for the right side b with the last factors: faer does not say where they are singular. Half of the digits are asked
-    /// for: Newton's method makes up for the rest.
+    /// Whether x solves the system with right-hand side b to half of the digits. This is checked because faer does not
+    /// report singular factors. Half of the digits suffice, since Newton's method corrects the remaining error.
     pub fn solves(&self, x: &[f64], b: &[f64], work: &mut [f64]) -> bool {
         let (left, size) = self.factors.residual(&self.entries, x, b, work);
         left <= f64::EPSILON.sqrt() * (size + max_abs_or_nan(b))

@@ -6,22 +6,23 @@ use crate::AssemblyError;
 use crate::local::{First, Place, Second};
 use crate::system::AssembledSystem;
 
-/// The most stages.
+/// The maximum number of stages.
 pub(crate) const MOST: usize = 2;
 
-/// The coefficients of Gauss collocation with one or two stages, times the step but for `ahead`.
+/// The coefficients of Gauss collocation with one or two stages. All except `ahead` are multiplied by the step size.
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
     pub s: usize,
     pub a: [[f64; MOST]; MOST],
     pub b: [f64; MOST],
     pub c: [f64; MOST],
-    /// The values at the next step's nodes of the polynomial through the values at this step's.
+    /// Extrapolation: the values, at the nodes of the next step, of the polynomial through the values at the nodes of
+    /// this step.
     pub ahead: [[f64; MOST]; MOST],
 }
 
 impl Table {
-    /// Of `s` stages, one or two.
+    /// The coefficients for `s` stages, one or two.
     pub fn new(s: usize, h: f64) -> Self {
         if s == 1 {
             let only = |x: f64| [x, 0.0];
@@ -52,22 +53,23 @@ impl Table {
         [(d * r[0] - b * r[1]) / determinant, (a * r[1] - c * r[0]) / determinant]
     }
 
-    /// The integrating factors of the stages, for the rates `L_z` there: `rho_i = 1 - h sum a_ij rho_j rate_j`.
+    /// The integrating factors of the stages for given rates `L_z` there: `rho_i = 1 - h sum a_ij rho_j rate_j`.
     pub fn factors(&self, rates: [f64; MOST]) -> [f64; MOST] {
         self.solve(rates, [1.0; MOST])
     }
 
-    /// The actions `Z_i - z0` of the stages where L is affine in z with these rates, from the values of L with z0 for z.
+    /// The actions `Z_i - z0` of the stages for an L that is affine in z with these rates, from its values at z = z0.
     pub fn actions(&self, rates: [f64; MOST], values: [f64; MOST]) -> [f64; MOST] {
         let sums = self.a.map(|row| row.iter().zip(values).take(self.s).map(|(a, l)| a * l).sum());
         self.solve(rates.map(|rate| -rate), sums)
     }
 }
 
-/// The second derivatives of a system at one stage after the other, and where they go.
+/// The second derivatives of a system at one stage at a time, and their assembly into the Jacobian.
 pub(crate) struct Assembly {
     pub pattern: FullPattern,
-    /// Where the second derivatives of the potentials stand in `lower`, and those of the general terms in `second`.
+    /// The indices of the second derivatives of the potentials in `lower`, and of those of the general terms in
+    /// `second`.
     potentials: Vec<Vec<u32>>,
     locals: Vec<Vec<u32>>,
     lower: Vec<f64>,
@@ -75,10 +77,10 @@ pub(crate) struct Assembly {
 }
 
 impl Assembly {
-    /// Finds the pattern.
+    /// Determines the pattern.
     ///
     /// # Errors
-    /// [`AssemblyError::Unknowns`] where there are more entries than 32 bits count.
+    /// [`AssemblyError::Unknowns`] if there are more entries than 32-bit indices allow.
     pub fn new(system: &AssembledSystem) -> Result<Self, AssemblyError> {
         let n = system.unknowns();
         let triangle = Pattern::new(n, |f| {
@@ -92,7 +94,7 @@ impl Assembly {
         Ok(Assembly { potentials, locals, lower: vec![0.0; triangle.rows.len()], second, pattern })
     }
 
-    /// The second derivatives at a place.
+    /// Evaluates the second derivatives at a point.
     fn evaluate(&mut self, system: &AssembledSystem, at: Place) {
         self.lower.fill(0.0);
         for (list, places) in system.potentials.iter().zip(&self.potentials) {
@@ -104,7 +106,7 @@ impl Assembly {
         }
     }
 
-    /// `L_vv` at a place.
+    /// Computes the entries of `L_vv` at a point.
     pub fn mass_matrix(&mut self, system: &AssembledSystem, at: Place, entries: &mut [f64]) {
         self.evaluate(system, at);
         for (column, range) in self.pattern.columns() {
@@ -116,7 +118,8 @@ impl Assembly {
         }
     }
 
-    /// Adds what the stage j, with its first derivatives, contributes to the Jacobian, and to its border where there is one:
+    /// Adds the contribution of the stage j, with its first derivatives, to the Jacobian, and to its border if there is
+    /// one:
     ///
     /// `dR_i/dV_k = delta_ik rho_i L_vv + h a_ik (rho_i L_vq - rho_k L_qv) - h^2 sum_j a_ij a_jk rho_j L_qq`.
     #[expect(clippy::too_many_arguments, reason = "what the formula has, and where its sum goes")]

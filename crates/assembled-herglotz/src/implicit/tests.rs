@@ -1,4 +1,4 @@
-//! The assembled matrix of a step against duals of the whole system.
+//! Compares the assembled matrix of a step with second derivatives of the whole Lagrangian by dual numbers.
 
 use super::AssembledMidpoint;
 use super::midpoint::Linear;
@@ -9,7 +9,7 @@ use contact_geom::{Derivatives, Lagrangian, Scalar, VelocityPoint};
 const N: usize = 21;
 const H: f64 = 0.3;
 
-/// A bond with an uneven force.
+/// A bond whose force is not an odd function of r.
 struct Bond;
 
 impl Potential<1, 1> for Bond {
@@ -19,7 +19,7 @@ impl Potential<1, 1> for Bond {
     }
 }
 
-/// Three unknowns at once.
+/// A potential of three unknowns.
 struct Triple;
 
 impl Potential<3> for Triple {
@@ -29,7 +29,7 @@ impl Potential<3> for Triple {
     }
 }
 
-/// Bonds in a run from wall to wall, and triples apart.
+/// The bonds, as one run from wall to wall.
 fn bonds() -> impl Iterator<Item = ([usize; 2], [f64; 1])> {
     (0..=N).map(|i| ([i.checked_sub(1).unwrap_or(FIXED), if i == N { FIXED } else { i }], [0.1 * i as f64]))
 }
@@ -75,6 +75,7 @@ fn the_assembled_matrix_is_that_of_the_whole() {
             assert!((found - expected).abs() <= 20.0 * f64::EPSILON, "({i}, {j}): {found}, not {expected}");
         }
     }
-    // Nothing is kept that is always zero: the diagonal, N - 1 bonds, and the pairs of triples that are no bonds.
+    // The pattern holds only the diagonal, the N - 1 bonds between unknowns, and the pairs of triples that are not
+    // bonds.
     assert_eq!(pattern.rows.len(), N + N - 1 + 7);
 }

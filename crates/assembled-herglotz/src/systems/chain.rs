@@ -4,12 +4,12 @@ use crate::{AssembledSystem, AssemblyError, Difference, FIXED, Potential};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 
-/// A bond of the alpha-beta chain, `V(r) = r^2/2 + alpha r^3/3 + beta r^4/4` with r its lengthening.
+/// A bond of the alpha-beta chain, `V(r) = r^2/2 + alpha r^3/3 + beta r^4/4` with r its elongation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FputBond {
-    /// The coefficient of the cubic part.
+    /// The coefficient of the cubic term.
     pub alpha: f64,
-    /// The coefficient of the quartic part.
+    /// The coefficient of the quartic term.
     pub beta: f64,
 }
 
@@ -27,13 +27,13 @@ impl Potential<1> for FputBond {
     }
 }
 
-/// `sites` unit masses in a row between two walls, with a bond between neighbours and to the walls, and drag:
+/// A chain of `sites` unit masses between two walls, with a bond between neighbours and to the walls, and drag:
 /// `L = sum v_i^2/2 - sum V(q_(i+1) - q_i) + gamma z`, `q_0 = q_(n+1) = 0`. Dimensionless.
 ///
-/// The system of [`Chain`](contact_geom::systems::Chain) with fixed ends, for any number of sites.
+/// This is [`Chain`](contact_geom::systems::Chain) with fixed ends, for any number of sites.
 ///
 /// # Errors
-/// [`AssemblyError::Unknowns`] for no sites.
+/// [`AssemblyError::Unknowns`] if `sites` is 0.
 pub fn fput_chain(sites: usize, bond: FputBond, gamma: f64) -> Result<AssembledSystem, AssemblyError> {
     let bonds = (0..=sites).map(|i| [i.checked_sub(1).unwrap_or(FIXED), if i == sites { FIXED } else { i }]);
     AssembledSystem::new(sites)?.with_mass(1.0).with_drag(gamma).with_potential(Difference(bond), bonds)

@@ -4,7 +4,8 @@ use crate::{AssembledSystem, AssemblyError, Difference, Potential};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 
-/// A spring between two points in space, `V(r) = k (|r| - l)^2/2`, with the parameters stiffness k and natural length l.
+/// A spring between two points in space, `V(r) = k (|r| - l)^2/2`, with the parameters stiffness k and natural length
+/// l.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LengthSpring;
 
@@ -33,19 +34,19 @@ impl Potential<1, 1> for Weight {
     }
 }
 
-/// A cloth of `size[0] x size[1]` unit masses, free at its edges, with springs of natural length 1 along the threads and sqrt(2) across
-/// them, under a weight g, with drag:
-/// `L = sum v_i^2/2 - sum k (|r_ij| - l_ij)^2/2 - sum g z_i + gamma z`. Dimensionless; heights are the third coordinate, and the mass
-/// (i, j) has the unknowns `3 (i + size[0] j)` and the two after it.
+/// A cloth of `size[0] x size[1]` unit masses, free at its edges, with springs of natural length 1 along the threads
+/// and sqrt(2) along the diagonals, under a weight g, with drag:
+/// `L = sum v_i^2/2 - sum k (|r_ij| - l_ij)^2/2 - sum g z_i + gamma z`. Dimensionless. The third coordinate is the
+/// height, and the mass (i, j) has the unknowns `3 (i + size[0] j)` and the two after it.
 ///
 /// # Errors
-/// [`AssemblyError::Unknowns`] for a size of 0; [`AssemblyError::Parameter`] where the stiffness or g is not finite.
+/// [`AssemblyError::Unknowns`] if a size is 0; [`AssemblyError::Parameter`] if the stiffness or g is not finite.
 pub fn cloth(size: [usize; 2], stiffness: f64, g: f64, gamma: f64) -> Result<AssembledSystem, AssemblyError> {
     let [width, height] = size;
     let count = width.checked_mul(height).and_then(|c| c.checked_mul(3)).unwrap_or(usize::MAX);
     let system = AssembledSystem::new(count)?.with_mass(1.0).with_drag(gamma);
     let mut system = system.with_potential(Weight, (0..count / 3).map(|i| ([3 * i + 2], [g])))?;
-    // Along the threads, and along both diagonals: to the neighbour at (dx, dy).
+    // Springs along the threads and along both diagonals, to the neighbour at (dx, dy).
     for (dx, dy) in [(1isize, 0usize), (0, 1), (1, 1), (-1, 1)] {
         let length = ((dx * dx) as f64 + (dy * dy) as f64).sqrt();
         let places = (0..height).flat_map(|j| (0..width).map(move |i| (i, j)));

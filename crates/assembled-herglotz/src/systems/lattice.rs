@@ -4,12 +4,13 @@ use crate::{AssembledSystem, AssemblyError, Difference, Potential};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 
-/// The potential of a site, `V(q) = m^2 q^2/2 + lambda q^4/4`: that of the Klein-Gordon equation `q_tt = Laplace q - m^2 q - lambda q^3`.
+/// The potential of a site in the Klein-Gordon equation `q_tt = Laplace q - m^2 q - lambda q^3`,
+/// `V(q) = m^2 q^2/2 + lambda q^4/4`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KleinGordon {
     /// The square of the mass m.
     pub mass_squared: f64,
-    /// The coefficient of the quartic part.
+    /// The coefficient of the quartic term.
     pub lambda: f64,
 }
 
@@ -26,7 +27,8 @@ impl Potential<1> for KleinGordon {
     }
 }
 
-/// The potential of a site, `V(q) = omega^2 (1 - cos q)`: that of the sine-Gordon equation `q_tt = Laplace q - omega^2 sin q`.
+/// The potential of a site in the sine-Gordon equation `q_tt = Laplace q - omega^2 sin q`,
+/// `V(q) = omega^2 (1 - cos q)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SineGordon {
     /// The square of the frequency of a single site.
@@ -64,13 +66,13 @@ impl Potential<1> for Spring {
     }
 }
 
-/// A lattice of `size[0] x size[1] x ...` unit masses in `D` dimensions with free boundaries, a potential on each site, a linear
-/// spring between neighbours, and drag:
-/// `L = sum v_i^2/2 - sum W(q_i) - sum_bonds k (q_i - q_j)^2/2 + gamma z`. Dimensionless; `k = 1/dx^2` is the wave equation on a grid
-/// of width dx. The site `(i_0, i_1, ..)` is the unknown `i_0 + size[0] (i_1 + size[1] (i_2 + ..))`.
+/// A lattice of `size[0] x size[1] x ...` unit masses in `D` dimensions with free boundaries, a potential on each site,
+/// a linear spring between neighbours, and drag:
+/// `L = sum v_i^2/2 - sum W(q_i) - sum_bonds k (q_i - q_j)^2/2 + gamma z`. Dimensionless; `k = 1/dx^2` gives the wave
+/// equation on a grid of width dx. The site `(i_0, i_1, ..)` is the unknown `i_0 + size[0] (i_1 + size[1] (i_2 + ..))`.
 ///
 /// # Errors
-/// [`AssemblyError::Unknowns`] for a size of 0, or more sites than can be counted.
+/// [`AssemblyError::Unknowns`] if a size is 0 or there are too many sites.
 pub fn lattice<W: Potential<1>, const D: usize>(
     size: [usize; D],
     site: W,

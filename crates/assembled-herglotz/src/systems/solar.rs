@@ -1,10 +1,11 @@
-//! Bodies in space that attract each other, and the outer solar system.
+//! Gravitating bodies in space, and the outer solar system.
 
 use crate::{AssembledSystem, AssemblyError, Difference, Potential};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 
-/// Newton's gravitation of a pair at the distance vector r of space or of a plane in it, `V(r) = -c/|r|` with `c = G m_a m_b` its parameter.
+/// The Newtonian gravitational potential of a pair with separation vector r in the plane or in space, `V(r) = -c/|r|`
+/// with the parameter `c = G m_a m_b`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gravitation;
 
@@ -27,7 +28,7 @@ macro_rules! gravitation {
 }
 gravitation! { 2 3 }
 
-/// `|r|^2`, summed from the first component on.
+/// `|r|^2`, summed in the order of the components.
 #[inline(always)]
 fn square<T: Scalar, const D: usize>(r: &SVector<T, D>) -> T {
     let mut sum = r[0] * r[0];
@@ -37,15 +38,15 @@ fn square<T: Scalar, const D: usize>(r: &SVector<T, D>) -> T {
     sum
 }
 
-/// Bodies in space with Newton's gravitation of each pair and linear drag,
+/// Bodies in space with Newtonian gravitation between all pairs, and linear drag:
 /// `L = sum m_i v_i^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z`. Body i has the unknowns `3i, 3i + 1, 3i + 2`.
 ///
-/// Each pair is an element: the cost grows with the square of the number of bodies. Over many revolutions take
-/// [`AssembledSplitting::compensated`](crate::AssembledSplitting::compensated); few bodies are a small system too,
-/// [`contact_geom::systems::Bodies`], which Gauss collocation takes further for less.
+/// Each pair is an element, so that the cost grows with the square of the number of bodies. Over many revolutions use
+/// [`AssembledSplitting::compensated`](crate::AssembledSplitting::compensated). For few bodies
+/// [`contact_geom::systems::Bodies`] with Gauss collocation is more efficient.
 ///
 /// # Errors
-/// [`AssemblyError::Unknowns`] for no bodies; [`AssemblyError::Parameter`] where a mass or `g` is not finite.
+/// [`AssemblyError::Unknowns`] if there are no bodies; [`AssemblyError::Parameter`] if a mass or `g` is not finite.
 pub fn bodies(masses: &[f64], g: f64, gamma: f64) -> Result<AssembledSystem, AssemblyError> {
     let n = masses.len();
     let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
@@ -58,17 +59,18 @@ pub fn bodies(masses: &[f64], g: f64, gamma: f64) -> Result<AssembledSystem, Ass
     system.with_potential(Difference(Gravitation), elements)
 }
 
-/// The outer solar system: the Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune and Pluto, on September 5, 1994 at 0h00,
-/// in astronomical units, days and solar masses. Hairer, Lubich and Wanner, Geometric Numerical Integration, second edition (2006),
-/// section I.2.4, table 2.2 (there after Ahnerts Kalender für Sternfreunde 1994).
+/// The outer solar system: the Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune and Pluto, on September 5,
+/// 1994 at 0h00, in astronomical units, days and solar masses. Source: Hairer, Lubich and Wanner, Geometric Numerical
+/// Integration, second edition (2006), section I.2.4, table 2.2 (taken there from Ahnerts Kalender für Sternfreunde
+/// 1994).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OuterSolarSystem;
 
 impl OuterSolarSystem {
-    /// The constant of gravitation, in au^3 / (solar mass day^2).
+    /// The gravitational constant, in au^3 / (solar mass day^2).
     pub const G: f64 = 2.95912208286e-4;
 
-    /// The masses; that of the Sun has those of the inner planets.
+    /// The masses in solar masses; that of the Sun includes the inner planets.
     pub const MASSES: [f64; 6] =
         [1.00000597682, 0.000954786104043, 0.000285583733151, 0.0000437273164546, 0.0000517759138449, 1.0 / 1.3e8];
 
@@ -92,10 +94,10 @@ impl OuterSolarSystem {
         [0.00276725, -0.00170702, -0.00136504],
     ];
 
-    /// The first so many bodies, from 2 to 6, with a drag; with 5 without Pluto.
+    /// The system of the first `count` bodies, from 2 to 6, with the drag `gamma`; five bodies are all but Pluto.
     ///
     /// # Errors
-    /// [`AssemblyError::Parameters`] for another number.
+    /// [`AssemblyError::Parameters`] for any other `count`.
     pub fn system(count: usize, gamma: f64) -> Result<AssembledSystem, AssemblyError> {
         match Self::MASSES.get(..count) {
             Some(masses) if count >= 2 => bodies(masses, Self::G, gamma),
@@ -107,12 +109,12 @@ impl OuterSolarSystem {
         }
     }
 
-    /// The positions of the first so many bodies at the start.
+    /// The initial positions of the first `count` bodies.
     pub fn positions(count: usize) -> Vec<f64> {
         Self::POSITIONS.iter().take(count).flatten().copied().collect()
     }
 
-    /// The velocities of the first so many bodies at the start.
+    /// The initial velocities of the first `count` bodies.
     pub fn velocities(count: usize) -> Vec<f64> {
         Self::VELOCITIES.iter().take(count).flatten().copied().collect()
     }

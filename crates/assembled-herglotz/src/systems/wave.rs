@@ -1,11 +1,11 @@
-//! The damped wave equation by finite elements.
+//! The damped wave equation, discretised by finite elements.
 
 use crate::{AssembledSystem, AssemblyError, FIXED, LocalLagrangian, Potential};
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SVector;
 
-/// The elastic energy of a linear triangle, `c^2/2 |grad q|^2 A`: its parameters are the three entries beside the diagonal of the stiffness
-/// matrix, `V = -k_01 (q_0 - q_1)^2/2 - k_12 (q_1 - q_2)^2/2 - k_20 (q_2 - q_0)^2/2`.
+/// The elastic energy of a linear triangle, `c^2/2 |grad q|^2 A`. Its parameters are the three off-diagonal entries of
+/// the stiffness matrix: `V = -k_01 (q_0 - q_1)^2/2 - k_12 (q_1 - q_2)^2/2 - k_20 (q_2 - q_0)^2/2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Membrane;
 
@@ -28,14 +28,14 @@ impl Potential<3, 3> for Membrane {
 pub struct Mesh<'a> {
     /// The nodes.
     pub nodes: &'a [[f64; 2]],
-    /// The nodes of each triangle, in either sense.
+    /// The nodes of each triangle, in either orientation.
     pub triangles: &'a [[usize; 3]],
     /// Whether each node is held at 0; the others are unknowns, counted in the order of the nodes.
     pub held: &'a [bool],
 }
 
-/// The kinetic energy of a linear triangle with its consistent masses, `A/12 (v_0^2 + v_1^2 + v_2^2 + v_0 v_1 + v_1 v_2 + v_2 v_0)`: its parameter is
-/// the area A.
+/// The kinetic energy of a linear triangle with its consistent mass matrix,
+/// `A/12 (v_0^2 + v_1^2 + v_2^2 + v_0 v_1 + v_1 v_2 + v_2 v_0)`. Its parameter is the area A.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConsistentMass;
 
@@ -47,13 +47,14 @@ impl LocalLagrangian<3, 1> for ConsistentMass {
     }
 }
 
-/// The damped wave equation `q_tt = c^2 Laplace q + gamma q_t` on a triangulated domain, by linear finite elements with lumped masses; free
-/// edges unless their nodes are held.
+/// The damped wave equation `q_tt = c^2 Laplace q + gamma q_t` on a triangulated domain, by linear finite elements with
+/// lumped masses. The boundary is free except at held nodes.
 ///
 /// # Errors
-/// [`AssemblyError::Length`] where `held` is not as long as the nodes; [`AssemblyError::OutOfRange`] where a triangle names a node that there is
-/// none of; [`AssemblyError::Parameters`] for a triangle without area; [`AssemblyError::Unknowns`] where all nodes are held.
-/// A free node of no triangle has no mass, which the integrators refuse.
+/// [`AssemblyError::Length`] if `held` and the nodes differ in length; [`AssemblyError::OutOfRange`] if a triangle
+/// refers to a node that does not exist; [`AssemblyError::Parameters`] for a triangle of zero or non-finite area;
+/// [`AssemblyError::Unknowns`] if all nodes are held. A free node that belongs to no triangle has no mass; the
+/// integrators reject it.
 pub fn membrane(mesh: Mesh, speed: f64, gamma: f64) -> Result<AssembledSystem, AssemblyError> {
     let triangles = Triangles::new(mesh, speed)?;
     let mut masses = vec![0.0; triangles.unknowns];
@@ -68,8 +69,9 @@ pub fn membrane(mesh: Mesh, speed: f64, gamma: f64) -> Result<AssembledSystem, A
     system.with_potential(Membrane, triangles.elements)
 }
 
-/// The same equation with consistent masses, those of the finite elements themselves: the error of frequencies has the other sign, and the
-/// mass matrix is sparse, so that the motion is one for [`AssembledGauss`](crate::AssembledGauss).
+/// The same equation with the consistent mass matrix of the finite elements. The error of the frequencies has the
+/// opposite sign. The mass matrix is sparse instead of diagonal, so that only [`AssembledGauss`](crate::AssembledGauss)
+/// applies.
 ///
 /// # Errors
 /// Those of [`membrane`].
@@ -83,7 +85,7 @@ pub fn consistent_membrane(mesh: Mesh, speed: f64, gamma: f64) -> Result<Assembl
 /// The triangles of a mesh.
 struct Triangles {
     unknowns: usize,
-    /// The unknowns of each, and its parameters as a [`Membrane`].
+    /// The unknowns of each triangle, and its parameters as a [`Membrane`].
     elements: Vec<([usize; 3], [f64; 3])>,
     areas: Vec<f64>,
 }
@@ -122,7 +124,8 @@ impl Triangles {
                     remedy: "mend the mesh",
                 });
             }
-            // The product of the gradients of two hat functions is that of the sides opposite to their nodes, by (2A)^2; times A.
+            // The inner product of the gradients of two hat functions is that of the sides opposite their nodes,
+            // divided by (2A)^2. Its integral has a factor A.
             let entry = |x: [f64; 2], y: [f64; 2]| speed * speed * (x[0] * y[0] + x[1] * y[1]) / (4.0 * area);
             elements.push((triangle.map(|i| number[i]), [entry(bc, ca), entry(ca, ab), entry(ab, bc)]));
             areas.push(area);

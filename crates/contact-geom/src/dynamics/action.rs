@@ -1,6 +1,8 @@
 //! One-parameter groups acting on Q, their lifts to the contact manifolds, and their momenta.
 
-use crate::{ChartVector, Derivatives, Dual, GeometryError, Lagrangian, Scalar, VelocityPoint, max_abs_or_nan};
+use crate::{
+    ChartVector, Derivatives, Dual, GeometryError, Lagrangian, Scalar, VelocityPoint, numbers::max_abs_or_nan,
+};
 use nalgebra::SVector;
 
 type Line<T> = SVector<T, 1>;
@@ -8,10 +10,10 @@ type Line<T> = SVector<T, 1>;
 /// A one-parameter group of diffeomorphisms of Q, given as a generic function: `act(0, q) = q` and
 /// `act(s, act(r, q)) = act(s + r, q)`.
 ///
-/// A Lie group G acts through the one-parameter groups `exp(s xi)` of its Lie algebra's elements; the momentum of each is
-/// a component of the momentum map.
+/// A Lie group G acts through the one-parameter groups `exp(s xi)` of its Lie algebra's elements; the momentum of each
+/// is a component of the momentum map.
 pub trait OneParameterGroup<const N: usize> {
-    /// The point to which the group element of parameter `s` takes `q`.
+    /// The image of `q` under the group element of parameter `s`.
     fn act<T: Scalar>(&self, s: T, q: &SVector<T, N>) -> SVector<T, N>;
 
     /// The infinitesimal generator `xi_Q(q) = d/ds act(s, q)` at `s = 0`.
@@ -50,15 +52,15 @@ pub trait OneParameterGroup<const N: usize> {
         ChartVector { x: xi.map(|c| c.re), y: xi.map(|c| c.d[0]), z: T::zero() }
     }
 
-    /// The momentum `J = p . xi_Q(q) = -eta(xi)`; the project's sign for the continuous and the discrete side, see
+    /// The momentum `J = p . xi_Q(q) = -eta(xi)`. The sign is the same on the continuous and on the discrete side; see
     /// the errata to the paper's sections 2.2.2 and 3.2.
     #[inline]
     fn momentum<T: Scalar>(&self, q: &SVector<T, N>, p: &SVector<T, N>) -> T {
         p.dot(&self.generator(q))
     }
 
-    /// How far L is from being invariant, to first order in the group's parameter: `dL(xi_TQxR)`, relative to the sum of
-    /// the absolute terms. Zero (to round-off) at every point exactly if the group is a symmetry of L.
+    /// The defect of the invariance of L to first order in the group's parameter: `|dL(xi_TQxR)|`, relative to the sum
+    /// of the absolute terms. It is zero (to round-off) at every point if and only if the group is a symmetry of L.
     fn symmetry_defect(&self, lagrangian: &impl Lagrangian<N>, t: f64, x: &VelocityPoint<N>) -> f64 {
         let (g, xi) = (lagrangian.gradient(t, x), self.velocity_generator(x));
         let size = g.x.abs().dot(&xi.x.abs()) + g.y.abs().dot(&xi.y.abs());
@@ -72,17 +74,17 @@ impl<const N: usize, G: OneParameterGroup<N>> OneParameterGroup<N> for &G {
     }
 }
 
-/// The groups that mechanics meets most, as data: a system lists its symmetries with these.
+/// The most common one-parameter groups of mechanics, as data. Systems list their symmetries in this form.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Symmetry<const N: usize> {
     /// `q + s a`.
     Translation(SVector<f64, N>),
     /// SO(2): rotation by the angle `s` in the plane of the coordinates of these two different indices.
     Rotation(usize, usize),
-    /// The same in several planes at once, as bodies turn together: in that of the coordinates i and `planes[i]`, where there is one. No coordinate
-    /// lies in two planes.
+    /// Rotation by the angle `s` in several planes at once, as in a common rotation of several bodies: in the plane of
+    /// the coordinates i and `planes[i]`, for each i that has one. No coordinate lies in two planes.
     Rotations([Option<usize>; N]),
-    /// One axis of SO(3), for N = 3: rotation by the angle `s` about this unit vector.
+    /// An element of SO(3), for N = 3: rotation by the angle `s` about this unit vector.
     Axis(SVector<f64, N>),
     /// `q_i e^(s w_i)`.
     Scaling(SVector<f64, N>),
@@ -124,12 +126,13 @@ impl<const N: usize> Symmetry<N> {
     /// Rotation about an axis of R^3, given by any non-zero vector.
     ///
     /// # Errors
-    /// [`GeometryError::WrongSize`] unless `N = 3`; [`GeometryError::NonFinite`] if the axis has no direction.
+    /// [`GeometryError::WrongSize`] unless `N = 3`; [`GeometryError::NonFinite`] if the axis is zero or not finite.
     pub fn axis(axis: [f64; 3]) -> Result<Self, GeometryError> {
         if N != 3 {
             return Err(GeometryError::WrongSize { what: "the axis of rotation", expected: N, found: 3 });
         }
-        // Relative to the largest component: the squares of a huge axis overflow, those of a tiny one vanish.
+        // Scaled by the largest component, since the squares of very large components overflow and those of very small
+        // ones vanish.
         let most = max_abs_or_nan(axis);
         let axis = axis.map(|a| a / most);
         let length = SVector::from(axis).norm();

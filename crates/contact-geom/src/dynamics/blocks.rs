@@ -1,22 +1,23 @@
-//! Derivatives of systems of many coordinates: by blocks of directions, so that the numbers stay small enough for the stack.
+//! Derivatives of systems with many coordinates, computed in blocks of directions so that the dual numbers stay small
+//! enough for the stack.
 
-use crate::{ChartVector, Derivatives, Hessian, KernelDual, Lagrangian, Scalar, VelocityPoint};
+use crate::{ChartVector, Derivatives, Hessian, Lagrangian, Scalar, VelocityPoint, support::KernelDual};
 use nalgebra::{SMatrix, SVector};
 
-/// The largest dimension whose directions are carried all at once: nested, those of all coordinates take memory as the third
-/// power of the dimension.
+/// The largest dimension for which all directions are carried at once: for nested duals the memory for all coordinates
+/// grows as the third power of the dimension.
 pub(crate) const BLOCK: usize = 8;
 
-/// A number with the derivatives along a block of coordinates.
+/// A number with its derivatives along a block of coordinates.
 type Block<T> = KernelDual<T, SVector<T, BLOCK>>;
 
-/// The starts of the blocks of `n` directions.
+/// The first indices of the blocks of `n` directions.
 #[inline(always)]
 fn starts(n: usize) -> impl Iterator<Item = usize> {
     (0..n.div_ceil(BLOCK)).map(|k| k * BLOCK)
 }
 
-/// The coordinates with those from `start` on as directions, in the order q, v, z.
+/// The coordinates as dual numbers whose directions are the block of coordinates from `start` on, in the order q, v, z.
 #[inline(always)]
 fn lifted<T: Scalar, const N: usize>(x: &VelocityPoint<N, T>, start: usize) -> VelocityPoint<N, Block<T>> {
     let one = |i: usize, re: T| {
@@ -33,7 +34,7 @@ fn lifted<T: Scalar, const N: usize>(x: &VelocityPoint<N, T>, start: usize) -> V
     }
 }
 
-/// The value of L with the derivatives along a block of coordinates.
+/// The value of L with its derivatives along a block of coordinates.
 #[inline(always)]
 fn value<T: Scalar, const N: usize>(
     lagrangian: &(impl Lagrangian<N> + ?Sized),
@@ -45,7 +46,7 @@ fn value<T: Scalar, const N: usize>(
     lagrangian.value(Block::constant(t), &y.q, &y.v, y.z)
 }
 
-/// The value and the gradient, not in closed form.
+/// The value and the gradient by automatic differentiation.
 #[inline(always)]
 pub(crate) fn with_gradient<T: Scalar, const N: usize>(
     lagrangian: &(impl Lagrangian<N> + ?Sized),
@@ -70,7 +71,7 @@ pub(crate) fn with_gradient<T: Scalar, const N: usize>(
     (re, gradient)
 }
 
-/// The value and `L_q`, not in closed form.
+/// The value and `L_q` by automatic differentiation.
 #[inline(always)]
 pub(crate) fn with_force<T: Scalar, const N: usize>(
     lagrangian: &(impl Lagrangian<N> + ?Sized),
@@ -88,7 +89,7 @@ pub(crate) fn with_force<T: Scalar, const N: usize>(
     (re, force)
 }
 
-/// W, not by a closed Hessian.
+/// The mass matrix W by automatic differentiation, of the closed gradient where there is one.
 #[inline(always)]
 pub(crate) fn mass_matrix<T: Scalar, const N: usize>(
     lagrangian: &(impl Lagrangian<N> + ?Sized),
@@ -105,7 +106,7 @@ pub(crate) fn mass_matrix<T: Scalar, const N: usize>(
             }
             continue;
         }
-        // Blocks on and below the diagonal; the others by symmetry.
+        // Compute the blocks on and below the diagonal; the others follow by symmetry.
         for row in starts(N).filter(|row| *row >= column) {
             let l = value(lagrangian, time, &y, N + row);
             for (j, i) in columns.clone().flat_map(|j| (row..N.min(row + BLOCK)).map(move |i| (j, i))) {
@@ -117,7 +118,7 @@ pub(crate) fn mass_matrix<T: Scalar, const N: usize>(
     w
 }
 
-/// The second derivatives by those of the gradient, itself derived or in closed form.
+/// The second derivatives by automatic differentiation of the gradient, which is in closed form where there is one.
 pub(crate) fn hessian<T: Scalar, const N: usize>(
     lagrangian: &(impl Lagrangian<N> + ?Sized),
     t: T,

@@ -1,12 +1,16 @@
 //! The derivatives of Lagrangians.
 
 use crate::dynamics::blocks::{self, BLOCK};
-use crate::{ChartVector, Dual, KernelDual, Lagrangian, Scalar, TangentVector, VelocityPoint, seed};
+use crate::{
+    ChartVector, Dual, Lagrangian, Scalar, VelocityPoint,
+    numbers::TangentVector,
+    support::{KernelDual, seed},
+};
 use nalgebra::{SMatrix, SVector};
 use num_traits::One;
 
-/// The derivatives of a Lagrangian: those in closed form where it has them, the others by automatic differentiation. Every Lagrangian has
-/// these methods, and none has others in their place.
+/// The derivatives of a Lagrangian: in closed form where it provides them, otherwise by automatic differentiation. The
+/// trait is implemented for every Lagrangian, so that its methods cannot be overridden.
 ///
 /// ```
 /// use contact_geom::{Derivatives, VelocityPoint, systems::Pendulum};
@@ -14,15 +18,14 @@ use num_traits::One;
 /// assert_eq!(Pendulum { gamma: -0.1 }.gradient(0.0, &x).y[0], 2.0); // L_v
 /// ```
 pub trait Derivatives<const N: usize>: Lagrangian<N> {
-    /// The value and the differential along given directions: the coordinates of `x` carry the directions as duals.
-    /// It uses
+    /// The value and the differential along given directions, which the coordinates of `x` carry as dual parts. It uses
     /// [`closed_gradient`](Lagrangian::closed_gradient) where there is one.
     fn along<T: Scalar, D: TangentVector<T>>(&self, t: T, x: &VelocityPoint<N, Dual<T, D>>) -> Dual<T, D>;
 
     /// The value with the partial derivatives `(L_q, L_v, L_z)`, for kernels.
     fn with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, ChartVector<N, T>);
 
-    /// The value with the partial derivatives `L_q` alone, for kernels: what a force needs.
+    /// The value with the partial derivatives `L_q` alone, for kernels that need only the force.
     fn with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> (T, SVector<T, N>);
 
     /// `L_q` without the value, for kernels.
@@ -174,14 +177,14 @@ impl<L: Lagrangian<N> + ?Sized, const N: usize> Derivatives<N> for L {
     }
 }
 
-/// The gradient that a Lagrangian promises, and has not: no number.
+/// The gradient of a Lagrangian that declares closed derivatives but does not provide them: all entries are NaN.
 #[cold]
 fn missing<T: Scalar, const N: usize>() -> ChartVector<N, T> {
     let none = || SVector::from_fn(|_, _| T::from(f64::NAN));
     ChartVector { x: none(), y: none(), z: T::from(f64::NAN) }
 }
 
-/// Coordinates that no direction moves.
+/// The coordinates as constants, whose differentials vanish.
 #[inline(always)]
 fn still<T: Scalar, D: TangentVector<T>, const N: usize>(x: &SVector<T, N>) -> SVector<KernelDual<T, D>, N> {
     SVector::from_array_storage(nalgebra::ArrayStorage([std::array::from_fn(|i| KernelDual::constant(x[i]))]))
@@ -204,7 +207,7 @@ pub struct Hessian<const N: usize, T = f64> {
     pub zz: T,
 }
 
-/// The gradient by automatic differentiation, whatever the implementor overrides.
+/// The gradient by automatic differentiation, even where the Lagrangian has a closed one.
 #[inline]
 pub fn derived_gradient<T: Scalar, const N: usize>(
     lagrangian: &(impl Lagrangian<N> + ?Sized),
@@ -218,7 +221,7 @@ pub fn derived_gradient<T: Scalar, const N: usize>(
     lagrangian.value(Dual::constant(t), &s.x, &s.y, s.z).d
 }
 
-/// The second derivatives by automatic differentiation of the gradient, itself derived or in closed form.
+/// The second derivatives by automatic differentiation of the gradient, which is in closed form where there is one.
 #[inline]
 pub fn derived_hessian<T: Scalar, const N: usize>(
     lagrangian: &(impl Lagrangian<N> + ?Sized),

@@ -1,9 +1,13 @@
 //! Contact Hamiltonian vector fields, the Jacobi bracket and dissipated quantities.
 
 use crate::forms::smooth::{apply, apply_transposed};
-use crate::{ChartVector, ContactForm, GeometryError, MaxAbsOrNan, Scalar, Smooth, SmoothFunction, TangentVector};
+use crate::{
+    ChartVector, ContactForm, GeometryError, Scalar, Smooth, SmoothFunction,
+    numbers::{MaxAbsOrNan, TangentVector},
+};
 
-/// The contact Hamiltonian vector field `X_f` of any contact form: `flat(X_f) = df - (f + R(f)) eta`; paper, section 2.1.
+/// The contact Hamiltonian vector field `X_f` of a function f for any contact form, `flat(X_f) = df - (f + R(f)) eta`;
+/// paper, section 2.1.
 ///
 /// # Errors
 /// Those of the form.
@@ -18,13 +22,13 @@ pub fn hamiltonian_vector_field<const N: usize>(
     form.sharp(x, &df.minus(form.eta(x)?.scale(f.value(t, x) + rate)))
 }
 
-/// `X_H` in Darboux coordinates: `q' = H_p`, `p' = -H_q - p H_z`, `z' = p H_p - H`, as a field that can itself be
+/// `X_H` in Darboux coordinates, `q' = H_p`, `p' = -H_q - p H_z`, `z' = p H_p - H`, as a vector field that can be
 /// differentiated.
 #[derive(Clone, Copy, Debug)]
 pub struct DarbouxField<'a, H> {
     /// The Hamiltonian.
     pub hamiltonian: &'a H,
-    /// The time at which it is taken.
+    /// The time at which it is evaluated.
     pub t: f64,
 }
 
@@ -46,7 +50,7 @@ pub fn derivative_along<const N: usize>(
     f.differential(t, x).dot(vector)
 }
 
-/// The Jacobi bracket `{f, g} = X_f(g) + g R(f)`, at one point. It is skew, and `X_{f,g} = [X_f, X_g]`.
+/// The Jacobi bracket `{f, g} = X_f(g) + g R(f)` at one point. It is skew, and `X_{f,g} = [X_f, X_g]`.
 ///
 /// # Errors
 /// Those of the form.
@@ -62,7 +66,7 @@ pub fn jacobi_bracket<const N: usize>(
     Ok(derivative_along(g, t, x, &x_f) + g.value(t, x) * rate)
 }
 
-/// A function on Darboux coordinates: the bracket of two others, differentiable again.
+/// The Jacobi bracket of two functions in Darboux coordinates, as a function that can be differentiated.
 #[derive(Clone, Copy, Debug)]
 pub struct DarbouxBracket<'a, F, G> {
     /// The first function.
@@ -79,8 +83,8 @@ impl<const N: usize, F: SmoothFunction<N>, G: SmoothFunction<N>> SmoothFunction<
     }
 }
 
-/// The dissipation test `L_{X_H} f + R(H) f`, relative to the sizes of its terms: zero everywhere exactly if `f` is
-/// dissipated at the rate of H, `f o phi_t = sigma_t f`; paper, section 2.2.2.
+/// The defect `|L_{X_H} f + R(H) f|` of dissipation, relative to the sizes of its terms. It vanishes everywhere if and
+/// only if `f` is dissipated at the rate of H, `f o phi_t = sigma_t f`; paper, section 2.2.2.
 ///
 /// # Errors
 /// Those of the form.
@@ -151,11 +155,11 @@ pub fn infinitesimal_conformality<const N: usize, F: Smooth<N> + ContactForm<N>>
     Ok(InfinitesimalConformality { rate, defect })
 }
 
-/// The conformal factor along a flow, `sigma_t(x) = exp(int_0^t a(F_s(x)) ds)` with `a = -R(H)`: the corrected form of the
-/// paper's section 2.1.
+/// The conformal factor along a flow, `sigma_t(x) = exp(int_0^t a(F_s(x)) ds)` with `a = -R(H)`, in the corrected form
+/// of the paper's section 2.1.
 ///
-/// The integral is a quadrature that the caller chooses, as times in `[0, t]` with weights; `path` is the integral curve
-/// of `X_H` through x.
+/// The integral is evaluated by the given quadrature, a list of times in `[0, t]` with weights; `path` is the integral
+/// curve of `X_H` through x.
 ///
 /// # Errors
 /// Those of the form.

@@ -1,16 +1,17 @@
 //! Regularity, energy, the Legendre transformation and the Herglotz vector field of a Lagrangian.
 
 use crate::dynamics::blocks::BLOCK;
-use crate::linear::{SingularMatrix, solve};
-use crate::{
-    AugmentedVector, Derivatives, Dual, GeometryError, Lagrangian, PhasePoint, Scalar, Smooth, SmoothFunction,
-    TangentVector,
-};
+use crate::support::linear::{SingularMatrix, solve};
 use crate::{ChartVector, OneParameterGroup, VelocityPoint};
+use crate::{
+    Derivatives, Dual, GeometryError, Lagrangian, PhasePoint, Scalar, Smooth, SmoothFunction,
+    numbers::{AugmentedVector, TangentVector},
+};
 use nalgebra::{DMatrix, SMatrix, SVector};
 use num_traits::One;
 
-/// How regular a matrix of the theory is: W for a Lagrangian, the derivative of F-L_d for a discrete one.
+/// The regularity of a matrix of the theory, W for a Lagrangian or the derivative of F-L_d for a discrete Lagrangian:
+/// its extreme singular values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Regularity {
     /// The smallest singular value; 0 where the Lagrangian is singular.
@@ -20,20 +21,21 @@ pub struct Regularity {
 }
 
 impl Regularity {
-    /// The singular values of a matrix that decides regularity. A matrix that is not finite counts as singular.
+    /// The extreme singular values of a matrix. A matrix that is not finite counts as singular.
     pub fn of(matrix: DMatrix<f64>) -> Self {
         if !matrix.iter().all(|e| e.is_finite()) {
             return Regularity { smallest: 0.0, largest: f64::INFINITY };
         }
         if matrix.is_empty() {
-            // Of dimension 0 there is one matrix, the identity.
+            // The only matrix of dimension 0 is the identity.
             return Regularity { smallest: 1.0, largest: 1.0 };
         }
         let values = matrix.singular_values();
         Regularity { smallest: values.min(), largest: values.max() }
     }
 
-    /// The condition number; infinite for a singular matrix. Digits beyond `16 - log10(condition)` are noise.
+    /// The condition number; infinite for a singular matrix. A linear solve has about `16 - log10(condition)` correct
+    /// digits.
     pub fn condition(&self) -> f64 {
         if self.smallest > 0.0 { self.largest / self.smallest } else { f64::INFINITY }
     }
@@ -88,7 +90,7 @@ pub fn legendre_jacobian<const N: usize>(
 pub struct Legendre<'a, L> {
     /// The Lagrangian.
     pub lagrangian: &'a L,
-    /// The time at which it is taken.
+    /// The time at which it is evaluated.
     pub t: f64,
 }
 
@@ -101,9 +103,9 @@ impl<const N: usize, L: Lagrangian<N>> Smooth<N> for Legendre<'_, L> {
 /// The Herglotz vector field `xi_L = (v, a, L)` on TQ x R: Herglotz' equations
 /// `d/dt L_v = L_q + L_v L_z`, `zdot = L` solved for the acceleration `a`; paper, section 2.2.
 ///
-/// For any regular L: `W a = L_q + L_v L_z - (L_vq v + L_vz L + L_vt)`. One evaluation on nested duals along the `N` velocities
-/// and along the drift `(v, 0, L, 1)` gives W and the bracket together, one before along q and z the rest: two thirds of the
-/// work of all mixed second derivatives.
+/// For any regular L: `W a = L_q + L_v L_z - (L_vq v + L_vz L + L_vt)`. A first evaluation, on duals along q and z,
+/// gives L, `L_q` and `L_z`; a second, on nested duals along the `N` velocities and along the drift `(v, 0, L, 1)`,
+/// gives W and the bracket. This takes two thirds of the work of all mixed second derivatives.
 ///
 /// # Errors
 /// [`GeometryError::Singular`] where W is singular.
@@ -116,8 +118,8 @@ pub fn herglotz_field<T: Scalar, const N: usize>(
     Ok(herglotz_rates(lagrangian, t, x)?.0)
 }
 
-/// The Herglotz vector field with the rate `L_z` of the conformal factor, which its evaluation gives as well: along a
-/// motion `sigma = exp int L_z`.
+/// The Herglotz vector field together with the rate `L_z` of the conformal factor, which the same evaluation provides.
+/// Along a motion `sigma = exp int L_z`.
 ///
 /// # Errors
 /// Those of [`herglotz_field`].
@@ -130,7 +132,7 @@ pub fn herglotz_rates<T: Scalar, const N: usize>(
     if const { N > BLOCK } {
         return rates_of_many(lagrangian, t, x);
     }
-    // L_q, L_z and L along the N + 1 directions of q and z.
+    // L, L_q and L_z, by duals along the N + 1 directions of q and z.
     let still = Dual::<T, AugmentedVector<N, T>>::constant;
     let mut y = VelocityPoint { q: x.q.map(still), v: x.v.map(still), z: still(x.z) };
     for i in 0..N {
@@ -161,7 +163,7 @@ pub fn herglotz_rates<T: Scalar, const N: usize>(
     Ok((ChartVector { x: x.v, y: a, z: zdot }, slope.z))
 }
 
-/// [`herglotz_rates`] of many coordinates: by blocks of directions, for the sake of the stack.
+/// [`herglotz_rates`] for many coordinates, in blocks of directions to save stack space.
 #[inline(never)]
 fn rates_of_many<T: Scalar, const N: usize>(
     lagrangian: &impl Lagrangian<N>,
@@ -181,7 +183,7 @@ fn rates_of_many<T: Scalar, const N: usize>(
     Ok((ChartVector { x: x.v, y: a, z: zdot }, slope.z))
 }
 
-/// What a singular W means for the equations of motion.
+/// The error for a singular W.
 fn irregular(singular: SingularMatrix) -> GeometryError {
     singular.of("W = L_vv", "Herglotz' equations have no unique acceleration here; L is not regular")
 }
@@ -191,7 +193,7 @@ fn irregular(singular: SingularMatrix) -> GeometryError {
 pub struct HerglotzField<'a, L> {
     /// The Lagrangian.
     pub lagrangian: &'a L,
-    /// The time at which it is taken.
+    /// The time at which it is evaluated.
     pub t: f64,
 }
 
@@ -201,8 +203,8 @@ impl<const N: usize, L: Lagrangian<N>> Smooth<N> for HerglotzField<'_, L> {
     }
 }
 
-/// Noether's momentum `J(xi) = L_v . xi_Q = -eta_L(xi_TQxR)` on TQ x R: dissipated wherever the group is a symmetry of L;
-/// paper, section 2.2.2, with the sign of the errata.
+/// Noether's momentum `J(xi) = L_v . xi_Q = -eta_L(xi_TQxR)` on TQ x R. It is dissipated if the group is a symmetry of
+/// L; paper, section 2.2.2, with the sign of the errata.
 #[derive(Clone, Copy, Debug)]
 pub struct NoetherMomentum<'a, L, G> {
     /// The Lagrangian.

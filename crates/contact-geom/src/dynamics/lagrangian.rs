@@ -5,14 +5,15 @@ use nalgebra::{SMatrix, SVector};
 
 /// A Lagrangian of Herglotz' variational principle, `L : R x TQ x R -> R`, written once as a generic function.
 ///
-/// The motion makes the end value of the action critical, where `zdot = L(t, q, qdot, z)`. In the field's signs a
-/// dissipative term is `gamma z` with `gamma < 0`. Every derivative is `value` on duals; a user who has a closed form
-/// overrides [`closed_gradient`](Self::closed_gradient), which vector fields, forms and steps then differentiate once less,
-/// or [`closed_hessian`](Self::closed_hessian), which W, forms and second jets then use. [`check_closed_derivatives`](crate::check_closed_derivatives)
-/// compares such a form with the derived one.
+/// The motion makes the final value of the action critical, where `zdot = L(t, q, qdot, z)`. With the usual sign
+/// convention a dissipative term is `gamma z` with `gamma < 0`. All derivatives are obtained by evaluating `value` on
+/// dual numbers. A Lagrangian with closed forms may override [`closed_gradient`](Self::closed_gradient), which saves
+/// vector fields, forms and steps one level of differentiation, or [`closed_hessian`](Self::closed_hessian), which is
+/// used for W, forms and second jets. [`check_closed_derivatives`](crate::check_closed_derivatives) compares such
+/// closed forms with automatic differentiation.
 ///
-/// Mark `value`, and the functions that it calls, `#[inline(always)]`: integrators evaluate them at several stages in one
-/// vector register, and what the compiler does not merge into their kernels is ten times slower.
+/// Annotate `value`, and the functions that it calls, with `#[inline(always)]`: integrators evaluate several stages at
+/// once in a SIMD register, and a function that is not inlined into their kernels is ten times slower.
 ///
 /// ```
 /// use contact_geom::{nalgebra::SVector, Derivatives, Lagrangian, Scalar, VelocityPoint};
@@ -27,89 +28,98 @@ use nalgebra::{SMatrix, SVector};
 /// assert_eq!(Damped.gradient(0.0, &x).y[0], 2.0); // L_v
 /// ```
 pub trait Lagrangian<const N: usize> {
-    /// Whether this Lagrangian states a time transformation, that is, whether [`dt_dtau`](Self::dt_dtau) is overridden: it is asked for
-    /// and compiled only then.
+    /// Whether this Lagrangian has a time transformation, that is, whether [`dt_dtau`](Self::dt_dtau) is overridden.
+    /// The transformation is evaluated and compiled only in this case.
     const HAS_TIME_TRANSFORMATION: bool = false;
 
-    /// Whether [`structure`](Self::structure) and all closed derivatives are there and follow from the formula of L, as those of the crate
-    /// `formula-lagrangian` do: they are not probed, and no other derivatives are compiled.
+    /// Whether [`structure`](Self::structure) and all closed derivatives are provided and derived from the formula of
+    /// L, as by the crate `formula-lagrangian`. They are then not checked numerically, and automatic differentiation is
+    /// not compiled.
     const PROVED: bool = false;
 
-    /// Whether this Lagrangian states [switching functions](Self::switching_functions): they are asked for, and what ends steps on them is
-    /// compiled, only then.
+    /// Whether this Lagrangian has [switching functions](Self::switching_functions). They are evaluated, and the code
+    /// that ends steps on their zeros is compiled, only in this case.
     const HAS_SWITCHING_FUNCTIONS: bool = false;
 
-    /// Whether an evaluation is dear to begin, whatever the numbers: L is then asked for many at once where that is possible.
+    /// Whether an evaluation has a large fixed cost, so that batches of evaluations are preferred.
     const INTERPRETED: bool = false;
 
     /// The value `L(t, q, v, z)`.
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T;
 
-    /// The partial derivatives `(L_q, L_v, L_z)` in closed form, if the implementor has one that is worth it.
+    /// The partial derivatives `(L_q, L_v, L_z)` in closed form; `None`, the default, where a closed form is not
+    /// provided.
     fn closed_gradient<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> Option<ChartVector<N, T>> {
         None
     }
 
-    /// The second partial derivatives in closed form, if the implementor has one that is worth it.
+    /// The second partial derivatives in closed form; `None`, the default, where a closed form is not provided.
     fn closed_hessian<T: Scalar>(&self, _t: T, _x: &VelocityPoint<N, T>) -> Option<Hessian<N, T>> {
         None
     }
 
-    /// The value with the gradient, where the two share work that the compiler cannot see: the default asks for each by itself.
+    /// The value with the gradient, in closed form. Override it where the two share work that the compiler cannot
+    /// detect; the default evaluates each of them separately.
     #[inline(always)]
     fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, ChartVector<N, T>)> {
         self.closed_gradient(t, x).map(|gradient| (self.value(t, &x.q, &x.v, x.z), gradient))
     }
 
-    /// `L_q` alone, where it is less work than the gradient and the compiler cannot see that.
+    /// `L_q` alone, in closed form. Override it where it is less work than the gradient and the compiler cannot detect
+    /// that.
     #[inline(always)]
     fn closed_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SVector<T, N>> {
         self.closed_gradient(t, x).map(|gradient| gradient.x)
     }
 
-    /// The value with `L_q`, where the two share work that the compiler cannot see: the default asks for each by itself.
+    /// The value with `L_q`, in closed form. Override it where the two share work that the compiler cannot detect; the
+    /// default evaluates each of them separately.
     #[inline(always)]
     fn closed_with_force<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, SVector<T, N>)> {
         self.closed_force(t, x).map(|force| (self.value(t, &x.q, &x.v, x.z), force))
     }
 
-    /// `L_z` alone, where it is less work than the gradient and the compiler cannot see that: splittings ask for it at several times of each
-    /// step where it depends on time.
+    /// `L_z` alone, in closed form. Override it where it is less work than the gradient and the compiler cannot detect
+    /// that; splitting methods evaluate it at several times of each step where it depends on time.
     #[inline(always)]
     fn closed_rate<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<T> {
         self.closed_gradient(t, x).map(|gradient| gradient.z)
     }
 
-    /// `W = L_vv` alone, where it is less work than all second derivatives and the compiler cannot see that.
+    /// `W = L_vv` alone, in closed form. Override it where it is less work than all second derivatives and the compiler
+    /// cannot detect that.
     #[inline(always)]
     fn closed_mass_matrix<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<SMatrix<T, N, N>> {
         self.closed_hessian(t, x).map(|hessian| hessian.vv)
     }
 
-    /// What is known of this Lagrangian's form; see [`Structure`]. The default claims nothing.
+    /// The declared structure of this Lagrangian; see [`Structure`]. The default makes no claims.
     fn structure(&self) -> Structure {
         Structure::default()
     }
 
-    /// The switching functions `g_i(t, q, v, z)`, at whose zeros L has a kink or a jump: appends their values at a point, always as many and in
-    /// the same order. A run ends a step on each zero that its motion crosses, so that integrators keep their order there; where L itself
-    /// jumps across a surface in the positions, the motion is refracted or reflected by the corner conditions of Weierstrass and Erdmann (the
-    /// momentum changes along the normal, the energy not at all). The default is none: L is smooth.
+    /// The switching functions `g_i(t, q, v, z)`, at whose zeros L has a kink or a jump: appends their values at a
+    /// point, always in the same number and order. A run ends a step at each zero that its motion crosses, so that
+    /// integrators keep their order; where L itself jumps across a surface in the positions, the motion is refracted or
+    /// reflected according to the Weierstrass-Erdmann corner conditions (the momentum changes along the normal, the
+    /// energy does not change). By default there are none: L is smooth.
     ///
-    /// With [`HAS_SWITCHING_FUNCTIONS`](Self::HAS_SWITCHING_FUNCTIONS). A spring that only pushes, `q.if_less(0, q^2/2, 0)`, has the one switching
-    /// function q.
+    /// Set [`HAS_SWITCHING_FUNCTIONS`](Self::HAS_SWITCHING_FUNCTIONS) as well. For example, a spring that only pushes,
+    /// `q.if_less(0, q^2/2, 0)`, has the single switching function q.
     fn switching_functions(&self, _t: f64, _x: &VelocityPoint<N>, _values: &mut Vec<f64>) {}
 
-    /// The rate `g(q) = dt/dtau` of the [`TimeTransformation`](crate::TimeTransformation) by whose time tau the steps of this motion are best equal, for
-    /// autonomous Lagrangians: it should fall as the motion gets faster, and be positive. With [`HAS_TIME_TRANSFORMATION`](Self::HAS_TIME_TRANSFORMATION); the
-    /// default is the time itself.
+    /// The rate `g(q) = dt/dtau` of the [`TimeTransformation`](crate::TimeTransformation) in which steps of equal
+    /// length suit this motion, for autonomous Lagrangians. It must be positive and should decrease where the motion
+    /// gets faster. Set [`HAS_TIME_TRANSFORMATION`](Self::HAS_TIME_TRANSFORMATION) as well; by default tau is the time
+    /// itself.
     #[inline(always)]
     fn dt_dtau<T: Scalar>(&self, _q: &SVector<T, N>) -> T {
         T::one()
     }
 }
 
-/// A Lagrangian without its closed derivatives: all are found by automatic differentiation, to see what they cost or gain.
+/// A Lagrangian without its closed derivatives: all derivatives are found by automatic differentiation, to compare the
+/// cost.
 #[derive(Clone, Copy, Debug)]
 pub struct WithoutClosedDerivatives<L>(pub L);
 

@@ -1,4 +1,5 @@
-//! Lagrangians and what they claim of themselves, Herglotz and contact Hamiltonian vector fields, symmetries, time transformations.
+//! Lagrangians and their declared structure, Herglotz and contact Hamiltonian vector fields, symmetries, and time
+//! transformations.
 
 mod action;
 pub(crate) mod blocks;

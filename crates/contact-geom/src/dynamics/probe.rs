@@ -1,20 +1,21 @@
 //! The derivatives of a Lagrangian at one point along a few directions, each with the size of its terms.
 
 use crate::number::rounded::Rounded;
-use crate::{Dual, Lagrangian, VelocityPoint, max_abs_or_nan};
+use crate::{Dual, Lagrangian, VelocityPoint, numbers::max_abs_or_nan};
 use nalgebra::{SMatrix, SVector};
 
-/// A number with its derivatives along a line through the whole of TQ x R, and in time.
+/// A number with its derivatives along one direction of TQ x R, and in time.
 pub(crate) type Moving = Dual<Rounded, SVector<Rounded, 2>>;
-/// The same with first derivatives: along a direction of q, one of v, and z.
+/// The same with its first derivatives along a direction of q, a direction of v, and z.
 pub(crate) type First = Dual<Moving, SVector<Moving, 3>>;
-/// The same with second derivatives, along such directions again.
+/// The same with its second derivatives, by a second set of such directions.
 pub(crate) type Second = Dual<First, SVector<First, 3>>;
 
-/// A point with directions through it that have no special symmetry: a form that does not vanish, does not vanish on them, but
-/// by chance. So one value of L on nested duals of few directions tells what whole matrices would, whatever N.
+/// A point with directions without special symmetry: a non-zero form vanishes on them only by coincidence. One
+/// evaluation of L on nested duals with a few directions therefore replaces the computation of whole matrices, for any
+/// N.
 ///
-/// A direction is as long as the coordinates are large, so that derivatives overflow where L does, and not before.
+/// Each direction is as long as the coordinates are large, so that derivatives overflow only where L does.
 pub(crate) struct Probe<const N: usize> {
     t: f64,
     x: VelocityPoint<N>,
@@ -22,7 +23,7 @@ pub(crate) struct Probe<const N: usize> {
     lengths: [f64; 4],
 }
 
-/// Which of the three directions through a coordinate.
+/// One of the three directions through a coordinate.
 #[derive(Clone, Copy)]
 enum Along {
     Inner,
@@ -42,14 +43,14 @@ impl<const N: usize> Probe<N> {
         Probe { x: VelocityPoint { v: SVector::zeros(), ..self.x }, ..*self }
     }
 
-    /// The component of a direction: of coordinate `i` of the group `kind`, q, v or z.
+    /// The component of a direction at coordinate `i` of the group `kind`: 0 for q, 1 for v, 2 for z.
     fn direction(&self, along: Along, kind: usize, i: usize) -> f64 {
         let golden = 0.618_033_988_749_894_9;
         let index = (along as usize * (2 * N + 1) + kind * N + i) as f64;
         self.lengths[kind] * (0.3 + ((index * index + 1.0) * golden).fract())
     }
 
-    /// A coordinate with its place in all directions.
+    /// A coordinate as a dual number, with its components of all directions.
     fn seed(&self, kind: usize, i: usize, value: f64) -> Second {
         let along = |direction| Rounded::from(self.direction(direction, kind, i));
         let mut moving = Moving::constant(value.into());
@@ -61,7 +62,7 @@ impl<const N: usize> Probe<N> {
         second
     }
 
-    /// The time, of which only the derivative in time is taken.
+    /// The time as a dual number, with its derivative in time only.
     fn clock(&self) -> Moving {
         let mut clock = Moving::constant(self.t.into());
         clock.d[1] = self.lengths[3].into();
@@ -76,8 +77,9 @@ impl<const N: usize> Probe<N> {
         lagrangian.value(clock, &q, &v, self.seed(2, 0, self.x.z))
     }
 
-    /// How far the closed gradient is from that of `l`, the value: the largest relative difference of the derivatives along the
-    /// directions, with their own derivatives. `None` where there is no closed one.
+    /// The defect of the closed gradient, compared with the derivatives of the value `l`: the largest relative
+    /// difference of the derivatives along the directions, and of their derivatives. `None` where there is no closed
+    /// gradient.
     pub fn closed_gradient(&self, lagrangian: &impl Lagrangian<N>, l: &Second) -> Option<f64> {
         let [q, v] =
             [(0, &self.x.q), (1, &self.x.v)].map(|(kind, c)| c.map_with_location(|i, _, c| self.seed(kind, i, c).re));
@@ -96,7 +98,8 @@ impl<const N: usize> Probe<N> {
         })))
     }
 
-    /// The same of the closed second derivatives. In a frame of its own, for the sake of the room that matrices take.
+    /// The defect of the closed second derivatives, likewise. It is not inlined, since the matrices need much stack
+    /// space.
     #[inline(never)]
     pub fn closed_hessian(&self, lagrangian: &impl Lagrangian<N>, l: &Second) -> Option<f64> {
         let x = VelocityPoint { q: self.x.q.map(Rounded::from), v: self.x.v.map(Rounded::from), z: self.x.z.into() };
@@ -122,18 +125,20 @@ pub(crate) fn entries(m: &Moving) -> [Rounded; 3] {
     [m.re, m.d[0], m.d[1]]
 }
 
-/// The difference of a closed derivative from the derived one, relative to the terms of both; not a number where L has none.
+/// The difference of a closed derivative from the derived one, relative to the terms of both. It is infinite where only
+/// the closed one is not finite, and NaN where the derived one is not finite.
 fn mismatch(closed: Rounded, derived: Rounded) -> f64 {
     let relative = (closed - derived).relative();
     if relative.is_nan() && derived.relative().is_finite() { f64::INFINITY } else { relative }
 }
 
-/// How far the closed derivatives that an implementor gives are from the derived ones at a point: of the gradient and of the
-/// Hessian the largest difference, relative to the size of its terms. `None` where nothing is overridden; not a number where L
-/// is not smooth.
+/// The defects of the closed gradient and of the closed Hessian of a Lagrangian at a point: the largest difference from
+/// the derived ones, relative to the size of its terms. `None` where there is no closed form; NaN where L is not
+/// smooth.
 ///
-/// A correct closed form gives a few units of round-off, a wrong one something of the order of one, in whatever units. The
-/// derivatives are compared along directions without special symmetry. Call it in a test of your own, at several points.
+/// A correct closed form gives a few units of round-off, a wrong one a number of order one, independent of the units.
+/// The derivatives are compared along directions without special symmetry. Call this function in tests of a Lagrangian,
+/// at several points.
 pub fn check_closed_derivatives<const N: usize>(
     lagrangian: &impl Lagrangian<N>,
     t: f64,

@@ -3,12 +3,12 @@
 use crate::number::rounded::Rounded;
 use crate::{ChartVector, Derivatives, Lagrangian, VelocityPoint};
 
-/// What rounding may have changed of the value of L and of its gradient `(L_q, L_v, L_z)` at a point, to first order: the roundings of
-/// each operation, and one of each coordinate, carried to the result. Forces that cancel at an equilibrium are rounded like the terms
-/// that cancel.
+/// First-order bounds of the rounding errors of the value of L and of its gradient `(L_q, L_v, L_z)` at a point. They
+/// account for the rounding of each coordinate and of each operation, propagated to the result. Where forces cancel, as
+/// at an equilibrium, the bound is that of the terms that cancel.
 ///
 /// ```
-/// use contact_geom::{VelocityPoint, gradient_rounding, systems::Pendulum};
+/// use contact_geom::{VelocityPoint, systems::Pendulum, support::gradient_rounding};
 /// let x = VelocityPoint::new([1.0], [0.0], 0.0);
 /// let (_, rounding) = gradient_rounding(&Pendulum { gamma: -0.1 }, 0.0, &x);
 /// assert!((1e-17..1e-15).contains(&rounding.x[0])); // of a sine

@@ -1,11 +1,14 @@
-//! What is known of a Lagrangian's form, and how to see whether a claim holds.
+//! The declared structure of a Lagrangian, and the check of its claims.
 
 use crate::dynamics::probe::{Moving, Probe, entries};
 use crate::number::rounded::Rounded;
-use crate::{Lagrangian, VelocityPoint, max_abs_or_nan, max_or_nan};
+use crate::{
+    Lagrangian, VelocityPoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
 
-/// The declared structure of a Lagrangian: claims that let a method skip work. A claim that is not made costs time only; a
-/// false one would cost the answer, so [`Structure::defects`] measures each at a point.
+/// The declared structure of a Lagrangian: claims that allow a method to skip work. Omitting a claim costs only time,
+/// but a false claim makes results wrong; [`Structure::defects`] checks each claim at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Structure {
     /// L does not depend on t.
@@ -14,8 +17,8 @@ pub struct Structure {
     pub z_free: bool,
     /// `L = L0(t, q, v) + gamma(t) z`: the conformal factor depends on time alone.
     pub z_affine: bool,
-    /// `L_z` is one number, at all times too: the conformal factor is `e^(gamma (t - t0))`. Said by `z_affine` already where
-    /// L is autonomous.
+    /// `L_z` is constant, also in time: the conformal factor is `e^(gamma (t - t0))`. Where L is autonomous, this
+    /// follows from `z_affine`.
     pub constant_rate: bool,
     /// `L = v.Mv/2 - V(t, q) + f(t, z)` with constant M.
     pub separable: bool,
@@ -25,38 +28,40 @@ pub struct Structure {
     pub constant_mass: bool,
 }
 
-/// One claim on a Lagrangian with the size of what it says is zero.
+/// A claim on a Lagrangian, with the size of the derivatives that the claim states to be zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Defect {
     /// The name of the claim: a field of [`Structure`], or `closed_gradient` or `closed_hessian`.
     pub claim: &'static str,
-    /// The largest of the derivatives that the claim says vanish, each relative to the size of the terms that it is a sum of: a
-    /// few units of round-off where the claim holds, of the order of one where it does not, in whatever units.
+    /// The largest of the derivatives that the claim states to be zero, each relative to the size of the terms of which
+    /// it is a sum: a few units of round-off where the claim holds, of order one where it is violated, independent of
+    /// the units.
     pub size: f64,
 }
 
-/// The claims that are made, each with its size.
+/// The defects of the claims that are made.
 pub type Defects = std::iter::Flatten<std::array::IntoIter<Option<Defect>, 9>>;
 
 impl Structure {
-    /// Whether the claims say that `L_z` is constant.
+    /// Whether the claims imply that `L_z` is constant.
     pub fn has_constant_rate(&self) -> bool {
         self.constant_rate || self.z_free || (self.z_affine && self.autonomous)
     }
 
-    /// Whether the claims say that z does not act on the motion but by a rate that depends on time alone: L is affine in z.
+    /// Whether the claims imply that L is affine in z, so that z affects the motion only by a rate that depends on time
+    /// alone.
     pub fn is_affine_in_z(&self) -> bool {
         self.z_affine || self.z_free || self.constant_rate
     }
 
-    /// For each claim that is made, the size at one point of the derivatives that it says vanish; and that closed derivatives,
-    /// where there are any, are those of the value. `None` where L or one of these derivatives is not finite: L is not defined
-    /// or not smooth there, and nothing is said of its claims.
+    /// The defect at one point of each claim that is made. Closed derivatives, if there are any, are compared with
+    /// those of the value. `None` where L or one of these derivatives is not finite: L is not defined or not smooth
+    /// there, and its claims cannot be judged.
     ///
-    /// The claims concern derivatives up to the third, which are taken along directions without special symmetry: they see a
-    /// dependence unless the point is itself special. Rounding is told from a small number by the size of the terms that a
-    /// derivative is the sum of, which the numbers carry along; so the smallest dependence is seen that is not lost in the
-    /// rounding of L itself, and L times a constant gives the same sizes.
+    /// The claims concern derivatives up to third order. They are taken along directions without special symmetry, so
+    /// that a dependence is detected unless the point itself is special. A small derivative is distinguished from a
+    /// rounding error by the size of its terms, which is computed along with it. Hence every dependence is detected
+    /// that exceeds the rounding of L itself, and multiplying L by a constant leaves the sizes unchanged.
     pub fn defects<const N: usize>(
         &self,
         lagrangian: &impl Lagrangian<N>,
@@ -70,7 +75,7 @@ impl Structure {
             return None;
         }
         let worst = |sizes: &mut dyn Iterator<Item = Rounded>| max_abs_or_nan(sizes.map(Rounded::relative));
-        // A first or second derivative with its changes along the line and in time.
+        // Second derivatives, with their derivatives along the line and in time.
         let all = |second: [(usize, usize); 3]| worst(&mut second.into_iter().flat_map(|(i, j)| entries(&l.d[i].d[j])));
         let changes = |i: usize, j: usize| l.d[i].d[j].d[0];
         let in_time = |m: &Moving| m.d[1];
@@ -84,10 +89,10 @@ impl Structure {
             worst(&mut [value].into_iter().chain(firsts).chain(seconds.into_iter().flatten()).map(in_time))
         };
         let separable = || {
-            // A term linear in v, at this time or soon after.
+            // A term linear in v: its coefficient and the derivative of that in time.
             let linear = probe.at_rest().value(lagrangian).re.d[v];
             let linear = worst(&mut [linear.re, linear.d[1]].into_iter());
-            // At rest such a Lagrangian is defined where it is in motion.
+            // A separable Lagrangian that is defined for some velocity is also defined at rest.
             let linear = if linear.is_nan() { f64::INFINITY } else { linear };
             [constant_mass(), all([(q, v), (z, q), (z, v)])].into_iter().fold(linear, max_or_nan)
         };

@@ -1,14 +1,17 @@
-//! Time transformations: the variables in which steps are equal.
+//! Time transformations, by which steps of equal length in a new time vary in length in the physical time.
 
 use crate::Scalar;
 use nalgebra::SVector;
 
-/// A time transformation of an autonomous motion: the time tau with `dt = g(q) dtau`, whose rate g is positive where the motion goes.
+/// A time transformation of an autonomous system: a new time tau with `dt = g(q) dtau`, where the rate g is positive
+/// along the motion.
 ///
-/// Equal steps of tau are steps of t that follow g. That is the time transformation of Poincare and Levi-Civita: on T\*(Q x R) x R
-/// with coordinates `(q, t, p, p_t, z)` the contact Hamiltonian `K = g(q) (H(q, p, z) + p_t)` has on `K = 0` the motion of H
-/// in the time tau, and `K' = -K R(K)` with Reeb's field R keeps it there. So a contact method of fixed step for K is one of
-/// variable step for H; see Hairer, "Variable time step integration with symplectic methods", Appl. Numer. Math. 25 (1997).
+/// Equal steps in tau are steps in t that are proportional to g. This is the time transformation of Poincaré and
+/// Levi-Civita: on T\*(Q x R) x R with coordinates `(q, t, p, p_t, z)` the contact Hamiltonian
+/// `K = g(q) (H(q, p, z) + p_t)` has, on the surface `K = 0`, the motion of H in the time tau, and the surface is
+/// invariant since `K' = -K R(K)` with the Reeb field R. A contact method of fixed step size for K is therefore a
+/// method of variable step size for H; see Hairer, "Variable time step integration with symplectic methods", Appl.
+/// Numer. Math. 25 (1997).
 ///
 /// ```
 /// use contact_geom::{nalgebra::SVector, TimeTransformation, Scalar};

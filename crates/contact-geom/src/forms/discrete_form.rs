@@ -1,7 +1,7 @@
 //! The contact forms eta+ and eta- of a discrete Lagrangian on Q x Q x R.
 
 use crate::forms::fibre_form::{FibreForm, contact_form_by_fibre};
-use crate::linear::solve;
+use crate::support::linear::solve;
 use crate::{ChartVector, ContactForm, DiscretePoint, GeometryError, Regularity};
 use nalgebra::{DMatrix, SMatrix, SVector};
 

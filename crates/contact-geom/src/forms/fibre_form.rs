@@ -1,7 +1,7 @@
 //! Forms `dz - P(x, y, z) dx`, the pullbacks of Darboux' form along fibre maps: eta_L and eta-.
 
 use crate::forms::darboux::canonical_volume;
-use crate::linear::solve;
+use crate::support::linear::solve;
 use crate::{ChartVector, GeometryError};
 use nalgebra::{DMatrix, SMatrix, SVector};
 

@@ -1,6 +1,9 @@
 //! Points of the three contact manifolds, and the coordinates that they share.
 
-use crate::{Dual, GeometryError, MaxAbsOrNan, MaxOrNan, Scalar, TangentVector};
+use crate::{
+    Dual, GeometryError, Scalar,
+    numbers::{MaxAbsOrNan, MaxOrNan, TangentVector},
+};
 use nalgebra::{DVector, SVector};
 
 /// Coordinates `(x, y, z)` in `R^N x R^N x R`: of a point in a chart, of a tangent vector or of a covector.

@@ -1,7 +1,7 @@
 //! Pullbacks of contact forms: is a map contact, and with which conformal factor?
 
 use crate::forms::smooth::apply_transposed;
-use crate::{ChartVector, ContactForm, GeometryError, MaxAbsOrNan, Smooth};
+use crate::{ChartVector, ContactForm, GeometryError, Smooth, numbers::MaxAbsOrNan};
 use nalgebra::DMatrix;
 
 /// The pullback of a contact form along a map at a point, compared with the contact form there: `F* tau = sigma eta`?

@@ -3,7 +3,7 @@
 // The product and quotient rules mix operations: clippy takes that for a slip.
 #![allow(clippy::suspicious_arithmetic_impl)]
 
-use crate::{Scalar, TangentVector};
+use crate::{Scalar, numbers::TangentVector};
 use num_traits::{One, Zero};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 

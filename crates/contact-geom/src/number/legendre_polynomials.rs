@@ -6,7 +6,7 @@ use std::ops::{Add, Div, Mul, Sub};
 /// numbers of any precision, as the nodes of Gauss collocation ask for.
 ///
 /// ```
-/// let p: [f64; 4] = contact_geom::legendre_polynomials(3, 0.5);
+/// let p: [f64; 4] = contact_geom::support::legendre_polynomials(3, 0.5);
 /// assert_eq!(p, [1.0, 0.5, -0.125, -0.4375]);
 /// ```
 pub fn legendre_polynomials<T, const M: usize>(s: usize, x: T) -> [T; M]

@@ -35,7 +35,7 @@ pub fn solve<T: Scalar, D: Dim>(
     solve_in_kernel(a, b)
 }
 
-/// The same as a part of the code that calls it, for kernels over vector registers; see [`KernelDual`](crate::KernelDual).
+/// The same as a part of the code that calls it, for kernels over vector registers; see [`KernelDual`](crate::support::KernelDual).
 ///
 /// # Errors
 /// [`SingularMatrix`] where a pivot vanishes or is not finite.

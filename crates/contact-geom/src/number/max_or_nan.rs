@@ -6,7 +6,7 @@ use nalgebra::{Dim, Matrix, RawStorage};
 /// uses them cannot fail on it.
 ///
 /// ```
-/// use contact_geom::max_or_nan;
+/// use contact_geom::numbers::max_or_nan;
 /// assert_eq!(max_or_nan(1.0, 2.0), 2.0);
 /// assert!(max_or_nan(f64::NAN, 2.0).is_nan() && max_or_nan(2.0, f64::NAN).is_nan());
 /// ```
@@ -19,7 +19,7 @@ pub fn max_or_nan(a: f64, b: f64) -> f64 {
 /// The largest absolute value, 0 of nothing; not a number where an entry is not.
 ///
 /// ```
-/// use contact_geom::max_abs_or_nan;
+/// use contact_geom::numbers::max_abs_or_nan;
 /// assert_eq!(max_abs_or_nan([1.0, -3.0, 2.0]), 3.0);
 /// assert!(max_abs_or_nan([1.0, f64::NAN, 2.0]).is_nan());
 /// ```
@@ -45,7 +45,7 @@ impl MaxOrNan for f64 {
 /// [`max_abs_or_nan`] of a matrix or a vector, for which nalgebra's `amax` would lose a NaN.
 ///
 /// ```
-/// use contact_geom::{nalgebra::Vector2, MaxOrNan, MaxAbsOrNan};
+/// use contact_geom::{nalgebra::Vector2, numbers::{MaxOrNan, MaxAbsOrNan}};
 /// assert_eq!(Vector2::new(1.0, -3.0).max_abs_or_nan().max_or_nan(2.0), 3.0);
 /// assert!(Vector2::new(f64::NAN, -3.0).max_abs_or_nan().max_or_nan(2.0).is_nan());
 /// ```

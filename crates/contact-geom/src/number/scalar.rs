@@ -255,7 +255,7 @@ impl Scalar for f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Dual, KernelDual};
+    use crate::{Dual, support::KernelDual};
     use nalgebra::SVector;
 
     /// A number with a first and a second derivative along one direction.

@@ -1,6 +1,7 @@
-//! Systems with as many coordinates as one type.
+//! Enums of the systems with the same number of coordinates.
 
-/// An enum of systems with as many coordinates, as a system: what is generic over systems is compiled once for all of them.
+/// Defines an enum of systems with the same number of coordinates, which is itself a system. Code that is generic over
+/// systems is then compiled once for all of them.
 macro_rules! systems {
     ($(#[$of:meta])* $name:ident<$n:literal> { $($system:ident: $type:ty,)* }) => {
         $(#[$of])*

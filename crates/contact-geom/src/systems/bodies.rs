@@ -1,18 +1,20 @@
-//! Bodies in space that attract each other, with drag.
+//! The gravitational N-body problem in space, with drag.
 
 use crate::{ChartVector, Lagrangian, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
-/// Bodies in space with Newton's gravitation of each pair and linear drag,
-/// `L = sum m_i |v_i|^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z`. Body i has the coordinates `3i, 3i + 1, 3i + 2` of N: a planet and its sun
-/// are `Bodies<6>`. Units are those of G.
+/// Bodies in space with Newtonian gravitation between all pairs, and linear drag,
+/// `L = sum m_i |v_i|^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z`. Body i has the coordinates `3i, 3i + 1, 3i + 2`
+/// of N; a planet and its sun are `Bodies<6>`. Units are those of G.
 ///
-/// Herglotz' equation is `q_i'' = sum_j G m_j (q_j - q_i)/|q_j - q_i|^3 + gamma q_i'`; nonlinear, singular where two bodies meet, W diagonal.
-/// Translations and common rotations are symmetries: total and angular momentum decay as `e^(gamma t)`.
+/// Herglotz' equation is `q_i'' = sum_j G m_j (q_j - q_i)/|q_j - q_i|^3 + gamma q_i'`; nonlinear, singular where two
+/// bodies collide, W diagonal. Translations and common rotations are symmetries: total and angular momentum decay as
+/// `e^(gamma t)`.
 ///
-/// For few bodies over many revolutions Gauss collocation is the integrator to take: two to five steps in a period of the fastest. Its kernels are
-/// compiled for each N, so that this system is not one of [`visit_catalogue`](super::visit_catalogue). Any number of bodies:
-/// `bodies` of the crate `assembled-herglotz`.
+/// For few bodies over many revolutions, Gauss collocation with two to five steps per period of the fastest body is
+/// recommended. Its kernels are compiled for each N; this system is therefore not part of
+/// [`visit_catalogue`](super::visit_catalogue). For any number of bodies see `bodies` of the crate
+/// `assembled-herglotz`.
 ///
 /// ```
 /// use contact_geom::{Lagrangian, systems::Bodies};
@@ -22,16 +24,16 @@ use nalgebra::SVector;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bodies<const N: usize> {
-    /// The mass of each coordinate: that of its body.
+    /// The mass of each coordinate, which is that of its body.
     masses: SVector<f64, N>,
-    /// The constant of gravitation.
+    /// The gravitational constant.
     pub g: f64,
     /// The rate `L_z` of the conformal factor, negative for dissipation.
     pub gamma: f64,
 }
 
 impl<const N: usize> Bodies<N> {
-    /// Of bodies with these masses.
+    /// The system of bodies with masses `mass(i)`.
     pub fn new(mass: impl Fn(usize) -> f64, g: f64, gamma: f64) -> Self {
         const { assert!(N >= 6 && N.is_multiple_of(3), "two bodies have six coordinates, each further one has three") };
         Bodies { masses: SVector::from_fn(|d, _| mass(d / 3)), g, gamma }
@@ -42,7 +44,7 @@ impl<const N: usize> Bodies<N> {
         &self.masses
     }
 
-    /// From body i to body j, with the square of the distance and `G m_i m_j`.
+    /// The vector from body i to body j, with the square of its length and `G m_i m_j`.
     #[inline(always)]
     fn pair<T: Scalar>(&self, q: &SVector<T, N>, i: usize, j: usize) -> ([T; 3], T, f64) {
         let r = [q[3 * j] - q[3 * i], q[3 * j + 1] - q[3 * i + 1], q[3 * j + 2] - q[3 * i + 2]];

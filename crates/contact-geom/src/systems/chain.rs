@@ -4,27 +4,27 @@ use super::{System, between};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
-/// What holds the two ends of a [`Chain`].
+/// The boundary conditions of a [`Chain`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
-    /// A bond at each end to a wall: N + 1 bonds, with `q_0 = q_(N+1) = 0`.
+    /// Each end is bonded to a wall: `N + 1` bonds, with `q_0 = q_(N+1) = 0`.
     Fixed,
-    /// Nothing: N - 1 bonds.
+    /// Both ends are free: `N - 1` bonds.
     Free,
 }
 
-/// N particles on a line, bonds between neighbours, with drag: the beta chain of Fermi, Pasta, Ulam and Tsingou,
-/// `L = sum_i v_i^2/2 - sum_bonds (r^2/2 + beta r^4/4) + gamma z`, with r the lengthening of a bond. Dimensionless: masses
-/// and linear spring constants one.
+/// N particles on a line with bonds between neighbours and drag: the beta chain of Fermi, Pasta, Ulam and Tsingou,
+/// `L = sum_i v_i^2/2 - sum_bonds (r^2/2 + beta r^4/4) + gamma z`, where r is the elongation of a bond. Dimensionless:
+/// masses and linear spring constants are one.
 ///
-/// Herglotz' equations are `q_i'' = f(q_(i+1) - q_i) - f(q_i - q_(i-1)) + gamma q_i'`, `f(r) = r + beta r^3`, without the
-/// bonds that are not there; nonlinear unless `beta = 0`, W the identity. With free ends moving all sites together is a
-/// symmetry, and the total momentum decays as `e^(gamma t)`.
+/// Herglotz' equations are `q_i'' = f(q_(i+1) - q_i) - f(q_i - q_(i-1)) + gamma q_i'`, `f(r) = r + beta r^3`, where the
+/// terms of missing bonds are omitted; nonlinear unless `beta = 0`, W the identity. With free ends a common translation
+/// of all particles is a symmetry, and the total momentum decays as `e^(gamma t)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chain<const N: usize> {
-    /// What holds the ends.
+    /// The boundary conditions.
     pub ends: Ends,
-    /// The cubic part of the bonds' force.
+    /// The coefficient of the cubic part of the bonds' force.
     pub beta: f64,
     /// The rate `L_z` of the conformal factor, negative for dissipation.
     pub gamma: f64,
@@ -85,7 +85,7 @@ impl<const N: usize> System<N> for Chain<N> {
         }
     }
 
-    /// The longest wave of the linear chain at rest; with free ends on top of a drift.
+    /// The longest normal mode of the linear chain at rest; with free ends, a common drift is added.
     fn initial(&self) -> VelocityPoint<N> {
         let pi = std::f64::consts::PI;
         let wave = |i: usize| match self.ends {

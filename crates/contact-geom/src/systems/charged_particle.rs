@@ -8,9 +8,9 @@ use nalgebra::SVector;
 /// `L = |v|^2/2 + (b/2) (x v_y - y v_x) - k |q|^2/2 + gamma z`, `q = (x, y)`. Dimensionless: mass and charge one, b the
 /// cyclotron frequency.
 ///
-/// Herglotz' equations are `x'' = b y' - k x + gamma (x' - b y/2)`, `y'' = -b x' - k y + gamma (y' + b x/2)`; linear, W the
-/// identity, but L is not kinetic minus potential energy. The drag acts on the canonical momentum `p = v + A`, and so
-/// depends on the gauge: here the symmetric one, which keeps the rotations as symmetries.
+/// Herglotz' equations are `x'' = b y' - k x + gamma (x' - b y/2)`, `y'' = -b x' - k y + gamma (y' + b x/2)`; linear, W
+/// the identity, but L is not kinetic minus potential energy. The drag acts on the canonical momentum `p = v + A`, and
+/// therefore depends on the gauge. The symmetric gauge is used here, in which rotations are symmetries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChargedParticle {
     /// The magnetic field, as a cyclotron frequency.

@@ -1,4 +1,4 @@
-//! Quotients that closed forms are written with, without loss of digits at 0.
+//! Quotients that occur in closed-form solutions, without loss of digits near 0.
 
 /// `(e^x - 1) / x`, and 1 at 0.
 pub(super) fn relative_exp_m1(x: f64) -> f64 {
@@ -8,7 +8,7 @@ pub(super) fn relative_exp_m1(x: f64) -> f64 {
 /// `(e^x - 1 - x) / x^2`, and 1/2 at 0: the integral of `(1 - u) e^(x u)` over `[0, 1]`.
 pub(super) fn second_relative_exp(x: f64) -> f64 {
     if x.abs() < 1.0 {
-        // The terms x^k / (k + 2)!, from the last.
+        // The sum of the terms x^k / (k + 2)!, from the last to the first.
         (3..=20).rev().fold(1.0, |sum, k| 1.0 + sum * x / f64::from(k)) * 0.5
     } else {
         (x.exp_m1() - x) / x / x
@@ -19,7 +19,7 @@ pub(super) fn second_relative_exp(x: f64) -> f64 {
 /// `(f^2/2 - g)/x`.
 pub(super) fn third_relative_exp(x: f64) -> f64 {
     if x.abs() < 1.0 {
-        // The terms (2^(k-1) - 2) x^(k-3) / k!, from the last.
+        // The sum of the terms (2^(k-1) - 2) x^(k-3) / k!, from the last to the first.
         (3..=28).rev().fold(0.0, |sum, k| 2.0_f64.powi(k - 1) - 2.0 + sum * x / f64::from(k + 1)) / 6.0
     } else {
         let e = x.exp_m1();
@@ -38,7 +38,8 @@ mod tests {
 
     #[test]
     fn the_series_and_the_closed_forms_are_one_function() {
-        // Where both are good; three terms of the size of one, divided by at most 1/8: some 30 units.
+        // Where both are accurate. Three terms of size one are divided by at least 1/8, which gives some 30 units of
+        // round-off.
         for x in [-0.999_999, -0.75, -0.5, 0.5, 0.75, 0.999_999] {
             let e = f64::exp_m1(x);
             let (second, third) = ((e - x) / (x * x), (e * e * 0.5 - e + x) / (x * x * x));
@@ -51,7 +52,7 @@ mod tests {
             let (sum, root) = (second_relative_exp(x) + second_relative_exp(-x), (x * 0.5).sinh() / (x * 0.5));
             assert!((sum - root * root).abs() <= 16.0 * f64::EPSILON * sum, "{x}");
         }
-        // For large negative x only the polynomials are left.
+        // For large negative x only the polynomial terms remain.
         assert!((third_relative_exp(-1e3) - 998.5e-9).abs() <= 4.0 * f64::EPSILON * 1e-6);
     }
 }

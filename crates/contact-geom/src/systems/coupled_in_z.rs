@@ -5,20 +5,21 @@ use crate::{Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use nalgebra::SVector;
 
 /// A pendulum whose inertia depends on its position and its action, and grows with its speed:
-/// `L = (1 + a cos q cos z) v^2/2 + b v^4/4 - (1 - cos q) + gamma z`, with `|a| < 1` and `b >= 0`. Dimensionless: as
+/// `L = (1 + a cos q cos z) v^2/2 + b v^4/4 - (1 - cos q) + gamma z`, with `|a| < 1` and `b >= 0`. Dimensionless, like
 /// [`Pendulum`](super::Pendulum).
 ///
 /// With `m = 1 + a cos q cos z` Herglotz' equation is
-/// `(m + 3 b v^2) q'' = -m_q v^2/2 - m_z v L - sin q + (m v + b v^3) (gamma + m_z v^2/2)`. `W = m + 3 b v^2` depends on all
-/// of q, v and z, and is at least `1 - |a|` everywhere. It has no other structure than to be autonomous: what holds here
-/// holds for every regular L. No formula for H: that of p asks for the root of a cubic.
+/// `(m + 3 b v^2) q'' = -m_q v^2/2 - m_z v L - sin q + (m v + b v^3) (gamma + m_z v^2/2)`. `W = m + 3 b v^2` depends on
+/// all of q, v and z, and is at least `1 - |a|` everywhere. The system is autonomous and has no other structure, so
+/// that it tests statements for general regular L. For `b > 0` there is no formula for H, since v as a function of p is
+/// the root of a cubic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoupledInZ {
-    /// How much the inertia depends on position and action; below one in absolute value.
+    /// The strength of the dependence of the inertia on position and action; below one in absolute value.
     pub a: f64,
-    /// How much it grows with the speed; not negative.
+    /// The strength of the growth of the inertia with the speed; not negative.
     pub b: f64,
-    /// The part of `L_z` that does not depend on the point, negative for dissipation.
+    /// The part of `L_z` that does not depend on the state, negative for dissipation.
     pub gamma: f64,
 }
 

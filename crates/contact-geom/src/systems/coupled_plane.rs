@@ -1,4 +1,4 @@
-//! Two degrees of freedom in which everything is coupled.
+//! A system with two degrees of freedom in which positions, velocities and action are all coupled.
 
 use super::{System, between};
 use crate::{Lagrangian, Scalar, Structure, VelocityPoint};
@@ -9,12 +9,12 @@ use nalgebra::SVector;
 /// `L = ((1 + a cos x) v_x^2 + (1 + a sin y cos z) v_y^2)/2 + b z (x v_y - y v_x) - (x^2 + 2 y^2)/2 - x^2 y/3 - c z^2/2`, with
 /// `|a| < 1`. Dimensionless: mass one, time in units of the inverse frequency along x.
 ///
-/// Herglotz' equations are those of this L written out; no second derivative in (q, v, z) is constant, W is diagonal and at
-/// least `1 - |a|`. The system to see that a formula holds in more than one dimension and with `L_qz`, `L_vz` and `W_z` all
-/// different from zero.
+/// Herglotz' equations are those of this L. No block of second derivatives in `(q, v, z)` is constant, and W is
+/// diagonal with entries of at least `1 - |a|`. The system tests formulas in more than one dimension and with `L_qz`,
+/// `L_vz` and `W_z` all different from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoupledPlane {
-    /// How much the inertia depends on position and action; below one in absolute value.
+    /// The strength of the dependence of the inertia on position and action; below one in absolute value.
     pub a: f64,
     /// The strength of the magnetic term, in inverse units of action.
     pub b: f64,

@@ -12,7 +12,7 @@ use nalgebra::SVector;
 /// energy. W depends on `q1 - q2`, with determinant `m2 l1^2 l2^2 (m1 + m2 sin^2(q1 - q2)) > 0`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoublePendulum {
-    /// The masses: of the upper bob, and of the lower one.
+    /// The masses of the upper and of the lower bob.
     pub masses: [f64; 2],
     /// The lengths of the upper and of the lower rod.
     pub lengths: [f64; 2],
@@ -34,7 +34,7 @@ impl DoublePendulum {
         ((m1 + m2) * l1 * l1, m2 * l2 * l2, m2 * l1 * l2)
     }
 
-    /// The potential energy, zero with both rods hanging.
+    /// The potential energy, zero where both rods hang down.
     #[inline(always)]
     fn potential<T: Scalar>(&self, q: &SVector<T, 2>) -> T {
         let ([m1, m2], [l1, l2]) = (self.masses, self.lengths);

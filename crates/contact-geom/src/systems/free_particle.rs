@@ -8,7 +8,7 @@ use nalgebra::SVector;
 /// A free particle with linear drag, `L = v^2/2 + gamma z`. Dimensionless: any units of length and time in which the mass
 /// is one.
 ///
-/// Herglotz' equation is `q'' = gamma q'`; linear, W = 1. Everything is known in closed form, see
+/// Herglotz' equation is `q'' = gamma q'`; linear, W = 1. The motion is known in closed form; see
 /// [`solution`](Self::solution) and [`velocity_through`](Self::velocity_through).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeParticle {
@@ -33,7 +33,8 @@ impl FreeParticle {
         VelocityPoint::new([q + v * s], [v * sigma], (start.z + v * v * (0.5 * s)) * sigma)
     }
 
-    /// The initial velocity of the motion from `q0` to `q1` in time `h`; `None` for `h = 0`, which has none or all.
+    /// The initial velocity of the motion from `q0` to `q1` in time `h`; `None` for `h = 0`, where there is none or it
+    /// is not unique.
     pub fn velocity_through(&self, q0: f64, q1: f64, h: f64) -> Option<f64> {
         Some((q1 - q0) / (h * relative_exp_m1(self.gamma * h))).filter(|v| v.is_finite())
     }

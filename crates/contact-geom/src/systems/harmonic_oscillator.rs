@@ -8,8 +8,9 @@ use nalgebra::SVector;
 /// The harmonic oscillator with linear drag, `L = v^2/2 - q^2/2 + gamma z`. Dimensionless: time in units of the inverse
 /// frequency of the undamped oscillator.
 ///
-/// Herglotz' equation is `q'' = -q + gamma q'`; linear, W = 1. Damped below `|gamma| = 2`, critical there, overdamped
-/// beyond; [`solution`](Self::solution) covers all three. The energy `v^2/2 + q^2/2 - gamma z` decays as `e^(gamma t)`.
+/// Herglotz' equation is `q'' = -q + gamma q'`; linear, W = 1. It is underdamped for `|gamma| < 2`, critically damped
+/// at 2 and overdamped beyond; [`solution`](Self::solution) covers all three cases. The energy
+/// `v^2/2 + q^2/2 - gamma z` decays as `e^(gamma t)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HarmonicOscillator {
     /// The rate `L_z` of the conformal factor, negative for dissipation.
@@ -25,11 +26,11 @@ impl Default for HarmonicOscillator {
 impl HarmonicOscillator {
     /// The entries `(a, b, s)` of the propagator: `q = a q0 + s v0`, `v = b v0 - s q0` after time `t`.
     ///
-    /// Below the critical drag, with `d = 1 - gamma^2/4` and `w = sqrt d`: `s = e^(gamma t/2) sin(w t)/w`. Beyond it, with
-    /// the exponents `fast` and `slow`, `fast slow = 1`: `s = (e^(fast t) - e^(slow t)) / (fast - slow)`.
+    /// Below the critical drag, with `d = 1 - gamma^2/4` and `w = sqrt d`: `s = e^(gamma t/2) sin(w t)/w`. Above it,
+    /// with the exponents `fast` and `slow`, `fast slow = 1`: `s = (e^(fast t) - e^(slow t)) / (fast - slow)`.
     fn propagator(&self, t: f64) -> (f64, f64, f64) {
         let half = self.gamma * 0.5;
-        // Rounded once, so that no digit is lost near the critical drag nor near none.
+        // Rounded once, so that no digits are lost near critical drag or near zero drag.
         let d = (-half).mul_add(half, 1.0);
         if d > 0.0 {
             let (growth, angle) = ((half * t).exp(), d.sqrt() * t);
@@ -40,7 +41,7 @@ impl HarmonicOscillator {
             let fast = half + sigma.copysign(half);
             let slow = fast.recip();
             let (e_fast, e_slow) = ((fast * t).exp(), (slow * t).exp());
-            // The larger exponential in front: nothing overflows unless the answer does.
+            // The larger exponential is factored out, so that nothing overflows unless the result does.
             let s = t * e_fast.max(e_slow) * relative_exp_m1(-2.0 * sigma * t.abs());
             (e_slow - slow * s, e_fast + slow * s, s)
         }
@@ -58,8 +59,9 @@ impl HarmonicOscillator {
         VelocityPoint::new([q], [v], start.z * (self.gamma * t).exp() + (v * v0 - q * q0) * (0.5 * s))
     }
 
-    /// The initial velocity of the motion from `q0` to `q1` in time `h`; `None` where there is none or not one: at
-    /// `h = 0` and at the conjugate points `sin(w h) = 0`, `w = sqrt(1 - gamma^2/4)`, to within the rounding of `w h`.
+    /// The initial velocity of the motion from `q0` to `q1` in time `h`; `None` where there is none or it is not
+    /// unique: at `h = 0` and at the conjugate points `sin(w h) = 0`, `w = sqrt(1 - gamma^2/4)`, to within the rounding
+    /// of `w h`.
     pub fn velocity_through(&self, q0: f64, q1: f64, h: f64) -> Option<f64> {
         let (a, _, s) = self.propagator(h);
         // sin(w h) / (w h); four units cover the roundings of w and of h.
@@ -132,7 +134,7 @@ mod tests {
         VelocityPoint::new([at(&q)], [at(&v)], at(&z))
     }
 
-    /// Compares with the size of the point, z being quadratic in the others.
+    /// Compares two points relative to their size, and z, which is quadratic in q and v, relative to the square of it.
     fn assert_close(x: &VelocityPoint<1>, y: &VelocityPoint<1>, scale: f64, units: f64, what: &str) {
         let size = scale.max(x.q[0].abs()).max(x.v[0].abs());
         for (a, b, size) in [(x.q[0], y.q[0], size), (x.v[0], y.v[0], size), (x.z, y.z, x.z.abs().max(size * size))] {
@@ -171,7 +173,7 @@ mod tests {
             let energy = |x: &VelocityPoint<1>| (x.v[0] * x.v[0] + x.q[0] * x.q[0]) * 0.5 - gamma * x.z;
             let once = system.solution(t1 + t2, &start);
             let twice = system.solution(t2, &system.solution(t1, &start));
-            // The exponents are rounded: at most `|gamma t|` units, several times.
+            // The rounding of the exponents contributes at most `|gamma t|` units, several times.
             let units = 32.0 + 8.0 * gamma.abs() * (t1 + t2);
             assert_close(&once, &twice, 0.0, units, &format!("gamma = {gamma}"));
             let size = once.q[0] * once.q[0] + once.v[0] * once.v[0] + (gamma * once.z).abs();
@@ -186,7 +188,7 @@ mod tests {
         for (gamma, h) in GAMMAS.into_iter().flat_map(|gamma| [1e-3, 0.1, 0.5, 2.0, 4.0].map(|h| (gamma, h))) {
             let system = HarmonicOscillator { gamma };
             let (end, (a, _, s)) = (system.solution(h, &start).q[0], system.propagator(h));
-            // The condition of the problem: how a rounding of the two positions moves the velocity.
+            // The condition number of the problem: the sensitivity of the velocity to a rounding of the two positions.
             let condition = 1.0 + ((a * 0.3).abs() + end.abs()) / s.abs();
             let Some(v) = system.velocity_through(0.3, end, h) else { unreachable!("{h} is not conjugate") };
             assert!((v - 1.7).abs() <= 16.0 * EPS * condition, "gamma = {gamma}, h = {h}: {v}");

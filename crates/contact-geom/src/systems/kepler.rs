@@ -4,14 +4,14 @@ use super::{System, between};
 use crate::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, TimeTransformation, VelocityPoint};
 use nalgebra::SVector;
 
-/// Kepler's problem with linear drag, `L = |v|^2/2 + mu/|q| + gamma z` in R^D. Dimensionless: lengths in units of the
-/// semi-major axis of the natural start, times in units of its period over 2 pi, when `mu = 1`.
+/// Kepler's problem with linear drag, `L = |v|^2/2 + mu/|q| + gamma z` in R^D. Dimensionless: for `mu = 1`, lengths are
+/// in units of the semi-major axis of the default initial orbit, times in units of its period over 2 pi.
 ///
-/// Herglotz' equation is `q'' = -mu q/|q|^3 + gamma q'`; nonlinear, singular at `q = 0`, W the identity. Every rotation is
-/// a symmetry: the angular momenta decay as `e^(gamma t)`, and so the orbit stays in its plane.
+/// Herglotz' equation is `q'' = -mu q/|q|^3 + gamma q'`; nonlinear, singular at `q = 0`, W the identity. Every rotation
+/// is a symmetry: the angular momenta decay as `e^(gamma t)`, and the orbit stays in its plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kepler<const D: usize> {
-    /// The attraction of the centre: the gravitational constant times its mass.
+    /// The gravitational parameter: the gravitational constant times the mass of the centre.
     pub mu: f64,
     /// The rate `L_z` of the conformal factor, negative for dissipation.
     pub gamma: f64,
@@ -82,15 +82,15 @@ impl<const D: usize> System<D> for Kepler<D> {
 }
 
 impl<const D: usize> Kepler<D> {
-    /// The natural time transformation: its rate `|q|^(3/2)` is the time of fall to the centre but for a factor, so that all passages of the
-    /// centre, near or far, take as many steps.
+    /// The natural time transformation. Its rate `|q|^(3/2)` is proportional to the free-fall time to the centre, so
+    /// that close and distant passages of the centre take the same number of steps.
     pub fn time_transformation(&self) -> Radial {
         Radial { exponent: 1.5 }
     }
 }
 
-/// the time transformation `g = |q|^a`. Of Kepler's problem the times are the eccentric anomaly for `a = 1` and the true one for `a = 2`, but
-/// for constant factors and without drag.
+/// The time transformation `g = |q|^a`. For Kepler's problem without drag, tau is up to a constant factor the eccentric
+/// anomaly for `a = 1` and the true anomaly for `a = 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Radial {
     /// The exponent `a`.
@@ -101,7 +101,7 @@ impl<const D: usize> TimeTransformation<D> for Radial {
     #[inline(always)]
     fn rate<T: Scalar>(&self, q: &SVector<T, D>) -> T {
         let (square, halves) = (q.dot(q), 2.0 * self.exponent);
-        // Vector registers have roots and products, and no powers.
+        // SIMD registers support square roots and products, but no general powers.
         if halves.fract() == 0.0 && halves.abs() <= 64.0 {
             square.sqrt().sqrt().powi(halves as i32)
         } else {
@@ -130,12 +130,12 @@ pub(super) fn pericentre<const D: usize>(mu: f64) -> VelocityPoint<D> {
     VelocityPoint { q, v, z: 0.0 }
 }
 
-/// Positions at distances 0.4 to 2 from the centre, in spherical coordinates of R^D.
+/// A sample with the position at a distance of 0.4 to 2 from the centre, in spherical coordinates of R^D.
 pub(super) fn sample_annulus<const D: usize>(u: &[f64]) -> (f64, VelocityPoint<D>) {
     let mut radius = between(0.4, 2.0, u[0]);
     let mut q = SVector::zeros();
     for i in 0..D {
-        // Each coordinate but the last takes its part of the radius that is left.
+        // Each coordinate except the last takes its part of the remaining radius.
         let (sin, cos) = if i + 1 < D { (std::f64::consts::TAU * u[i + 1]).sin_cos() } else { (0.0, 1.0) };
         q[i] = radius * cos;
         radius *= sin;

@@ -11,8 +11,8 @@ use nalgebra::SVector;
 /// factor from t to r is `(t/r)^2`. Bravetti, Seri, Vermeeren and Zadra, "Numerical integration in celestial mechanics: a
 /// case for contact geometry", Celest. Mech. Dyn. Astron. 132 (2020).
 ///
-/// The default index is 5: the only nonlinear one with a closed form, smooth and positive for all t. (At 0 and 1 the
-/// equation is linear, which flatters the order of a method.)
+/// The default index is 5: the only nonlinear case with a closed form, smooth and positive for all t. (For indices 0
+/// and 1 the equation is linear, which can make the order of a method appear too high.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneEmden {
     /// The polytropic index n.
@@ -26,10 +26,11 @@ impl Default for LaneEmden {
 }
 
 impl LaneEmden {
-    /// The regular motion, `q = 1`, `q' = 0`, `z = 0` at `t = 0`, at the time t; known for `n` = 0, 1, 5.
+    /// The regular motion, `q = 1`, `q' = 0`, `z = 0` at `t = 0`, at the time t; known in closed form for `n` = 0, 1,
+    /// 5.
     ///
-    /// `q = 1 - t^2/6`, `sin(t)/t`, `(1 + t^2/3)^(-1/2)`; and `t^2 z = t^2 q v/2 + (1/2 - 1/(n+1)) I` where I, the integral
-    /// of `t^2 q^(n+1)`, is known for them as well.
+    /// `q = 1 - t^2/6`, `sin(t)/t`, `(1 + t^2/3)^(-1/2)`; and `t^2 z = t^2 q v/2 + (1/2 - 1/(n+1)) I` where I, the
+    /// integral of `t^2 q^(n+1)`, is known for these indices as well.
     pub fn solution(&self, t: f64) -> Option<VelocityPoint<1>> {
         if t.abs() < 0.5 && matches!(self.n, 0 | 1 | 5) {
             // The closed forms of v and I lose digits near 0.

@@ -5,10 +5,11 @@ use crate::{ChartVector, PhasePoint, Scalar, SmoothFunction};
 /// A forced Liénard system `q'' + f(q) q' + F(q, t) = 0` as the contact Hamiltonian `H = p z + f(q) z + F(q, t)` on
 /// T\*R x R. Dimensionless.
 ///
-/// Here `z` is not an action but the velocity: `q' = H_p = z` and `z' = p H_p - H = -f(q) z - F(q, t)`. H is affine in p, so
-/// its fibre derivative is not a diffeomorphism and no regular Lagrangian gives it. The momentum obeys a Riccati equation,
-/// `p' = -p^2 - f p - f' z - F_q`, and usually reaches infinity in finite time; q and z do not feel it. Zadra, Bravetti and
-/// Seri, "Geometric numerical integration of Liénard systems via a contact Hamiltonian approach", Mathematics 9 (2021).
+/// Here `z` is not an action but the velocity: `q' = H_p = z` and `z' = p H_p - H = -f(q) z - F(q, t)`. H is affine in
+/// p, so its fibre derivative is not a diffeomorphism and there is no corresponding regular Lagrangian. The momentum
+/// obeys a Riccati equation, `p' = -p^2 - f p - f' z - F_q`, and usually blows up in finite time; q and z do not depend
+/// on it. Zadra, Bravetti and Seri, "Geometric numerical integration of Liénard systems via a contact Hamiltonian
+/// approach", Mathematics 9 (2021).
 ///
 /// `f` and `F` are polynomials in q, with the periodic forcing `-amplitude cos(omega t)` in F.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +32,7 @@ impl Default for Lienard {
 }
 
 impl Lienard {
-    /// A natural start: `q = 1.5` at rest, on the momentum `p = 0`.
+    /// Natural initial data: `q = 1.5` at rest, with the momentum `p = 0`.
     pub fn initial(&self) -> PhasePoint<1> {
         PhasePoint::new([1.5], [0.0], 0.0)
     }
@@ -46,7 +47,7 @@ impl SmoothFunction<1> for Lienard {
     }
 }
 
-/// The polynomial with these coefficients, lowest first.
+/// The polynomial with these coefficients, lowest degree first.
 #[inline(always)]
 fn horner<T: Scalar>(coefficients: &[f64], q: T) -> T {
     coefficients.iter().rev().fold(T::zero(), |sum, c| sum * q + *c)

@@ -1,6 +1,7 @@
-//! The catalogue: mechanical systems with dissipation, one file each.
+//! The catalogue of mechanical systems with dissipation, one file each.
 //!
-//! Every theorem test of the workspace runs over all of them; a new system joins [`visit_catalogue`] and is tested at once.
+//! Every theorem test of the workspace runs over all of them; a new system is tested once it is added to
+//! [`visit_catalogue`].
 
 mod as_one;
 mod bodies;
@@ -48,7 +49,7 @@ use crate::{ChartVector, Hessian, Lagrangian, PhasePoint, Scalar, Structure, Sym
 use as_one::systems;
 use nalgebra::SVector;
 
-/// A system of the catalogue: a regular Lagrangian with what is known of it.
+/// A system of the catalogue: a regular Lagrangian with initial data, sample points, and its known properties.
 pub trait System<const N: usize>: Lagrangian<N> {
     /// The name in tables, in lower case with underscores.
     fn name(&self) -> &'static str;
@@ -61,8 +62,9 @@ pub trait System<const N: usize>: Lagrangian<N> {
         0.0
     }
 
-    /// A time and a point of the domain on which L is smooth and regular, away from its boundary: the image of `2N + 2`
-    /// numbers of `[0, 1]`. Covers the region that a user would visit, and is what random tests draw from.
+    /// A sample time and a sample point of the domain on which L is smooth and regular, away from its boundary: the
+    /// image of `2N + 2` numbers of `[0, 1]`. The samples cover the region of typical use; randomised tests draw from
+    /// them.
     fn sample(&self, u: &[f64]) -> (f64, VelocityPoint<N>);
 
     /// The Hamiltonian `H` with `E_L = H o FL`, where it is known in closed form.
@@ -77,9 +79,9 @@ pub trait System<const N: usize>: Lagrangian<N> {
 }
 
 systems! {
-    /// The systems of the catalogue in one coordinate, as one system.
+    /// The systems of the catalogue with one coordinate, as one type.
     ///
-    /// For speed take a system's own type: a kernel for this one asks which it is, at each evaluation.
+    /// A system's own type is faster: a kernel for this type selects the system at each evaluation.
     OneCoordinate<1> {
         FreeParticle: FreeParticle,
         HarmonicOscillator: HarmonicOscillator,
@@ -93,9 +95,10 @@ systems! {
 }
 
 systems! {
-    /// The systems of the catalogue in two coordinates, as one system; [`Kepler`] states a time transformation and stays a type of its own.
+    /// The systems of the catalogue with two coordinates, as one type. [`Kepler`] has a time transformation and is not
+    /// included.
     ///
-    /// For speed take a system's own type: a kernel for this one asks which it is, at each evaluation.
+    /// A system's own type is faster: a kernel for this type selects the system at each evaluation.
     TwoCoordinates<2> {
         UniformField: UniformField<2>,
         SphericalPendulum: SphericalPendulum,
@@ -106,14 +109,14 @@ systems! {
     }
 }
 
-/// Something done to every system, whatever its dimension.
+/// A computation that is applied to systems of any dimension.
 pub trait SystemVisitor {
-    /// Does it to one system.
+    /// Applies the computation to one system.
     fn visit<const N: usize, S: System<N>>(&mut self, system: &S);
 }
 
-/// Visits every regular system of the catalogue with its natural parameters. [`Lienard`] and
-/// [`VanDerPol`] are not among them: they have a contact Hamiltonian, but no regular Lagrangian.
+/// Visits every regular system of the catalogue with its natural parameters. [`Lienard`] and [`VanDerPol`] are not
+/// included: they have a contact Hamiltonian, but no regular Lagrangian.
 pub fn visit_catalogue(visitor: &mut impl SystemVisitor) {
     let one = |system: OneCoordinate, visitor: &mut _| SystemVisitor::visit(visitor, &system);
     let two = |system: TwoCoordinates, visitor: &mut _| SystemVisitor::visit(visitor, &system);

@@ -5,20 +5,21 @@ use super::kepler::{attraction, pericentre, sample_annulus};
 use crate::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 use nalgebra::SVector;
 
-/// Kepler's problem in the plane with a drag that changes sign periodically, `L = |v|^2/2 + mu/|q| + alpha sin(theta t) z`.
-/// Dimensionless: as [`Kepler`](super::Kepler).
+/// Kepler's problem in the plane with a drag that changes sign periodically,
+/// `L = |v|^2/2 + mu/|q| + alpha sin(theta t) z`. Dimensionless, like [`Kepler`](super::Kepler).
 ///
-/// Herglotz' equation is `q'' = -mu q/|q|^3 + alpha sin(theta t) q'`; nonlinear, singular at `q = 0`, W the identity. The
-/// conformal factor `exp(alpha (1 - cos(theta t)) / theta)` from `t = 0` depends on time alone and comes back to one, so
-/// nothing is lost on average. One of the family `q'' + grad V + f(t) q' = 0` of Bravetti, Seri, Vermeeren and Zadra,
-/// "Numerical integration in celestial mechanics: a case for contact geometry", Celest. Mech. Dyn. Astron. 132 (2020).
+/// Herglotz' equation is `q'' = -mu q/|q|^3 + alpha sin(theta t) q'`; nonlinear, singular at `q = 0`, W the identity.
+/// The conformal factor `exp(alpha (1 - cos(theta t)) / theta)` from `t = 0` depends on time alone and returns to one
+/// periodically, so that there is no dissipation on average. The system is one of the family
+/// `q'' + grad V + f(t) q' = 0` of Bravetti, Seri, Vermeeren and Zadra, "Numerical integration in celestial mechanics:
+/// a case for contact geometry", Celest. Mech. Dyn. Astron. 132 (2020).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PerturbedKepler {
-    /// The attraction of the centre: the gravitational constant times its mass.
+    /// The gravitational parameter: the gravitational constant times the mass of the centre.
     pub mu: f64,
-    /// The largest rate `L_z` of the conformal factor.
+    /// The amplitude of the rate `L_z` of the conformal factor.
     pub alpha: f64,
-    /// The angular frequency at which the rate changes.
+    /// The angular frequency of the rate.
     pub theta: f64,
 }
 

@@ -12,7 +12,7 @@ use nalgebra::SVector;
 /// "Contact variational integrators", J. Phys. A 52 (2019), treat it as an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadraticInZ {
-    /// The strength of the drag, relative to the action.
+    /// The strength of the drag per unit of action.
     pub c: f64,
 }
 

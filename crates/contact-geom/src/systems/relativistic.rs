@@ -8,7 +8,7 @@ use nalgebra::SVector;
 /// mass, spring constant and speed of light one.
 ///
 /// Herglotz' equation is `p' = -q + gamma p` with `p = v / sqrt(1 - v^2)`; nonlinear through the kinetic term alone.
-/// `W = (1 - v^2)^(-3/2)` depends on the velocity and has no bound at `|v| = 1`.
+/// `W = (1 - v^2)^(-3/2)` depends on the velocity and is unbounded as `|v|` approaches 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relativistic {
     /// The rate `L_z` of the conformal factor, negative for dissipation.
@@ -24,7 +24,7 @@ impl Default for Relativistic {
 impl Lagrangian<1> for Relativistic {
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        // As a product, 1 - v^2 keeps its digits near the speed of light.
+        // As a product, 1 - v^2 is accurate near the speed of light.
         let proper = ((-v[0] + 1.0) * (v[0] + 1.0)).sqrt();
         z * self.gamma - q[0] * q[0] * 0.5 - proper
     }

@@ -9,7 +9,7 @@ use nalgebra::SVector;
 ///
 /// Herglotz' equations are `theta'' = sin theta cos theta phi'^2 - sin theta + gamma theta'` and
 /// `(sin^2 theta phi')' = gamma sin^2 theta phi'`; nonlinear. `W = diag(1, sin^2 theta)` depends on the position, and is
-/// singular at the two poles of the chart, `theta = 0` and `pi`. Turning about the vertical is a symmetry.
+/// singular at the two poles of the chart, `theta = 0` and `pi`. Rotations about the vertical are a symmetry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphericalPendulum {
     /// The rate `L_z` of the conformal factor, negative for dissipation.

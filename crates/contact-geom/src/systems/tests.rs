@@ -1,18 +1,19 @@
-//! What every system of the catalogue declares, measured at its start and at points of its domain.
+//! The declared properties of every system of the catalogue, checked at its initial data and at points of its domain.
 
 use super::*;
-use crate::linear::solve;
+use crate::support::linear::solve;
 use crate::{ChartVector, Derivatives, OneParameterGroup};
 use nalgebra::{SMatrix, SVector};
 
-/// Weyl's sequence: multiples of numbers that are independent over the rationals fill the cube evenly.
+/// Weyl's sequence: the fractional parts of multiples of numbers that are independent over the rationals are
+/// equidistributed in the cube.
 fn weyl(k: u32, length: usize) -> Vec<f64> {
     const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
     assert!(length <= PRIMES.len());
     PRIMES[..length].iter().map(|p| (f64::from(k + 1) * p.sqrt()).fract()).collect()
 }
 
-/// The condition number of a matrix in the norm of its rows' sums; infinite where it is singular.
+/// The condition number of a matrix in the maximum row sum norm; infinite where it is singular.
 fn condition<const N: usize>(w: &SMatrix<f64, N, N>) -> f64 {
     let norm = |m: &SMatrix<f64, N, N>| m.row_iter().map(|r| r.abs().sum()).fold(0.0, f64::max);
     let mut inverse = SMatrix::<f64, N, N>::zeros();
@@ -26,7 +27,7 @@ fn condition<const N: usize>(w: &SMatrix<f64, N, N>) -> f64 {
     norm(w) * norm(&inverse)
 }
 
-/// Does something to every system at its start and at 64 points of its domain.
+/// Applies a computation to every system at its initial data and at 64 points of its domain.
 struct AtSamples<F>(F);
 
 trait AtPoint {

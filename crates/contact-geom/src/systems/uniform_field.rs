@@ -8,8 +8,8 @@ use nalgebra::SVector;
 /// A particle falling in a uniform field with linear drag, `L = |v|^2/2 + a . q + gamma z` in R^D. Dimensionless: any units
 /// in which the mass is one; natural are those in which the field is one.
 ///
-/// Herglotz' equation is `q'' = a + gamma q'`; linear, inhomogeneous, W the identity. The velocity tends to `-a/gamma` for
-/// `gamma < 0`. Translations perpendicular to the field are symmetries. Everything is known in closed form, see
+/// Herglotz' equation is `q'' = a + gamma q'`; linear, inhomogeneous, W the identity. The velocity tends to `-a/gamma`
+/// for `gamma < 0`. Translations perpendicular to the field are symmetries. The motion is known in closed form; see
 /// [`solution`](Self::solution) and [`velocity_through`](Self::velocity_through).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UniformField<const D: usize> {
@@ -52,7 +52,8 @@ impl<const D: usize> UniformField<D> {
         }
     }
 
-    /// The initial velocity of the motion from `q0` to `q1` in time `h`; `None` for `h = 0`, which has none or all.
+    /// The initial velocity of the motion from `q0` to `q1` in time `h`; `None` for `h = 0`, where there is none or it
+    /// is not unique.
     pub fn velocity_through(&self, q0: &SVector<f64, D>, q1: &SVector<f64, D>, h: f64) -> Option<SVector<f64, D>> {
         let x = self.gamma * h;
         let (f, g) = (relative_exp_m1(x), second_relative_exp(x));
@@ -85,7 +86,7 @@ impl<const D: usize> System<D> for UniformField<D> {
         "uniform_field"
     }
 
-    /// A throw at 45 degrees from the origin.
+    /// A throw from the origin at 45 degrees.
     fn initial(&self) -> VelocityPoint<D> {
         let v = SVector::from_fn(|i, _| if i == 0 || i + 1 == D { 1.0 } else { 0.0 });
         VelocityPoint { q: SVector::zeros(), v, z: 0.0 }
@@ -111,7 +112,10 @@ impl<const D: usize> System<D> for UniformField<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Derivatives, MaxAbsOrNan, MaxOrNan, OneParameterGroup};
+    use crate::{
+        Derivatives, OneParameterGroup,
+        numbers::{MaxAbsOrNan, MaxOrNan},
+    };
 
     const GAMMAS: [f64; 9] = [-1e3, -40.0, -2.5, -0.1, -1e-9, 0.0, 1e-15, 0.7, 3.0];
     const EPS: f64 = f64::EPSILON;
@@ -126,7 +130,7 @@ mod tests {
         (20.0 + 4.0 * (gamma * t).abs()) * EPS
     }
 
-    /// Compares q and v with the size of the two points, z with its square.
+    /// Compares q and v relative to the size of the two points, and z relative to its square.
     fn assert_close(x: &VelocityPoint<2>, y: &VelocityPoint<2>, tolerance: f64, what: &str) {
         let size = 1.0_f64.max_or_nan(x.q.max_abs_or_nan()).max_or_nan(x.v.max_abs_or_nan());
         assert!(
@@ -209,7 +213,7 @@ mod tests {
             let Some(found) = system.velocity_through(&from, &end, h) else {
                 unreachable!("a motion exists for every h > 0")
             };
-            // The fall is subtracted: beside the way, its size counts.
+            // The displacement by the field is subtracted, so that its size contributes to the error.
             let size = 1.7 + h * second_relative_exp(gamma * h) / relative_exp_m1(gamma * h) * 1.3;
             assert!((found - v).max_abs_or_nan() <= size * tolerance(gamma, h), "gamma = {gamma}, h = {h}: {found}");
             assert_eq!(system.velocity_through(&from, &from, 0.0), None);

@@ -6,11 +6,11 @@ use crate::{ChartVector, PhasePoint, Scalar, SmoothFunction};
 /// `H = p z + mu (q^2 - 1) z + q - amplitude cos(omega t)` on T\*R x R. Dimensionless: time in units of the inverse
 /// frequency of small oscillations, q in units of the amplitude at which the damping changes sign.
 ///
-/// A [`Lienard`](super::Lienard) system: z is the velocity, there is no regular Lagrangian, and `p` usually reaches infinity
-/// in finite time while q and z go on to the limit cycle of amplitude about 2.
+/// A [`Lienard`](super::Lienard) system: z is the velocity, there is no regular Lagrangian, and `p` usually blows up in
+/// finite time while q and z continue to the limit cycle of amplitude about 2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VanDerPol {
-    /// The strength of the nonlinear damping; the limit cycle relaxes in jumps where it is large.
+    /// The strength of the nonlinear damping; for large values the limit cycle is a relaxation oscillation.
     pub mu: f64,
     /// The amplitude of the forcing.
     pub amplitude: f64,
@@ -25,7 +25,7 @@ impl Default for VanDerPol {
 }
 
 impl VanDerPol {
-    /// A natural start: `q = 2` at rest, near the limit cycle, on the momentum `p = 0`.
+    /// Natural initial data: `q = 2` at rest, near the limit cycle, with the momentum `p = 0`.
     pub fn initial(&self) -> PhasePoint<1> {
         PhasePoint::new([2.0], [0.0], 0.0)
     }

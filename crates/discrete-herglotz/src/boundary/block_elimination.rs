@@ -4,7 +4,7 @@ use super::elimination::{ActionRow, BlockRows, Panel, back_substitute};
 use super::end::Conditions;
 use crate::{DiscreteLagrangian, StepError};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{DiscretePoint, SecondDiscreteJet, linear, max_or_nan};
+use contact_geom::{DiscretePoint, SecondDiscreteJet, numbers::max_or_nan, support::linear};
 
 /// The positions and actions of a path.
 #[derive(Clone)]

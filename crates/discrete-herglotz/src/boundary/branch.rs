@@ -4,7 +4,7 @@ use super::block_elimination::BlockElimination;
 use super::critical_path::CriticalPath;
 use super::deflation::square;
 use super::problem::BoundaryPath;
-use crate::{DiscreteLagrangian, DiscretePath, InputError};
+use crate::{DiscreteLagrangian, InputError, theory::DiscretePath};
 use contact_geom::GeometryError;
 use contact_geom::nalgebra::SVector;
 
@@ -66,7 +66,7 @@ struct Corrections<const N: usize> {
 ///
 /// ```
 /// use contact_geom::{Lagrangian, Scalar, nalgebra::SVector};
-/// use discrete_herglotz::{BoundaryPath, End, Midpoint, branch};
+/// use discrete_herglotz::{boundary::{BoundaryPath, End, branch}, rules::Midpoint};
 ///
 /// // Bratu's problem q'' = -lambda e^q has two paths below lambda = 3.5138, and none above.
 /// struct Bratu(f64);

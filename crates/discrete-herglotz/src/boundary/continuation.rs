@@ -2,12 +2,12 @@
 
 use super::critical_path::CriticalPath;
 use super::problem::BoundaryPath;
-use crate::{DiscreteLagrangian, DiscretePath, InputError};
+use crate::{DiscreteLagrangian, InputError, theory::DiscretePath};
 use contact_geom::nalgebra::SVector;
 
 /// Solves problems one after another, each from the path of the one before: continuation in a parameter of the Lagrangian, in the
 /// step, the number of steps or the ends, whatever changes along the sequence. The first starts as it is told to. Where the paths end in
-/// a fold, [`branch`](crate::branch) goes around it.
+/// a fold, [`branch`](crate::boundary::branch) goes around it.
 ///
 /// The paths that were found, in the order of the problems; the last one has another status where the search ended without
 /// a path, and the problems after it are not tried.
@@ -17,7 +17,7 @@ use contact_geom::nalgebra::SVector;
 ///
 /// ```
 /// use contact_geom::systems::Pendulum;
-/// use discrete_herglotz::{BoundaryPath, End, Midpoint, continuation};
+/// use discrete_herglotz::{boundary::{BoundaryPath, End, continuation}, rules::Midpoint};
 ///
 /// // The same span with more and more steps.
 /// let ends = [End::Position([0.0].into()), End::Position([1.0].into())];

@@ -2,7 +2,7 @@
 
 use super::block_elimination::{Measured, Nodes};
 use super::judge::Judgement;
-use crate::{DiscretePath, StepError, UnresolvedStep};
+use crate::{StepError, UnresolvedStep, theory::DiscretePath};
 use contact_geom::nalgebra::SVector;
 
 /// How the search for a critical path ended.
@@ -14,7 +14,7 @@ pub enum PathStatus {
     /// The iterations were used up.
     NotConverged,
     /// No correction lessens the residual: there may be no critical path near, as beyond a fold, where two paths have met and vanished;
-    /// [`branch`](crate::branch) finds it.
+    /// [`branch`](crate::boundary::branch) finds it.
     Stalled,
     /// The ends are conjugate along the path, to round-off: the linearised equations have no unique solution.
     Conjugate {

@@ -4,7 +4,10 @@ use super::block_elimination::{BlockElimination, Carry, Equations, Nodes};
 use crate::resolution::monitor::{ROUNDED, at_rest, rounding};
 use crate::{DiscreteLagrangian, UnresolvedStep};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    PhasePoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
 
 /// The part of its range by which the steps may move a path that they resolve.
 const LARGEST_CORRECTION: f64 = 0.25;

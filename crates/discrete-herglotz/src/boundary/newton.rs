@@ -4,7 +4,7 @@ use super::block_elimination::{BlockElimination, Equations, Measured, Nodes};
 use super::critical_path::{CriticalPath, PathStatus};
 use super::deflation::Deflation;
 use super::judge::{Judgement, judge};
-use crate::{DiscreteLagrangian, last_correction};
+use crate::{DiscreteLagrangian, solve::last_correction};
 use contact_geom::nalgebra::SVector;
 
 /// The corrections that a search may make.

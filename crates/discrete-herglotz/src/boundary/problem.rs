@@ -6,7 +6,7 @@ use super::deflation::{Deflation, square};
 use super::end::{Conditions, End};
 use super::index::inertia;
 use super::newton::search;
-use crate::{DiscreteLagrangian, DiscretePath, InputError};
+use crate::{DiscreteLagrangian, InputError, theory::DiscretePath};
 use contact_geom::GeometryError;
 use contact_geom::nalgebra::SVector;
 
@@ -20,7 +20,7 @@ use contact_geom::nalgebra::SVector;
 ///
 /// ```
 /// use contact_geom::systems::Pendulum;
-/// use discrete_herglotz::{BoundaryPath, End, Midpoint};
+/// use discrete_herglotz::{boundary::{BoundaryPath, End}, rules::Midpoint};
 ///
 /// // From rest position to 1 in time 2, by 200 steps.
 /// let ld = Midpoint::new(Pendulum { gamma: -0.1 }, 0.01)?;

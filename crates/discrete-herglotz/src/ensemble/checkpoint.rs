@@ -1,7 +1,8 @@
 //! A file of the shards that are done.
 
-use super::{EnsembleError, SHARD, Shard};
+use crate::ensemble::error::EnsembleError;
 use crate::ensemble::member::{Ending, Member};
+use crate::ensemble::task::{SHARD, Shard};
 use crate::numbers::state_words::digest;
 use crate::numbers::state_words::{Saved, load_option, save_option};
 use crate::{CheckpointError, InputError, Row, Status, UnresolvedStep};

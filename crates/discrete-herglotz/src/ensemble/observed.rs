@@ -1,6 +1,9 @@
 //! Ensembles of which each member has an observer of its own.
 
-use super::{Ensemble, EnsembleError, Member, Tally, shards};
+use crate::ensemble::builder::Ensemble;
+use crate::ensemble::error::EnsembleError;
+use crate::ensemble::member::{Member, Tally};
+use crate::ensemble::shards;
 use crate::{InputError, Observer, Until};
 use contact_geom::Lagrangian;
 use std::ops::ControlFlow;

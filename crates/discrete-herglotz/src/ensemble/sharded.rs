@@ -1,9 +1,12 @@
 //! An ensemble in shards, for those who compute them in other processes.
 
-use super::{Ensemble, EnsembleError, Member, SHARD, Shard, Tally, Task};
 use crate::Until;
+use crate::ensemble::builder::Ensemble;
 use crate::ensemble::checkpoint::{self, Shards};
+use crate::ensemble::error::EnsembleError;
+use crate::ensemble::member::{Member, Tally};
 use crate::ensemble::shards::WINDOW_OF_A_THREAD;
+use crate::ensemble::task::{SHARD, Shard, Task};
 use contact_geom::Lagrangian;
 use std::collections::VecDeque;
 
@@ -28,7 +31,7 @@ use std::collections::VecDeque;
 ///     merge.add(&words, &mut |member| indices.push(member.index))?;
 /// }
 /// assert!(merge.is_complete() && indices.iter().copied().eq(0..1000));
-/// # Ok::<(), discrete_herglotz::EnsembleError>(())
+/// # Ok::<(), discrete_herglotz::ensemble::EnsembleError>(())
 /// ```
 pub struct ShardedEnsemble<'e, 'a, L, const N: usize> {
     pub(crate) task: Task<'e, 'a, L, N>,

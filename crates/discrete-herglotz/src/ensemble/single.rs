@@ -1,11 +1,11 @@
 //! A member by a run of its own.
 
-use crate::ensemble::accuracy::StepControl;
 use crate::ensemble::member::{Ending, Member};
+use crate::ensemble::step_control::StepControl;
 use crate::run::Interruption;
 use crate::{
-    BatchKernel, InputError, Integrator, Interrupt, MethodInfo, Observer, Plan, Problem, Rows, Run, Start, Stepper,
-    StepperOptions, Until,
+    InputError, Integrator, Interrupt, MethodInfo, Observer, Plan, Problem, Rows, Run, Start, Stepper, StepperOptions,
+    Until, integration::BatchKernel,
 };
 use contact_geom::Lagrangian;
 

@@ -10,11 +10,11 @@ use crate::splitting::linear_drag::{Stage, SubstepTable};
 use crate::splitting::separable::SeparableForm;
 use crate::{InputError, Interrupt, SplittingScheme};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan};
 use pulp::{Simd, WithSimd};
 use std::borrow::Cow;
 
-/// The steps of a [`Splitting`](crate::Splitting), for many motions of one Lagrangian.
+/// The steps of a [`Splitting`](crate::splitting::Splitting), for many motions of one Lagrangian.
 pub(crate) struct SplittingPacks<'a, L, const N: usize> {
     form: SeparableForm<&'a L, N>,
     drag: Drag<N>,

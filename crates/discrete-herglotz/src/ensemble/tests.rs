@@ -1,7 +1,8 @@
 use crate::ensemble::*;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::simd_batch::SimdBatch;
-use crate::{GaussCollocation, SplittingScheme};
+use crate::{Ensemble, GaussCollocation, SplittingScheme, Steps, Until};
+use contact_geom::Lagrangian;
 use contact_geom::systems::{Kepler, Pendulum};
 use contact_geom::{Scalar, VelocityPoint};
 use pulp::{Arch, Simd, WithSimd};

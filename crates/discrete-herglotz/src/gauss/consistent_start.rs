@@ -1,9 +1,9 @@
 //! What is found of a Lagrangian at the start of a run.
 
 use crate::solve::mass_matrix::{inverted, kept_mass_matrix};
-use crate::{InputError, StepError, check_claims, legendre_inverse};
+use crate::{InputError, StepError, integration::check_claims, theory::legendre_inverse};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint, max_abs_or_nan};
+use contact_geom::{GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint, numbers::max_abs_or_nan};
 
 /// The start of a run.
 pub(crate) struct ConsistentStart<const N: usize> {

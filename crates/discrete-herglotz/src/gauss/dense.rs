@@ -106,7 +106,7 @@ fn through(values: &[f64; MAX_STAGES], s: usize) -> Series {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contact_geom::max_or_nan;
+    use contact_geom::numbers::max_or_nan;
     use std::array::from_fn;
 
     /// The states between the parts are those of the curve, to some roundings of each of its terms.

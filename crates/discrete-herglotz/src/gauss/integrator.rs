@@ -2,10 +2,10 @@
 
 use crate::gauss::routes::transformed::OwnTransformation;
 use crate::gauss::{GaussStepper, MAX_STAGES, TransformedStepper};
-use crate::{BatchKernel, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
+use crate::{InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions, integration::BatchKernel};
 use contact_geom::Lagrangian;
 
-/// Contact [`Gauss`](crate::Gauss) collocation with 1 to 16 stages, of order twice their number, for every regular Lagrangian.
+/// Contact [`Gauss`](crate::gauss::Gauss) collocation with 1 to 16 stages, of order twice their number, for every regular Lagrangian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussCollocation {
     /// The number of stages.

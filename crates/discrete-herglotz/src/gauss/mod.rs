@@ -2,7 +2,7 @@
 
 mod consistent_start;
 mod dense;
-mod integrator;
+pub(crate) mod integrator;
 pub(crate) mod resolution;
 mod routes;
 mod stages;
@@ -12,18 +12,17 @@ mod work_summary;
 
 pub(crate) use dense::StepStart;
 pub(crate) use integrator::info;
-pub use integrator::{GaussCollocation, TransformedGauss};
 pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS, UNDERFLOWN};
 pub(crate) use resolution::sequence::FEW_STAGES;
 pub use routes::transformed::TransformedStepper;
 pub use stepper::GaussStepper;
 pub use work_summary::GaussRoute;
 
-use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
+use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
     ChartVector, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet,
-    TimeTransformation, seed,
+    TimeTransformation, support::seed,
 };
 use stages::equations::{Given, Products, StageEquations, Workspace};
 pub(crate) use tables::coefficients::MAX_STAGES;
@@ -42,7 +41,7 @@ pub(crate) use tables::coefficients::MAX_STAGES;
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::DoublePendulum};
-/// use discrete_herglotz::{Gauss, Stepper};
+/// use discrete_herglotz::{Stepper, gauss::Gauss};
 /// let gauss = Gauss::new(DoublePendulum::default(), 8, 0.1)?;
 /// let mut run = gauss.stepper(0.0, PhasePoint::new([1.0, 0.5], [0.0, 0.0], 0.0), [0.0, 0.0].into())?;
 /// run.advance(100)?;

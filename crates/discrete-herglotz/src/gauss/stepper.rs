@@ -24,7 +24,9 @@ use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::resolution::monitor::ResolutionMonitor;
 use crate::solve::mass_matrix::is_identity;
-use crate::{DenseStep, InputError, PlanEntry, StepError, StepFailure, Stepper, SuspectInterval, UnresolvedStep};
+use crate::{
+    DenseStep, InputError, PlanEntry, StepError, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
+};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure};
 use pulp::{Simd, WithSimd};

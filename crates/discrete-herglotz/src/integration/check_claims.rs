@@ -1,6 +1,6 @@
 //! The declared structure of a Lagrangian, after a probe.
 
-use crate::{InputError, legendre_inverse};
+use crate::{InputError, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Defect, GeometryError, Lagrangian, PhasePoint, Structure, VelocityPoint};
 

@@ -2,12 +2,13 @@
 
 use crate::integration::check_claims::check_claims;
 use crate::{
-    DiscreteLagrangian, InputError, Interrupt, StepError, discrete_regularity, legendre_inverse, legendre_minus,
+    DiscreteLagrangian, InputError, Interrupt, StepError,
+    theory::{discrete_regularity, legendre_inverse, legendre_minus},
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
     Derivatives, DiscretePoint, GeometryError, Lagrangian, PhasePoint, Regularity, Structure, VelocityPoint, legendre,
-    max_abs_or_nan,
+    numbers::max_abs_or_nan,
 };
 
 /// Where a motion starts.

@@ -9,7 +9,7 @@ use thiserror::Error;
 /// compensations, a kick that two steps share).
 ///
 /// This is what a run advances. A [`DiscreteLagrangian`](crate::DiscreteLagrangian) is a function, and a
-/// [`Flow`](crate::Flow) a stepper on it; methods that gain by more than a guess of the velocity have a stepper of their own.
+/// [`Flow`](crate::rules::Flow) a stepper on it; methods that gain by more than a guess of the velocity have a stepper of their own.
 pub trait Stepper<const N: usize> {
     /// Takes `steps` steps with nothing observed between them.
     ///

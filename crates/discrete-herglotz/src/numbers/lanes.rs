@@ -398,7 +398,7 @@ mod tests {
 
     /// The slopes of powers and of a choice by x.
     fn slopes<T: Scalar>(x: T) -> [T; 5] {
-        let x = contact_geom::KernelDual { re: x, d: SVector::<T, 1>::new(T::one()) };
+        let x = contact_geom::support::KernelDual { re: x, d: SVector::<T, 1>::new(T::one()) };
         let zero = num_traits::Zero::zero();
         let chosen = x.if_less(zero, zero, x.powf(2.5) + x.sqrt());
         [Scalar::abs(x).powf(2.5), (x * x).powf(1.5), (x * x).powf(0.5), x.sqrt(), chosen].map(|y| y.d[0])

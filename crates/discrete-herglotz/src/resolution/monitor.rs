@@ -1,9 +1,12 @@
 //! What a run sees of steps that do not resolve its motion.
 
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
-use crate::{SuspectInterval, UnresolvedStep};
+use crate::{UnresolvedStep, integration::SuspectInterval};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    PhasePoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
 
 /// What a run notes of its own steps: the first that cannot have resolved the motion, and the last that may not have.
 ///

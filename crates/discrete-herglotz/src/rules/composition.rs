@@ -4,8 +4,8 @@ use crate::numbers::state_words::{Saved, saved};
 use crate::resolution::monitor::{ResolutionMonitor, sharper, turning};
 use crate::rules::flow::account_of;
 use crate::{
-    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, Solver, SplittingScheme, StepError, StepFailure, Stepper,
-    SuspectInterval, UnresolvedStep,
+    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, SplittingScheme, StepError, StepFailure, Stepper,
+    UnresolvedStep, integration::SuspectInterval, solve::Solver,
 };
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
@@ -21,7 +21,7 @@ use contact_geom::nalgebra::SVector;
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::DoublePendulum};
-/// use discrete_herglotz::{Composition, Midpoint, SplittingScheme, Stepper};
+/// use discrete_herglotz::{SplittingScheme, Stepper, rules::{Composition, Midpoint}};
 /// let system = DoublePendulum::default();
 /// let rule = |h| Midpoint::new(&system, h);
 /// let start = PhasePoint::new([1.0, 0.5], [0.0, 0.0], 0.0);

@@ -1,6 +1,10 @@
 //! Discrete paths on `Q x Q x R^2`, where the discrete Lagrangian depends on both actions of a step.
 
-use crate::{DiscreteLagrangian, DiscretePath, Quadrature, Rule, StepError};
+use crate::{
+    DiscreteLagrangian, StepError,
+    rules::{Quadrature, Rule},
+    theory::DiscretePath,
+};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian};
 

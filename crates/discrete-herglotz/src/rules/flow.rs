@@ -4,8 +4,8 @@ use crate::integration::problem::{check_time, start_of};
 use crate::numbers::state_words::{Saved, saved};
 use crate::resolution::monitor::{ResolutionMonitor, at_rest, sharper};
 use crate::{
-    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, Solver, StepError, StepFailure, Stepper, SuspectInterval,
-    UnresolvedStep,
+    DiscreteLagrangian, DiscreteStep, InputError, PlanEntry, StepError, StepFailure, Stepper, UnresolvedStep,
+    integration::SuspectInterval, solve::Solver,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, PhasePoint};
@@ -35,7 +35,7 @@ pub struct FlowStep<const N: usize> {
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::Pendulum};
-/// use discrete_herglotz::{Flow, Midpoint, Stepper};
+/// use discrete_herglotz::{Stepper, rules::{Flow, Midpoint}};
 /// let ld = Midpoint::new(Pendulum { gamma: -0.1 }, 0.1)?;
 /// let mut flow = Flow::new(&ld, 0.0, PhasePoint::new([1.0], [1.0], 0.0))?;
 /// flow.advance(100)?;

@@ -1,8 +1,8 @@
 //! Discrete Lagrangians as integrators.
 
 use crate::{
-    AnyDiscreteLagrangian, Composition, DiscreteLagrangian, Flow, InputError, Integrator, Method, MethodInfo, Problem,
-    Quadrature, Rule, SplittingScheme, Stepper, StepperOptions,
+    DiscreteLagrangian, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Stepper, StepperOptions,
+    rules::{AnyDiscreteLagrangian, Composition, Flow, Method, Quadrature, Rule},
 };
 use contact_geom::Lagrangian;
 use std::borrow::Cow;
@@ -110,7 +110,7 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> DiscretizationMethod<'a, L, N> f
 ///
 /// ```
 /// use contact_geom::{VelocityPoint, systems::Pendulum};
-/// use discrete_herglotz::{CustomMethod, Midpoint, Problem, Steps, Until};
+/// use discrete_herglotz::{CustomMethod, Problem, Steps, Until, rules::Midpoint};
 /// let pendulum = Pendulum { gamma: -0.1 };
 /// let mine = CustomMethod::new("mine", 2, |h| Midpoint::new(&pendulum, h));
 /// let problem = Problem::new(&pendulum, 0.0, VelocityPoint::new([1.0], [0.0], 0.0))?;

@@ -1,6 +1,6 @@
 //! The paper's midpoint rule, with the action at the step's start.
 
-use crate::{Node, Quadrature, Rule};
+use crate::rules::{Node, Quadrature, Rule};
 
 /// The paper's midpoint rule (section 5), of order 1 and explicit in z:
 /// `L_d = h L(t + h/2, (q0 + q1)/2, (q1 - q0)/h, z0)` with `sigma_d = 1 + h L_z`.

@@ -2,8 +2,10 @@
 
 use crate::rules::{LeftMidpointRule, MidpointRule, RectangleRule, TrapezoidalRule};
 use crate::{
-    DiscreteLagrangian, DiscreteStep, InputError, LeftMidpoint, Midpoint, Quadrature, Rectangle, Rule, Solver,
-    StepError, Strang, Trapezoidal,
+    DiscreteLagrangian, DiscreteStep, InputError, StepError,
+    rules::{LeftMidpoint, Midpoint, Quadrature, Rectangle, Rule, Trapezoidal},
+    solve::Solver,
+    splitting::Strang,
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscreteJet, DiscretePoint, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet, Structure};
@@ -15,7 +17,7 @@ use thiserror::Error;
 ///
 /// ```
 /// use contact_geom::{Lagrangian, PhasePoint, systems::Pendulum};
-/// use discrete_herglotz::{DiscreteLagrangian, Method};
+/// use discrete_herglotz::{DiscreteLagrangian, rules::Method};
 ///
 /// let (system, start) = (Pendulum::default(), PhasePoint::new([1.0], [0.5], 0.0));
 /// for method in Method::applicable(&system.structure()) {
@@ -26,7 +28,7 @@ use thiserror::Error;
 /// # Ok::<(), discrete_herglotz::InputError>(())
 /// ```
 ///
-/// Where the method is known when the program is written, its own type ([`Midpoint`](crate::Midpoint) and so on) saves
+/// Where the method is known when the program is written, its own type ([`Midpoint`](crate::rules::Midpoint) and so on) saves
 /// the choice in every step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -151,7 +153,7 @@ impl Method {
     /// The discrete Lagrangian of this method for a Lagrangian, or a reference to one, with the time step `h`. The form of
     /// the Lagrangian is verified at a time and a state, and its constants are read there, by the methods that rest on it;
     /// of the state they take position and action. Whether it is regular shows where a run starts, as at
-    /// [`Flow::new`](crate::Flow::new).
+    /// [`Flow::new`](crate::rules::Flow::new).
     ///
     /// # Errors
     /// [`InputError::Geometry`] where the time or the state is not finite, and those of the method's constructor:
@@ -179,7 +181,7 @@ impl Method {
 /// The discrete Lagrangian that a [`Method`] chosen at run time makes from a Lagrangian.
 ///
 /// One type for all methods: code that is generic over discrete Lagrangians is compiled once for a Lagrangian, not once
-/// for each method. [`Gauss`](crate::Gauss) is not among them: derivatives of its value, through the stages, would be
+/// for each method. [`Gauss`](crate::gauss::Gauss) is not among them: derivatives of its value, through the stages, would be
 /// compiled into every program that names this type.
 #[derive(Clone, Debug)]
 #[non_exhaustive]

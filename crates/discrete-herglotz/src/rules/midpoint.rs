@@ -1,6 +1,6 @@
 //! The symmetric midpoint rule.
 
-use crate::{Node, Quadrature, Rule};
+use crate::rules::{Node, Quadrature, Rule};
 
 /// The symmetric midpoint rule, of order 2 and implicit in z:
 /// `z1 = z0 + h L(t + h/2, (q0 + q1)/2, (q1 - q0)/h, (z0 + z1)/2)` with

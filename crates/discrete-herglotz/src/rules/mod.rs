@@ -3,7 +3,7 @@
 mod composition;
 mod extended_path;
 pub(crate) mod flow;
-mod integrator;
+pub(crate) mod integrator;
 mod left_midpoint;
 mod method;
 mod midpoint;
@@ -15,7 +15,7 @@ mod trapezoidal;
 
 pub use composition::Composition;
 pub use flow::{Flow, FlowStep};
-pub use integrator::{CompositionMethod, CustomMethod, DiscretizationMethod, QuadratureMethod};
+pub use integrator::{CompositionMethod, DiscretizationMethod, QuadratureMethod};
 pub use left_midpoint::{LeftMidpoint, LeftMidpointRule};
 pub use method::{AnyDiscreteLagrangian, Method, RuleVisitor, UnknownMethod};
 pub use midpoint::{Midpoint, MidpointRule};

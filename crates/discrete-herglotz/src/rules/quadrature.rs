@@ -4,11 +4,13 @@ use crate::resolution::monitor::{defect, factor_defect, value_rounding};
 use crate::rules::node::Node;
 use crate::rules::step_equations::{BLOCK, Frame, Sums, rates_at};
 use crate::solve::newton::{Linearised, NewtonStart, max_abs_or_nan, newton};
-use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
+use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
-    AugmentedVector, ChartVector, Derivatives, DiscreteJet, DiscretePoint, Dual, GeometryError, Lagrangian, PhasePoint,
-    Regularity, Scalar, SecondDiscreteJet, TangentVector, VelocityPoint, gradient_rounding,
+    ChartVector, Derivatives, DiscreteJet, DiscretePoint, Dual, GeometryError, Lagrangian, PhasePoint, Regularity,
+    Scalar, SecondDiscreteJet, VelocityPoint,
+    numbers::{AugmentedVector, TangentVector},
+    support::gradient_rounding,
 };
 use std::marker::PhantomData;
 
@@ -342,7 +344,8 @@ impl<const N: usize, L: Lagrangian<N>, R: Rule> DiscreteLagrangian<N> for Quadra
     /// units of the coordinates do not count, so W is scaled by its rows.
     fn check_start(&self, t: f64, from: &PhasePoint<N>, velocity: &SVector<f64, N>) -> Result<(), InputError> {
         let w = self.lagrangian.mass_matrix(t, &VelocityPoint { q: from.q, v: *velocity, z: from.z });
-        let rows: Vec<f64> = (0..N).map(|i| contact_geom::max_abs_or_nan((0..N).map(|j| w[(i, j)])).sqrt()).collect();
+        let rows: Vec<f64> =
+            (0..N).map(|i| contact_geom::numbers::max_abs_or_nan((0..N).map(|j| w[(i, j)])).sqrt()).collect();
         let scaled = Regularity::of(DMatrix::from_fn(N, N, |i, j| w[(i, j)] / (rows[i] * rows[j])));
         // Not `condition() >= 1/eps`: that would let a NaN pass.
         if scaled.condition() < 1.0 / f64::EPSILON {

@@ -1,6 +1,6 @@
 //! The rectangle rule.
 
-use crate::{Node, Quadrature, Rule};
+use crate::rules::{Node, Quadrature, Rule};
 
 /// The rectangle rule, of order 1 and explicit in z: `L_d = h L(t, q0, (q1 - q0)/h, z0)` with `sigma_d = 1 + h L_z`.
 ///

@@ -4,7 +4,7 @@ use crate::rules::node::Node;
 pub(crate) use crate::solve::mass_matrix::BLOCK;
 use crate::solve::unknowns::Unknowns;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{AugmentedVector, Derivatives, Dual, Lagrangian, VelocityPoint};
+use contact_geom::{Derivatives, Dual, Lagrangian, VelocityPoint, numbers::AugmentedVector};
 
 /// The sums over the nodes that the step equations consist of.
 pub(crate) struct Sums<const N: usize> {

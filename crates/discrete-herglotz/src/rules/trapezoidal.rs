@@ -1,6 +1,6 @@
 //! The symmetric trapezoidal rule.
 
-use crate::{Node, Quadrature, Rule};
+use crate::rules::{Node, Quadrature, Rule};
 
 /// The symmetric trapezoidal rule, of order 2 and implicit in z, with `u = (q1 - q0)/h`:
 /// `z1 = z0 + h/2 L(t, q0, u, z0) + h/2 L(t + h, q1, u, z1)` and

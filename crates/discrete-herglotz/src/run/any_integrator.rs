@@ -1,8 +1,11 @@
 //! The table of integrators.
 
 use crate::{
-    BatchKernel, CompositionMethod, DividedGauss, Gauss, GaussCollocation, InputError, Integrator, Method, MethodInfo,
-    Problem, SplittingScheme, Stepper, StepperOptions, TransformedGauss,
+    DividedGauss, GaussCollocation, InputError, Integrator, MethodInfo, Problem, SplittingScheme, Stepper,
+    StepperOptions, TransformedGauss,
+    gauss::Gauss,
+    integration::BatchKernel,
+    rules::{CompositionMethod, Method},
 };
 use contact_geom::Lagrangian;
 use std::fmt::{Display, Formatter};

@@ -7,7 +7,7 @@ use crate::run::motion::{Motion, Near};
 use crate::run::observers::output_request::OutputRequest;
 use crate::run::request::{Request, Shared, StepSelection};
 use crate::switching::{has_switching_functions, of_integrator};
-use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, StepperOptions, legendre_inverse};
+use crate::{DenseStep, InputError, MethodInfo, Problem, StepError, Stepper, StepperOptions, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint};
 

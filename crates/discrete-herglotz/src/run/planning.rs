@@ -6,7 +6,7 @@ use crate::run::observers::observer::Terminal;
 use crate::run::observers::output_request::OutputRequest;
 use crate::run::request::{MOST_STEPS, Request, Shared, StepControl, StepSelection, Steps};
 use crate::{GaussCollocation, InputError};
-use contact_geom::{Lagrangian, max_or_nan};
+use contact_geom::{Lagrangian, numbers::max_or_nan};
 use std::sync::Arc;
 
 impl<'p, L: Lagrangian<N>, const N: usize> Request<'p, L, N> {

@@ -1,7 +1,7 @@
 //! The mass matrix `W = L_vv` and its inverse.
 
-use contact_geom::linear::{self, SingularMatrix};
 use contact_geom::nalgebra::SMatrix;
+use contact_geom::support::linear::{self, SingularMatrix};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint};
 
 /// The largest dimension whose directions are carried at once; larger ones go in blocks, so that the numbers stay small

@@ -1,8 +1,8 @@
 //! Newton's method for the implicit part of a step.
 
-use crate::{Solver, StepError};
-use contact_geom::max_or_nan;
+use crate::{StepError, solve::Solver};
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::numbers::max_or_nan;
 
 /// The iterations that a step may take.
 pub const ITERATION_LIMIT: u32 = 50;

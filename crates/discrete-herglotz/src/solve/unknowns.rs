@@ -1,7 +1,7 @@
 //! The directions of a step's unknowns, as modules that duals carry.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{AugmentedVector, TangentVector};
+use contact_geom::numbers::{AugmentedVector, TangentVector};
 
 /// A module of `LEN` directions that can be reached by index: a block of the unknowns of a step.
 pub(crate) trait Unknowns: TangentVector<f64> {

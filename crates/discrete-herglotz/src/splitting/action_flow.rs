@@ -12,7 +12,7 @@ use contact_geom::{Derivatives, Dual, Lagrangian, PhasePoint, Scalar, VelocityPo
 ///
 /// ```
 /// use contact_geom::Scalar;
-/// use discrete_herglotz::{ActionFlow, ActionMap};
+/// use discrete_herglotz::splitting::{ActionFlow, ActionMap};
 /// /// `f(z) = -k e^z`.
 /// struct Exponential { k: f64 }
 /// #[derive(Clone, Copy, Debug)]

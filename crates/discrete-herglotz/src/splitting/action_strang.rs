@@ -3,11 +3,11 @@
 use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope};
 use super::separable::SeparableForm;
 use crate::resolution::monitor::defect;
-use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
+use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 
-/// The substep `C B A B C` of [`ActionSplitting`](crate::ActionSplitting) as a discrete Lagrangian of order 2: with the flow
+/// The substep `C B A B C` of [`ActionSplitting`](crate::splitting::ActionSplitting) as a discrete Lagrangian of order 2: with the flow
 /// `phi` of `f(z)` over half a step,
 ///
 /// `z0 + L_d = phi(phi(z0) + (q1 - q0).M(q1 - q0)/(2h) - h/2 V(t, q0) - h/2 V(t + h, q1))`.
@@ -27,7 +27,7 @@ impl<L: Lagrangian<N>, const N: usize> ActionStrang<L, Riccati, N> {
     /// That of a Lagrangian whose f is a polynomial of degree two, read off and verified at a time and a state.
     ///
     /// # Errors
-    /// Those of [`ActionSplitting::new`](crate::ActionSplitting::new), but for the last.
+    /// Those of [`ActionSplitting::new`](crate::splitting::ActionSplitting::new), but for the last.
     pub fn new(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
         let form = SeparableForm::read(lagrangian, h, t, state)?;
         let flow = Riccati::of(&form.lagrangian, t, state)?;
@@ -39,7 +39,7 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionStrang<L, F, N> {
     /// That of a Lagrangian with the flow of its f, verified at a time and a state.
     ///
     /// # Errors
-    /// Those of [`ActionSplitting::with_flow`](crate::ActionSplitting::with_flow), but for the last.
+    /// Those of [`ActionSplitting::with_flow`](crate::splitting::ActionSplitting::with_flow), but for the last.
     pub fn with_flow(lagrangian: L, flow: &F, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
         Self::of(SeparableForm::read(lagrangian, h, t, state)?, flow, h, t, state)
     }

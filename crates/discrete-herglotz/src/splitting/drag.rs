@@ -81,7 +81,7 @@ pub(crate) struct Drift {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Splitting, SplittingScheme, Stepper};
+    use crate::{SplittingScheme, Stepper, splitting::Splitting};
     use contact_geom::nalgebra::SVector;
     use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
     use std::cell::Cell;

@@ -3,7 +3,7 @@
 use super::separable::SeparableForm;
 use super::{ActionSplitting, Splitting};
 use crate::SplittingScheme;
-use crate::{BatchKernel, InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions};
+use crate::{InputError, Integrator, MethodInfo, Problem, Stepper, StepperOptions, integration::BatchKernel};
 use contact_geom::Lagrangian;
 use std::borrow::Cow;
 

@@ -5,7 +5,9 @@ use super::motion::{CompensatedState, Reached, SplittingRun};
 use super::separable::SeparableForm;
 use crate::integration::plan_entry::DECOUPLED;
 use crate::numbers::state_words::Saved;
-use crate::{InputError, PlanEntry, SplittingScheme, StepFailure, Stepper, SuspectInterval, UnresolvedStep};
+use crate::{
+    InputError, PlanEntry, SplittingScheme, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
+};
 use contact_geom::{Lagrangian, PhasePoint};
 
 /// A splitting at work on `L = v.Mv/2 - V(t, q) + gamma(t) z`.
@@ -25,7 +27,7 @@ use contact_geom::{Lagrangian, PhasePoint};
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::Pendulum};
-/// use discrete_herglotz::{Splitting, SplittingScheme, Stepper};
+/// use discrete_herglotz::{SplittingScheme, Stepper, splitting::Splitting};
 /// let pendulum = Pendulum { gamma: -0.1 };
 /// let start = PhasePoint::new([1.0], [1.0], 0.0);
 /// let mut motion = Splitting::new(&pendulum, &SplittingScheme::BLANES_MOAN_6, 0.5, 0.0, start)?;

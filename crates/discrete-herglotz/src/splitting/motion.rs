@@ -2,9 +2,9 @@
 
 use crate::numbers::state_words::saved;
 use crate::resolution::monitor::{ResolutionMonitor, sharper, turning};
-use crate::{StepError, StepFailure, SuspectInterval};
+use crate::{StepError, StepFailure, integration::SuspectInterval};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, PhasePoint, max_or_nan};
+use contact_geom::{ChartVector, PhasePoint, numbers::max_or_nan};
 
 /// A vector that many small changes are added to, with what rounding has taken from the compensated ones so far.
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,9 @@ use super::action_flow::{ActionFlow, ActionMap, Riccati, check_flow, with_slope}
 use super::motion::{CompensatedState, Reached, SplittingRun};
 use super::separable::SeparableForm;
 use crate::numbers::state_words::Saved;
-use crate::{InputError, PlanEntry, SplittingScheme, StepFailure, Stepper, SuspectInterval, UnresolvedStep};
+use crate::{
+    InputError, PlanEntry, SplittingScheme, StepFailure, Stepper, UnresolvedStep, integration::SuspectInterval,
+};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint};
 
@@ -99,7 +101,7 @@ impl<'a, L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionSplitting<'a, L,
         Ok(ActionSplitting { form, table, progress, compensated: false, doubting: false })
     }
 
-    /// With compensated sums (Kahan's), as [`Splitting::compensated`](crate::Splitting::compensated).
+    /// With compensated sums (Kahan's), as [`Splitting::compensated`](crate::splitting::Splitting::compensated).
     pub fn compensated(self) -> Self {
         ActionSplitting { compensated: true, ..self }
     }

@@ -169,7 +169,7 @@ pub(super) fn without_symmetry(i: usize) -> f64 {
 mod tests {
     use crate::{Ensemble, Problem, SplittingScheme, Steps, Until};
     use contact_geom::nalgebra::SVector;
-    use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, max_or_nan};
+    use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, numbers::max_or_nan};
 
     /// `v.v/2 + c f(t) q0 - b q1^2/2`: the first coordinate is pushed by next to nothing, from the start on or later.
     struct Whisper {

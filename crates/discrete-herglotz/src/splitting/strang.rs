@@ -3,7 +3,7 @@
 use super::drag::{Drag, Drift};
 use super::separable::SeparableForm;
 use crate::resolution::monitor::defect;
-use crate::{DiscreteLagrangian, DiscreteStep, InputError, Solver, StepError};
+use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 
@@ -15,11 +15,11 @@ use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 /// Where gamma depends on time, `gamma h` is its integral over the step, and d that of the exponential of the integral so far.
 /// So `sigma_d = e^(gamma h)` at every point, and the step is explicit: the drift alone joins the positions, which gives the
 /// momentum between the kicks. Symmetric; the second-order member of [`SplittingScheme`](crate::SplittingScheme), whose
-/// runs are a [`Splitting`](crate::Splitting)'s.
+/// runs are a [`Splitting`](crate::splitting::Splitting)'s.
 ///
 /// ```
 /// use contact_geom::{PhasePoint, systems::Pendulum};
-/// use discrete_herglotz::{Flow, Stepper, Strang};
+/// use discrete_herglotz::{Stepper, rules::Flow, splitting::Strang};
 /// let pendulum = Pendulum { gamma: -0.1 };
 /// let start = PhasePoint::new([1.0], [1.0], 0.0);
 /// let ld = Strang::new(&pendulum, 0.1, 0.0, &start)?;
@@ -40,7 +40,7 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
     /// That of a Lagrangian whose form is verified at a time and a state.
     ///
     /// # Errors
-    /// Those of [`Splitting::new`](crate::Splitting::new), but for the last.
+    /// Those of [`Splitting::new`](crate::splitting::Splitting::new), but for the last.
     pub fn new(lagrangian: L, h: f64, t: f64, state: &PhasePoint<N>) -> Result<Self, InputError> {
         let form = SeparableForm::read(lagrangian, h, t, state)?;
         let drag = Drag::of(&form, t, state)?;

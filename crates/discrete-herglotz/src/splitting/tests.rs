@@ -2,10 +2,14 @@
 
 use super::{ActionFlow, ActionMap, ActionSplitting, ActionStrang, Riccati, Splitting, Strang};
 use crate::SplittingScheme;
-use crate::{Composition, DiscreteLagrangian, Flow, InputError, Midpoint, Solver, StepError, StepFailure, Stepper};
+use crate::{
+    DiscreteLagrangian, InputError, StepError, StepFailure, Stepper,
+    rules::{Composition, Flow, Midpoint},
+    solve::Solver,
+};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{DoublePendulum, Duffing, Kepler, LaneEmden, Pendulum, QuadraticInZ};
-use contact_geom::{ChartVector, DiscretePoint, Lagrangian, MaxAbsOrNan, PhasePoint, Scalar, Structure};
+use contact_geom::{ChartVector, DiscretePoint, Lagrangian, PhasePoint, Scalar, Structure, numbers::MaxAbsOrNan};
 
 /// The time that errors are measured after.
 const DURATION: f64 = 4.0;

@@ -3,7 +3,11 @@
 use super::surfaces::{Surfaces, TimedState};
 use crate::StepError;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Lagrangian, VelocityPoint, linear, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    Derivatives, Lagrangian, VelocityPoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+    support::linear,
+};
 
 /// The distance from the surface at which one side is read, relative to the position and to what a step moves: far beyond the rounding of a position,
 /// and so near that what is continuous differs by little.

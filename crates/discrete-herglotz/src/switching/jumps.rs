@@ -3,7 +3,7 @@
 use super::corner::{Corner, corner};
 use super::surfaces::{StepCurve, Surfaces, TimedState, sign};
 use crate::gauss::StepStart;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan};
 
 /// Whether the Lagrangian itself jumps on the way between two points of a motion, across one of its [switching
 /// functions](Lagrangian::switching_functions): there the motion has a corner, and no vector field has a flow. The way is taken to be the cubic curve

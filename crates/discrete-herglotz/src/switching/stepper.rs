@@ -7,11 +7,17 @@ use crate::gauss::StepStart;
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
 use crate::solve::roots::bracketed_root;
 use crate::{
-    DenseStep, Gauss, GaussCollocation, GaussStepper, InputError, Integrator, PlanEntry, Problem, StepError,
-    StepFailure, Stepper, StepperOptions, SuspectInterval, UnresolvedStep, legendre_inverse,
+    DenseStep, GaussCollocation, InputError, Integrator, PlanEntry, Problem, StepError, StepFailure, Stepper,
+    StepperOptions, UnresolvedStep,
+    gauss::{Gauss, GaussStepper},
+    integration::SuspectInterval,
+    theory::legendre_inverse,
 };
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    Lagrangian, PhasePoint, VelocityPoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
 use std::sync::Arc;
 
 /// The parts that a step may have: beyond that the Lagrangian switches without end.

@@ -2,9 +2,11 @@
 
 use crate::solve::mass_matrix::BLOCK;
 use crate::solve::newton::{Linearised, NewtonStart, newton};
-use crate::{InputError, Solver, StepError};
+use crate::{InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{ChartVector, DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, seed};
+use contact_geom::{
+    ChartVector, DiscreteJet, DiscretePoint, Dual, PhasePoint, Scalar, SecondDiscreteJet, support::seed,
+};
 
 /// A discrete Lagrangian `L_d : Q x Q x R -> R` with the action's recursion `z1 = z0 + L_d(q0, q1, z0)`; paper, section 3.
 ///

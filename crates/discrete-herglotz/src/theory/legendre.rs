@@ -1,6 +1,6 @@
 //! The discrete Legendre transforms F+L_d and F-L_d, their inverses, and regularity.
 
-use crate::{DiscreteLagrangian, Solver, StepError};
+use crate::{DiscreteLagrangian, StepError, solve::Solver};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, PhasePoint, Regularity};
 

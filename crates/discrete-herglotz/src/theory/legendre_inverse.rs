@@ -1,9 +1,12 @@
 //! The inverse of the Legendre transformation.
 
 use crate::solve::mass_matrix::mass_matrix;
-use crate::{ITERATION_LIMIT, StepError, last_correction};
+use crate::{
+    StepError,
+    solve::{ITERATION_LIMIT, last_correction},
+};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, linear, max_abs_or_nan};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, support::linear};
 
 /// The corrections that have not become smaller after which they are rounding.
 const STALLED: u32 = 8;
@@ -17,7 +20,7 @@ const STALLED: u32 = 8;
 /// ```
 /// use contact_geom::{PhasePoint, systems::Relativistic};
 /// let (system, state) = (Relativistic::default(), PhasePoint::new([0.2], [1.5], 0.1));
-/// let x = discrete_herglotz::legendre_inverse(&system, 0.0, &state, &[0.0].into())?;
+/// let x = discrete_herglotz::theory::legendre_inverse(&system, 0.0, &state, &[0.0].into())?;
 /// assert!((contact_geom::legendre(&system, 0.0, &x).p[0] - 1.5).abs() < 1e-14);
 /// # Ok::<(), discrete_herglotz::StepError>(())
 /// ```

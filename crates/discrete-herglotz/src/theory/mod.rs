@@ -1,6 +1,6 @@
 //! The theory of discrete Lagrangians on Q x Q x R.
 
-mod discrete_lagrangian;
+pub(crate) mod discrete_lagrangian;
 mod flow;
 mod legendre;
 mod legendre_inverse;
@@ -8,7 +8,7 @@ mod momentum;
 mod path;
 pub mod statements;
 
-pub use discrete_lagrangian::{DiscreteLagrangian, DiscreteStep, derived_jet, derived_second_jet};
+pub use discrete_lagrangian::{derived_jet, derived_second_jet};
 pub use flow::{HamiltonianFlow, discrete_flow, discrete_flow_jacobian, hamiltonian_flow, hamiltonian_flow_jacobian};
 pub use legendre::{
     DiscreteRegularity, discrete_regularity, legendre_minus, legendre_minus_inverse, legendre_plus,

@@ -8,15 +8,19 @@
 #![deny(clippy::disallowed_methods)]
 
 use crate::{
-    DiscreteLagrangian, DiscretePath, HamiltonianFlow, StepError, derived_jet, derived_second_jet, discrete_action,
-    discrete_flow, discrete_flow_jacobian, discrete_momentum, discrete_symmetry_defect, hamiltonian_flow,
-    hamiltonian_flow_jacobian, legendre_minus, legendre_minus_inverse, legendre_plus, legendre_plus_inverse,
+    DiscreteLagrangian, StepError,
+    theory::{
+        DiscretePath, HamiltonianFlow, derived_jet, derived_second_jet, discrete_action, discrete_flow,
+        discrete_flow_jacobian, discrete_momentum, discrete_symmetry_defect, hamiltonian_flow,
+        hamiltonian_flow_jacobian, legendre_minus, legendre_minus_inverse, legendre_plus, legendre_plus_inverse,
+    },
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
-    ChartVector, ContactForm, Darboux, DiscretePoint, Dual, EtaMinus, EtaPlus, GeometryError, MaxAbsOrNan, MaxOrNan,
-    OneParameterGroup, PhasePoint, Scalar, SecondDiscreteJet, Smooth, Statement, Symmetry, conformality,
-    conformality_with_jacobian, generic, max_or_nan, seed,
+    ChartVector, ContactForm, Darboux, DiscretePoint, Dual, EtaMinus, EtaPlus, GeometryError, OneParameterGroup,
+    PhasePoint, Scalar, SecondDiscreteJet, Smooth, Statement, Symmetry, conformality,
+    numbers::{MaxAbsOrNan, MaxOrNan, max_or_nan},
+    support::{conformality_with_jacobian, generic, seed},
 };
 
 /// The statements of section 3 that [`residual`] evaluates.
@@ -348,7 +352,7 @@ fn three_expressions<const N: usize>(
     let guess = (x.q1 - x.q0) / ld.step_size();
     let by = |expression| hamiltonian_flow(ld, t, &state, &guess, expression);
     let direct = by(HamiltonianFlow::Direct)?;
-    let step = ld.forward(t, &state, &guess, &mut crate::Solver::default())?;
+    let step = ld.forward(t, &state, &guess, &mut crate::solve::Solver::default())?;
     // p is recovered from rounded positions, of which it depends by W/h.
     let size = ChartVector::from(direct)
         .max_abs_or_nan()

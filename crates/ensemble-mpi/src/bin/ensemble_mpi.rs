@@ -12,7 +12,7 @@
 
 use clap::Parser;
 use contact_geom::{VelocityPoint, systems::Pendulum};
-use discrete_herglotz::{AnyIntegrator, Ensemble, Member, Status, Steps, Until};
+use discrete_herglotz::{AnyIntegrator, Ensemble, Status, Steps, Until, ensemble::Member};
 use ensemble_mpi::{Merged, MpiError, Options, run};
 use mpi::topology::Communicator;
 use std::cell::Cell;

@@ -3,7 +3,7 @@
 use crate::map::exact_lagrangian::seeded;
 use crate::{ContactExponential, ExactError, herglotz_flow};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
-use contact_geom::{Dual, Lagrangian, Regularity, VelocityPoint, max_abs_or_nan};
+use contact_geom::{Dual, Lagrangian, Regularity, VelocityPoint, numbers::max_abs_or_nan};
 
 /// A time at which a motion meets a conjugate point: motions with slightly different initial velocities meet there again, to
 /// first order.

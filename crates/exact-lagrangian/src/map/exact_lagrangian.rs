@@ -2,14 +2,15 @@
 
 use crate::map::retraction::Retraction;
 use crate::{ContactExponential, ExactError, Motion, herglotz_flow};
-use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::support::linear::solve;
 use contact_geom::{
     ChartVector, Derivatives, DiscreteJet, DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar, SecondDiscreteJet,
     VelocityPoint,
 };
 use discrete_herglotz::{
-    DiscreteLagrangian, DiscreteStep, ITERATION_LIMIT, InputError, Solver, StepError, last_correction,
+    DiscreteLagrangian, DiscreteStep, InputError, StepError,
+    solve::{ITERATION_LIMIT, Solver, last_correction},
 };
 
 /// The exact discrete Lagrangian `L_h^e(q0, q1, z0) = int_0^h L o phi_t o R_h^(e-) dt = z(h) - z0`, the action along the motion from
@@ -178,7 +179,7 @@ impl<L: Lagrangian<N>, const N: usize> DiscreteLagrangian<N> for ExactLagrangian
             let p = lagrangian.gradient(Dual::from(t), x).y;
             SVector::<ChartVector<N>, N>::from_fn(|i, _| total(&p[i].d))
         };
-        let p0 = of_start(&contact_geom::seed(&ChartVector::from(retraction.start)).into(), t);
+        let p0 = of_start(&contact_geom::support::seed(&ChartVector::from(retraction.start)).into(), t);
         let p1 = of_start(&varied.end, t + h);
         let b = total(&varied.b.d);
         let first = self.jet_of(t, &retraction);

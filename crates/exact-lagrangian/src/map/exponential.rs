@@ -2,7 +2,7 @@
 
 use crate::{ExactError, Motion, herglotz_flow};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
-use contact_geom::{ChartVector, DiscretePoint, Lagrangian, Regularity, Scalar, VelocityPoint, seed};
+use contact_geom::{ChartVector, DiscretePoint, Lagrangian, Regularity, Scalar, VelocityPoint, support::seed};
 use contact_geom::{Dual, GeometryError, Smooth};
 use discrete_herglotz::InputError;
 

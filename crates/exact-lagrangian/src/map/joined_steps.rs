@@ -1,9 +1,12 @@
 //! Composition of discrete Lagrangians: one step of length `h1 + h2` from two.
 
-use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::support::linear::solve;
 use contact_geom::{ChartVector, DiscretePoint};
-use discrete_herglotz::{DiscreteLagrangian, ITERATION_LIMIT, StepError, last_correction};
+use discrete_herglotz::{
+    DiscreteLagrangian, StepError,
+    solve::{ITERATION_LIMIT, last_correction},
+};
 
 /// Two steps through a point `q1` in between, and the action's change over both.
 #[derive(Clone, Copy, Debug, PartialEq)]

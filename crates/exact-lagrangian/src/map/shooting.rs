@@ -6,10 +6,10 @@ use super::exponential::singular_values;
 use crate::numerics::flow::{ACCURACY, Herglotz, Work, integrate};
 use crate::numerics::panel::{End, Floor, Problem, Rates, State, collocate};
 use crate::{ContactExponential, ExactError, Motion, Retraction, RetractionRoute};
-use contact_geom::linear::solve;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{DiscretePoint, Dual, Lagrangian, VelocityPoint, max_or_nan};
-use discrete_herglotz::last_correction;
+use contact_geom::support::linear::solve;
+use contact_geom::{DiscretePoint, Dual, Lagrangian, VelocityPoint, numbers::max_or_nan};
+use discrete_herglotz::solve::last_correction;
 
 /// The Newton iterations that a retraction may take.
 pub(crate) const ITERATIONS: u32 = 50;

@@ -6,8 +6,10 @@ mod tests;
 use crate::ExactError;
 use crate::numerics::panel::{Floor, Panel, Problem, Rate, Rates, Refused, SMALLEST, Size, State, collocate};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, GeometryError, Lagrangian, Scalar, VelocityPoint, herglotz_rates, max_or_nan};
-use discrete_herglotz::jumps_between;
+use contact_geom::{
+    ChartVector, GeometryError, Lagrangian, Scalar, VelocityPoint, numbers::max_or_nan, support::herglotz_rates,
+};
+use discrete_herglotz::checks::jumps_between;
 
 /// The evaluations of the vector field that a motion, or the search for one between two points, may take, about a second's: over
 /// duals of n entries each counts n times.

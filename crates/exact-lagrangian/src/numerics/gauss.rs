@@ -1,6 +1,6 @@
 //! Coefficients of Gauss collocation.
 
-use contact_geom::legendre_polynomials;
+use contact_geom::support::legendre_polynomials;
 use std::array::from_fn;
 use std::sync::LazyLock;
 

@@ -1,8 +1,8 @@
 //! One panel of a motion: collocation at Gauss points, solved by iteration to round-off.
 
 use crate::numerics::gauss::{Gauss, MOST, PROBES, Probe, collocations};
-use contact_geom::max_or_nan;
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::numbers::max_or_nan;
 use contact_geom::{GeometryError, Scalar};
 
 /// The state of a motion `q'' = a`, with two more quantities that grow along it.
@@ -344,8 +344,7 @@ fn between_nodes<const N: usize, T: Scalar>(
     }
     // In the mean the polynomial's own error vanishes, up to an order beyond the panel's, and so does its first moment. Not so those
     // of a force which is too small to be seen beside it, and too fast for the nodes; that both do by chance is unlikely.
-    let mean =
-        std::array::from_fn(|i| 16.0 * accuracy * max_or_nan(largest[i], state[i] / h.abs()) + floor[i].0[0]);
+    let mean = std::array::from_fn(|i| 16.0 * accuracy * max_or_nan(largest[i], state[i] / h.abs()) + floor[i].0[0]);
     if !missed.iter().all(|missed| within(missed, &mean)) {
         return Err(Refused::Hidden(0.0));
     }

@@ -1,5 +1,9 @@
 //! Herglotz' principle for curves, and the constrained system that the paper proves its theorems with.
 
-pub(crate) mod curve;
-pub(crate) mod nonholonomic;
-pub(crate) mod spline_curve;
+mod curve;
+mod nonholonomic;
+mod spline_curve;
+
+pub use curve::{Curve, CurveAction, MotionCurve, VariedCurve, action, action_derivative};
+pub use nonholonomic::{Chetaev, ExtendedMotion, ExtendedPoint, NonHolonomic};
+pub use spline_curve::SplineCurve;

@@ -3,11 +3,12 @@
 use crate::numerics::flow::{ACCURACY, Work, integrate};
 use crate::numerics::panel::{Rate, Rates, State};
 use crate::{ExactError, Motion};
-use contact_geom::linear::solve;
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
+use contact_geom::support::linear::solve;
 use contact_geom::{
-    AugmentedVector, ChartVector, Derivatives, Dual, GeometryError, Lagrangian, Regularity, Scalar, TangentVector,
-    VelocityPoint, max_or_nan, seed,
+    ChartVector, Derivatives, Dual, GeometryError, Lagrangian, Regularity, Scalar, VelocityPoint,
+    numbers::{AugmentedVector, TangentVector, max_or_nan},
+    support::seed,
 };
 
 /// A point `(q, z, v, w)` of T(Q x R); on `M_L` where `w = L(q, v, z)`.

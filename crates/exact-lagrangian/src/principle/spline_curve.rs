@@ -1,6 +1,6 @@
 //! A curve through given nodes.
 
-use crate::Curve;
+use crate::principle::Curve;
 use contact_geom::GeometryError;
 use contact_geom::nalgebra::SVector;
 use cubic_splines::{BoundaryCondition, Spline};

@@ -3,7 +3,10 @@
 use super::*;
 use crate::herglotz_flow;
 use contact_geom::systems::{Chain, ChargedParticle, Ends, FreeParticle, HarmonicOscillator, Pendulum, UniformField};
-use contact_geom::{Derivatives, GeometryError, MaxAbsOrNan, MaxOrNan, Structure};
+use contact_geom::{
+    Derivatives, GeometryError, Structure,
+    numbers::{MaxAbsOrNan, MaxOrNan},
+};
 
 const GAMMAS: [f64; 12] = [-40.0, -2.5, -2.0 - 1e-12, -2.0, -2.0 + 1e-12, -1.999, -1e-9, 0.0, 1e-15, 0.3, 2.0, 2.5];
 const STEPS: [f64; 5] = [1e-8, 1e-5, 1e-3, 0.1, 0.8];

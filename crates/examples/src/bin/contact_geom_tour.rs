@@ -13,11 +13,14 @@ use clap::Parser;
 use contact_examples::{Failure, finish, print};
 use contact_geom::systems::{CoupledInZ, Pendulum, System};
 use contact_geom::{
-    ChartVector, ContactForm, Darboux, DarbouxField, DiscretePoint, EtaMinus, EtaPlus, GeometryError, LagrangianForm,
-    PhasePoint, Scalar, Smooth, SmoothFunction, conformality, conformality_with_jacobian, legendre,
+    ChartVector, ContactForm, Darboux, DiscretePoint, EtaMinus, EtaPlus, GeometryError, LagrangianForm, PhasePoint,
+    Scalar, Smooth, SmoothFunction, conformality, hamiltonian::DarbouxField, legendre,
+    support::conformality_with_jacobian,
 };
 use discrete_herglotz::{
-    DiscreteLagrangian, Flow, LeftMidpoint, Midpoint, hamiltonian_flow_jacobian, legendre_minus_inverse,
+    DiscreteLagrangian,
+    rules::{Flow, LeftMidpoint, Midpoint},
+    theory::{hamiltonian_flow_jacobian, legendre_minus_inverse},
 };
 use std::process::ExitCode;
 

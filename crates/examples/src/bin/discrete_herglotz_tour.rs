@@ -13,7 +13,7 @@ use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, f
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Symmetry};
 use discrete_herglotz::{
-    AnyIntegrator, Method, MomentumDecay, MomentumRow, Problem, Row, Rows, Status, StepView, Steps, Until,
+    AnyIntegrator, MomentumDecay, MomentumRow, Problem, Row, Rows, Status, StepView, Steps, Until, rules::Method,
 };
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;

@@ -3,7 +3,7 @@
 use super::{Assembled, argument};
 use crate::RuntimeError;
 use assembled_herglotz::{AssembledGauss, AssembledMidpoint, AssembledSplitting, State};
-use discrete_herglotz::{AnyIntegrator, Method, StepError, StepFailure, UnresolvedStep};
+use discrete_herglotz::{AnyIntegrator, StepError, StepFailure, UnresolvedStep, rules::Method};
 
 /// An integrator of a motion, including its action.
 pub(super) enum Stepper<'a> {

@@ -3,7 +3,10 @@
 use super::theorems::{Points, theorems};
 use super::{Sized, coordinates};
 use crate::{Check, Interrupt, MomentumSample, Motion, Place, RuntimeError, StatementResidual, StepControl};
-use contact_geom::{ChartVector, OneParameterGroup, PhasePoint, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    ChartVector, OneParameterGroup, PhasePoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, Start, Steps, Stop, Until};
 use formula_lagrangian::FormulaLagrangian;
 use std::ops::ControlFlow;

@@ -6,7 +6,11 @@ use super::{Sized, coordinates};
 use crate::{Column, Ending, EnsembleMonitor, Event, Interrupt, MemberEnd, RuntimeError, StepControl, Varied};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint};
-use discrete_herglotz::{Ensemble, EnsembleError, InputError, Member, Row, Start, Tally, Until, legendre_inverse};
+use discrete_herglotz::{
+    Ensemble, InputError, Row, Start, Until,
+    ensemble::{EnsembleError, Member, Tally},
+    theory::legendre_inverse,
+};
 use formula_lagrangian::{Expression, FormulaLagrangian};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -260,7 +264,7 @@ impl<const N: usize> Sized<N> {
 /// The end of a member as a row.
 fn end_of<const N: usize>(
     lagrangian: &FormulaLagrangian<N>,
-    ending: &discrete_herglotz::Ending<N>,
+    ending: &discrete_herglotz::ensemble::Ending<N>,
     last: Option<&Row<N>>,
 ) -> Row<N> {
     let (t, x) = (ending.t, &ending.state);

@@ -15,7 +15,7 @@ use crate::{
 };
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Structure, Symmetry, VelocityPoint};
-use discrete_herglotz::{AnyIntegrator, InputError, Problem, ResumeState, StepError, Tally};
+use discrete_herglotz::{AnyIntegrator, InputError, Problem, ResumeState, StepError, ensemble::Tally};
 use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
 use std::sync::Arc;
 

@@ -4,8 +4,10 @@ use crate::{BoundaryProblem, FoundPath, RuntimeError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, VelocityPoint, legendre};
 use discrete_herglotz::{
-    AnyIntegrator, BoundaryPath, CriticalPath, DiscreteLagrangian, DiscretePath, End, Gauss, legendre_inverse,
-    legendre_minus, legendre_plus,
+    AnyIntegrator, DiscreteLagrangian,
+    boundary::{BoundaryPath, CriticalPath, End},
+    gauss::Gauss,
+    theory::{DiscretePath, legendre_inverse, legendre_minus, legendre_plus},
 };
 use formula_lagrangian::{Formula, FormulaLagrangian};
 

@@ -5,7 +5,8 @@ use crate::{Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, R
 use contact_geom::PhasePoint;
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{
-    Event, Events, InputError, Observer, OutputRequest, Row, Rows, RunInfo, StepView, Stop, Terminal, legendre_inverse,
+    Event, Events, InputError, Observer, OutputRequest, Row, Rows, RunInfo, StepView, Stop, Terminal,
+    theory::legendre_inverse,
 };
 use formula_lagrangian::{Expression, FormulaLagrangian};
 use std::cell::Cell;

@@ -1,15 +1,15 @@
-//! By blocks as by all directions at once.
+//! Derivatives that are computed in blocks equal those that are computed along all directions at once.
 
 use crate::{
-    ChartVector, Derivatives, Dual, Lagrangian, Scalar, Structure, VelocityPoint, derived_gradient, herglotz_rates,
-    seed,
+    ChartVector, Derivatives, Dual, Lagrangian, Scalar, Structure, VelocityPoint,
+    support::{derived_gradient, herglotz_rates, seed},
 };
 use nalgebra::SVector;
 
-/// Neither a multiple of the block, nor is `2N + 1`.
+/// The dimension. Neither N nor `2N + 1` is a multiple of the block size.
 const N: usize = 11;
 
-/// All second derivatives are there, and no two coordinates are alike.
+/// A Lagrangian with second derivatives of every kind and no symmetry between the coordinates.
 struct Generic;
 
 impl Lagrangian<N> for Generic {
@@ -27,7 +27,7 @@ impl Lagrangian<N> for Generic {
     }
 }
 
-/// The same with its gradient as if it were a closed one.
+/// The same Lagrangian, with its derived gradient declared as a closed one.
 struct Closed;
 
 impl Lagrangian<N> for Closed {
@@ -48,7 +48,7 @@ fn point() -> (f64, VelocityPoint<N>) {
     (0.6, x)
 }
 
-/// Sums of some twenty terms of size one or ten, in another order.
+/// The tolerance for sums of some twenty terms of size one to ten that are added in a different order.
 const CLOSE: f64 = 200.0 * f64::EPSILON;
 
 fn close(a: f64, b: f64) -> bool {

@@ -1,11 +1,11 @@
-//! False claims are seen in whatever units, true ones hold to the rounding of their terms, and where L is not defined nothing
-//! is said.
+//! Structure claims: false claims are detected in any units, true claims hold to the rounding of their terms, and there
+//! is no result where L is not defined.
 
 use super::*;
 use crate::{ChartVector, Hessian, Scalar, check_closed_derivatives};
 use nalgebra::SVector;
 
-/// `m v^2/2 - k q^2/2` and one more term, in units of the action, the time and the length.
+/// `v^2/2 - q^2/2` plus one more term, in given units of action, time and length.
 struct Scaled {
     term: Term,
     claims: Structure,
@@ -13,10 +13,10 @@ struct Scaled {
     units: [f64; 3],
 }
 
-/// What makes a claim false.
+/// The additional term, which may violate a claim.
 #[derive(Clone, Copy, Debug)]
 enum Term {
-    /// None.
+    /// No additional term.
     Nothing,
     /// A force `0.5 cos(0.7 t)`.
     Force,
@@ -34,7 +34,7 @@ enum Term {
     LinearInVelocity,
     /// `v^2 sin t`.
     MassInTime,
-    /// `q^2 sin(t)^2 + q^2 cos(t)^2 - q^2`: nothing but its rounding.
+    /// `q^2 sin(t)^2 + q^2 cos(t)^2 - q^2`, which is zero up to rounding.
     Cancelling,
 }
 
@@ -64,7 +64,7 @@ impl Lagrangian<1> for Scaled {
     }
 }
 
-/// A point in these units.
+/// A time and a point in the given units.
 fn point([action, time, length]: [f64; 3], q: f64) -> (f64, VelocityPoint<1>) {
     (0.4 * time, VelocityPoint::new([q * length], [0.7 * length / time], 0.3 * action))
 }
@@ -79,7 +79,7 @@ const NOTHING: Structure = Structure {
     constant_mass: false,
 };
 
-/// Units as small and as large as third derivatives of L stay in the range of a double.
+/// Units from 1e-40 to 1e40, for which third derivatives of L stay in the range of a double.
 fn all_units() -> impl Iterator<Item = [f64; 3]> {
     let sizes = [1e-40, 1e-12, 1.0, 1e12, 1e40];
     sizes.into_iter().flat_map(move |a| sizes.into_iter().flat_map(move |t| sizes.map(|l| [a, t, l])))
@@ -102,7 +102,7 @@ fn a_false_claim_is_seen_in_all_units() {
         (Term::NonlinearDrag, constant_rate, 1.3),
         (Term::Drag, z_free, 1.3),
         (Term::NonlinearDrag, quadratic, 1.3),
-        // Far from the wall, where it is 1e-46 of the oscillator's energy.
+        // Far from the wall, where its potential is 1e-46 of the oscillator's energy.
         (Term::Wall, quadratic, 0.1),
         (Term::Magnetic, separable, 1.3),
         (Term::LinearInVelocity, separable, 1.3),
@@ -114,7 +114,8 @@ fn a_false_claim_is_seen_in_all_units() {
         for units in all_units() {
             let (t, x) = point(units, q);
             let defects: Vec<_> = claims.defects(&Scaled { term, claims, units }, t, &x).unwrap().collect();
-            // One claim is made; the derivative does not cancel, and its terms are counted once for each product.
+            // One claim is made. Its derivative does not cancel, but each product adds to the size of the terms, so
+            // that the relative size may be well below one.
             assert!(matches!(defects[..], [Defect { size, .. }] if size > 1e-3), "{term:?} {units:?}: {defects:?}");
         }
     }
@@ -136,13 +137,14 @@ fn a_true_claim_holds_to_the_rounding_of_its_terms() {
             let (t, x) = point(units, 1.3);
             let defects: Vec<_> = all.defects(&Scaled { term, claims: all, units }, t, &x).unwrap().collect();
             assert_eq!(defects.len(), 7);
-            // The size of the terms is a bound of the rounding error in units of epsilon.
+            // The size of the terms bounds the rounding error in units of epsilon.
             assert!(defects.iter().all(|d| d.size <= f64::EPSILON), "{term:?} {units:?}: {defects:?}");
         }
     }
 }
 
-/// Its closed derivatives are wrong by a factor, in all or in one entry only.
+/// A Lagrangian whose closed gradient is multiplied by a factor in one entry, and its closed Hessian in the block of
+/// `L_vv`.
 struct Closed {
     gradient: f64,
     hessian: f64,
@@ -188,11 +190,11 @@ fn a_wrong_closed_derivative_is_seen() {
         sizes
     };
     assert!(sizes(1.0, 1.0).iter().all(|size| *size <= f64::EPSILON));
-    // A sign in one of five components.
+    // A wrong sign in one of five components.
     assert!(sizes(-1.0, 1.0)[0] > 0.01);
     assert!(sizes(1.0, -1.0)[1] > 0.01);
     assert!(sizes(1.0, 1.0 + 1e-9)[1] > 1e-11);
-    // A closed form that is not a number where the value is smooth.
+    // A closed form that is NaN or infinite where the value is smooth.
     assert_eq!(sizes(f64::NAN, 1.0), [f64::INFINITY, sizes(1.0, 1.0)[1]]);
     assert_eq!(sizes(1.0, f64::INFINITY)[1], f64::INFINITY);
 }
@@ -210,7 +212,7 @@ impl Lagrangian<1> for Root {
 fn where_a_lagrangian_is_not_defined_nothing_is_said() {
     let claims = Structure { z_free: true, quadratic: true, constant_mass: true, ..NOTHING };
     let at = |q: f64| claims.defects(&Root, 0.0, &VelocityPoint::new([q], [0.5], 0.0));
-    // Outside of the domain, at its border where derivatives are infinite, and where they overflow.
+    // Outside the domain, at its boundary, where derivatives are infinite, and where they overflow.
     for q in [-1.0, 0.0, 1e300] {
         assert!(at(q).is_none(), "{q:e}: {:?}", at(q).unwrap().collect::<Vec<_>>());
     }

@@ -13,7 +13,8 @@ use crate::numbers::pair::{Registers, Two, by_two};
 use crate::numbers::registers::{StageMap, Stages, blocks};
 use contact_geom::nalgebra::SMatrix;
 use contact_geom::{
-    ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint, max_abs_or_nan, max_or_nan,
+    ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, VelocityPoint,
+    numbers::{max_abs_or_nan, max_or_nan},
 };
 use pulp::{Simd, WithSimd};
 use std::array::from_fn;

@@ -3,7 +3,7 @@
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{Stages, blocks};
-use contact_geom::max_or_nan;
+use contact_geom::numbers::max_or_nan;
 use pulp::Simd;
 
 /// The relative error of `sigma_d` in a step from which on the step does not resolve the drag: a tenth. Gauss' method with one

@@ -7,7 +7,7 @@ use crate::numbers::compensated::{CompensatedSum, Unevaluated};
 use crate::numbers::double_double::solve_exactly;
 use crate::numbers::state_words::saved;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Hessian, Lagrangian, VelocityPoint, linear};
+use contact_geom::{Derivatives, Hessian, Lagrangian, VelocityPoint, support::linear};
 use num_traits::{One, Zero};
 use qd::Quad;
 use std::array::from_fn;

@@ -17,7 +17,7 @@ use crate::numbers::pair::{Registers, over_registers};
 use crate::numbers::registers::{Stages, blocks};
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, Lagrangian, VelocityPoint, gradient_rounding, max_abs_or_nan};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, numbers::max_abs_or_nan, support::gradient_rounding};
 use pulp::Simd;
 use std::sync::Arc;
 

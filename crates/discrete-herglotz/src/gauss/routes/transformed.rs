@@ -12,7 +12,7 @@ use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::numbers::state_words::{Saved, load_option, save_option};
-use crate::{ITERATION_LIMIT, InputError, PlanEntry, StepError, StepFailure, Stepper, UnresolvedStep};
+use crate::{InputError, PlanEntry, StepError, StepFailure, Stepper, UnresolvedStep, solve::ITERATION_LIMIT};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, TimeTransformation};
 use pulp::{Simd, WithSimd};
@@ -44,7 +44,7 @@ impl<L: Lagrangian<N>, const N: usize> TimeTransformation<N> for OwnTransformati
 ///
 /// ```
 /// use contact_geom::{legendre, systems::{Kepler, System}};
-/// use discrete_herglotz::{Gauss, Stepper};
+/// use discrete_herglotz::{Stepper, gauss::Gauss};
 /// let kepler = Kepler::<2>::default();
 /// let start = kepler.initial();
 /// let gauss = Gauss::new(kepler, 6, 0.2)?;

@@ -7,10 +7,11 @@ use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
 use crate::solve::DenseLu;
 use crate::solve::inverse::inverse;
 use crate::solve::mass_matrix::BLOCK;
-use crate::{ITERATION_LIMIT, StepError};
+use crate::{StepError, solve::ITERATION_LIMIT};
 use contact_geom::nalgebra::{DMatrix, DVector, SVector};
 use contact_geom::{
-    ChartVector, Derivatives, Dual, Hessian, Lagrangian, PhasePoint, Scalar, VelocityPoint, max_or_nan, seed,
+    ChartVector, Derivatives, Dual, Hessian, Lagrangian, PhasePoint, Scalar, VelocityPoint, numbers::max_or_nan,
+    support::seed,
 };
 use std::array::from_fn;
 

@@ -7,7 +7,7 @@ use crate::numbers::lanes::{Lanes, vector};
 use crate::numbers::registers::Stages;
 use crate::numbers::state_words::Saved;
 use contact_geom::nalgebra::SMatrix;
-use contact_geom::{Structure, linear};
+use contact_geom::{Structure, support::linear};
 use pulp::Simd;
 
 /// How velocities are found from momenta.

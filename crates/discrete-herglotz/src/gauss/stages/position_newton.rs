@@ -6,7 +6,7 @@ use crate::gauss::tables::condensed::Condensed;
 use crate::solve::DenseLu;
 use crate::solve::mass_matrix::BLOCK;
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Derivatives, KernelDual, Lagrangian, VelocityPoint, max_abs_or_nan};
+use contact_geom::{Derivatives, Lagrangian, VelocityPoint, numbers::max_abs_or_nan, support::KernelDual};
 
 /// Solves `Q = q0 + u v0 + B a`, `a_i = M^-1 L_q(t_i, Q_i)`, for the positions Q of the stages: `s N` unknowns, of which a correction is
 /// `(1 - B a')^-1` times the residual. Made once for a run, so that no step allocates.
@@ -228,10 +228,10 @@ fn extent(x: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Gauss;
+    use crate::gauss::Gauss;
     use crate::gauss::stages::equations::{Given, StageEquations};
-    use crate::{DiscreteLagrangian, Solver, Stepper};
-    use contact_geom::{PhasePoint, Scalar, Structure, max_or_nan};
+    use crate::{DiscreteLagrangian, Stepper, solve::Solver};
+    use contact_geom::{PhasePoint, Scalar, Structure, numbers::max_or_nan};
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// Two coupled pendulums with masses that are not diagonal, and drag.

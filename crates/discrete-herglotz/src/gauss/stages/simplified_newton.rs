@@ -16,7 +16,7 @@ use crate::numbers::state_words::saved;
 use crate::solve::inverse::invert_complex;
 use contact_geom::nalgebra::linalg::try_invert_to;
 use contact_geom::nalgebra::{Complex, SMatrix, SVector};
-use contact_geom::{ChartVector, Hessian, Scalar, max_or_nan};
+use contact_geom::{ChartVector, Hessian, Scalar, numbers::max_or_nan};
 use pulp::{Simd, WithSimd};
 
 type Matrix<const N: usize> = SMatrix<Complex<f64>, N, N>;

@@ -7,9 +7,13 @@ use crate::gauss::resolution::tail::ROUNDINGS;
 use crate::gauss::stages::parametrization::Physical;
 use crate::gauss::stepper::{GaussStepper, Route};
 use crate::resolution::monitor::{defect, sharper, size, value_rounding};
-use crate::{Stepper, SuspectInterval, UnresolvedStep, legendre_inverse};
+use crate::{Stepper, UnresolvedStep, integration::SuspectInterval, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, gradient_rounding, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    Derivatives, Lagrangian,
+    numbers::{max_abs_or_nan, max_or_nan},
+    support::gradient_rounding,
+};
 use pulp::{Simd, WithSimd};
 
 /// The misfit between the nodes from which a step of at least three stages does not resolve the motion: of harmonics it then has an

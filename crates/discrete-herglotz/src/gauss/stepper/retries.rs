@@ -2,7 +2,7 @@
 
 use super::{GaussStepper, Route, Solution};
 use crate::gauss::stages::equations::{Given, Products, StageEquations, Workspace};
-use crate::{StepError, Stepper, legendre_inverse};
+use crate::{StepError, Stepper, theory::legendre_inverse};
 use contact_geom::{Derivatives, Lagrangian, VelocityPoint};
 
 /// What has been tried on a step.

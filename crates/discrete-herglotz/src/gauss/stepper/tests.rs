@@ -1,8 +1,8 @@
 //! Lagrangians that choose by a value, in every instruction set that this processor has.
 
 use super::*;
-use crate::Gauss;
-use crate::{DiscreteLagrangian, DiscreteStep, Solver};
+use crate::gauss::Gauss;
+use crate::{DiscreteLagrangian, DiscreteStep, solve::Solver};
 use contact_geom::systems::QuadraticInZ;
 use contact_geom::{Scalar, Structure};
 use pulp::Arch;

@@ -2,7 +2,7 @@
 
 use crate::numbers::double_double::ExactRow;
 use crate::numbers::instructions::Instructions;
-use contact_geom::legendre_polynomials;
+use contact_geom::support::legendre_polynomials;
 use num_traits::{One, Zero};
 use pulp::{Simd, WithSimd};
 use qd::Quad;

@@ -10,8 +10,8 @@ use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{DoubleDoubleStages, StageMap, Stages, Weights, padded};
 use crate::{InputError, StepError};
-use contact_geom::linear;
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::support::linear;
 use num_traits::{One, Zero};
 use pulp::{Simd, WithSimd};
 use qd::Quad;
@@ -375,7 +375,7 @@ impl WithSimd for LeftOut<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contact_geom::max_or_nan;
+    use contact_geom::numbers::max_or_nan;
 
     /// A table that is kept serves the same stages, step and rate alone.
     #[test]

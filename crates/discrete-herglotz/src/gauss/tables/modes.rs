@@ -3,8 +3,8 @@
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES, POLYNOMIALS};
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{StageMap, Stages};
-use contact_geom::legendre_polynomials;
 use contact_geom::nalgebra::{Complex, DMatrix};
+use contact_geom::support::legendre_polynomials;
 use num_traits::{One, Zero};
 use pulp::Simd;
 use qd::Quad;

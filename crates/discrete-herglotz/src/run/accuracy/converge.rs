@@ -6,7 +6,7 @@ use crate::run::accuracy::track::Track;
 use crate::run::accuracy::trial_runs::{ComparisonGrid, SwitchReason, TrialEnd, TrialRuns};
 use crate::run::request::{MOST_STEPS, Shared, StepSelection};
 use crate::{InputError, SelectionFailure};
-use contact_geom::{Lagrangian, max_or_nan};
+use contact_geom::{Lagrangian, numbers::max_or_nan};
 
 /// The searches that may follow each other: each makes the steps shorter, or ends.
 pub(crate) const MAX_SEARCHES: usize = 64;

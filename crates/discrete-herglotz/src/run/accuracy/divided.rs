@@ -7,7 +7,7 @@ use crate::run::accuracy::trial_runs::{ComparisonGrid, TrialEnd, TrialRuns};
 use crate::run::request::StepSelection;
 use crate::switching::DividedGauss;
 use crate::{InputError, SelectionFailure};
-use contact_geom::{Lagrangian, max_or_nan};
+use contact_geom::{Lagrangian, numbers::max_or_nan};
 use std::sync::Arc;
 
 /// The stages of the parts.

@@ -4,7 +4,7 @@ use crate::Problem;
 use crate::run::request::Request;
 use crate::solve::mass_matrix::inverted;
 use contact_geom::nalgebra::SMatrix;
-use contact_geom::{Derivatives, Lagrangian, max_or_nan};
+use contact_geom::{Derivatives, Lagrangian, numbers::max_or_nan};
 use std::f64::consts::PI;
 
 /// The steps in which the motion linearised at its start has an error: few, since what is not linear has higher frequencies.

@@ -1,9 +1,11 @@
 //! What rounding keeps in motion at an equilibrium.
 
-use crate::legendre_inverse;
 use crate::run::request::Request;
+use crate::theory::legendre_inverse;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, max_abs_or_nan};
+use contact_geom::{
+    Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_abs_or_nan, support::gradient_rounding,
+};
 
 /// The displacement of a motion at an equilibrium by the rounding of its forces alone. Forces that cancel there are rounded like the terms
 /// that cancel, as in `1 - exp(-x)` beside `x = 0`: however small the motion would become, this much is left of it.

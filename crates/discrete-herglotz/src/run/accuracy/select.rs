@@ -9,7 +9,7 @@ use crate::run::accuracy::trial_runs::{SwitchReason, TrialRuns};
 use crate::run::observers::observer::Terminal;
 use crate::run::request::{Request, Shared, StepSelection};
 use crate::{GaussCollocation, InputError, SelectionFailure, TransformedGauss};
-use contact_geom::{Lagrangian, max_or_nan};
+use contact_geom::{Lagrangian, numbers::max_or_nan};
 use std::sync::Arc;
 
 /// The stages from which a Gauss method is its own reference.

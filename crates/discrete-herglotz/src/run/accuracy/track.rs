@@ -1,7 +1,7 @@
 //! A motion as trial runs see it at some marks, and how far two of them are apart.
 
 use contact_geom::nalgebra::SVector;
-use contact_geom::{PhasePoint, max_or_nan};
+use contact_geom::{PhasePoint, numbers::max_or_nan};
 
 /// The smallest number.
 const SMALLEST: f64 = f64::from_bits(1);
@@ -29,7 +29,7 @@ pub(crate) struct Track<const N: usize> {
 
 /// A 2-norm that neither overflows nor underflows.
 pub(crate) fn norm<const N: usize, const M: usize>(x: &[SVector<f64, N>; M]) -> f64 {
-    let size = contact_geom::max_abs_or_nan(x.iter().flat_map(|x| x.iter().copied()));
+    let size = contact_geom::numbers::max_abs_or_nan(x.iter().flat_map(|x| x.iter().copied()));
     if !(size > 0.0 && size.is_finite()) {
         return size;
     }
@@ -101,6 +101,6 @@ impl<const N: usize> Track<N> {
 
     /// The largest of the [`distances`](Self::distances).
     pub fn distance(&self, of: &Self) -> f64 {
-        contact_geom::max_abs_or_nan(self.distances(of))
+        contact_geom::numbers::max_abs_or_nan(self.distances(of))
     }
 }

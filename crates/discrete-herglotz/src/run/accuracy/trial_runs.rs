@@ -9,10 +9,11 @@ use crate::run::discretization::Discretization;
 use crate::run::request::{Request, Shared, StepSelection};
 use crate::switching::{DividedGauss, Reach, SwitchingStepper, has_switching_functions};
 use crate::{
-    GaussCollocation, GaussRoute, GaussStepper, InputError, StepError, StepFailure, Stepper, TransformedGauss,
+    GaussCollocation, InputError, StepError, StepFailure, Stepper, TransformedGauss,
+    gauss::{GaussRoute, GaussStepper},
 };
 use crate::{Interrupt, Problem, StepperOptions};
-use contact_geom::{Defect, Lagrangian, max_or_nan};
+use contact_geom::{Defect, Lagrangian, numbers::max_or_nan};
 
 /// What all trial runs of a plan may cost together, in evaluations of L at one stage: some seconds.
 pub(crate) const BUDGET: u64 = 1 << 26;

@@ -6,9 +6,9 @@ use crate::run::accuracy::track::{in_units, norm};
 use crate::run::motion::Near;
 use crate::run::request::Request;
 use crate::solve::mass_matrix::inverted;
-use crate::{InputError, SelectionFailure, legendre_inverse};
+use crate::{InputError, SelectionFailure, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, max_or_nan};
+use contact_geom::{Derivatives, Lagrangian, PhasePoint, numbers::max_or_nan};
 
 /// The velocities of one run, and what their errors are relative to.
 pub(crate) struct Velocities<'r, 'p, L, const N: usize> {

@@ -4,9 +4,13 @@ use crate::Problem;
 use crate::resolution::monitor::{ROUNDED, rounding, size};
 use crate::run::discretization::Discretization;
 use crate::solve::hermite::hermite;
-use crate::{SuspectInterval, UnresolvedStep, legendre_inverse};
+use crate::{UnresolvedStep, integration::SuspectInterval, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, herglotz_rates, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    Lagrangian,
+    numbers::{max_abs_or_nan, max_or_nan},
+    support::herglotz_rates,
+};
 
 /// The parts of the steps in doubt at whose ends the acceleration is taken.
 const PARTS: usize = 32;

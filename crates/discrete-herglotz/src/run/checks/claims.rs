@@ -3,11 +3,12 @@
 use crate::resolution::monitor::size;
 use crate::run::discretization::Discretization;
 use crate::solve::hermite::hermite;
-use crate::{Stepper, legendre_inverse};
+use crate::{Stepper, theory::legendre_inverse};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    Defect, Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint, gradient_rounding, max_abs_or_nan,
-    max_or_nan,
+    Defect, Derivatives, Lagrangian, PhasePoint, Structure, VelocityPoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+    support::gradient_rounding,
 };
 
 /// The part of what a motion has covered, in any coordinate or momentum, that it moves at least between two looks.

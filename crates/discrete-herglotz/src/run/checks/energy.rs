@@ -3,9 +3,11 @@
 use crate::run::accuracy::noise::Noise;
 use crate::run::checks::energy_drift::{EnergyDrift, EnergyLook, allowed};
 use crate::run::discretization::Discretization;
-use crate::{Stepper, legendre_inverse};
+use crate::{Stepper, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, max_or_nan};
+use contact_geom::{
+    Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_or_nan, support::gradient_rounding,
+};
 
 /// The shortest distance of two looks in long runs, in steps: a look costs about three of the cheapest.
 const APART: usize = 256;

@@ -1,7 +1,7 @@
 //! The drift of a provably dissipated energy.
 
 use crate::numbers::state_words::saved;
-use contact_geom::max_or_nan;
+use contact_geom::numbers::max_or_nan;
 
 /// The part of the kinetic energy by which the energy may be off: that of an oscillation by steps of half a radian, with the power of
 /// the order; and at the least this, by which a frequency is off too, so that the phase is lost in some ten periods.
@@ -20,7 +20,7 @@ const FIRST: f64 = 16.0;
 /// A [`Run`](crate::Run) looks at it by itself. This is for programs that take the steps of systems of their own:
 ///
 /// ```
-/// use discrete_herglotz::{EnergyDrift, EnergyLook};
+/// use discrete_herglotz::checks::{EnergyDrift, EnergyLook};
 /// let look = |total: f64, taken: usize| EnergyLook { total, kinetic: 0.5, terms: 0.5, log_factor: 0.0, taken };
 /// let mut drift = EnergyDrift::new(2, &look(1.0, 0));
 /// assert_eq!(drift.defect(&look(1.001, 100), |_| 0.0), None);

@@ -2,9 +2,12 @@
 
 use crate::resolution::monitor::{LEAST, rounding};
 use crate::run::discretization::Discretization;
-use crate::{Problem, SuspectInterval, legendre_inverse};
+use crate::{Problem, integration::SuspectInterval, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    Lagrangian, PhasePoint, VelocityPoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
 
 /// The difference from two halves, relative to the motion, from which on a step does not resolve it. Of the orders that there are
 /// a step then has an error of its own of a twentieth, or a fifteenth with order one.

@@ -13,7 +13,7 @@ use crate::error::first;
 use crate::integration::check_claims::violated_claim;
 use crate::run::discretization::Discretization;
 use crate::run::findings::Findings;
-use crate::{Status, Stepper, SuspectInterval, UnresolvedStep};
+use crate::{Status, Stepper, UnresolvedStep, integration::SuspectInterval};
 use claims::ClaimMonitor;
 use contact_geom::{Defect, Lagrangian, PhasePoint};
 use energy::EnergyMonitor;

@@ -4,7 +4,9 @@ use crate::Problem;
 use crate::resolution::monitor::size;
 use crate::run::observers::output_request::OutputRequest;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Derivatives, Lagrangian, PhasePoint, VelocityPoint, gradient_rounding, max_or_nan};
+use contact_geom::{
+    Derivatives, Lagrangian, PhasePoint, VelocityPoint, numbers::max_or_nan, support::gradient_rounding,
+};
 
 /// What ends a run that has come to rest, in its [`Status`](crate::Status).
 pub(crate) const REST: &str = "rest";

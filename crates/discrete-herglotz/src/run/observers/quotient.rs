@@ -41,7 +41,7 @@ impl<'f, const N: usize> Quotient<'f, N> {
     /// The largest change since the start, relative to the quotient there; NaN where a quotient is none.
     pub fn largest_change(&self) -> f64 {
         let Some((_, first)) = self.rows.first() else { return 0.0 };
-        contact_geom::max_abs_or_nan(self.rows.iter().map(|(_, quotient)| (quotient - first) / first))
+        contact_geom::numbers::max_abs_or_nan(self.rows.iter().map(|(_, quotient)| (quotient - first) / first))
     }
 }
 

@@ -3,7 +3,10 @@
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number};
 use contact_geom::systems::{CoupledInZ, System};
 use contact_geom::{PhasePoint, legendre};
-use discrete_herglotz::{DiscreteLagrangian, Flow, LeftMidpoint, Midpoint};
+use discrete_herglotz::{
+    DiscreteLagrangian,
+    rules::{Flow, LeftMidpoint, Midpoint},
+};
 use exact_lagrangian::{ExactLagrangian, herglotz_flow};
 
 /// A pendulum whose inertia depends on position, velocity and action: nonlinear in z.

@@ -3,7 +3,7 @@
 use contact_examples::{Axis, Checks, Curve, Directory, Failure, Line, Panel, Subject, draw_row, fractions};
 use contact_geom::systems::{CoupledInZ, System, SystemVisitor, visit_catalogue};
 use contact_geom::{Statement, VelocityPoint, legendre};
-use discrete_herglotz::Method;
+use discrete_herglotz::rules::Method;
 use exact_lagrangian::{ErrorOrders, ExactError, MeasuredOrder, Order, error_orders};
 
 /// The accepted deviation from the documented order.

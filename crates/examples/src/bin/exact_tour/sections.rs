@@ -3,7 +3,10 @@
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number};
 use contact_geom::DiscretePoint;
 use contact_geom::systems::Pendulum;
-use discrete_herglotz::{DiscreteLagrangian, LeftMidpoint, Midpoint};
+use discrete_herglotz::{
+    DiscreteLagrangian,
+    rules::{LeftMidpoint, Midpoint},
+};
 use exact_lagrangian::ExactLagrangian;
 
 /// A pendulum with strong drag, since the rules differ mainly in how they treat z.

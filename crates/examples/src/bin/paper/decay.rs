@@ -3,8 +3,14 @@
 use contact_examples::{Axis, Curve, Directory, Failure, Line, Panel, draw_row, number};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::systems::{Kepler, Pendulum, System};
-use contact_geom::{Darboux, DiscretePoint, OneParameterGroup, Symmetry, conformality_with_jacobian, legendre};
-use discrete_herglotz::{DiscreteLagrangian, Flow, LeftMidpoint, Midpoint, MomentumRow, hamiltonian_flow_jacobian};
+use contact_geom::{
+    Darboux, DiscretePoint, OneParameterGroup, Symmetry, legendre, support::conformality_with_jacobian,
+};
+use discrete_herglotz::{
+    DiscreteLagrangian, MomentumRow,
+    rules::{Flow, LeftMidpoint, Midpoint},
+    theory::hamiltonian_flow_jacobian,
+};
 
 const TIME: &str = "time t (dimensionless)";
 

@@ -23,7 +23,7 @@ mod tables;
 use clap::Parser;
 use contact_examples::{Directory, Failure, finish, number, print};
 use contact_geom::systems::{FreeParticle, HarmonicOscillator};
-use discrete_herglotz::{LeftMidpoint, Rectangle};
+use discrete_herglotz::rules::{LeftMidpoint, Rectangle};
 use published::PublishedRow;
 use series::{GAMMA, Row, STEP};
 use std::path::PathBuf;

@@ -4,8 +4,8 @@ use contact_examples::{Checks, Subject, fractions};
 use contact_geom::statements::{ActionSquared, ClosedFlow, conformal_flow};
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, Lienard, VanDerPol};
 use contact_geom::{
-    ChartVector, ContactForm, Darboux, DarbouxField, GeometryError, Smooth, SmoothFunction, Statement,
-    dissipation_defect, hamiltonian_vector_field, infinitesimal_conformality,
+    ChartVector, ContactForm, Darboux, GeometryError, Smooth, SmoothFunction, Statement,
+    hamiltonian::{DarbouxField, dissipation_defect, hamiltonian_vector_field, infinitesimal_conformality},
 };
 
 /// The points at which each statement is checked on each system.

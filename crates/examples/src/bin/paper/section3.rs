@@ -5,9 +5,11 @@ use contact_examples::{Checks, Subject, fractions};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::System;
 use contact_geom::{DiscretePoint, GeometryError, Statement, VelocityPoint, legendre};
-use discrete_herglotz::statements::{STATEMENTS, residual};
+use discrete_herglotz::theory::statements::{STATEMENTS, residual};
 use discrete_herglotz::{
-    DiscreteLagrangian, DiscretePath, InputError, Method, Quadrature, Rule, RuleVisitor, derived_jet,
+    DiscreteLagrangian, InputError,
+    rules::{Method, Quadrature, Rule, RuleVisitor},
+    theory::{DiscretePath, derived_jet},
 };
 
 /// The points at which each statement is checked for each system, discretisation and step.

@@ -10,8 +10,9 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::systems::{Duffing, FreeParticle, HarmonicOscillator, Kepler, Pendulum, System};
 use contact_geom::{DiscretePoint, GeometryError, PhasePoint, Statement, VelocityPoint, legendre};
 use discrete_herglotz::{
-    DiscreteLagrangian, HamiltonianFlow, InputError, LeftMidpoint, Rectangle, derived_jet, discrete_flow,
-    hamiltonian_flow, sigma_d,
+    DiscreteLagrangian, InputError,
+    rules::{LeftMidpoint, Rectangle},
+    theory::{HamiltonianFlow, derived_jet, discrete_flow, hamiltonian_flow, sigma_d},
 };
 use exact_lagrangian::QuadraticExact;
 

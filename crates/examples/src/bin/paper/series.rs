@@ -4,7 +4,7 @@ use crate::explicit::Explicit;
 use contact_examples::Failure;
 use contact_geom::systems::{FreeParticle, HarmonicOscillator, System};
 use contact_geom::{ChartVector, DiscretePoint, Energy, GeometryError, PhasePoint, SmoothFunction, VelocityPoint};
-use discrete_herglotz::{DiscreteLagrangian, Flow, legendre_minus};
+use discrete_herglotz::{DiscreteLagrangian, rules::Flow, theory::legendre_minus};
 
 /// The rate of the conformal factor in both examples, in inverse units of time.
 pub const GAMMA: f64 = -0.05;

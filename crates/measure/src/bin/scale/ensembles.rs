@@ -6,7 +6,7 @@ use crate::report::Report;
 use contact_examples::{Failure, print};
 use contact_geom::VelocityPoint;
 use contact_geom::systems::Pendulum;
-use discrete_herglotz::{AnyIntegrator, Ensemble, EnsembleError, InputError, SplittingScheme, Steps, Until};
+use discrete_herglotz::{AnyIntegrator, Ensemble, InputError, SplittingScheme, Steps, Until, ensemble::EnsembleError};
 use std::time::Instant;
 
 const CASE: &str = "ensembles";
@@ -76,7 +76,7 @@ fn distance(a: &[[f64; 2]], b: &[[f64; 2]], relative: bool) -> f64 {
     let of = |(a, b): (&[f64; 2], &[f64; 2])| {
         (a[0] - b[0]).hypot(a[1] - b[1]) / if relative { b[0].hypot(b[1]) } else { 1.0 }
     };
-    contact_geom::max_abs_or_nan(a.iter().zip(b).map(of))
+    contact_geom::numbers::max_abs_or_nan(a.iter().zip(b).map(of))
 }
 
 /// The initial values of problem P5: `q0` in [-2, 2] by `v0` in [-1, 1], 400 by 250.

@@ -6,8 +6,15 @@ use crate::sparse_path;
 use contact_examples::Failure;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::systems::Chain;
-use contact_geom::{ChartVector, Hessian, Lagrangian, Scalar, VelocityPoint, max_abs_or_nan, max_or_nan};
-use discrete_herglotz::{BoundaryPath, DiscreteLagrangian, End, LeftMidpoint};
+use contact_geom::{
+    ChartVector, Hessian, Lagrangian, Scalar, VelocityPoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
+use discrete_herglotz::{
+    DiscreteLagrangian,
+    boundary::{BoundaryPath, End},
+    rules::LeftMidpoint,
+};
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -8,8 +8,8 @@ use assembled_herglotz::{AssembledSplitting, AssembledSystem, State};
 use contact_examples::{Failure, print};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Bodies;
-use contact_geom::{PhasePoint, max_or_nan};
-use discrete_herglotz::{Gauss, SplittingScheme, Stepper};
+use contact_geom::{PhasePoint, numbers::max_or_nan};
+use discrete_herglotz::{SplittingScheme, Stepper, gauss::Gauss};
 use std::time::Instant;
 
 const CASE: &str = "solar";

@@ -7,8 +7,11 @@ use crate::random::Random;
 use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
-use discrete_herglotz::{AnyIntegrator, Flow, Gauss, InputError, Rows, Run, Stepper, Steps};
+use contact_geom::{
+    ChartVector, PhasePoint, VelocityPoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
+use discrete_herglotz::{AnyIntegrator, InputError, Rows, Run, Stepper, Steps, gauss::Gauss, rules::Flow};
 
 /// A particle in a square well with rounded corners, chaotic at this energy.
 fn chaotic(gamma: f64) -> Formula<2> {

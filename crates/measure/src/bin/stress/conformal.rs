@@ -5,7 +5,10 @@ use crate::motion::{FAMILIES, Problem};
 use crate::parallel::parallel;
 use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
-use contact_geom::{ChartVector, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    ChartVector, PhasePoint, VelocityPoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
 use discrete_herglotz::{AnyIntegrator, InputError, Steps};
 
 /// The coefficient of the drag, and the step, a power of two.

@@ -8,7 +8,7 @@ use crate::report::Report;
 use contact_examples::{Failure, number};
 use contact_geom::nalgebra::SMatrix;
 use contact_geom::systems::HarmonicOscillator;
-use contact_geom::{PhasePoint, VelocityPoint, max_or_nan};
+use contact_geom::{PhasePoint, VelocityPoint, numbers::max_or_nan};
 use discrete_herglotz::{AnyIntegrator, SplittingScheme};
 use std::collections::BTreeMap;
 

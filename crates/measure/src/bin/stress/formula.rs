@@ -1,7 +1,7 @@
 //! One Lagrangian with many variants, so that a single type covers all systems of a dimension.
 
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{Lagrangian, Scalar, Structure, linear};
+use contact_geom::{Lagrangian, Scalar, Structure, support::linear};
 
 /// `L = kinetic - smooth potential - feature + force(t) q_1 + rate(t, q) z - action z^2 / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]

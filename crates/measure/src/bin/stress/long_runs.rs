@@ -7,7 +7,10 @@ use crate::report::Report;
 use crate::statistics::quantile;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::systems::HarmonicOscillator;
-use contact_geom::{ChartVector, PhasePoint, VelocityPoint, max_abs_or_nan, max_or_nan};
+use contact_geom::{
+    ChartVector, PhasePoint, VelocityPoint,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
 use discrete_herglotz::{AnyIntegrator, SplittingScheme, Steps};
 use std::time::Instant;
 

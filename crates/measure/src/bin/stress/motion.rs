@@ -2,11 +2,11 @@
 
 use crate::formula::Formula;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, PhasePoint, VelocityPoint, herglotz_rates, legendre, max_or_nan};
+use contact_geom::{ChartVector, PhasePoint, VelocityPoint, legendre, numbers::max_or_nan, support::herglotz_rates};
 use differential_equations::methods::ExplicitRungeKutta;
 use differential_equations::prelude::{IVP, ODE};
 use discrete_herglotz::{
-    AnyIntegrator, InputError, Method, Outcome, Run, SplittingScheme, Status, StepError, Steps, Until,
+    AnyIntegrator, InputError, Outcome, Run, SplittingScheme, Status, StepError, Steps, Until, rules::Method,
 };
 use exact_lagrangian::{ExactError, herglotz_flow};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -105,7 +105,7 @@ impl<const N: usize> End<N> {
 
 /// The 2-norm of a vector, without overflow or underflow of the squares.
 pub fn norm(entries: &[f64]) -> f64 {
-    let size = contact_geom::max_abs_or_nan(entries.iter().copied());
+    let size = contact_geom::numbers::max_abs_or_nan(entries.iter().copied());
     if size > 0.0 && size.is_finite() {
         size * entries.iter().map(|e| (e / size).powi(2)).sum::<f64>().sqrt()
     } else {

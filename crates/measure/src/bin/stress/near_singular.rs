@@ -8,8 +8,8 @@ use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::SMatrix;
 use contact_geom::systems::{HarmonicOscillator, LaneEmden, Radial};
-use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint, legendre, max_or_nan};
-use discrete_herglotz::{AnyIntegrator, Gauss, Method, Stepper};
+use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint, legendre, numbers::max_or_nan};
+use discrete_herglotz::{AnyIntegrator, Stepper, gauss::Gauss, rules::Method};
 use exact_lagrangian::ContactExponential;
 use std::f64::consts::{PI, TAU};
 

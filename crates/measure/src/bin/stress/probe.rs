@@ -3,8 +3,8 @@
 use crate::formula::{Formula, Kinetic, Rate, Smooth};
 use crate::motion::Problem;
 use contact_geom::systems::Radial;
-use contact_geom::{VelocityPoint, legendre, max_abs_or_nan};
-use discrete_herglotz::{AnyIntegrator, Gauss, InputError, Method, Rows, Status, Stepper, Steps};
+use contact_geom::{VelocityPoint, legendre, numbers::max_abs_or_nan};
+use discrete_herglotz::{AnyIntegrator, InputError, Rows, Status, Stepper, Steps, gauss::Gauss, rules::Method};
 use exact_lagrangian::herglotz_flow;
 use std::io::Read;
 use std::process::{Command, Stdio};

@@ -14,8 +14,11 @@ use crate::statistics::{mean, rms, slope};
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw_row, number};
 use contact_geom::nalgebra::SVector;
 use contact_geom::systems::Radial;
-use contact_geom::{PhasePoint, Structure, VelocityPoint, legendre, max_abs_or_nan, max_or_nan};
-use discrete_herglotz::{AnyIntegrator, Gauss, InputError, Method, SplittingScheme, Stepper, Steps};
+use contact_geom::{
+    PhasePoint, Structure, VelocityPoint, legendre,
+    numbers::{max_abs_or_nan, max_or_nan},
+};
+use discrete_herglotz::{AnyIntegrator, InputError, SplittingScheme, Stepper, Steps, gauss::Gauss, rules::Method};
 
 /// The number of members of an ensemble.
 const STARTS: usize = 64;

@@ -7,7 +7,7 @@ use crate::parallel::parallel;
 use crate::report::Report;
 use contact_examples::{Failure, number};
 use contact_geom::systems::HarmonicOscillator;
-use contact_geom::{PhasePoint, VelocityPoint, max_or_nan};
+use contact_geom::{PhasePoint, VelocityPoint, numbers::max_or_nan};
 
 /// Exponents of two, for scales from 3e-151 to 3e150; their squares, the scales of z, are still normal numbers.
 const POWERS: [i32; 7] = [-500, -300, -100, 0, 100, 300, 500];

@@ -8,8 +8,13 @@ use crate::random::Random;
 use crate::report::Report;
 use contact_examples::{Axis, Curve, Failure, Line, Panel, draw, number};
 use contact_geom::nalgebra::{SMatrix, SVector};
-use contact_geom::{ChartVector, PhasePoint, VelocityPoint, max_or_nan};
-use discrete_herglotz::{AnyIntegrator, Flow, Gauss, InputError, Midpoint, Solver, Stepper, Steps, Trapezoidal};
+use contact_geom::{ChartVector, PhasePoint, VelocityPoint, numbers::max_or_nan};
+use discrete_herglotz::{
+    AnyIntegrator, InputError, Stepper, Steps,
+    gauss::Gauss,
+    rules::{Flow, Midpoint, Trapezoidal},
+    solve::Solver,
+};
 use std::time::{Duration, Instant};
 
 /// The bound on the time of a step whose iteration does not contract, relative to one whose iteration contracts.
@@ -187,7 +192,7 @@ fn matrices(report: &mut Report, rows: &mut Vec<Vec<String>>) -> Result<(), Fail
             let (mut a, mut b) = (matrix, rhs);
             let solved = solver.solve(&mut a, &mut b);
             // The residual of each row, relative to the sum of its terms.
-            let residual = contact_geom::max_abs_or_nan((0..SIZE).map(|i| {
+            let residual = contact_geom::numbers::max_abs_or_nan((0..SIZE).map(|i| {
                 let terms: f64 = (0..SIZE).map(|j| (matrix[(i, j)] * b[j]).abs()).sum();
                 let sum: f64 = (0..SIZE).map(|j| matrix[(i, j)] * b[j]).sum();
                 if sum == rhs[i] { 0.0 } else { (sum - rhs[i]).abs() / (terms + rhs[i].abs()) }

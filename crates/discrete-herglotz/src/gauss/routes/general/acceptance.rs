@@ -10,7 +10,7 @@ use crate::numbers::registers::{Stages, blocks};
 use crate::resolution::monitor::value_rounding;
 use crate::solve::mass_matrix::{inverted, kept_mass_matrix};
 use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, VelocityPoint, gradient_rounding, max_or_nan};
+use contact_geom::{Lagrangian, VelocityPoint, numbers::max_or_nan, support::gradient_rounding};
 use pulp::Simd;
 use std::array::from_fn;
 

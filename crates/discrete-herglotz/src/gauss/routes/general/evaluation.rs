@@ -9,7 +9,7 @@ use crate::numbers::lanes::{Lanes, vector};
 use crate::numbers::pair::{Registers, over_registers};
 use crate::numbers::registers::blocks;
 use contact_geom::nalgebra::SVector;
-use contact_geom::{ChartVector, Derivatives, KernelDual, Lagrangian, VelocityPoint};
+use contact_geom::{ChartVector, Derivatives, Lagrangian, VelocityPoint, support::KernelDual};
 use pulp::Simd;
 use std::array::from_fn;
 

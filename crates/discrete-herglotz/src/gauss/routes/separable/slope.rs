@@ -89,7 +89,10 @@ impl<L: Lagrangian<N>, const N: usize> SeparableStages<'_, L, N> {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Gauss, GaussRoute, Stepper};
+    use crate::{
+        Stepper,
+        gauss::{Gauss, GaussRoute},
+    };
     use contact_geom::nalgebra::SVector;
     use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure};
 
